@@ -1,0 +1,146 @@
+"""The oracle: POGEMA 1.4.0 itself behind a pipe. One JSON request per line in, one JSON response per line out.
+
+Request   {"id", "config": GridConfig's fields, "register": {"name", "rows"} | null, "density": bool, "ops": [op, ...]}
+  op      ["reset", seed | null]  ["step", [actions]]  ["astar"]  ["sample"]  ["back"]  ["history"]
+Response  {"id", "records": [one per op], "warnings": [text, ...]}, and where it ended early
+          "error": {"when": "request" | "register" | "config" | "make" | index of the op, "type", "message"}
+
+Cells are [row, column] without the padding, but for `global_xy` and `global_target_xy`, which are as POGEMA gives them.
+Windows of zeros and ones are hexadecimal, eight cells a byte, the first cell in the highest bit. A float that JSON has
+no number for is a string. A request may take POGEMA_ORACLE_TIMEOUT seconds (20): then its error is a `Timeout`.
+"""
+
+import gc
+import json
+import math
+import os
+import platform
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+VERSION = "1.4.0"
+
+try:
+    import numpy as np
+    import pogema
+
+    if pogema.__version__ != VERSION:
+        raise ImportError(f"pogema {VERSION} is needed, this is {pogema.__version__}")
+    from deadline import LIMIT, Timeout, deadline, disarm
+    from episodes import Episodes, ProtocolError, Record
+    from pogema import GridConfig
+    from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+except (ImportError, ValueError) as failure:
+    sys.exit(f"oracle: {' '.join(str(failure).split())}")
+
+
+@contextmanager
+def registered(grid: Record | None) -> Iterator[None]:
+    """Keeps the request's map in POGEMA's registry during its body."""
+    if grid is None:
+        yield
+        return
+    try:
+        RegisteredGrid(grid["name"], "\n".join(grid["rows"]))
+        yield
+    finally:
+        GRID_STR_REGISTRY.pop(grid["name"], None)
+
+
+def describe(when: str | int, error: BaseException) -> Record:
+    """An exception as the protocol tells it."""
+    return {"when": when, "type": type(error).__name__, "message": str(error)}
+
+
+def parse(line: bytes) -> Record:
+    """A request with every field present and of its type; the config's fields are left to POGEMA."""
+    request = json.loads(line)
+    if not isinstance(request, dict) or not {"id", "config", "ops"} <= request.keys():
+        raise ProtocolError("a request is an object with `id`, `config` and `ops`")
+    if unknown := request.keys() - {"id", "config", "register", "density", "ops"}:
+        raise ProtocolError(f"unknown field `{min(unknown)}`")
+    request = {"register": None, "density": False, **request}
+    match request:
+        case {"config": dict(), "register": None, "density": bool(), "ops": list()}:
+            return request
+        case {"config": dict(), "register": {"name": str(), "rows": list(rows)}, "density": bool(), "ops": list()}:
+            if all(isinstance(row, str) for row in rows):
+                return request
+    raise ProtocolError("a field has the wrong type")
+
+
+def run(request: Record) -> Record:
+    """Carries out a request, up to its end or its first error."""
+    response: Record = {"id": request["id"], "records": []}
+    when: str | int = "register"
+    try:
+        with deadline(LIMIT), registered(request["register"]):
+            when = "config"
+            config = GridConfig(**request["config"])
+            when = "make"
+            episodes = Episodes(config, request["density"])
+            for when, op in enumerate(request["ops"]):
+                response["records"].append(episodes.perform(op))
+    except (Exception, Timeout) as error:
+        response["error"] = describe(when, error)
+    finally:
+        disarm()
+    return response
+
+
+def answer(line: bytes) -> Record:
+    """The response to one line, whatever the line is."""
+    try:
+        request = parse(line)
+    except (ValueError, RecursionError) as error:
+        return {"id": None, "error": describe("request", error), "records": [], "warnings": []}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        response = run(request)
+    return {**response, "warnings": [str(warning.message) for warning in caught]}
+
+
+def plain(value: Any) -> Any:
+    """What JSON has no form for: NumPy's numbers as Python's, the rest as text."""
+    return value.item() if isinstance(value, np.generic) else repr(value)
+
+
+def spelt(value: Any) -> Any:
+    """The same value with every float that is not finite as text."""
+    if isinstance(value, dict):
+        return {key: spelt(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [spelt(part) for part in value]
+    return str(float(value)) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def encode(response: Record) -> bytes:
+    """One line of JSON in ASCII."""
+    encoder = json.JSONEncoder(default=plain, allow_nan=False, separators=(",", ":"), check_circular=False)
+    try:
+        return encoder.encode(response).encode("ascii") + b"\n"
+    except ValueError:
+        return encoder.encode(spelt(response)).encode("ascii") + b"\n"
+
+
+def main() -> None:
+    """Says who it is, then serves until stdin ends."""
+    out = open(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever else prints, prints to stderr
+    gc.freeze()
+    versions = {"version": VERSION, "numpy": np.__version__, "python": platform.python_version()}
+    try:
+        out.write(encode({"oracle": "pogema", **versions}))
+        out.flush()
+        for line in sys.stdin.buffer:
+            out.write(encode(answer(line)))
+            out.flush()
+    except (BrokenPipeError, KeyboardInterrupt):
+        os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+//! What a case expects of one moment; only what is written is checked.
+
+use pogema_core::{Cell, Change, Map, Metrics, Observed, Snapshot, picture};
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::request::{Record, ResetRecord, StepRecord};
+
+/// What holds after one operation. Pictures may end in blank lines.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct Expect {
+    /// Agents (`a`…) and goals (`A`…) of active agents on the map.
+    pub picture: Option<String>,
+    /// `o` where the occupancy grid marks a cell.
+    pub occupied: Option<String>,
+    /// Where each agent is.
+    pub cells: Option<Vec<Cell>>,
+    /// Where each agent wants to go.
+    pub goals: Option<Vec<Cell>>,
+    /// Which agents take part.
+    pub active: Option<Vec<bool>>,
+    /// Which agents reached their goals.
+    pub on_goal: Option<Vec<bool>>,
+    /// The rewards.
+    pub rewards: Option<Vec<f32>>,
+    /// Which agents ended.
+    pub terminated: Option<Vec<bool>>,
+    /// Which agents were cut off.
+    pub truncated: Option<Vec<bool>>,
+    /// The chosen actions, for a policy.
+    pub actions: Option<Vec<u8>>,
+    /// The caller's list after the step.
+    pub actions_after: Option<Vec<i64>>,
+    /// The figures of the episode; `{}` for none.
+    pub metrics: Option<Metrics>,
+    /// What one agent sees.
+    pub sees: Option<Sees>,
+    /// Cells counted from the starts.
+    pub xy: Option<Vec<[i32; 2]>>,
+    /// Goals counted from the starts.
+    pub target_xy: Option<Vec<[i32; 2]>>,
+    /// Cells counted from the border's corner.
+    pub global_xy: Option<Vec<[i32; 2]>>,
+    /// Goals counted from the border's corner.
+    pub global_target_xy: Option<Vec<[i32; 2]>>,
+    /// The map with its border.
+    pub padded: Option<String>,
+    /// NumPy's name of the element type of the map with its border.
+    pub padded_dtype: Option<String>,
+    /// What the config derived: some of `width`, `height`, `size`, `density`, `num_agents`.
+    pub derived: Option<Value>,
+    /// The goals foretold for each agent.
+    pub foretold: Option<Vec<Vec<Cell>>>,
+    /// Whether a step was taken back.
+    pub moved: Option<bool>,
+    /// For each agent its changes: row, column, goal row, goal column, step, active.
+    pub changes: Option<Vec<Vec<Change>>>,
+}
+
+/// The windows of one agent, as lines of `.` for 0 and anything else for 1.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sees {
+    /// The agent.
+    pub agent: usize,
+    /// Its obstacles window.
+    pub obstacles: Option<String>,
+    /// Its agents window.
+    pub agents: Option<String>,
+    /// Its goal window, of the `default` observation.
+    pub goal: Option<String>,
+}
+
+impl Expect {
+    /// Whether nothing is expected.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The first thing that is not as expected, in words.
+    pub fn mismatch(&self, record: &Record, map: &Map) -> Option<String> {
+        let state = record.state().map(|state| self.of_state(state, map));
+        let rest = match record {
+            Record::Reset(reset) => self.of_reset(reset),
+            Record::Step(step) | Record::Astar(step) | Record::Sample(step) => self.of_step(step),
+            Record::Back(back) => differ("moved", self.moved.as_ref(), &back.moved),
+            Record::History(history) => differ("changes", self.changes.as_ref(), &history.changes),
+        };
+        state.flatten().or(rest)
+    }
+
+    fn of_state(&self, state: &Snapshot, map: &Map) -> Option<String> {
+        differ_in_lines("picture", self.picture.as_deref(), &picture::picture(map, state))
+            .or_else(|| {
+                differ_in_lines("occupied", self.occupied.as_deref(), &picture::occupancy_picture(map, state))
+            })
+            .or_else(|| differ("cells", self.cells.as_ref(), &state.cells))
+            .or_else(|| differ("goals", self.goals.as_ref(), &state.goals))
+            .or_else(|| differ("active", self.active.as_ref(), &state.active))
+            .or_else(|| differ("on_goal", self.on_goal.as_ref(), &state.on_goal))
+    }
+
+    fn of_reset(&self, reset: &ResetRecord) -> Option<String> {
+        differ_in_lines("padded", self.padded.as_deref(), &reset.padded.rows.join("\n"))
+            .or_else(|| differ("padded_dtype", self.padded_dtype.as_ref(), &reset.padded.dtype))
+            .or_else(|| self.of_derived(reset))
+            .or_else(|| differ("foretold", self.foretold.as_ref(), reset.goal_lists.as_ref()?))
+            .or_else(|| self.of_observations(&reset.observations))
+    }
+
+    fn of_derived(&self, reset: &ResetRecord) -> Option<String> {
+        let derived = serde_json::to_value(&reset.derived).ok()?;
+        let wanted = self.derived.as_ref()?.as_object()?;
+        let wrong = wanted.iter().find(|(field, value)| derived[field.as_str()].as_f64() != value.as_f64());
+        wrong.map(|(field, value)| {
+            format!("derived {field}: expected {value}, got {}", derived[field.as_str()])
+        })
+    }
+
+    fn of_step(&self, record: &StepRecord) -> Option<String> {
+        let step = &record.step;
+        let actions: Vec<u8> = step.actions.iter().map(|&action| action.into()).collect();
+        differ("rewards", self.rewards.as_ref(), &step.rewards)
+            .or_else(|| differ("terminated", self.terminated.as_ref(), &step.terminated))
+            .or_else(|| differ("truncated", self.truncated.as_ref(), &step.truncated))
+            .or_else(|| differ("actions", self.actions.as_ref(), &actions))
+            .or_else(|| differ("actions_after", self.actions_after.as_ref(), &record.actions_after))
+            .or_else(|| differ("metrics", self.metrics.as_ref(), &step.metrics.unwrap_or_default()))
+            .or_else(|| self.of_observations(step.observations.as_ref()?))
+    }
+
+    fn of_observations(&self, observed: &Observed) -> Option<String> {
+        if let Some(sees) = &self.sees
+            && let Some(mismatch) = sees.mismatch(observed)
+        {
+            return Some(mismatch);
+        }
+        let pomapf = match observed {
+            Observed::Default { .. } => return None,
+            Observed::Pomapf(pomapf) => pomapf,
+            Observed::Mapf(mapf) => &mapf.pomapf,
+        };
+        let own = differ("xy", self.xy.as_ref(), &pomapf.xy)
+            .or_else(|| differ("target_xy", self.target_xy.as_ref(), &pomapf.target_xy));
+        let Observed::Mapf(mapf) = observed else { return own };
+        own.or_else(|| differ("global_xy", self.global_xy.as_ref(), &mapf.global_xy))
+            .or_else(|| differ("global_target_xy", self.global_target_xy.as_ref(), &mapf.global_target_xy))
+    }
+}
+
+impl Sees {
+    fn mismatch(&self, observed: &Observed) -> Option<String> {
+        let agent = self.agent;
+        let (obstacles, agents, goal) = match observed {
+            Observed::Default { windows, .. } => {
+                let flags = unpack(windows.get(agent)?);
+                let area = area_of(flags.len())?;
+                (
+                    flags[..area].to_vec(),
+                    flags[area..2 * area].to_vec(),
+                    Some(flags[2 * area..3 * area].to_vec()),
+                )
+            }
+            Observed::Pomapf(pomapf) => {
+                (unpack(&pomapf.obstacles[agent]), unpack(&pomapf.agents[agent]), None)
+            }
+            Observed::Mapf(mapf) => {
+                (unpack(&mapf.pomapf.obstacles[agent]), unpack(&mapf.pomapf.agents[agent]), None)
+            }
+        };
+        differ_in_window("obstacles", self.obstacles.as_deref(), &obstacles)
+            .or_else(|| differ_in_window("agents", self.agents.as_deref(), &agents))
+            .or_else(|| differ_in_window("goal", self.goal.as_deref(), &goal?))
+    }
+}
+
+/// The area of a window, three of which fill so many flags up to a whole byte.
+fn area_of(num_flags: usize) -> Option<usize> {
+    let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
+    areas.last().filter(|area| num_flags < 3 * area + 8)
+}
+
+fn unpack(window: &str) -> Vec<bool> {
+    let digit = |character: char| character.to_digit(16).unwrap_or(0);
+    window
+        .chars()
+        .flat_map(|character| (0..4).rev().map(move |bit| digit(character) >> bit & 1 == 1))
+        .collect()
+}
+
+fn differ<T: PartialEq + std::fmt::Debug>(what: &str, expected: Option<&T>, got: &T) -> Option<String> {
+    let expected = expected.filter(|&expected| expected != got)?;
+    Some(format!("{what}: expected {expected:?}, got {got:?}"))
+}
+
+fn differ_in_lines(what: &str, expected: Option<&str>, got: &str) -> Option<String> {
+    let expected = expected.filter(|text| text.trim_end() != got)?;
+    Some(format!("{what}: expected\n{}\n  got\n{got}", expected.trim_end()))
+}
+
+fn differ_in_window(what: &str, expected: Option<&str>, got: &[bool]) -> Option<String> {
+    let lines: Vec<&str> = expected?.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let wanted: Vec<bool> = lines.concat().chars().map(|character| character != '.').collect();
+    let holds =
+        got.len() >= wanted.len() && got.len() < wanted.len() + 8 && got[..wanted.len()] == wanted[..];
+    let side = lines.len().max(1);
+    let drawn: Vec<String> = got
+        .chunks(side)
+        .take(side)
+        .map(|row| row.iter().map(|&flag| if flag { '1' } else { '.' }).collect())
+        .collect();
+    (!holds).then(|| format!("{what} window: expected\n{}\n  got\n{}", lines.join("\n"), drawn.join("\n")))
+}

@@ -1,0 +1,316 @@
+//! Random requests: every axis of the config, mostly small and crowded.
+
+use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_maps::{GridConfig, InstanceSource};
+use serde_json::{Map as Object, Value, json};
+
+use crate::request::{Registered, Request};
+
+/// Random choices for making test cases.
+#[derive(Clone, Debug)]
+pub(crate) struct Dice(Generator);
+
+impl Dice {
+    /// Dice for one case of a run.
+    pub fn new(seed: u64, case: u64) -> Self {
+        let words = [seed as u32, (seed >> 32) as u32, case as u32, (case >> 32) as u32];
+        Self(Generator::from_sequence(&SeedSequence::from_words(&words)))
+    }
+
+    /// A number below `limit`.
+    pub fn below(&mut self, limit: usize) -> usize {
+        // INVARIANT: the range holds at least one number.
+        self.0.integers(0, limit.max(1) as i64).unwrap_or_default() as usize
+    }
+
+    /// A number of a range, both ends included.
+    pub fn between(&mut self, least: usize, most: usize) -> usize {
+        least + self.below(most.saturating_sub(least) + 1)
+    }
+
+    /// Whether an event of this probability happens.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.0.random() < probability
+    }
+
+    /// One of a list.
+    pub fn pick<T: Copy>(&mut self, list: &[T]) -> T {
+        list[self.below(list.len())]
+    }
+
+    /// A list in random order.
+    pub fn shuffle<T>(&mut self, list: &mut [T]) {
+        self.0.shuffle_list(list);
+    }
+}
+
+/// Where the map of a case comes from.
+#[derive(Clone, Copy)]
+enum Ground {
+    Seeded,
+    Text,
+    Rows,
+    Letters,
+    PoolText,
+    Pools,
+    GoalPool,
+    Explicit,
+    Sequences,
+    RandomStarts,
+    Named,
+}
+
+/// Draws the config of a case; [`crate::play_script`] adds what to do with it.
+pub fn draw_request(seed: u64, case: u64) -> Request {
+    let mut dice = Dice::new(seed, case);
+    loop {
+        let mut request = draw_once(&mut dice);
+        request.id = case;
+        if fits(&mut dice, &mut request) {
+            return request;
+        }
+    }
+}
+
+/// Whether the case can be played, with fewer agents if need be; now and then one that cannot is kept.
+fn fits(dice: &mut Dice, request: &mut Request) -> bool {
+    const KEPT_UNPLAYABLE: f64 = 0.005;
+    let registered = request.register.as_ref().and_then(|map| pogema_core::Map::from_rows(&map.rows).ok());
+    loop {
+        let generated = GridConfig::from_value(&request.config)
+            .and_then(|config| InstanceSource::new(config, registered.clone())?.generate());
+        let Err(error) = generated else { return true };
+        let num_agents = request.config.get("num_agents").and_then(Value::as_u64);
+        let is_crowded = error.to_string().contains("`num_agents`");
+        match num_agents {
+            Some(num) if num > 1 && is_crowded && !dice.chance(KEPT_UNPLAYABLE) => {
+                request.config["num_agents"] = json!(num / 2);
+            }
+            // POGEMA swaps a named map that is too small for a drawn one: not a case to compare.
+            Some(_) => return is_crowded && request.register.is_none(),
+            None => return false,
+        }
+    }
+}
+
+fn draw_once(dice: &mut Dice) -> Request {
+    let mut config = Object::new();
+    let on_target = dice.pick(&["finish", "nothing", "restart"]);
+    config.insert("on_target".into(), on_target.into());
+    config.insert("collision_system".into(), dice.pick(&["priority", "block_both", "soft", "soft"]).into());
+    config.insert("observation_type".into(), dice.pick(&["default", "default", "POMAPF", "MAPF"]).into());
+    config.insert("seed".into(), draw_seed(dice).into());
+    config.insert("obs_radius".into(), draw_radius(dice).into());
+    let max_steps: i64 = if dice.chance(0.02) { -1 } else { dice.between(1, 24) as i64 };
+    config.insert("max_episode_steps".into(), max_steps.into());
+    config.insert("empty_outside".into(), dice.chance(0.7).into());
+    config.insert("persistent".into(), dice.chance(0.12).into());
+    let (height, width) = draw_size(dice);
+    let ground = draw_ground(dice, on_target);
+    let register = put_ground(dice, &mut config, ground, height, width);
+    let density = config["observation_type"] != "default" && dice.chance(0.5);
+    Request { id: 0, config: Value::Object(config), register, density, ops: Vec::new() }
+}
+
+fn draw_seed(dice: &mut Dice) -> u64 {
+    match dice.below(8) {
+        0 => dice.between(0, 3) as u64,
+        1 => (1 << 62) + dice.below(1 << 60) as u64,
+        2 => i64::MAX as u64 - 1 - dice.below(5) as u64,
+        _ => dice.below(1 << 32) as u64,
+    }
+}
+
+fn draw_radius(dice: &mut Dice) -> usize {
+    match dice.below(50) {
+        0 => dice.between(6, 40),
+        1..=10 => dice.between(4, 6),
+        _ => dice.between(1, 3),
+    }
+}
+
+fn draw_size(dice: &mut Dice) -> (usize, usize) {
+    let longest = dice.pick(&[2, 3, 3, 4, 4, 5, 6, 8, 10, 12, 16, 24]);
+    loop {
+        let (height, width) = (dice.between(1, longest), dice.between(1, longest));
+        if height * width > 1 {
+            return (height, width);
+        }
+    }
+}
+
+fn draw_ground(dice: &mut Dice, on_target: &str) -> Ground {
+    use Ground::{
+        Explicit, GoalPool, Letters, Named, PoolText, Pools, RandomStarts, Rows, Seeded, Sequences, Text,
+    };
+    let grounds: &[Ground] = if on_target == "restart" {
+        &[
+            Seeded,
+            Seeded,
+            Seeded,
+            Seeded,
+            Text,
+            Rows,
+            PoolText,
+            Pools,
+            GoalPool,
+            Sequences,
+            RandomStarts,
+            Named,
+        ]
+    } else {
+        &[Seeded, Seeded, Seeded, Text, Rows, Letters, PoolText, Pools, Explicit, Explicit, Sequences, Named]
+    };
+    dice.pick(grounds)
+}
+
+/// Writes map, starts and goals into the config; gives the map to register, if there is one.
+fn put_ground(
+    dice: &mut Dice,
+    config: &mut Object<String, Value>,
+    ground: Ground,
+    height: usize,
+    width: usize,
+) -> Option<Registered> {
+    let density = dice.pick(&[0.0, 0.0, 0.1, 0.2, 0.3, 0.5]);
+    let obstacles = draw_obstacles(dice, height, width, density);
+    let num_free = obstacles.iter().flatten().filter(|&&obstacle| !obstacle).count();
+    let crowd = dice.between(1, (num_free / 2).max(1));
+    let set_crowd = |config: &mut Object<String, Value>| config.insert("num_agents".into(), crowd.into());
+    match ground {
+        Ground::Seeded => {
+            if height == width && dice.chance(0.5) {
+                config.insert("size".into(), height.into());
+            } else {
+                config.insert("height".into(), height.into());
+                config.insert("width".into(), width.into());
+            }
+            config.insert("density".into(), density.into());
+            set_crowd(config);
+        }
+        Ground::Text => {
+            config.insert("map".into(), text(&obstacles).into());
+            set_crowd(config);
+        }
+        Ground::Rows => {
+            config.insert("map".into(), rows(&obstacles));
+            set_crowd(config);
+        }
+        Ground::Letters => {
+            config.insert("map".into(), lettered(dice, &obstacles).into());
+        }
+        Ground::PoolText => {
+            config.insert("map".into(), marked(dice, &obstacles).into());
+            set_crowd(config);
+        }
+        Ground::Named => {
+            let name = "drawn-map";
+            config.insert("map_name".into(), name.into());
+            set_crowd(config);
+            return Some(Registered { name: name.into(), rows: lines(&obstacles) });
+        }
+        Ground::Pools | Ground::GoalPool | Ground::Explicit | Ground::Sequences | Ground::RandomStarts => {
+            put_places(dice, config, ground, &obstacles, crowd);
+        }
+    }
+    None
+}
+
+/// Starts and goals as lists, on a map or on a drawn one.
+fn put_places(
+    dice: &mut Dice,
+    config: &mut Object<String, Value>,
+    ground: Ground,
+    obstacles: &[Vec<bool>],
+    crowd: usize,
+) {
+    let (height, width) = (obstacles.len(), obstacles[0].len());
+    if dice.chance(0.6) {
+        config.insert("map".into(), if dice.chance(0.5) { rows(obstacles) } else { text(obstacles).into() });
+    } else {
+        config.insert("height".into(), height.into());
+        config.insert("width".into(), width.into());
+        config.insert("density".into(), 0.2.into());
+    }
+    let mut cells: Vec<[usize; 2]> =
+        (0..height).flat_map(|row| (0..width).map(move |col| [row, col])).collect();
+    dice.shuffle(&mut cells);
+    let any = |dice: &mut Dice| [dice.below(height), dice.below(width)];
+    let crowd = crowd.min(cells.len());
+    config.insert("num_agents".into(), crowd.into());
+    match ground {
+        Ground::Pools => {
+            let num_starts = dice.between(crowd, cells.len());
+            config.insert("possible_agents_xy".into(), json!(cells[..num_starts]));
+            dice.shuffle(&mut cells);
+            let num_goals = dice.between(crowd, cells.len());
+            config.insert("possible_targets_xy".into(), json!(cells[..num_goals]));
+        }
+        Ground::GoalPool => {
+            config.insert("possible_targets_xy".into(), json!(cells[..dice.between(2, cells.len())]));
+        }
+        Ground::Explicit => {
+            let goals: Vec<_> = (0..crowd).map(|_| any(dice)).collect();
+            config.insert("agents_xy".into(), json!(cells[..crowd]));
+            config.insert("targets_xy".into(), json!(goals));
+            match dice.below(3) {
+                0 => drop(config.remove("num_agents")),
+                1 => drop(config.insert("num_agents".into(), dice.between(1, crowd).into())),
+                _ => {}
+            }
+        }
+        _ => {
+            let sequence = |dice: &mut Dice| (0..dice.between(2, 4)).map(|_| any(dice)).collect::<Vec<_>>();
+            let sequences: Vec<_> = (0..crowd).map(|_| sequence(dice)).collect();
+            config.insert("targets_xy".into(), json!(sequences));
+            if matches!(ground, Ground::Sequences) {
+                config.insert("agents_xy".into(), json!(cells[..crowd]));
+            }
+        }
+    }
+}
+
+fn draw_obstacles(dice: &mut Dice, height: usize, width: usize, density: f64) -> Vec<Vec<bool>> {
+    (0..height).map(|_| (0..width).map(|_| dice.chance(density)).collect()).collect()
+}
+
+fn lines(obstacles: &[Vec<bool>]) -> Vec<String> {
+    let line = |row: &Vec<bool>| row.iter().map(|&obstacle| if obstacle { '#' } else { '.' }).collect();
+    obstacles.iter().map(line).collect()
+}
+
+fn text(obstacles: &[Vec<bool>]) -> String {
+    lines(obstacles).join("\n")
+}
+
+fn rows(obstacles: &[Vec<bool>]) -> Value {
+    let row = |row: &Vec<bool>| row.iter().map(|&obstacle| u8::from(obstacle)).collect::<Vec<_>>();
+    json!(obstacles.iter().map(row).collect::<Vec<_>>())
+}
+
+/// A map text with some free cells marked by letters in pairs.
+fn lettered(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
+    let mut letters: Vec<char> = text(obstacles).chars().collect();
+    let mut free: Vec<usize> = (0..letters.len()).filter(|&at| letters[at] != '\n').collect();
+    dice.shuffle(&mut free);
+    let num_agents = dice.between(1, (free.len() / 2).clamp(1, 26));
+    let mut names: Vec<char> = ('a'..='z').collect();
+    dice.shuffle(&mut names);
+    let mut goal_names = names.clone();
+    if dice.chance(0.3) {
+        dice.shuffle(&mut goal_names);
+    }
+    for (agent, cells) in free.chunks_exact(2).take(num_agents).enumerate() {
+        letters[cells[0]] = names[agent];
+        letters[cells[1]] = goal_names[agent].to_ascii_uppercase();
+    }
+    letters.into_iter().collect()
+}
+
+/// A map text with some free cells marked as possible starts, goals or neither.
+fn marked(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
+    let mark = |character: char, dice: &mut Dice| {
+        if character == '.' { dice.pick(&['.', '@', '@', '$', '$', '!']) } else { character }
+    };
+    text(obstacles).chars().map(|character| mark(character, dice)).collect()
+}

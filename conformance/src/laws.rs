@@ -1,0 +1,82 @@
+//! Laws that hold in every episode, whatever the rules make of it.
+
+use std::collections::HashSet;
+
+use pogema_core::{Collision, Occupancy, OnGoal, Snapshot};
+use pogema_maps::GridConfig;
+
+use crate::request::{Record, Request, Response};
+
+/// The first law that an answer breaks, in words, with the operation that broke it.
+pub fn broken_law(request: &Request, response: &Response) -> Option<(usize, String)> {
+    let config = GridConfig::from_value(&request.config).ok()?;
+    let mut before: Option<&Snapshot> = None;
+    let mut obstacles: Vec<Vec<u8>> = Vec::new();
+    for (op, record) in response.records.iter().enumerate() {
+        if let Record::Reset(reset) = record {
+            obstacles = reset.map.iter().map(|row| row.bytes().collect()).collect();
+        }
+        let Some(state) = record.state() else { continue };
+        let broken = of_state(&config, state).or_else(|| match (record.step(), before) {
+            (Some(_), Some(before)) => of_step(&config, &obstacles, before, state),
+            _ => None,
+        });
+        if let Some(law) = broken {
+            return Some((op, law));
+        }
+        before = Some(state);
+    }
+    None
+}
+
+fn of_state(config: &GridConfig, state: &Snapshot) -> Option<String> {
+    let active = || (0..state.cells.len()).filter(|&agent| state.active[agent]);
+    let mut seen = HashSet::new();
+    if let Some(agent) = active().find(|&agent| !seen.insert(state.cells[agent])) {
+        return Some(format!("agent {agent} shares cell {} with another active agent", state.cells[agent]));
+    }
+    let occupied: HashSet<_> = state.occupied.iter().copied().collect();
+    if let Some(cell) = occupied.iter().find(|cell| !seen.contains(cell)) {
+        return Some(format!("cell {cell} is marked as occupied without an active agent"));
+    }
+    let shows_all = config.collision_system != Collision::Soft || config.occupancy == Occupancy::Exact;
+    if shows_all && occupied.len() != seen.len() {
+        return Some("the occupancy grid does not show every active agent".into());
+    }
+    if config.on_target != OnGoal::Finish && active().count() != state.cells.len() {
+        return Some("an agent became inactive".into());
+    }
+    None
+}
+
+fn of_step(
+    config: &GridConfig,
+    obstacles: &[Vec<u8>],
+    before: &Snapshot,
+    after: &Snapshot,
+) -> Option<String> {
+    for agent in 0..before.cells.len() {
+        let (from, to) = (before.cells[agent], after.cells[agent]);
+        let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
+        if distance > u16::from(before.active[agent]) {
+            return Some(format!("agent {agent} went from {from} to {to}"));
+        }
+        if from != to && obstacles[usize::from(to.row)][usize::from(to.col)] == b'#' {
+            return Some(format!("agent {agent} entered the obstacle at {to}"));
+        }
+        if after.active[agent] && !before.active[agent] {
+            return Some(format!("agent {agent} came back"));
+        }
+        let swaps = (0..agent).any(|other| {
+            let both = before.active[agent] && before.active[other] && from != to;
+            both && before.cells[other] == to && after.cells[other] == from
+        });
+        if swaps {
+            return Some(format!("agent {agent} swapped cells with another"));
+        }
+        if config.on_target != OnGoal::Restart && before.goals[agent] != after.goals[agent] {
+            return Some(format!("the goal of agent {agent} changed"));
+        }
+    }
+    None
+}

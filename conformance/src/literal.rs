@@ -1,0 +1,345 @@
+//! A second opinion: POGEMA's own procedures, followed step for step.
+//!
+//! Where the reference *defines* (who may move, order-free), this engine *proceeds*, with the lists, edges and
+//! reverts of the original. The two were written apart and must agree on every step.
+
+use std::collections::HashMap;
+
+use pogema_core::{
+    Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, MapfOut, Occupancy, OnGoal,
+    Outside, PomapfOut, Reward, Snapshot, StepOut,
+};
+
+/// A place in the map with its border, counted from the border's corner.
+type Place = (usize, usize);
+
+/// One environment that proceeds as POGEMA 1.4.0 does.
+#[derive(Clone, Debug)]
+pub struct Literal {
+    config: Config,
+    obstacles: Vec<Vec<u8>>,
+    positions: Vec<Vec<u8>>,
+    starts: Vec<Place>,
+    places: Vec<Place>,
+    goals: Vec<Place>,
+    active: Vec<bool>,
+    was_on_goal: Vec<bool>,
+    streams: Vec<GoalStream>,
+    elapsed: u64,
+    kept: Vec<Snapshot>,
+}
+
+impl Literal {
+    /// An environment for a config; it wants a reset first.
+    ///
+    /// # Errors
+    /// If the config is out of range.
+    pub fn new(config: Config) -> Result<Self, Error> {
+        config.check()?;
+        Ok(Self {
+            config,
+            obstacles: Vec::new(),
+            positions: Vec::new(),
+            starts: Vec::new(),
+            places: Vec::new(),
+            goals: Vec::new(),
+            active: Vec::new(),
+            was_on_goal: Vec::new(),
+            streams: Vec::new(),
+            elapsed: 0,
+            kept: Vec::new(),
+        })
+    }
+
+    fn pad(&self, cell: Cell) -> Place {
+        (usize::from(cell.row) + self.config.radius, usize::from(cell.col) + self.config.radius)
+    }
+
+    fn unpad(&self, (row, col): Place) -> Cell {
+        Cell::new((row - self.config.radius) as u16, (col - self.config.radius) as u16)
+    }
+
+    fn ahead(&self, agent: usize, action: Action) -> Place {
+        let (row, col) = self.places[agent];
+        match action {
+            Action::Stay => (row, col),
+            Action::Up => (row - 1, col),
+            Action::Down => (row + 1, col),
+            Action::Left => (row, col - 1),
+            Action::Right => (row, col + 1),
+        }
+    }
+
+    fn try_move(&mut self, agent: usize, action: Action) {
+        let to = self.ahead(agent, action);
+        if self.obstacles[to.0][to.1] == 0 && self.positions[to.0][to.1] == 0 {
+            self.move_unchecked(agent, to);
+        }
+    }
+
+    fn move_unchecked(&mut self, agent: usize, to: Place) {
+        let from = self.places[agent];
+        self.positions[from.0][from.1] = 0;
+        self.positions[to.0][to.1] = 1;
+        self.places[agent] = to;
+    }
+
+    fn active_agents(&self) -> Vec<usize> {
+        (0..self.active.len()).filter(|&agent| self.active[agent]).collect()
+    }
+
+    fn block_both(&mut self, actions: &[Action]) {
+        let mut blocked: HashMap<Place, bool> = HashMap::new();
+        for agent in self.active_agents() {
+            let to = self.ahead(agent, actions[agent]);
+            blocked.entry(to).and_modify(|flag| *flag = true).or_insert(false);
+            blocked.insert(self.places[agent], true);
+        }
+        for agent in self.active_agents() {
+            if blocked.get(&self.ahead(agent, actions[agent])) == Some(&false) {
+                self.try_move(agent, actions[agent]);
+            }
+        }
+    }
+
+    /// The four passes of `soft`: wishes, swaps, reverts, moves.
+    fn soft(&mut self, actions: &[Action]) {
+        let mut actions = actions.to_vec();
+        let mut wishes: HashMap<Place, Vec<usize>> = HashMap::new();
+        let mut edges: HashMap<(Place, Place), Vec<usize>> = HashMap::new();
+        for agent in self.active_agents() {
+            let (from, to) = (self.places[agent], self.ahead(agent, actions[agent]));
+            wishes.entry(to).or_default().push(agent);
+            edges.insert((from, to), vec![agent]);
+            if from != to {
+                edges.entry((to, from)).or_default().push(agent);
+            }
+        }
+        for agent in self.active_agents() {
+            let (from, to) = (self.places[agent], self.ahead(agent, actions[agent]));
+            if edges.get(&(from, to)).is_some_and(|users| users.len() > 1) {
+                wishes.entry(to).or_default().retain(|&other| other != agent);
+                wishes.entry(from).or_default().push(agent);
+                actions[agent] = Action::Stay;
+            }
+        }
+        for agent in self.active_agents().into_iter().rev() {
+            let to = self.ahead(agent, actions[agent]);
+            if wishes.get(&to).is_some_and(|users| users.len() > 1) || self.obstacles[to.0][to.1] == 1 {
+                self.revert(agent, to, &mut wishes, &mut actions);
+            }
+        }
+        for agent in self.active_agents() {
+            self.move_unchecked(agent, self.ahead(agent, actions[agent]));
+        }
+    }
+
+    /// Sends an agent back to its own place, and whoever wanted that place back to theirs, and so on.
+    fn revert(
+        &self,
+        agent: usize,
+        to: Place,
+        wishes: &mut HashMap<Place, Vec<usize>>,
+        actions: &mut [Action],
+    ) {
+        let (mut agent, mut to) = (agent, to);
+        loop {
+            actions[agent] = Action::Stay;
+            let users = wishes.entry(to).or_default();
+            if let Some(at) = users.iter().position(|&other| other == agent) {
+                users.remove(at);
+            }
+            let own = self.places[agent];
+            let waiting = wishes.entry(own).or_default();
+            waiting.push(agent);
+            if waiting.len() == 1 {
+                return;
+            }
+            (agent, to) = (waiting[0], own);
+        }
+    }
+
+    fn note_goals(&mut self) {
+        let on_goal = |agent: usize| self.places[agent] == self.goals[agent] && self.active[agent];
+        self.was_on_goal = (0..self.places.len()).map(on_goal).collect();
+    }
+
+    fn window(&self, grid: &[Vec<u8>], agent: usize) -> impl Iterator<Item = f32> {
+        let (row, col) = self.places[agent];
+        let radius = self.config.radius;
+        let rows = grid[row - radius..=row + radius].to_vec();
+        rows.into_iter().flat_map(move |line| line[col - radius..=col + radius].to_vec()).map(f32::from)
+    }
+}
+
+impl Environment for Literal {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
+        Error::check_length("starts", self.config.num_agents, instance.starts.len())?;
+        let radius = self.config.radius;
+        let (height, width) = (instance.map.height() + 2 * radius, instance.map.width() + 2 * radius);
+        let mut obstacles = match &instance.outside {
+            Outside::Free => vec![vec![0; width]; height],
+            Outside::Noise(noise) => noise
+                .obstacles()
+                .chunks(width)
+                .map(|row| row.iter().map(|&flag| u8::from(flag)).collect())
+                .collect(),
+        };
+        obstacles[radius - 1][radius - 1..=width - radius].fill(1);
+        obstacles[height - radius][radius - 1..=width - radius].fill(1);
+        for row in &mut obstacles[radius - 1..=height - radius] {
+            row[radius - 1] = 1;
+            row[width - radius] = 1;
+        }
+        for (row, flags) in instance.map.obstacles().chunks(instance.map.width()).enumerate() {
+            for (col, &flag) in flags.iter().enumerate() {
+                obstacles[row + radius][col + radius] = u8::from(flag);
+            }
+        }
+        self.obstacles = obstacles;
+        self.positions = vec![vec![0; width]; height];
+        self.starts = instance.starts.iter().map(|&cell| self.pad(cell)).collect();
+        for &(row, col) in &self.starts {
+            self.positions[row][col] = 1;
+        }
+        self.places.clone_from(&self.starts);
+        self.goals = instance.first_goals().into_iter().map(|cell| self.pad(cell)).collect();
+        self.streams.clone_from(&instance.goals);
+        self.active = vec![true; self.config.num_agents];
+        self.elapsed = 0;
+        self.note_goals();
+        self.kept = vec![self.snapshot()];
+        Ok(())
+    }
+
+    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
+        Error::check_length("actions", self.config.num_agents, actions.len())?;
+        out.check(self.config.num_agents)?;
+        match self.config.collision {
+            Collision::Priority => {
+                self.active_agents().iter().for_each(|&agent| self.try_move(agent, actions[agent]))
+            }
+            Collision::BlockBoth => self.block_both(actions),
+            Collision::Soft => self.soft(actions),
+        }
+        if self.config.occupancy == Occupancy::Exact {
+            self.positions.iter_mut().for_each(|row| row.fill(0));
+            for agent in self.active_agents() {
+                let (row, col) = self.places[agent];
+                self.positions[row][col] = 1;
+            }
+        }
+        self.note_goals();
+        let solved = self.was_on_goal.iter().all(|&reached| reached);
+        let share = self.was_on_goal.iter().filter(|&&reached| reached).count() as f32 / actions.len() as f32;
+        for agent in 0..actions.len() {
+            let on_goal = self.places[agent] == self.goals[agent];
+            let (reward, ended) = match self.config.on_goal {
+                OnGoal::Finish => (self.was_on_goal[agent], on_goal),
+                OnGoal::Nothing => (solved, solved),
+                OnGoal::Restart => (on_goal, false),
+            };
+            let own = if reward { 1.0 } else { 0.0 };
+            out.rewards[agent] = if self.config.reward == Reward::Shared { share } else { own };
+            out.terminated[agent] = ended;
+            if on_goal && self.config.on_goal == OnGoal::Restart {
+                let cell = self.unpad(self.places[agent]);
+                let next = self.streams[agent].advance(cell);
+                self.goals[agent] = self.pad(next);
+            }
+        }
+        for agent in 0..actions.len() {
+            if self.config.on_goal == OnGoal::Finish && self.was_on_goal[agent] {
+                let (row, col) = self.places[agent];
+                self.positions[row][col] = 0;
+                self.active[agent] = false;
+            }
+        }
+        self.elapsed += 1;
+        out.truncated.fill(self.elapsed as i64 >= self.config.max_steps);
+        self.kept.push(self.snapshot());
+        Ok(())
+    }
+
+    fn step_back(&mut self) -> Result<bool, Error> {
+        if self.kept.len() < 2 {
+            return Ok(false);
+        }
+        self.kept.pop();
+        let Some(state) = self.kept.last().cloned() else { return Ok(false) };
+        self.places = state.cells.iter().map(|&cell| self.pad(cell)).collect();
+        self.goals = state.goals.iter().map(|&cell| self.pad(cell)).collect();
+        self.active = state.active;
+        self.elapsed = state.step;
+        self.positions.iter_mut().for_each(|row| row.fill(0));
+        for (row, col) in state.occupied.into_iter().map(|cell| self.pad(cell)).collect::<Vec<_>>() {
+            self.positions[row][col] = 1;
+        }
+        Ok(true)
+    }
+
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        let (side, radius) = (self.config.side(), self.config.radius as i64);
+        for (agent, channels) in out.chunks_mut(3 * side * side).enumerate() {
+            let clamped =
+                |own: usize, goal: usize| (goal as i64 - own as i64).clamp(-radius, radius) + radius;
+            let (place, goal) = (self.places[agent], self.goals[agent]);
+            let at = clamped(place.0, goal.0) as usize * side + clamped(place.1, goal.1) as usize;
+            let goal_window = (0..side * side).map(|index| if index == at { 1.0 } else { 0.0 });
+            let windows = self.window(&self.obstacles, agent).chain(self.window(&self.positions, agent));
+            channels.iter_mut().zip(windows.chain(goal_window)).for_each(|(value, seen)| *value = seen);
+        }
+        Ok(())
+    }
+
+    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+        let area = self.config.side() * self.config.side();
+        for agent in 0..self.config.num_agents {
+            let obstacles = out.obstacles[agent * area..].iter_mut().zip(self.window(&self.obstacles, agent));
+            obstacles.for_each(|(value, seen)| *value = seen);
+            let agents = out.agents[agent * area..].iter_mut().zip(self.window(&self.positions, agent));
+            agents.for_each(|(value, seen)| *value = seen);
+            let start = self.starts[agent];
+            for (values, place) in
+                [(&mut *out.cells, self.places[agent]), (&mut *out.goals, self.goals[agent])]
+            {
+                values[2 * agent] = place.0 as i32 - start.0 as i32;
+                values[2 * agent + 1] = place.1 as i32 - start.1 as i32;
+            }
+        }
+        Ok(())
+    }
+
+    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+        out.obstacles
+            .iter_mut()
+            .zip(self.obstacles.iter().flatten())
+            .for_each(|(value, &flag)| *value = flag);
+        for (values, places) in [(out.cells, &self.places), (out.goals, &self.goals)] {
+            for (pair, place) in values.chunks_exact_mut(2).zip(places) {
+                pair.copy_from_slice(&[place.0 as i32, place.1 as i32]);
+            }
+        }
+        Ok(())
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let mut occupied = Vec::new();
+        for (row, flags) in self.positions.iter().enumerate() {
+            let marked = flags.iter().enumerate().filter(|&(_, &flag)| flag == 1);
+            occupied.extend(marked.map(|(col, _)| self.unpad((row, col))));
+        }
+        Snapshot {
+            step: self.elapsed,
+            cells: self.places.iter().map(|&place| self.unpad(place)).collect(),
+            goals: self.goals.iter().map(|&place| self.unpad(place)).collect(),
+            active: self.active.clone(),
+            on_goal: self.was_on_goal.clone(),
+            occupied,
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! Our own answers to a request.
+
+use std::fmt::Write as _;
+
+use pogema_core::{
+    Action, Cell, Change, Config, DensityMeter, Environment, EpisodeMeter, Error, GoalStream, Instance,
+    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded, PomapfOut,
+    Snapshot, StepOut, TraceStep, changes, states_at_every_step,
+};
+use pogema_maps::numpy::Generator;
+use pogema_maps::{GridConfig, InstanceSource, Targets};
+use pogema_planners::{AStarTeam, View};
+
+use crate::request::{
+    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
+};
+
+/// An engine to play with.
+#[derive(Clone, Copy, Debug)]
+pub struct Engine {
+    /// Its name in reports.
+    pub name: &'static str,
+    /// Makes an environment of it.
+    pub make: fn(Config) -> Result<Box<dyn Environment>, Error>,
+}
+
+impl Engine {
+    /// The reference.
+    pub const REFERENCE: Self =
+        Self { name: "reference", make: |config| Ok(Box::new(pogema_reference::Reference::new(config)?)) };
+    /// POGEMA's procedures, step for step.
+    pub const LITERAL: Self =
+        Self { name: "literal", make: |config| Ok(Box::new(crate::Literal::new(config)?)) };
+}
+
+/// Plays a request on the reference.
+pub fn play(request: &Request) -> Response {
+    play_on(Engine::REFERENCE, request)
+}
+
+/// Plays a request on an engine.
+pub fn play_on(engine: Engine, request: &Request) -> Response {
+    let mut response = Response { id: Some(request.id), ..Response::default() };
+    let mut player = match Player::new(engine, request) {
+        Ok(player) => player,
+        Err(error) => {
+            response.error = Some(failure(When::Phase("config".into()), &error));
+            return response;
+        }
+    };
+    for (index, op) in request.ops.iter().enumerate() {
+        match player.perform(op) {
+            Ok(record) => response.records.push(record),
+            Err(error) => {
+                response.error = Some(failure(When::Op(index), &error));
+                break;
+            }
+        }
+    }
+    response.warnings = player.warnings;
+    response
+}
+
+fn failure(when: When, error: &Error) -> Failure {
+    Failure { when, kind: "Error".into(), message: error.to_string() }
+}
+
+/// One request at work.
+pub(crate) struct Player {
+    pub(crate) config: GridConfig,
+    source: InstanceSource,
+    pub(crate) environment: Box<dyn Environment>,
+    pub(crate) instance: Option<Instance>,
+    warnings: Vec<String>,
+    meter: EpisodeMeter,
+    density: Option<DensityMeter>,
+    past: Vec<Snapshot>,
+    team: AStarTeam,
+    sampler: Generator,
+    padded: Option<Padded>,
+}
+
+impl Player {
+    pub(crate) fn new(engine: Engine, request: &Request) -> Result<Self, Error> {
+        let config = GridConfig::from_value(&request.config)?;
+        let registered =
+            request.register.as_ref().map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
+        let rules = config.rules();
+        Ok(Self {
+            source: InstanceSource::new(config.clone(), registered)?,
+            environment: (engine.make)(rules)?,
+            instance: None,
+            warnings: Vec::new(),
+            meter: EpisodeMeter::new(&rules),
+            density: request.density.then(DensityMeter::default),
+            past: Vec::new(),
+            team: pogema_team(),
+            sampler: Generator::seeded(config.seed.unwrap_or(0)),
+            config,
+            padded: None,
+        })
+    }
+
+    pub(crate) fn perform(&mut self, op: &Op) -> Result<Record, Error> {
+        match op {
+            Op::Reset(_) => self.reset().map(|record| Record::Reset(Box::new(record))),
+            Op::Step(numbers) => {
+                let actions = numbers.iter().enumerate();
+                let actions: Result<_, _> =
+                    actions.map(|(agent, &number)| Action::from_number(agent, number)).collect();
+                self.step(actions?).map(|record| Record::Step(Box::new(record)))
+            }
+            Op::Astar => {
+                let actions = self.plan()?;
+                self.step(actions).map(|record| Record::Astar(Box::new(record)))
+            }
+            Op::Sample => {
+                let actions = sample(&mut self.sampler, self.config.num_agents);
+                self.step(actions).map(|record| Record::Sample(Box::new(record)))
+            }
+            Op::Back => {
+                let moved = self.environment.step_back()?;
+                if moved {
+                    self.past.pop();
+                }
+                Ok(Record::Back(Back { moved, state: self.state() }))
+            }
+            Op::History => Ok(Record::History(self.history())),
+        }
+    }
+
+    fn reset(&mut self) -> Result<ResetRecord, Error> {
+        let generated = self.source.generate()?;
+        self.warnings.extend(generated.warnings);
+        self.environment.reset(&generated.instance)?;
+        self.meter.reset();
+        self.team.reset();
+        self.past = vec![self.environment.snapshot()];
+        self.padded = Some(self.padded(&generated.instance)?);
+        let observations = self.observed(true)?;
+        if let Some(density) = &mut self.density {
+            density.reset();
+        }
+        self.feed_density()?;
+        let goal_lists = if self.config.on_target == OnGoal::Restart {
+            foretold_goals(&self.config, &generated.instance)
+        } else {
+            None
+        };
+        let record = ResetRecord {
+            derived: Derived {
+                width: self.config.width,
+                height: self.config.height,
+                size: self.config.size,
+                density: self.config.density,
+                num_agents: self.config.num_agents,
+            },
+            map: generated.instance.map.rows(),
+            padded: self.padded(&generated.instance)?,
+            state: self.state(),
+            observations,
+            goal_lists,
+            goal_lists_error: None,
+        };
+        self.instance = Some(generated.instance);
+        Ok(record)
+    }
+
+    pub(crate) fn step(&mut self, actions: Vec<Action>) -> Result<StepRecord, Error> {
+        let num_agents = self.config.num_agents;
+        let before = self.state();
+        let mut rewards = vec![0.0; num_agents];
+        let mut terminated = vec![false; num_agents];
+        let mut truncated = vec![false; num_agents];
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        self.environment.step(&actions, out)?;
+        let state = self.state();
+        self.past.push(self.environment.snapshot());
+        self.feed_density()?;
+        let metrics = self.metrics(&state, &terminated, &truncated);
+        let observations = Some(self.observed(false)?);
+        let actions_after = self.actions_after(&before, &actions, &state);
+        Ok(StepRecord {
+            infos_active: state.active.clone(),
+            step: TraceStep { actions, state, rewards, terminated, truncated, observations, metrics },
+            actions_after,
+        })
+    }
+
+    fn state(&self) -> Snapshot {
+        // The number of the step is not among what implementations answer.
+        Snapshot { step: 0, ..self.environment.snapshot() }
+    }
+
+    /// What POGEMA leaves of the caller's list: under `soft` a prevented move becomes a wait.
+    ///
+    /// Rule: collide/soft/rewrite
+    fn actions_after(&self, before: &Snapshot, actions: &[Action], after: &Snapshot) -> Vec<i64> {
+        let soft = self.config.collision_system == pogema_core::Collision::Soft;
+        let left = |(agent, &action): (usize, &Action)| {
+            let reverted = soft && before.active[agent] && before.cells[agent] == after.cells[agent];
+            if reverted { 0 } else { action as i64 }
+        };
+        actions.iter().enumerate().map(left).collect()
+    }
+
+    fn metrics(&mut self, state: &Snapshot, terminated: &[bool], truncated: &[bool]) -> Option<Metrics> {
+        // POGEMA's persistent environments measure nothing but the density, which a wrapper outside adds.
+        let figures = self.meter.feed(&state.on_goal, terminated, truncated)?;
+        let figures = if self.config.persistent { Metrics::default() } else { figures };
+        let avg_agents_density = self.density.as_ref().map(DensityMeter::mean);
+        let metrics = Metrics { avg_agents_density, ..figures };
+        (metrics != Metrics::default()).then_some(metrics)
+    }
+
+    fn feed_density(&mut self) -> Result<(), Error> {
+        if self.density.is_none() {
+            return Ok(());
+        }
+        let windows = Windows::of(&*self.environment)?;
+        let counts = windows.counts();
+        if let Some(density) = &mut self.density {
+            density.feed(counts.into_iter());
+        }
+        Ok(())
+    }
+
+    fn plan(&mut self) -> Result<Vec<Action>, Error> {
+        let windows = Windows::of(&*self.environment)?;
+        self.team.act(windows.views())
+    }
+
+    fn history(&self) -> History {
+        let changes = changes(&self.past);
+        let last = self.past.last().map_or(0, |state| state.step);
+        let full = changes.iter().map(|agent: &Vec<Change>| states_at_every_step(agent, last)).collect();
+        History { full, changes }
+    }
+
+    fn padded(&self, instance: &Instance) -> Result<Padded, Error> {
+        let border = 2 * self.config.obs_radius;
+        let (height, width) = (instance.map.height() + border, instance.map.width() + border);
+        let (mut obstacles, mut places) = (vec![0; height * width], vec![0; 4 * self.config.num_agents]);
+        let (cells, goals) = places.split_at_mut(2 * self.config.num_agents);
+        self.environment.observe_mapf(MapfOut { obstacles: &mut obstacles, cells, goals })?;
+        let line = |row: &[u8]| row.iter().map(|&value| if value == 0 { '.' } else { '#' }).collect();
+        let dtype = if self.config.empty_outside { "float64" } else { "int64" };
+        Ok(Padded { dtype: dtype.into(), rows: obstacles.chunks(width).map(line).collect() })
+    }
+
+    fn observed(&self, at_reset: bool) -> Result<Observed, Error> {
+        let side = self.config.obs_radius * 2 + 1;
+        if self.config.observation_type == Observation::Default {
+            let mut values = vec![0.0; self.environment.config().num_observed()];
+            self.environment.observe(&mut values)?;
+            let windows = values.chunks(3 * side * side).map(pack).collect();
+            return Ok(Observed::Default { dtype: "float32".into(), windows, odd: Vec::new() });
+        }
+        let windows = Windows::of(&*self.environment)?;
+        let pomapf = ObservedPomapf {
+            dtype: "float32".into(),
+            obstacles: windows.obstacles.chunks(side * side).map(pack).collect(),
+            agents: windows.agents.chunks(side * side).map(pack).collect(),
+            xy: pairs(&windows.cells),
+            target_xy: pairs(&windows.goals),
+            odd: Vec::new(),
+        };
+        if self.config.observation_type == Observation::Pomapf {
+            return Ok(Observed::Pomapf(pomapf));
+        }
+        let num_agents = self.config.num_agents;
+        let num_cells = self.padded.as_ref().map_or(0, |padded| padded.rows.iter().map(String::len).sum());
+        let (mut obstacles, mut cells, mut goals) =
+            (vec![0; num_cells], vec![0; 2 * num_agents], vec![0; 2 * num_agents]);
+        let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut goals };
+        self.environment.observe_mapf(out)?;
+        let global_obstacles = if at_reset { self.padded.clone() } else { None };
+        let (global_xy, global_target_xy) = (pairs(&cells), pairs(&goals));
+        Ok(Observed::Mapf(ObservedMapf { pomapf, global_obstacles, global_xy, global_target_xy }))
+    }
+}
+
+/// The arrays of the `POMAPF` observation.
+pub(crate) struct Windows {
+    side: usize,
+    obstacles: Vec<f32>,
+    agents: Vec<f32>,
+    cells: Vec<i32>,
+    goals: Vec<i32>,
+}
+
+impl Windows {
+    pub(crate) fn of(environment: &dyn Environment) -> Result<Self, Error> {
+        let config = environment.config();
+        let (num_agents, side) = (config.num_agents, config.side());
+        let mut windows = Self {
+            side,
+            obstacles: vec![0.0; num_agents * side * side],
+            agents: vec![0.0; num_agents * side * side],
+            cells: vec![0; 2 * num_agents],
+            goals: vec![0; 2 * num_agents],
+        };
+        environment.observe_pomapf(PomapfOut {
+            obstacles: &mut windows.obstacles,
+            agents: &mut windows.agents,
+            cells: &mut windows.cells,
+            goals: &mut windows.goals,
+        })?;
+        Ok(windows)
+    }
+
+    pub(crate) fn views(&self) -> impl Iterator<Item = View<'_>> {
+        let obstacles = self.obstacles.chunks(self.side * self.side);
+        let places = pairs(&self.cells).into_iter().zip(pairs(&self.goals));
+        obstacles.zip(places).map(|(obstacles, (cell, goal))| View { cell, goal, obstacles, side: self.side })
+    }
+
+    /// For each agent how many agents and how many free cells it sees.
+    fn counts(&self) -> Vec<(u32, u32)> {
+        let area = self.side * self.side;
+        let count =
+            |window: &[f32], wanted: bool| window.iter().filter(|&&value| (value != 0.0) == wanted).count();
+        let agents = self.agents.chunks(area).map(|window| count(window, true) as u32);
+        let free = self.obstacles.chunks(area).map(|window| count(window, false) as u32);
+        agents.zip(free).collect()
+    }
+}
+
+/// POGEMA's A* policy: every agent draws its random moves from a generator of seed 0.
+///
+/// Rule: policy/astar
+pub fn pogema_team() -> AStarTeam {
+    AStarTeam::new(Box::new(|| {
+        let mut generator = Generator::seeded(0);
+        Box::new(move || random_action(&mut generator))
+    }))
+}
+
+/// POGEMA's random policy: what `sample_actions` draws.
+///
+/// Rule: seed/actions
+pub fn sample(generator: &mut Generator, num_agents: usize) -> Vec<Action> {
+    (0..num_agents).map(|_| random_action(generator)).collect()
+}
+
+fn random_action(generator: &mut Generator) -> Action {
+    // INVARIANT: a range from 0 to 5 is never empty, and each of its numbers is an action.
+    let number = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
+    Action::ALL[number as usize]
+}
+
+/// The goals POGEMA foretells: until an agent walking straight from goal to goal would need the whole episode.
+/// None where it would go on for ever, since only the goal just reached can be drawn again.
+///
+/// Rule: goal/restart/foretold
+///
+/// Source: POGEMA 1.4.0, `envs.py`, `PogemaLifeLong.get_lifelong_targets_xy`
+fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Vec<Cell>>> {
+    if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
+        return Some(sequences.clone());
+    }
+    let agents = instance.goals.iter().zip(&instance.starts);
+    agents.map(|(stream, &start)| foretold_to_one(stream.clone(), start, config.max_episode_steps)).collect()
+}
+
+fn foretold_to_one(mut stream: GoalStream, start: Cell, max_steps: i64) -> Option<Vec<Cell>> {
+    /// So many equal draws in a row are no chance.
+    const MOST_REPEATS: usize = 10_000;
+    let mut at = stream.first();
+    let mut goals = vec![at];
+    let mut length = distance(start, at);
+    let mut num_repeats = 0;
+    while length < max_steps {
+        let next = stream.advance(at);
+        num_repeats = if next == at { num_repeats + 1 } else { 0 };
+        if num_repeats > MOST_REPEATS {
+            return None;
+        }
+        length += distance(at, next);
+        goals.push(next);
+        at = next;
+    }
+    Some(goals)
+}
+
+fn distance(one: Cell, other: Cell) -> i64 {
+    i64::from(one.row.abs_diff(other.row)) + i64::from(one.col.abs_diff(other.col))
+}
+
+fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
+    values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+}
+
+/// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
+fn pack(window: &[f32]) -> String {
+    let byte = |cells: &[f32]| {
+        cells.iter().enumerate().fold(0u8, |byte, (at, &value)| byte | (u8::from(value != 0.0) << (7 - at)))
+    };
+    window.chunks(8).fold(String::new(), |mut text, cells| {
+        let _ = write!(text, "{:02x}", byte(cells));
+        text
+    })
+}

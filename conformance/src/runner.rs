@@ -1,0 +1,303 @@
+//! One run over everything there is to check.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use pogema_core::Error;
+use serde::Serialize;
+
+use crate::compare::{Divergence, compare};
+use crate::draw::draw_request;
+use crate::events::Events;
+use crate::golden::Recording;
+use crate::laws::broken_law;
+use crate::oracle::Oracle;
+use crate::play::{Engine, play_on};
+use crate::request::{Request, Response};
+use crate::script::play_script;
+use crate::tally::Tally;
+use crate::{cases, golden};
+
+/// What a run found.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// The parts of the run, in order.
+    pub parts: Vec<Part>,
+    /// Comparisons by rule.
+    pub tally: Tally,
+    /// What happened in the episodes.
+    pub events: Events,
+    /// What went wrong.
+    pub failures: Vec<Fault>,
+}
+
+/// One part of a run: the golden recordings, the cases, and so on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// Files or cases checked.
+    pub checked: u64,
+    /// Those that failed.
+    pub failed: u64,
+}
+
+/// One thing that went wrong.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fault {
+    /// The part of the run.
+    pub part: String,
+    /// The file or case.
+    pub name: String,
+    /// The difference, if two answers differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub divergence: Option<Divergence>,
+    /// What is wrong, in words.
+    pub text: String,
+    /// Where it was kept, to be played again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<PathBuf>,
+}
+
+/// How a run goes on; called after each case.
+pub type Progress<'a> = &'a (dyn Fn() + Sync);
+
+/// The result of one case.
+#[derive(Default)]
+struct Checked {
+    tally: Tally,
+    events: Events,
+    fault: Option<Fault>,
+}
+
+impl Report {
+    /// Whether everything agreed.
+    pub fn agrees(&self) -> bool {
+        self.failures.is_empty()
+    }
+
+    fn take(&mut self, name: &str, results: Vec<Checked>) {
+        let mut part = Part { name: name.into(), checked: results.len() as u64, failed: 0 };
+        for checked in results {
+            self.tally.add(&checked.tally);
+            self.events.add(&checked.events);
+            if let Some(fault) = checked.fault {
+                part.failed += 1;
+                self.failures.push(fault);
+            }
+        }
+        self.parts.push(part);
+    }
+
+    /// Checks an engine against the recordings of a folder.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub fn check_recordings(&mut self, part: &str, folder: &Path, engine: Engine) -> Result<(), Error> {
+        let mut results = Vec::new();
+        for path in recording_files(folder)? {
+            for (index, recording) in golden::read(&path)?.iter().enumerate() {
+                let name = format!("{} line {}", path.display(), index + 1);
+                let got = play_on(engine, &recording.request);
+                results.push(check(part, &name, &recording.request, &recording.response, &got));
+            }
+        }
+        self.take(part, results);
+        Ok(())
+    }
+
+    /// Checks an engine against the cases of a folder.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub fn check_cases(&mut self, folder: &Path, engine: Engine) -> Result<(), Error> {
+        let mut results = Vec::new();
+        for path in golden::files(folder, ".yaml")? {
+            let case = cases::read(&path)?;
+            let response = play_on(engine, &case.request()?);
+            let mut checked = Checked::default();
+            checked.events.watch(&response);
+            let mismatch = case.mismatch(&response);
+            checked.tally.count(&case.rule, mismatch.is_none());
+            checked.fault = mismatch.map(|text| fault("cases", &path.display().to_string(), text));
+            results.push(checked);
+        }
+        self.take("cases", results);
+        Ok(())
+    }
+
+    /// Checks the engines against each other, and the first against the laws, on freshly drawn cases.
+    ///
+    /// # Errors
+    /// If a worker fails.
+    pub fn check_fresh(
+        &mut self,
+        engines: &[Engine],
+        num_cases: u64,
+        seed: u64,
+        keep: &Path,
+        progress: Progress<'_>,
+    ) -> Result<(), Error> {
+        let Some((&first, others)) = engines.split_first() else { return Ok(()) };
+        let results = on_workers(
+            num_cases,
+            || Ok(()),
+            |(), case| {
+                let (request, expected) = play_script(first, draw_request(seed, case), seed);
+                let name = format!("case {case} of seed {seed}");
+                let mut checked = Checked::default();
+                checked.events.watch(&expected);
+                let law = broken_law(&request, &expected);
+                checked.tally.count("laws", law.is_none());
+                if let Some((op, law)) = law {
+                    checked.fault = Some(fault("fresh", &name, format!("operation {op}: {law}")));
+                }
+                for &engine in others {
+                    let got = play_on(engine, &request);
+                    checked.fault = checked.fault.or_else(|| {
+                        let found = compare(&request, &expected, &got, &mut checked.tally)?;
+                        Some(diverged("fresh", &name, found))
+                    });
+                }
+                keep_fault(&mut checked, keep, &request, &expected);
+                progress();
+                Ok(checked)
+            },
+        )?;
+        self.take("fresh", results);
+        Ok(())
+    }
+
+    /// Checks an engine against POGEMA itself on freshly drawn cases.
+    ///
+    /// # Errors
+    /// If POGEMA cannot be started or ends.
+    pub fn check_oracle(
+        &mut self,
+        engine: Engine,
+        python: &Path,
+        num_cases: u64,
+        seed: u64,
+        keep: &Path,
+        progress: Progress<'_>,
+    ) -> Result<(), Error> {
+        let results = on_workers(
+            num_cases,
+            || Oracle::start(python),
+            |oracle, case| {
+                let request = play_script(engine, draw_request(seed, case), seed).0;
+                // POGEMA works on its answer while we work on ours.
+                oracle.send(&request)?;
+                let got = play_on(engine, &request);
+                let expected = oracle.receive()?;
+                let name = format!("case {case} of seed {seed}");
+                let mut checked = check("oracle", &name, &request, &expected, &got);
+                keep_fault(&mut checked, keep, &request, &expected);
+                progress();
+                Ok(checked)
+            },
+        )?;
+        self.take("oracle", results);
+        Ok(())
+    }
+
+    /// Checks the cases of a folder against POGEMA itself.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or POGEMA cannot be started or ends.
+    pub fn check_cases_with_oracle(&mut self, folder: &Path, python: &Path) -> Result<(), Error> {
+        let mut oracle = Oracle::start(python)?;
+        let mut results = Vec::new();
+        for path in golden::files(folder, ".yaml")? {
+            let case = cases::read(&path)?;
+            if !case.is_for_pogema() {
+                continue;
+            }
+            let name = path.display().to_string();
+            let request = case.request()?;
+            let expected = oracle.ask(&request)?;
+            let got = crate::play(&request);
+            let agreed = check("cases with oracle", &name, &request, &expected, &got);
+            // Where we differ by decision, POGEMA must really do otherwise.
+            let checked = match (&case.pogema, agreed.fault.is_some()) {
+                (None, _) => agreed,
+                (Some(_), true) => Checked::default(),
+                (Some(_), false) => {
+                    let text = "POGEMA does the same, though the case says that it does not".into();
+                    Checked { fault: Some(fault("cases with oracle", &name, text)), ..Checked::default() }
+                }
+            };
+            results.push(checked);
+        }
+        self.take("cases with oracle", results);
+        Ok(())
+    }
+}
+
+fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let mut files = golden::files(folder, ".jsonl")?;
+    files.extend(golden::files(folder, ".jsonl.zst")?);
+    Ok(files)
+}
+
+fn check(part: &str, name: &str, request: &Request, expected: &Response, got: &Response) -> Checked {
+    let mut checked = Checked::default();
+    checked.events.watch(expected);
+    checked.fault =
+        compare(request, expected, got, &mut checked.tally).map(|found| diverged(part, name, found));
+    checked
+}
+
+fn fault(part: &str, name: &str, text: String) -> Fault {
+    Fault { part: part.into(), name: name.into(), divergence: None, text, kept: None }
+}
+
+fn diverged(part: &str, name: &str, found: Divergence) -> Fault {
+    Fault { text: found.to_string(), divergence: Some(found), ..fault(part, name, String::new()) }
+}
+
+/// Keeps a failed case on disk, with the expected answer; a failure to do so is told along with it.
+fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected: &Response) {
+    let Some(fault) = &mut checked.fault else { return };
+    let name: String = fault.name.chars().map(|letter| if letter == ' ' { '-' } else { letter }).collect();
+    let path = folder.join(format!("{}-{name}.jsonl", fault.part));
+    let recording = Recording { request: request.clone(), response: expected.clone() };
+    match golden::write(&path, &[recording]) {
+        Ok(()) => fault.kept = Some(path),
+        Err(error) => fault.text = format!("{}\n  could not be kept: {error}", fault.text),
+    }
+}
+
+/// Runs cases on as many workers as there are processors; the results come in the order of the cases.
+fn on_workers<W, T: Send>(
+    num_cases: u64,
+    make_worker: impl Fn() -> Result<W, Error> + Sync,
+    run: impl Fn(&mut W, u64) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
+    let num_workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicU64::new(0);
+    let work = || -> Result<Vec<(u64, T)>, Error> {
+        let mut worker = make_worker()?;
+        let mut results = Vec::new();
+        loop {
+            let case = next.fetch_add(1, Ordering::Relaxed);
+            if case >= num_cases {
+                return Ok(results);
+            }
+            results.push((case, run(&mut worker, case)?));
+        }
+    };
+    let results = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..num_workers).map(|_| scope.spawn(work)).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<'_, Result<_, Error>>| {
+            worker.join().unwrap_or_else(|_| Err(Error::State { reason: "a worker panicked".into() }))
+        };
+        workers.into_iter().map(join).collect::<Result<Vec<_>, _>>()
+    })?;
+    let mut results: Vec<(u64, T)> = results.into_iter().flatten().collect();
+    results.sort_by_key(|(case, _)| *case);
+    Ok(results.into_iter().map(|(_, result)| result).collect())
+}

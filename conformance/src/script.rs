@@ -1,0 +1,189 @@
+//! What the agents of a random case do: wander, seek their goals, or get in each other's way.
+
+use pogema_core::{Action, Cell, Map, Snapshot};
+
+use crate::draw::Dice;
+use crate::play::{Engine, Player};
+use crate::request::{Op, Record, Request, Response};
+
+/// How the agents of an episode choose their actions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Script {
+    /// Each at random.
+    Random,
+    /// Mostly towards the goal.
+    GoalSeeking,
+    /// At a neighbour, or at a cell that a neighbour can enter too.
+    Adversarial,
+    /// Nearly all in one direction: long chains, and long cascades at walls.
+    Convoy,
+    /// Round and round the four cells of a block.
+    Carousel,
+    /// As POGEMA's A* policy.
+    Astar,
+    /// As POGEMA's random policy.
+    Sample,
+}
+
+const MOST_STEPS: usize = 26;
+
+/// Adds operations to a request while playing it, so that the actions can answer to what happens.
+///
+/// The result is the whole request and our answer to it, on the given engine.
+pub fn play_script(engine: Engine, mut request: Request, seed: u64) -> (Request, Response) {
+    let mut dice = Dice::new(seed ^ 0x5ca1_ab1e, request.id);
+    let mut response = Response { id: Some(request.id), ..Response::default() };
+    let Ok(mut player) = Player::new(engine, &request) else {
+        request.ops.push(Op::Reset(None));
+        return (request.clone(), crate::play_on(engine, &request));
+    };
+    let num_episodes = if dice.chance(0.2) { 2 } else { 1 };
+    for _ in 0..num_episodes {
+        play_episode(&mut player, &mut dice, &mut request, &mut response);
+        if response.error.is_some() {
+            break;
+        }
+    }
+    // Played afresh from the operations alone, as any other implementation will.
+    let response = crate::play_on(engine, &request);
+    (request, response)
+}
+
+fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, response: &mut Response) {
+    let script = draw_script(dice, player);
+    // Without a step in between, so that nothing of an episode is left when the next begins.
+    for _ in 0..if dice.chance(0.15) { 3 } else { 1 } {
+        let seed = dice.chance(0.2).then(|| dice.below(1000) as u64);
+        if !perform(player, Op::Reset(seed), request, response) {
+            return;
+        }
+    }
+    let max_steps = player.config.max_episode_steps.clamp(1, MOST_STEPS as i64) as usize;
+    let num_extra = if dice.chance(0.2) { 2 } else { 0 };
+    let can_go_back = player.config.persistent && script != Script::Astar && !loses_agents(player);
+    let mut ended = 0;
+    for _ in 0..max_steps + num_extra {
+        let op = match script {
+            Script::Astar => Op::Astar,
+            Script::Sample => Op::Sample,
+            _ => Op::Step(choose(script, player, dice)),
+        };
+        if !perform(player, op, request, response) {
+            return;
+        }
+        while can_go_back && dice.chance(0.2) {
+            if !perform(player, Op::Back, request, response) {
+                return;
+            }
+        }
+        let is_over = response.records.last().and_then(Record::step).is_some_and(|step| {
+            let all = |flags: &[bool]| flags.iter().all(|&flag| flag);
+            all(&step.step.terminated) || all(&step.step.truncated)
+        });
+        ended += usize::from(is_over);
+        if ended > num_extra {
+            break;
+        }
+    }
+    if player.config.persistent {
+        perform(player, Op::History, request, response);
+    }
+}
+
+/// Taking steps back is compared only where POGEMA's occupancy is right; where it has lost agents it goes wrong.
+fn loses_agents(player: &Player) -> bool {
+    player.config.collision_system == pogema_core::Collision::Soft
+}
+
+fn perform(player: &mut Player, op: Op, request: &mut Request, response: &mut Response) -> bool {
+    let result = player.perform(&op);
+    request.ops.push(op);
+    match result {
+        Ok(record) => {
+            response.records.push(record);
+            true
+        }
+        Err(_) => false,
+    }
+}
+
+fn draw_script(dice: &mut Dice, player: &Player) -> Script {
+    let has_policy_view = player.config.observation_type != pogema_core::Observation::Default;
+    match dice.below(10) {
+        0 if has_policy_view => Script::Astar,
+        1 if player.config.seed.is_some() => Script::Sample,
+        2 => Script::Random,
+        3 | 4 => Script::GoalSeeking,
+        5 | 6 => Script::Adversarial,
+        7 | 8 => Script::Convoy,
+        _ => Script::Carousel,
+    }
+}
+
+fn choose(script: Script, player: &Player, dice: &mut Dice) -> Vec<i64> {
+    let state = player.environment.snapshot();
+    let Some(map) = player.instance.as_ref().map(|instance| &instance.map) else { return Vec::new() };
+    let common = dice.pick(&Action::ALL);
+    let mut actions = Vec::with_capacity(state.cells.len());
+    for agent in 0..state.cells.len() {
+        let any = dice.pick(&Action::ALL);
+        let action = match script {
+            _ if dice.chance(0.12) => any,
+            Script::GoalSeeking => toward_goal(&state, agent, dice),
+            Script::Adversarial => at_neighbour(map, &state, agent, dice),
+            Script::Convoy => common,
+            Script::Carousel => around_block(state.cells[agent]),
+            Script::Random | Script::Astar | Script::Sample => any,
+        };
+        actions.push(action as i64);
+    }
+    actions
+}
+
+fn toward_goal(state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
+    let (cell, goal) = (state.cells[agent], state.goals[agent]);
+    let down = if goal.row > cell.row { Action::Down } else { Action::Up };
+    let right = if goal.col > cell.col { Action::Right } else { Action::Left };
+    match (goal.row == cell.row, goal.col == cell.col) {
+        (true, true) => Action::Stay,
+        (true, false) => right,
+        (false, true) => down,
+        (false, false) => dice.pick(&[down, right]),
+    }
+}
+
+/// Towards another agent next to it (a swap, if that one does the same), or else towards one that is two cells
+/// away (a contest for the cell between).
+fn at_neighbour(map: &Map, state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
+    let mut moves = [Action::Up, Action::Down, Action::Left, Action::Right];
+    dice.shuffle(&mut moves);
+    let at = |action: Action, reach: i32| {
+        let (down, right) = action.delta();
+        let row = i32::from(state.cells[agent].row) + reach * down;
+        let col = i32::from(state.cells[agent].col) + reach * right;
+        u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col))
+    };
+    let holds_agent = |cell: Option<Cell>| {
+        cell.is_some_and(|cell| {
+            (0..state.cells.len()).any(|other| state.active[other] && state.cells[other] == cell)
+        })
+    };
+    let is_free = |cell: Option<Cell>| cell.is_some_and(|cell| !map.is_obstacle(cell));
+    let reach = if dice.chance(0.5) { [1, 2] } else { [2, 1] };
+    for reach in reach {
+        let aims = |&&action: &&Action| is_free(at(action, 1)) && holds_agent(at(action, reach));
+        if let Some(&action) = moves.iter().find(aims) {
+            return action;
+        }
+    }
+    moves[0]
+}
+
+fn around_block(cell: Cell) -> Action {
+    match (cell.row % 2, cell.col % 2) {
+        (0, 0) => Action::Right,
+        (0, _) => Action::Down,
+        (_, 0) => Action::Up,
+        _ => Action::Left,
+    }
+}

@@ -1,0 +1,102 @@
+//! What was checked, and with what result, rule by rule.
+
+use std::collections::BTreeMap;
+
+use pogema_core::{Collision, Observation, Occupancy, OnGoal};
+use pogema_maps::GridConfig;
+use serde::Serialize;
+
+/// How often each rule was compared, and how often it was broken.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tally {
+    /// By rule id.
+    pub rules: BTreeMap<String, Count>,
+}
+
+/// Comparisons and divergences.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Count {
+    /// Comparisons made.
+    pub checked: u64,
+    /// Comparisons that failed.
+    pub diverged: u64,
+}
+
+impl Tally {
+    /// Counts one comparison under a rule.
+    pub fn count(&mut self, rule: &str, holds: bool) {
+        // Most rules are there already; no copy of the name is made for them.
+        if !self.rules.contains_key(rule) {
+            self.rules.insert(rule.to_owned(), Count::default());
+        }
+        if let Some(count) = self.rules.get_mut(rule) {
+            count.checked += 1;
+            count.diverged += u64::from(!holds);
+        }
+    }
+
+    /// Adds another tally.
+    pub fn add(&mut self, other: &Self) {
+        for (rule, count) in &other.rules {
+            let sum = self.rules.entry(rule.clone()).or_default();
+            sum.checked += count.checked;
+            sum.diverged += count.diverged;
+        }
+    }
+
+    /// All divergences together.
+    pub fn num_diverged(&self) -> u64 {
+        self.rules.values().map(|count| count.diverged).sum()
+    }
+}
+
+/// The rules that a config brings into play, one for each thing compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Families {
+    /// Where agents start and want to go.
+    pub place: &'static str,
+    /// Who moves.
+    pub collide: &'static str,
+    /// What reaching a goal does.
+    pub goal: &'static str,
+    /// What agents see.
+    pub observe: &'static str,
+    /// What the occupancy grid shows.
+    pub occupancy: &'static str,
+    /// What sums the episode up.
+    pub metrics: &'static str,
+}
+
+/// The rules that a config brings into play.
+pub fn families_of(config: &GridConfig) -> Families {
+    let is_explicit =
+        config.agents_xy.as_ref().is_some_and(|starts| !starts.is_empty()) && config.targets_xy.is_some();
+    let has_pools = [&config.possible_agents_xy, &config.possible_targets_xy]
+        .into_iter()
+        .all(|pool| pool.as_ref().is_some_and(|cells| !cells.is_empty()));
+    let place = match (is_explicit, has_pools) {
+        (true, _) => "place/explicit",
+        (false, true) => "place/pools",
+        (false, false) => "place/pairs",
+    };
+    let collide = match config.collision_system {
+        Collision::Priority => "collide/priority",
+        Collision::BlockBoth => "collide/block-both",
+        Collision::Soft => "collide/soft",
+    };
+    let (goal, metrics) = match config.on_target {
+        OnGoal::Finish => ("goal/finish", "metrics/finish"),
+        OnGoal::Nothing => ("goal/nothing", "metrics/nothing"),
+        OnGoal::Restart => ("goal/restart", "metrics/restart"),
+    };
+    let observe = match config.observation_type {
+        Observation::Default => "observe/default",
+        Observation::Pomapf => "observe/pomapf",
+        Observation::Mapf => "observe/mapf",
+    };
+    let occupancy = match config.occupancy {
+        Occupancy::AsReleased => "occupancy/as-released",
+        Occupancy::Exact => "occupancy/exact",
+    };
+    Families { place, collide, goal, observe, occupancy, metrics }
+}

@@ -1,0 +1,114 @@
+//! Cells and actions: the two words everything else is said in.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// One cell of a map, counted from the top left corner of the map itself, without its border.
+///
+/// Shape: row first, then column, both 0-based.
+///
+/// Rule: grid/coordinates
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(from = "[u16; 2]", into = "[u16; 2]")]
+pub struct Cell {
+    /// Row, 0 at the top.
+    pub row: u16,
+    /// Column, 0 at the left.
+    pub col: u16,
+}
+
+impl Cell {
+    /// A cell from its row and column.
+    pub const fn new(row: u16, col: u16) -> Self {
+        Self { row, col }
+    }
+
+    /// The neighbour that `action` aims at, as signed (row, col), since it may lie outside the map.
+    ///
+    /// Rule: move/actions
+    pub fn toward(self, action: Action) -> (i32, i32) {
+        let (down, right) = action.delta();
+        (i32::from(self.row) + down, i32::from(self.col) + right)
+    }
+}
+
+impl From<[u16; 2]> for Cell {
+    fn from([row, col]: [u16; 2]) -> Self {
+        Self { row, col }
+    }
+}
+
+impl From<Cell> for [u16; 2] {
+    fn from(cell: Cell) -> Self {
+        [cell.row, cell.col]
+    }
+}
+
+impl std::fmt::Display for Cell {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "({}, {})", self.row, self.col)
+    }
+}
+
+/// What an agent wants to do in one step; the numbers are POGEMA's.
+///
+/// Rule: move/actions
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "i64", into = "u8")]
+#[repr(u8)]
+pub enum Action {
+    /// Wait in place.
+    #[default]
+    Stay = 0,
+    /// One row less.
+    Up = 1,
+    /// One row more.
+    Down = 2,
+    /// One column less.
+    Left = 3,
+    /// One column more.
+    Right = 4,
+}
+
+impl Action {
+    /// All actions in the order of their numbers.
+    pub const ALL: [Self; 5] = [Self::Stay, Self::Up, Self::Down, Self::Left, Self::Right];
+
+    /// The change of (row, col) this action aims at.
+    pub const fn delta(self) -> (i32, i32) {
+        match self {
+            Self::Stay => (0, 0),
+            Self::Up => (-1, 0),
+            Self::Down => (1, 0),
+            Self::Left => (0, -1),
+            Self::Right => (0, 1),
+        }
+    }
+
+    /// The action with a given number.
+    ///
+    /// # Errors
+    /// [`Error::Action`] unless the number is 0 to 4; POGEMA's list indexing would read `-1` as Right.
+    ///
+    /// Rule: move/invalid
+    pub fn from_number(agent: usize, number: i64) -> Result<Self, Error> {
+        let known = usize::try_from(number).ok().and_then(|at| Self::ALL.get(at));
+        known.copied().ok_or(Error::Action { agent: Some(agent), number })
+    }
+}
+
+impl TryFrom<i64> for Action {
+    type Error = Error;
+
+    fn try_from(number: i64) -> Result<Self, Error> {
+        let known = usize::try_from(number).ok().and_then(|at| Self::ALL.get(at));
+        known.copied().ok_or(Error::Action { agent: None, number })
+    }
+}
+
+impl From<Action> for u8 {
+    fn from(action: Action) -> Self {
+        action as Self
+    }
+}

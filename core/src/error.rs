@@ -1,0 +1,137 @@
+//! The one error type of the workspace.
+
+use crate::Cell;
+
+/// Everything that can be wrong with input, each told in one line.
+///
+/// An error leaves the state that it came from as it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A config field holds what it may not hold.
+    #[error("config: `{field}` is `{value}`, expected {expected}")]
+    Config {
+        /// The field, by the name the file gives it.
+        field: String,
+        /// The offending value.
+        value: String,
+        /// What would have been right.
+        expected: String,
+    },
+    /// A config could not be read at all.
+    #[error("config: {reason}")]
+    Syntax {
+        /// What the parser says, with its place.
+        reason: String,
+    },
+    /// A map text is wrong.
+    #[error("map: line {line}, column {column}: {reason}")]
+    Map {
+        /// Line of the map, counted from 1.
+        line: usize,
+        /// Column of the map, counted from 1.
+        column: usize,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// The instance as a whole cannot be played.
+    #[error("instance: {reason}")]
+    Instance {
+        /// What is wrong.
+        reason: String,
+    },
+    /// One agent of an instance cannot be played.
+    #[error("instance: agent {agent}: {reason}")]
+    Agent {
+        /// The agent's index.
+        agent: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A number that is no action.
+    #[error("action{} is `{number}`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)", of_agent(*.agent))]
+    Action {
+        /// The agent, where it is known.
+        agent: Option<usize>,
+        /// The number given.
+        number: i64,
+    },
+    /// A list or buffer has the wrong length.
+    #[error("{what} has length {got}, expected {want}")]
+    Length {
+        /// Which list or buffer.
+        what: &'static str,
+        /// The length that was needed.
+        want: usize,
+        /// The length that was given.
+        got: usize,
+    },
+    /// A call that the state does not allow, such as a step before the first reset.
+    #[error("{reason}")]
+    State {
+        /// What has to happen first.
+        reason: String,
+    },
+    /// A file could not be read or written.
+    #[error("{path}: {reason}")]
+    Io {
+        /// The file.
+        path: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// A trace that cannot be read.
+    #[error("trace: line {line}: {reason}")]
+    Trace {
+        /// Line of the trace, counted from 1.
+        line: usize,
+        /// What is wrong there.
+        reason: String,
+    },
+}
+
+fn of_agent(agent: Option<usize>) -> String {
+    agent.map(|index| format!(" of agent {index}")).unwrap_or_default()
+}
+
+impl Error {
+    /// An error about one config field.
+    pub fn config(field: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
+        Self::Config { field: field.into(), value: shorten(&value.to_string()), expected: expected.into() }
+    }
+
+    /// An error about an instance as a whole.
+    pub fn instance(reason: impl Into<String>) -> Self {
+        Self::Instance { reason: reason.into() }
+    }
+
+    /// An error about one agent of an instance.
+    pub fn agent(agent: usize, reason: impl Into<String>) -> Self {
+        Self::Agent { agent, reason: reason.into() }
+    }
+
+    /// An error about a cell that lies outside a map.
+    pub fn outside(agent: usize, what: &str, cell: Cell, height: usize, width: usize) -> Self {
+        Self::agent(agent, format!("{what} {cell} is outside the map of {height} rows and {width} columns"))
+    }
+
+    /// An error about a file.
+    pub fn io(path: impl AsRef<std::path::Path>, reason: impl std::fmt::Display) -> Self {
+        Self::Io { path: path.as_ref().display().to_string(), reason: reason.to_string() }
+    }
+
+    /// Passes if a list or buffer has the length it must have.
+    pub fn check_length(what: &'static str, want: usize, got: usize) -> Result<(), Self> {
+        if want == got { Ok(()) } else { Err(Self::Length { what, want, got }) }
+    }
+}
+
+/// Keeps a quoted value on one line of bearable length.
+fn shorten(value: &str) -> String {
+    const LONGEST: usize = 60;
+    let line = value.replace(['\n', '\r'], " ");
+    if line.chars().count() <= LONGEST {
+        return line;
+    }
+    line.chars().take(LONGEST).chain("…".chars()).collect()
+}

@@ -1,0 +1,71 @@
+//! An episode told by what changed for each agent, as POGEMA's persistent mode keeps it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Cell, Snapshot};
+
+/// The state of one agent from `step` on.
+///
+/// Rule: history/changes
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "(u16, u16, u16, u16, u64, bool)", into = "(u16, u16, u16, u16, u64, bool)")]
+pub struct Change {
+    /// Where the agent is.
+    pub cell: Cell,
+    /// Where it wants to go.
+    pub goal: Cell,
+    /// Units: steps since the reset.
+    pub step: u64,
+    /// Whether it takes part.
+    pub active: bool,
+}
+
+impl From<(u16, u16, u16, u16, u64, bool)> for Change {
+    fn from((row, col, goal_row, goal_col, step, active): (u16, u16, u16, u16, u64, bool)) -> Self {
+        Self { cell: Cell::new(row, col), goal: Cell::new(goal_row, goal_col), step, active }
+    }
+}
+
+impl From<Change> for (u16, u16, u16, u16, u64, bool) {
+    fn from(change: Change) -> Self {
+        let Change { cell, goal, step, active } = change;
+        (cell.row, cell.col, goal.row, goal.col, step, active)
+    }
+}
+
+/// For each agent its first state and each later one that differs from the one before.
+///
+/// Rule: history/changes
+///
+/// Source: POGEMA 1.4.0, `wrappers/persistence.py`, `PersistentWrapper`
+pub fn changes(past: &[Snapshot]) -> Vec<Vec<Change>> {
+    let num_agents = past.first().map_or(0, |snapshot| snapshot.cells.len());
+    let state = |snapshot: &Snapshot, agent: usize| Change {
+        cell: snapshot.cells[agent],
+        goal: snapshot.goals[agent],
+        step: snapshot.step,
+        active: snapshot.active[agent],
+    };
+    let of_agent = |agent: usize| {
+        let mut kept: Vec<Change> = Vec::new();
+        for snapshot in past {
+            let now = state(snapshot, agent);
+            if kept
+                .last()
+                .is_none_or(|last| (last.cell, last.goal, last.active) != (now.cell, now.goal, now.active))
+            {
+                kept.push(now);
+            }
+        }
+        kept
+    };
+    (0..num_agents).map(of_agent).collect()
+}
+
+/// The state that holds at each of the steps `0..=last_step`, from the changes of one agent.
+///
+/// Rule: history/changes
+pub fn states_at_every_step(changes: &[Change], last_step: u64) -> Vec<Change> {
+    let at = |step: u64| changes.iter().rev().find(|change| change.step <= step).copied();
+    (0..=last_step).filter_map(at).collect()
+}

@@ -1,0 +1,40 @@
+//! The words of pogema-rs: what every other crate speaks and none of the rules.
+//!
+//! An episode of POGEMA is a pure function of an [`Instance`] (map, starts, goals) and the agents' [`Action`]s.
+//! A [`Config`] fixes its rules and the shape of every array; an [`Environment`] plays it; a [`Trace`] is what
+//! happened, step by step; [`metrics`] sum it up. Engines draw no random numbers: where goals are drawn, the
+//! instance brings a [`GoalStream`].
+//!
+//! | module | what it holds |
+//! | --- | --- |
+//! | [`Cell`], [`Action`] | places and moves, row first |
+//! | [`Map`], [`Instance`], [`Outside`], [`GoalStream`] | what is played on |
+//! | [`Config`] | which rules are played by |
+//! | [`Environment`], [`StepOut`], [`Snapshot`] | what an engine offers |
+//! | [`Trace`] | a recorded episode, as JSON lines |
+//! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
+//! | [`picture`] | text pictures of a state |
+//! | [`Error`] | the one error type |
+
+mod cell;
+mod config;
+mod environment;
+mod error;
+mod goals;
+mod history;
+mod instance;
+mod map;
+pub mod metrics;
+pub mod picture;
+mod trace;
+
+pub use cell::{Action, Cell};
+pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
+pub use environment::{Environment, MapfOut, PomapfOut, Snapshot, StepOut};
+pub use error::Error;
+pub use goals::{GoalSource, GoalStream};
+pub use history::{Change, changes, states_at_every_step};
+pub use instance::{Instance, Outside};
+pub use map::{Map, check_row_length};
+pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics};
+pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};

@@ -1,0 +1,143 @@
+//! A map: which cells hold an obstacle.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Cell, Error};
+
+/// The obstacles of a rectangular map, without any border.
+///
+/// Shape: `[height, width]`, row-major.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Vec<String>", into = "Vec<String>")]
+pub struct Map {
+    height: usize,
+    width: usize,
+    obstacles: Vec<bool>,
+}
+
+impl Map {
+    /// Longest side of a map: what is left of 16 bits after the widest border on both sides.
+    pub const LONGEST_SIDE: usize = (u16::MAX as usize) - 2 * crate::Config::LARGEST_RADIUS;
+
+    /// A map from its obstacles in row-major order.
+    ///
+    /// # Errors
+    /// [`Error::Instance`] for an empty map, a side over [`Map::LONGEST_SIDE`] or a wrong number of cells.
+    pub fn new(height: usize, width: usize, obstacles: Vec<bool>) -> Result<Self, Error> {
+        if height == 0 || width == 0 {
+            return Err(Error::instance("the map has no cells"));
+        }
+        if height > Self::LONGEST_SIDE || width > Self::LONGEST_SIDE {
+            let longest = Self::LONGEST_SIDE;
+            return Err(Error::instance(format!(
+                "a map of {height} x {width} is over {longest} cells a side"
+            )));
+        }
+        Error::check_length("obstacles", height * width, obstacles.len())?;
+        Ok(Self { height, width, obstacles })
+    }
+
+    /// A map from lines of `.` (free) and `#` (obstacle).
+    ///
+    /// # Errors
+    /// [`Error::Map`] with line and column for any other character or a line of another length.
+    pub fn from_rows<S: AsRef<str>>(rows: &[S]) -> Result<Self, Error> {
+        let width = rows.first().map_or(0, |row| row.as_ref().chars().count());
+        let mut obstacles = Vec::with_capacity(rows.len() * width);
+        for (index, row) in rows.iter().enumerate() {
+            for (column, character) in row.as_ref().chars().enumerate() {
+                match character {
+                    '.' => obstacles.push(false),
+                    '#' => obstacles.push(true),
+                    other => {
+                        let reason = format!("`{other}` is not `.` or `#`");
+                        return Err(Error::Map { line: index + 1, column: column + 1, reason });
+                    }
+                }
+            }
+            check_row_length(index, row.as_ref().chars().count(), width)?;
+        }
+        Self::new(rows.len(), width, obstacles)
+    }
+
+    /// Number of rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// All cells in row-major order: true where there is an obstacle.
+    pub fn obstacles(&self) -> &[bool] {
+        &self.obstacles
+    }
+
+    /// Whether a cell lies on the map.
+    pub fn contains(&self, cell: Cell) -> bool {
+        usize::from(cell.row) < self.height && usize::from(cell.col) < self.width
+    }
+
+    /// Whether a cell holds an obstacle; everything off the map does.
+    pub fn is_obstacle(&self, cell: Cell) -> bool {
+        !self.contains(cell) || self.obstacles[self.index(cell)]
+    }
+
+    /// Takes the obstacle off a cell; says whether there was one.
+    pub fn clear(&mut self, cell: Cell) -> bool {
+        if !self.contains(cell) {
+            return false;
+        }
+        let index = self.index(cell);
+        std::mem::replace(&mut self.obstacles[index], false)
+    }
+
+    /// Number of free cells.
+    pub fn num_free(&self) -> usize {
+        self.obstacles.iter().filter(|&&obstacle| !obstacle).count()
+    }
+
+    /// The place of a cell in [`Map::obstacles`].
+    pub fn index(&self, cell: Cell) -> usize {
+        usize::from(cell.row) * self.width + usize::from(cell.col)
+    }
+
+    /// The cell at a place of [`Map::obstacles`].
+    pub fn cell_at(&self, index: usize) -> Cell {
+        Cell::new((index / self.width) as u16, (index % self.width) as u16)
+    }
+
+    /// The map as lines of `.` and `#`.
+    pub fn rows(&self) -> Vec<String> {
+        let line = |row: &[bool]| row.iter().map(|&obstacle| if obstacle { '#' } else { '.' }).collect();
+        self.obstacles.chunks(self.width).map(line).collect()
+    }
+}
+
+/// Passes if row `index` is as long as the first.
+///
+/// # Errors
+/// [`Error::Map`] at the end of the row.
+pub fn check_row_length(index: usize, length: usize, width: usize) -> Result<(), Error> {
+    if length == width {
+        return Ok(());
+    }
+    let reason = format!("the line has {length} cells, expected {width} as in line 1");
+    Err(Error::Map { line: index + 1, column: length.min(width) + 1, reason })
+}
+
+impl TryFrom<Vec<String>> for Map {
+    type Error = Error;
+
+    fn try_from(rows: Vec<String>) -> Result<Self, Error> {
+        Self::from_rows(&rows)
+    }
+}
+
+impl From<Map> for Vec<String> {
+    fn from(map: Map) -> Self {
+        map.rows()
+    }
+}

@@ -1,0 +1,152 @@
+//! The figures that sum an episode up, as accumulators fed step by step.
+//!
+//! They stand here and not in an engine because every engine's episodes are measured by the same formulas.
+
+mod collisions;
+mod density;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Config, OnGoal};
+
+pub use collisions::CollisionMeter;
+pub use density::{DensityMeter, pairwise_mean};
+
+/// The figures of one episode, under POGEMA's names; a figure that its mode does not have is absent.
+///
+/// Rule: metrics/finish, metrics/nothing, metrics/restart
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Metrics {
+    /// Share of agents that reached their goals.
+    #[serde(rename = "ISR", skip_serializing_if = "Option::is_none")]
+    pub isr: Option<f64>,
+    /// 1 if all agents reached their goals, else 0.
+    #[serde(rename = "CSR", skip_serializing_if = "Option::is_none")]
+    pub csr: Option<f64>,
+    /// Units: steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ep_length: Option<f64>,
+    /// Sum of costs. Units: steps.
+    #[serde(rename = "SoC", skip_serializing_if = "Option::is_none")]
+    pub soc: Option<f64>,
+    /// Units: steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub makespan: Option<f64>,
+    /// Units: goals per step, all agents together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub avg_throughput: Option<f64>,
+    /// Agents per free cell of a window.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub avg_agents_density: Option<f64>,
+    /// Moves that another agent prevented.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub a_collisions: Option<f64>,
+    /// Moves that an obstacle prevented.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub o_collisions: Option<f64>,
+}
+
+impl Metrics {
+    /// The figures that are there, by name.
+    pub fn named(&self) -> Vec<(&'static str, f64)> {
+        let all = [
+            ("ISR", self.isr),
+            ("CSR", self.csr),
+            ("ep_length", self.ep_length),
+            ("SoC", self.soc),
+            ("makespan", self.makespan),
+            ("avg_throughput", self.avg_throughput),
+            ("avg_agents_density", self.avg_agents_density),
+            ("a_collisions", self.a_collisions),
+            ("o_collisions", self.o_collisions),
+        ];
+        all.into_iter().filter_map(|(name, value)| value.map(|value| (name, value))).collect()
+    }
+}
+
+/// Counts goals and steps and gives the figures of the episode when it ends.
+///
+/// Rule: metrics/finish, metrics/nothing, metrics/restart
+///
+/// Source: POGEMA 1.4.0, `wrappers/metrics.py`
+#[derive(Clone, Debug)]
+pub struct EpisodeMeter {
+    on_goal_mode: OnGoal,
+    max_steps: i64,
+    step: u64,
+    num_reached: u64,
+    /// Units: steps, 0-based: when each agent came to its goal.
+    arrived: Vec<Option<u64>>,
+}
+
+impl EpisodeMeter {
+    /// A meter for episodes of this config.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            on_goal_mode: config.on_goal,
+            max_steps: config.max_steps,
+            step: 0,
+            num_reached: 0,
+            arrived: vec![None; config.num_agents],
+        }
+    }
+
+    /// Forgets an episode that was left early; POGEMA 1.4.0 would count it into the next one.
+    pub fn reset(&mut self) {
+        self.step = 0;
+        self.num_reached = 0;
+        self.arrived.fill(None);
+    }
+
+    /// Takes one step in; gives the figures if the episode ended with it.
+    pub fn feed(&mut self, on_goal: &[bool], terminated: &[bool], truncated: &[bool]) -> Option<Metrics> {
+        let finished = terminated.iter().all(|&ended| ended) || truncated.iter().all(|&cut| cut);
+        self.num_reached += on_goal.iter().filter(|&&reached| reached).count() as u64;
+        for (arrived, &reached) in self.arrived.iter_mut().zip(on_goal) {
+            if arrived.is_none() && (reached || finished) {
+                *arrived = Some(self.step);
+            }
+            // On the last step an agent that just left its goal keeps its earlier arrival.
+            if self.on_goal_mode == OnGoal::Nothing && !reached && !finished {
+                *arrived = None;
+            }
+        }
+        let metrics = finished.then(|| self.figures(on_goal));
+        self.step += 1;
+        if finished {
+            self.reset();
+        }
+        metrics
+    }
+
+    fn figures(&self, on_goal: &[bool]) -> Metrics {
+        let num_agents = self.arrived.len() as f64;
+        let num_steps = self.step as f64 + 1.0;
+        let arrived = || self.arrived.iter().copied().flatten();
+        match self.on_goal_mode {
+            OnGoal::Finish => Metrics {
+                isr: Some(self.num_reached as f64 / num_agents),
+                csr: Some(flag(self.num_reached == self.arrived.len() as u64)),
+                ep_length: Some(arrived().sum::<u64>() as f64 / num_agents + 1.0),
+                ..Metrics::default()
+            },
+            OnGoal::Nothing => Metrics {
+                isr: Some(on_goal.iter().filter(|&&reached| reached).count() as f64 / num_agents),
+                csr: Some(flag(on_goal.iter().all(|&reached| reached))),
+                ep_length: Some(num_steps),
+                soc: Some(arrived().sum::<u64>() as f64 + num_agents),
+                makespan: Some(arrived().max().unwrap_or(0) as f64 + 1.0),
+                ..Metrics::default()
+            },
+            OnGoal::Restart => Metrics {
+                avg_throughput: Some(self.num_reached as f64 / self.max_steps as f64),
+                ..Metrics::default()
+            },
+        }
+    }
+}
+
+fn flag(holds: bool) -> f64 {
+    if holds { 1.0 } else { 0.0 }
+}

@@ -1,0 +1,34 @@
+//! Moves that came to nothing.
+
+use crate::{Action, Cell, Map};
+
+/// Counts moves that an obstacle or another agent prevented.
+///
+/// Rule: metrics/collisions
+///
+/// Source: the paper's Coordination metric; POGEMA 1.4.0 itself counts no collisions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CollisionMeter {
+    /// Moves that an obstacle or the wall prevented.
+    pub with_obstacles: u64,
+    /// Moves onto a free cell that another agent prevented.
+    pub with_agents: u64,
+}
+
+impl CollisionMeter {
+    /// Takes one step in: where each agent was, whether it took part, what it wanted, where it is now.
+    pub fn feed(&mut self, map: &Map, before: &[Cell], active: &[bool], actions: &[Action], after: &[Cell]) {
+        for (agent, &action) in actions.iter().enumerate() {
+            if !active[agent] || action == Action::Stay || before[agent] != after[agent] {
+                continue;
+            }
+            let (row, col) = before[agent].toward(action);
+            let target = u16::try_from(row).and_then(|row| Ok(Cell::new(row, u16::try_from(col)?)));
+            if target.is_ok_and(|cell| !map.is_obstacle(cell)) {
+                self.with_agents += 1;
+            } else {
+                self.with_obstacles += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! How crowded agents find it.
+
+/// Averages the share of free window cells that hold an agent, over agents and then over time.
+///
+/// Rule: metrics/density
+///
+/// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `AgentsDensityWrapper`
+#[derive(Clone, Debug, Default)]
+pub struct DensityMeter {
+    means: Vec<f64>,
+}
+
+impl DensityMeter {
+    /// Begins an episode.
+    pub fn reset(&mut self) {
+        self.means.clear();
+    }
+
+    /// Takes one moment in (the one after the reset too): for each agent how many agents and how many free
+    /// cells its window holds.
+    pub fn feed(&mut self, windows: impl Iterator<Item = (u32, u32)>) {
+        let shares: Vec<f64> = windows.map(|(agents, free)| f64::from(agents) / f64::from(free)).collect();
+        self.means.push(pairwise_mean(&shares));
+    }
+
+    /// The average so far.
+    pub fn mean(&self) -> f64 {
+        pairwise_mean(&self.means)
+    }
+}
+
+/// The mean with NumPy's order of additions, on which the last bits of a sum depend.
+///
+/// Source: NumPy 1.26, `mean` of a contiguous float64 array
+pub fn pairwise_mean(values: &[f64]) -> f64 {
+    pairwise_sum(values) / values.len() as f64
+}
+
+fn pairwise_sum(values: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    const BLOCK: usize = 128;
+    if values.len() < LANES {
+        return values.iter().fold(0.0, |sum, value| sum + value);
+    }
+    if values.len() > BLOCK {
+        let half = values.len() / 2;
+        let (left, right) = values.split_at(half - half % LANES);
+        return pairwise_sum(left) + pairwise_sum(right);
+    }
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut lane = chunks[0];
+    for chunk in &chunks[1..] {
+        for (sum, value) in lane.iter_mut().zip(chunk) {
+            *sum += value;
+        }
+    }
+    let sum = ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]));
+    rest.iter().fold(sum, |sum, value| sum + value)
+}

@@ -1,0 +1,65 @@
+//! Text pictures of a state, for cases, reports and the terminal.
+
+use crate::{Cell, Map, Snapshot};
+
+/// The letter of an agent: `a` to `z`, then digits, then `?`.
+pub fn agent_letter(agent: usize) -> char {
+    const LETTERS: &[u8] = b"abcdefghijklmnopqrstuvwxyz0123456789";
+    LETTERS.get(agent).map_or('?', |&letter| letter as char)
+}
+
+/// What a picture shows on one cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// Nothing.
+    Free,
+    /// An obstacle.
+    Obstacle,
+    /// An active agent, by index.
+    Agent(usize),
+    /// The goal of an active agent, by index.
+    Goal(usize),
+}
+
+/// What each cell of the map shows, row by row; an agent hides a goal, a lower index a higher one.
+pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
+    let ground = |&obstacle: &bool| if obstacle { Mark::Obstacle } else { Mark::Free };
+    let mut marks: Vec<Mark> = map.obstacles().iter().map(ground).collect();
+    let mut put = |cells: &[Cell], mark: fn(usize) -> Mark| {
+        for (agent, &cell) in cells.iter().enumerate().rev() {
+            if snapshot.active[agent] && map.contains(cell) {
+                marks[map.index(cell)] = mark(agent);
+            }
+        }
+    };
+    put(&snapshot.goals, Mark::Goal);
+    put(&snapshot.cells, Mark::Agent);
+    marks
+}
+
+/// A picture of the agents: `.` free, `#` obstacle, `a` the agent 0, `A` its goal, and so on.
+pub fn picture(map: &Map, snapshot: &Snapshot) -> String {
+    let letter = |mark: &Mark| match *mark {
+        Mark::Free => '.',
+        Mark::Obstacle => '#',
+        Mark::Agent(agent) => agent_letter(agent),
+        Mark::Goal(agent) => agent_letter(agent).to_ascii_uppercase(),
+    };
+    lines(map, marks(map, snapshot).iter().map(letter))
+}
+
+/// A picture of the occupancy grid: `o` where it marks a cell.
+pub fn occupancy_picture(map: &Map, snapshot: &Snapshot) -> String {
+    let mut letters: Vec<char> = map.rows().concat().chars().collect();
+    for &cell in &snapshot.occupied {
+        if map.contains(cell) {
+            letters[map.index(cell)] = 'o';
+        }
+    }
+    lines(map, letters.into_iter())
+}
+
+fn lines(map: &Map, letters: impl Iterator<Item = char>) -> String {
+    let letters: Vec<char> = letters.collect();
+    letters.chunks(map.width()).map(|row| row.iter().collect::<String>()).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,251 @@
+//! A recorded episode: the common currency of tests, reports, drawings and replays.
+
+use std::io::{BufRead, Write};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
+
+/// The format this version reads and writes.
+const FORMAT: &str = "pogema-trace/1";
+/// The spec whose rules the trace follows.
+const SPEC: &str = "pogema-1.4.0/1";
+
+/// An episode as it went.
+///
+/// As a file it is JSON Lines: the header, the start, then one line per step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// What was played.
+    pub header: TraceHeader,
+    /// The state after the reset.
+    pub start: TraceStart,
+    /// What each step did.
+    pub steps: Vec<TraceStep>,
+}
+
+/// The first line of a trace: versions, rules and instance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceHeader {
+    format: String,
+    spec: String,
+    /// The rules and sizes.
+    pub config: Config,
+    /// The map without its border.
+    pub map: Map,
+    /// What lies beyond the wall.
+    #[serde(default)]
+    pub outside: Outside,
+    /// Where each agent starts.
+    pub starts: Vec<Cell>,
+    /// The goals of each agent, as many as the episode could use.
+    pub goals: Vec<Vec<Cell>>,
+}
+
+/// The second line of a trace: the state after the reset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceStart {
+    /// The state.
+    #[serde(flatten)]
+    pub state: Snapshot,
+    /// What the agents see, where it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observations: Option<Observed>,
+}
+
+/// A further line of a trace: one step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceStep {
+    /// What each agent wanted.
+    pub actions: Vec<Action>,
+    /// The state after the step.
+    #[serde(flatten)]
+    pub state: Snapshot,
+    /// The reward of each agent.
+    pub rewards: Vec<f32>,
+    /// Which agents have ended.
+    pub terminated: Vec<bool>,
+    /// Which agents were cut off.
+    pub truncated: Vec<bool>,
+    /// What the agents see, where it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observations: Option<Observed>,
+    /// The metrics, on steps that end an episode.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<Metrics>,
+}
+
+/// All observation arrays of one moment, losslessly: a window of zeros and ones is one string of hex digits,
+/// eight cells to two digits, the first cell in the highest bit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "type")]
+pub enum Observed {
+    /// Rule: observe/default
+    #[serde(rename = "default")]
+    Default {
+        /// NumPy's name of the element type.
+        dtype: String,
+        /// One string per agent, over `[3, side, side]`.
+        windows: Vec<String>,
+        /// What does not fit this form, in words.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        odd: Vec<String>,
+    },
+    /// Rule: observe/pomapf
+    #[serde(rename = "POMAPF")]
+    Pomapf(ObservedPomapf),
+    /// Rule: observe/mapf
+    #[serde(rename = "MAPF")]
+    Mapf(ObservedMapf),
+}
+
+/// The arrays of `POMAPF`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ObservedPomapf {
+    /// NumPy's name of the windows' element type.
+    pub dtype: String,
+    /// One string per agent, over `[side, side]`.
+    pub obstacles: Vec<String>,
+    /// One string per agent, over `[side, side]`.
+    pub agents: Vec<String>,
+    /// Cell minus start.
+    pub xy: Vec<[i32; 2]>,
+    /// Goal minus start.
+    pub target_xy: Vec<[i32; 2]>,
+    /// What does not fit this form, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub odd: Vec<String>,
+}
+
+/// The arrays of `MAPF`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ObservedMapf {
+    /// What it shares with `POMAPF`.
+    #[serde(flatten)]
+    pub pomapf: ObservedPomapf,
+    /// The map with its border; absent where it is as it was at the start.
+    pub global_obstacles: Option<Padded>,
+    /// Cells counted from the border's corner.
+    pub global_xy: Vec<[i32; 2]>,
+    /// Goals counted from the border's corner.
+    pub global_target_xy: Vec<[i32; 2]>,
+}
+
+/// A map with its border, and the element type POGEMA keeps it in.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Padded {
+    /// NumPy's name of the element type: `float64` around free cells, `int64` around noise.
+    pub dtype: String,
+    /// Lines of `.` and `#`.
+    pub rows: Vec<String>,
+}
+
+impl TraceHeader {
+    /// The header of an episode, with `num_goals` goals listed for each agent.
+    pub fn new(config: Config, instance: &Instance, num_goals: usize) -> Self {
+        Self {
+            format: FORMAT.into(),
+            spec: SPEC.into(),
+            config,
+            map: instance.map.clone(),
+            outside: instance.outside.clone(),
+            starts: instance.starts.clone(),
+            goals: instance.goals.iter().map(|stream| stream.list(num_goals.max(1))).collect(),
+        }
+    }
+
+    /// The instance to play the trace again; each list of goals goes round.
+    ///
+    /// # Errors
+    /// If the header describes no playable instance.
+    pub fn instance(&self) -> Result<Instance, Error> {
+        let mut streams = Vec::with_capacity(self.goals.len());
+        for (agent, goals) in self.goals.iter().enumerate() {
+            let first = *goals.first().ok_or_else(|| Error::agent(agent, "has no goal"))?;
+            streams.push(GoalStream::sequence(first, goals.clone().into()));
+        }
+        Instance::new(self.map.clone(), self.outside.clone(), self.starts.clone(), streams)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let wrong = |what: &str, got: &str, want: &str| Error::Trace {
+            line: 1,
+            reason: format!("the {what} is `{got}`, expected `{want}`"),
+        };
+        if self.format != FORMAT {
+            return Err(wrong("format", &self.format, FORMAT));
+        }
+        if self.spec != SPEC {
+            return Err(wrong("spec", &self.spec, SPEC));
+        }
+        self.config.check()?;
+        Error::check_length("starts", self.config.num_agents, self.starts.len())
+    }
+}
+
+impl Trace {
+    /// Reads a trace from JSON Lines.
+    ///
+    /// # Errors
+    /// [`Error::Trace`] with the line that is wrong.
+    pub fn read(input: impl BufRead) -> Result<Self, Error> {
+        let mut lines = input.lines().enumerate().map(|(index, line)| match line {
+            Ok(text) => Ok((index + 1, text)),
+            Err(error) => Err(Error::Trace { line: index + 1, reason: error.to_string() }),
+        });
+        let header: TraceHeader = parse_next(&mut lines, "the header")?;
+        header.check()?;
+        let start = parse_next(&mut lines, "the start")?;
+        let mut steps = Vec::new();
+        for line in lines {
+            let (number, text) = line?;
+            if !text.trim().is_empty() {
+                steps.push(parse(number, &text)?);
+            }
+        }
+        let trace = Self { header, start, steps };
+        trace.check_lengths()?;
+        Ok(trace)
+    }
+
+    /// Writes the trace as JSON Lines.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the writer fails.
+    pub fn write(&self, mut output: impl Write) -> Result<(), Error> {
+        write_line(&mut output, &self.header)?;
+        write_line(&mut output, &self.start)?;
+        self.steps.iter().try_for_each(|step| write_line(&mut output, step))
+    }
+
+    fn check_lengths(&self) -> Result<(), Error> {
+        let want = self.header.config.num_agents;
+        let states = std::iter::once(&self.start.state).chain(self.steps.iter().map(|step| &step.state));
+        for (index, state) in states.enumerate() {
+            let lengths = [state.cells.len(), state.goals.len(), state.active.len(), state.on_goal.len()];
+            if lengths.iter().any(|&length| length != want) {
+                let reason = format!("expected {want} agents in every list");
+                return Err(Error::Trace { line: index + 2, reason });
+            }
+        }
+        self.steps.iter().try_for_each(|step| Error::check_length("actions", want, step.actions.len()))
+    }
+}
+
+fn parse_next<T: serde::de::DeserializeOwned>(
+    lines: &mut impl Iterator<Item = Result<(usize, String), Error>>,
+    what: &str,
+) -> Result<T, Error> {
+    let missing = || Error::Trace { line: 1, reason: format!("the trace ends before {what}") };
+    let (number, text) = lines.next().ok_or_else(missing)??;
+    parse(number, &text)
+}
+
+fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, Error> {
+    serde_json::from_str(text).map_err(|error| Error::Trace { line, reason: error.to_string() })
+}
+
+fn write_line(output: &mut impl Write, value: &impl Serialize) -> Result<(), Error> {
+    let text = serde_json::to_string(value).map_err(|error| Error::io("trace", error))?;
+    writeln!(output, "{text}").map_err(|error| Error::io("trace", error))
+}

@@ -1,0 +1,37 @@
+//! What has to hold between the fields of a config.
+
+use pogema_core::{Cell, Error, OnGoal};
+
+use super::{GridConfig, Integration, Targets};
+
+impl GridConfig {
+    /// Rule: config/positions
+    pub(super) fn check_places(&self) -> Result<(), Error> {
+        self.check_inside("agents_xy", self.agents_xy.iter().flatten())?;
+        match &self.targets_xy {
+            Some(Targets::Single(goals)) => self.check_inside("targets_xy", goals)?,
+            Some(Targets::Sequences(all)) => self.check_inside("targets_xy", all.iter().flatten())?,
+            None => {}
+        }
+        if self.on_target == OnGoal::Restart && matches!(self.targets_xy, Some(Targets::Single(_))) {
+            let expected = "goal sequences such as [[[0, 0], [1, 1]]] with on_target `restart`";
+            return Err(Error::config("targets_xy", "one goal per agent", expected));
+        }
+        if self.auto_reset == Some(true) && self.integration != Some(Integration::SampleFactory) {
+            return Err(Error::config("auto_reset", true, "the integration `SampleFactory`"));
+        }
+        Ok(())
+    }
+
+    fn check_inside<'a>(&self, field: &str, cells: impl IntoIterator<Item = &'a Cell>) -> Result<(), Error> {
+        let (height, width) = (self.height, self.width);
+        let inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
+        match cells.into_iter().find(|cell| !inside(cell)) {
+            Some(cell) => {
+                let expected = format!("cells inside the map of {height} rows and {width} columns");
+                Err(Error::config(field, cell, expected))
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! One field of a config at a time: its type, its range, and the error if it has neither.
+
+use std::ops::RangeInclusive;
+
+use pogema_core::{Cell, Error};
+use serde_json::{Map as Object, Value};
+
+/// Every key a config may have, POGEMA's first, ours last.
+pub const FIELDS: [&str; 27] = [
+    "MOVES",
+    "FREE",
+    "OBSTACLE",
+    "empty_outside",
+    "on_target",
+    "seed",
+    "width",
+    "height",
+    "size",
+    "density",
+    "obs_radius",
+    "agents_xy",
+    "targets_xy",
+    "num_agents",
+    "possible_agents_xy",
+    "possible_targets_xy",
+    "collision_system",
+    "persistent",
+    "observation_type",
+    "map",
+    "map_name",
+    "integration",
+    "max_episode_steps",
+    "auto_reset",
+    "occupancy",
+    "reward",
+    "limits",
+];
+
+/// The known word that is most like the one given.
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let likeness = |other: &str| strsim::jaro_winkler(&word.to_lowercase(), &other.to_lowercase());
+    known.into_iter().max_by(|one, other| likeness(one).total_cmp(&likeness(other)))
+}
+
+/// The fields of a config as they stand in the file.
+pub(super) struct Fields<'a>(&'a Object<String, Value>);
+
+impl<'a> Fields<'a> {
+    /// Takes the fields of a file in, if all of them are known.
+    pub fn new(object: &'a Object<String, Value>) -> Result<Self, Error> {
+        if let Some(key) = object.keys().find(|key| !FIELDS.contains(&key.as_str())) {
+            let hint = nearest(key, FIELDS).unwrap_or_default();
+            return Err(Error::Syntax {
+                reason: format!("unknown field `{key}`, the nearest known one is `{hint}`"),
+            });
+        }
+        Ok(Self(object))
+    }
+
+    /// The value of a field, unless it is absent or null.
+    pub fn optional(&self, field: &str) -> Option<&'a Value> {
+        self.0.get(field).filter(|value| !value.is_null())
+    }
+
+    /// The value of a field that may be absent but not null.
+    pub fn required(&self, field: &str, expected: &str) -> Result<Option<&'a Value>, Error> {
+        match self.0.get(field) {
+            Some(Value::Null) => Err(Error::config(field, "null", expected)),
+            value => Ok(value),
+        }
+    }
+
+    /// A whole number in a range, where null stands for absent.
+    pub fn optional_integer(&self, field: &str, range: RangeInclusive<i64>) -> Result<Option<i64>, Error> {
+        self.optional(field).map(|value| integer(field, value, &range)).transpose()
+    }
+
+    /// A whole number in a range.
+    pub fn integer(&self, field: &str, range: RangeInclusive<i64>, default: i64) -> Result<i64, Error> {
+        let value = self.required(field, &whole_number_in(&range))?;
+        value.map_or(Ok(default), |value| integer(field, value, &range))
+    }
+
+    /// A number in a range.
+    pub fn number(&self, field: &str, range: RangeInclusive<f64>, default: f64) -> Result<f64, Error> {
+        let expected = format!("a number from {} to {}", range.start(), range.end());
+        let Some(value) = self.required(field, &expected)? else { return Ok(default) };
+        let number = value.as_f64().filter(|number| range.contains(number));
+        number.ok_or_else(|| Error::config(field, value, expected))
+    }
+
+    /// True or false, where null stands for absent.
+    pub fn optional_flag(&self, field: &str) -> Result<Option<bool>, Error> {
+        self.optional(field).map(|value| flag(field, value)).transpose()
+    }
+
+    /// True or false.
+    pub fn flag(&self, field: &str, default: bool) -> Result<bool, Error> {
+        self.required(field, "true or false")?.map_or(Ok(default), |value| flag(field, value))
+    }
+
+    /// One of a few words, where null stands for absent.
+    pub fn optional_choice<T: Copy>(&self, field: &str, words: &[(&str, T)]) -> Result<Option<T>, Error> {
+        self.optional(field).map(|value| choice(field, value, words)).transpose()
+    }
+
+    /// One of a few words; the first one by default.
+    pub fn choice<T: Copy>(&self, field: &str, words: &[(&str, T)]) -> Result<T, Error> {
+        let value = self.required(field, &one_of(words))?;
+        value.map_or(Ok(words[0].1), |value| choice(field, value, words))
+    }
+
+    /// A text, where null stands for absent.
+    pub fn text(&self, field: &str) -> Result<Option<&'a str>, Error> {
+        let Some(value) = self.optional(field) else { return Ok(None) };
+        value.as_str().map(Some).ok_or_else(|| Error::config(field, value, "a text"))
+    }
+
+    /// A list of cells, where null stands for absent.
+    pub fn cells(&self, field: &str) -> Result<Option<Vec<Cell>>, Error> {
+        self.optional(field).map(|value| cells(field, value)).transpose()
+    }
+}
+
+fn whole_number_in(range: &RangeInclusive<i64>) -> String {
+    if *range == (i64::MIN..=i64::MAX) {
+        return "a whole number of 64 bits".into();
+    }
+    format!("a whole number from {} to {}", range.start(), range.end())
+}
+
+fn integer(field: &str, value: &Value, range: &RangeInclusive<i64>) -> Result<i64, Error> {
+    let number = value.as_i64().filter(|number| range.contains(number));
+    number.ok_or_else(|| Error::config(field, value, whole_number_in(range)))
+}
+
+fn flag(field: &str, value: &Value) -> Result<bool, Error> {
+    value.as_bool().ok_or_else(|| Error::config(field, value, "true or false"))
+}
+
+fn one_of<T>(words: &[(&str, T)]) -> String {
+    let quoted: Vec<String> = words.iter().map(|(word, _)| format!("`{word}`")).collect();
+    format!("one of {}", quoted.join(", "))
+}
+
+fn choice<T: Copy>(field: &str, value: &Value, words: &[(&str, T)]) -> Result<T, Error> {
+    let chosen = value.as_str().and_then(|word| words.iter().find(|(known, _)| *known == word));
+    chosen.map(|(_, meaning)| *meaning).ok_or_else(|| Error::config(field, value, one_of(words)))
+}
+
+/// A list of `[row, col]` pairs.
+pub(super) fn cells(field: &str, value: &Value) -> Result<Vec<Cell>, Error> {
+    let list = value.as_array().ok_or_else(|| Error::config(field, value, "a list of [row, col] pairs"))?;
+    list.iter().map(|pair| cell(field, pair)).collect()
+}
+
+fn cell(field: &str, value: &Value) -> Result<Cell, Error> {
+    let coordinate = |at: usize| value.get(at)?.as_i64().and_then(|number| u16::try_from(number).ok());
+    let pair =
+        value.as_array().filter(|pair| pair.len() == 2).and_then(|_| Some((coordinate(0)?, coordinate(1)?)));
+    let (row, col) = pair.ok_or_else(|| {
+        Error::config(field, value, format!("a pair [row, col] of whole numbers from 0 to {}", u16::MAX))
+    })?;
+    Ok(Cell::new(row, col))
+}

@@ -1,0 +1,233 @@
+//! From YAML or JSON to a config.
+
+use pogema_core::{Cell, Collision, Error, Map, Observation, Occupancy, OnGoal, Reward};
+use serde_json::{Value, json};
+
+use super::fields::{Fields, cells};
+use super::{GridConfig, Integration, Limits, Targets};
+use crate::text::{MapText, parse_map_text};
+
+/// Largest side and number of agents that POGEMA 1.4.0 accepts.
+const RELEASED_SIDE: i64 = 4096;
+const RELEASED_AGENTS: i64 = 10_000_000;
+
+impl GridConfig {
+    /// Reads a config from YAML.
+    ///
+    /// # Errors
+    /// One line that names the field, its value and what was expected.
+    ///
+    /// Rule: config/fields
+    pub fn from_yaml(text: &str) -> Result<Self, Error> {
+        if text.trim().is_empty() {
+            return Ok(Self::default());
+        }
+        let value: Value = serde_saphyr::from_str(text).map_err(|error| syntax(&error))?;
+        Self::from_value(&value)
+    }
+
+    /// Reads a config from JSON.
+    ///
+    /// # Errors
+    /// One line that names the field, its value and what was expected.
+    ///
+    /// Rule: config/fields
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        let value: Value = serde_json::from_str(text).map_err(|error| syntax(&error))?;
+        Self::from_value(&value)
+    }
+
+    /// Reads a config from an already parsed object.
+    ///
+    /// # Errors
+    /// One line that names the field, its value and what was expected.
+    ///
+    /// Rule: config/fields
+    pub fn from_value(value: &Value) -> Result<Self, Error> {
+        let object = value
+            .as_object()
+            .ok_or_else(|| Error::Syntax { reason: "expected an object of fields and values".into() })?;
+        let fields = Fields::new(object)?;
+        check_constants(&fields)?;
+        let limits = fields
+            .choice("limits", &[("as_released", Limits::AsReleased), ("extended", Limits::Extended)])?;
+        let on_target = fields.choice(
+            "on_target",
+            &[("finish", OnGoal::Finish), ("nothing", OnGoal::Nothing), ("restart", OnGoal::Restart)],
+        )?;
+        let mut config = Self { on_target, limits, ..Self::default() };
+        config.read_sizes(&fields)?;
+        config.read_places(&fields)?;
+        config.read_rules(&fields)?;
+        config.read_map(&fields)?;
+        config.check_places()?;
+        Ok(config)
+    }
+
+    /// Rule: config/size
+    fn read_sizes(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
+        let (longest, agents) = match self.limits {
+            Limits::AsReleased => (RELEASED_SIDE, RELEASED_AGENTS),
+            Limits::Extended => (Map::LONGEST_SIDE as i64, i64::from(u32::MAX)),
+        };
+        self.seed = fields.optional_integer("seed", 0..=i64::MAX - 1)?.map(|seed| seed as u64);
+        let size = fields.integer("size", 2..=longest, 8)? as usize;
+        let width = fields.optional_integer("width", 1..=longest)?;
+        let height = fields.optional_integer("height", 1..=longest)?;
+        (self.width, self.height) = match (width, height) {
+            (Some(width), Some(height)) => (width as usize, height as usize),
+            (None, None) => (size, size),
+            (Some(width), None) => return Err(Error::config("width", width, "a height to go with it")),
+            (None, Some(height)) => return Err(Error::config("height", height, "a width to go with it")),
+        };
+        self.size = self.width.max(self.height);
+        self.density = fields.number("density", 0.0..=1.0, 0.3)?;
+        self.obs_radius = fields.integer("obs_radius", 1..=128, 5)? as usize;
+        self.agents_xy = fields.cells("agents_xy")?;
+        let default = self.agents_xy.as_ref().map_or(1, |starts| starts.len().max(1));
+        self.num_agents =
+            fields.optional_integer("num_agents", 1..=agents)?.map_or(default, |num| num as usize);
+        Ok(())
+    }
+
+    /// Rule: config/positions
+    fn read_places(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
+        self.targets_xy = fields.optional("targets_xy").map(read_targets).transpose()?;
+        self.possible_agents_xy = fields.cells("possible_agents_xy")?;
+        self.possible_targets_xy = fields.cells("possible_targets_xy")?;
+        Ok(())
+    }
+
+    fn read_rules(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
+        let released = [("as_released", Occupancy::AsReleased), ("exact", Occupancy::Exact)];
+        let frameworks = [
+            ("SampleFactory", Integration::SampleFactory),
+            ("PyMARL", Integration::PyMarl),
+            ("rllib", Integration::Rllib),
+            ("gymnasium", Integration::Gymnasium),
+            ("PettingZoo", Integration::PettingZoo),
+        ];
+        self.collision_system = fields.choice(
+            "collision_system",
+            &[
+                ("priority", Collision::Priority),
+                ("block_both", Collision::BlockBoth),
+                ("soft", Collision::Soft),
+            ],
+        )?;
+        self.observation_type = fields.choice(
+            "observation_type",
+            &[
+                ("default", Observation::Default),
+                ("POMAPF", Observation::Pomapf),
+                ("MAPF", Observation::Mapf),
+            ],
+        )?;
+        self.max_episode_steps = fields.integer("max_episode_steps", i64::MIN..=i64::MAX, 64)?;
+        self.persistent = fields.flag("persistent", false)?;
+        self.empty_outside = fields.flag("empty_outside", true)?;
+        self.map_name = fields.text("map_name")?.map(str::to_owned);
+        self.integration = fields.optional_choice("integration", &frameworks)?;
+        self.auto_reset = fields.optional_flag("auto_reset")?;
+        self.occupancy = fields.choice("occupancy", &released)?;
+        self.reward = fields.choice("reward", &[("own", Reward::Own), ("shared", Reward::Shared)])?;
+        Ok(())
+    }
+
+    /// Rule: config/map, config/letters
+    fn read_map(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
+        let map = match fields.optional("map") {
+            None => return Ok(()),
+            Some(Value::String(text)) => self.take_map_text(parse_map_text(text)?)?,
+            Some(Value::Array(rows)) => map_from_rows(rows)?,
+            Some(other) => return Err(Error::config("map", other, "a text or a list of rows")),
+        };
+        (self.width, self.height) = (map.width(), map.height());
+        self.size = self.width.max(self.height);
+        let num_cells = map.width() * map.height();
+        self.density = (num_cells - map.num_free()) as f64 / num_cells as f64;
+        self.map = Some(map);
+        Ok(())
+    }
+
+    /// Rule: config/letters, grid/pools
+    fn take_map_text(&mut self, text: MapText) -> Result<Map, Error> {
+        let both_given = self.agents_xy.is_some() && self.targets_xy.is_some();
+        if !text.starts.is_empty() {
+            let twice = "starts and goals either in the map or in agents_xy and targets_xy";
+            if both_given {
+                return Err(Error::config("map", "letters", twice));
+            }
+            self.num_agents = text.starts.len();
+            self.agents_xy = Some(text.starts);
+            self.targets_xy = Some(Targets::Single(text.goals));
+        } else if let (false, Some((starts, goals))) = (both_given, text.pools)
+            && !starts.is_empty()
+            && !goals.is_empty()
+        {
+            self.possible_agents_xy = Some(starts);
+            self.possible_targets_xy = Some(goals);
+        }
+        Ok(text.map)
+    }
+}
+
+fn syntax(error: &dyn std::fmt::Display) -> Error {
+    let text = error.to_string();
+    let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("unreadable").to_owned();
+    Error::Syntax { reason: line }
+}
+
+/// POGEMA lets a config redefine these; we accept only what every rule is written for.
+///
+/// Rule: config/constants
+fn check_constants(fields: &Fields<'_>) -> Result<(), Error> {
+    let moves = json!([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]);
+    for (field, constant) in [("MOVES", moves), ("FREE", json!(0)), ("OBSTACLE", json!(1))] {
+        let value = fields.required(field, &constant.to_string())?;
+        if let Some(other) = value.filter(|value| **value != constant) {
+            return Err(Error::config(field, other, constant.to_string()));
+        }
+    }
+    Ok(())
+}
+
+fn read_targets(value: &Value) -> Result<Targets, Error> {
+    let expected = "a list of [row, col] goals, or of lists of at least two such goals";
+    let list = value.as_array().filter(|list| !list.is_empty());
+    let list = list.ok_or_else(|| Error::config("targets_xy", value, expected))?;
+    let is_sequence = |value: &Value| value.get(0).is_some_and(Value::is_array);
+    if !is_sequence(&list[0]) {
+        return Ok(Targets::Single(cells("targets_xy", value)?));
+    }
+    let sequence = |value: &Value| -> Result<Vec<Cell>, Error> {
+        let goals = cells("targets_xy", value)?;
+        if goals.len() < 2 {
+            return Err(Error::config("targets_xy", value, "at least two goals in the sequence of an agent"));
+        }
+        Ok(goals)
+    };
+    Ok(Targets::Sequences(list.iter().map(sequence).collect::<Result<_, _>>()?))
+}
+
+/// Rule: config/map
+fn map_from_rows(rows: &[Value]) -> Result<Map, Error> {
+    let mut obstacles = Vec::new();
+    let mut width = 0;
+    for (index, row) in rows.iter().enumerate() {
+        let list = row.as_array().ok_or_else(|| Error::config("map", row, "a row as a list of 0 and 1"))?;
+        width = if index == 0 { list.len() } else { width };
+        pogema_core::check_row_length(index, list.len(), width)?;
+        for (column, value) in list.iter().enumerate() {
+            match value.as_i64() {
+                Some(0) => obstacles.push(false),
+                Some(1) => obstacles.push(true),
+                _ => {
+                    let reason = format!("`{value}` is not 0 (free) or 1 (obstacle)");
+                    return Err(Error::Map { line: index + 1, column: column + 1, reason });
+                }
+            }
+        }
+    }
+    Map::new(rows.len(), width, obstacles)
+}

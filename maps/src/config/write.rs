@@ -1,0 +1,78 @@
+//! From a config back to the object that POGEMA would read.
+
+use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward};
+use serde_json::{Value, json};
+
+use super::{GridConfig, Integration, Limits, Targets};
+
+impl GridConfig {
+    /// The config as an object under POGEMA's names, everything derived written out.
+    pub fn to_value(&self) -> Value {
+        json!({
+            "on_target": match self.on_target {
+                OnGoal::Finish => "finish",
+                OnGoal::Nothing => "nothing",
+                OnGoal::Restart => "restart",
+            },
+            "seed": self.seed,
+            "width": self.width,
+            "height": self.height,
+            "density": self.density,
+            "obs_radius": self.obs_radius,
+            "agents_xy": self.agents_xy,
+            "targets_xy": self.targets_xy.as_ref().map(targets),
+            "num_agents": self.num_agents,
+            "possible_agents_xy": self.possible_agents_xy,
+            "possible_targets_xy": self.possible_targets_xy,
+            "collision_system": match self.collision_system {
+                Collision::Priority => "priority",
+                Collision::BlockBoth => "block_both",
+                Collision::Soft => "soft",
+            },
+            "persistent": self.persistent,
+            "observation_type": match self.observation_type {
+                Observation::Default => "default",
+                Observation::Pomapf => "POMAPF",
+                Observation::Mapf => "MAPF",
+            },
+            "map": self.map.as_ref().map(rows_of_numbers),
+            "map_name": self.map_name,
+            "integration": self.integration.map(|framework| match framework {
+                Integration::SampleFactory => "SampleFactory",
+                Integration::PyMarl => "PyMARL",
+                Integration::Rllib => "rllib",
+                Integration::Gymnasium => "gymnasium",
+                Integration::PettingZoo => "PettingZoo",
+            }),
+            "max_episode_steps": self.max_episode_steps,
+            "auto_reset": self.auto_reset,
+            "empty_outside": self.empty_outside,
+            "occupancy": match self.occupancy {
+                Occupancy::AsReleased => "as_released",
+                Occupancy::Exact => "exact",
+            },
+            "reward": match self.reward {
+                Reward::Own => "own",
+                Reward::Shared => "shared",
+            },
+            "limits": match self.limits {
+                Limits::AsReleased => "as_released",
+                Limits::Extended => "extended",
+            },
+        })
+    }
+}
+
+fn targets(targets: &Targets) -> Value {
+    match targets {
+        Targets::Single(goals) => json!(goals),
+        Targets::Sequences(sequences) => json!(sequences),
+    }
+}
+
+fn rows_of_numbers(map: &pogema_core::Map) -> Value {
+    let number = |&obstacle: &bool| u8::from(obstacle);
+    let rows: Vec<Vec<u8>> =
+        map.obstacles().chunks(map.width()).map(|row| row.iter().map(number).collect()).collect();
+    json!(rows)
+}

@@ -1,0 +1,28 @@
+//! From a config and a seed to an instance, bit for bit as POGEMA 1.4.0 makes it.
+//!
+//! [`GridConfig`] is POGEMA's config file. [`InstanceSource`] turns it into one [`pogema_core::Instance`] per
+//! reset, drawing the same random numbers as POGEMA does through NumPy ([`numpy`]).
+//!
+//! ```
+//! use pogema_maps::{GridConfig, InstanceSource};
+//!
+//! let config = GridConfig::from_yaml("{size: 8, num_agents: 2, seed: 0}")?;
+//! let mut source = InstanceSource::new(config, None)?;
+//! let instance = source.generate()?.instance;
+//! assert_eq!(instance.starts[0], pogema_core::Cell::new(0, 2));
+//! # Ok::<(), pogema_core::Error>(())
+//! ```
+
+mod components;
+mod config;
+pub mod numpy;
+mod place;
+mod source;
+mod streams;
+mod text;
+
+pub use components::{ComponentCells, Components};
+pub use config::{FIELDS, GridConfig, Integration, Limits, Targets, nearest};
+pub use place::{capacity, place_at_random};
+pub use source::{Generated, InstanceSource};
+pub use text::{MapText, parse_map_text};

@@ -1,0 +1,72 @@
+//! What NumPy raises for.
+
+use std::error::Error;
+use std::fmt;
+
+/// Why numbers cannot be drawn; the generator is left as it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum NumpyError {
+    /// No integer lies in the half-open range.
+    EmptyRange {
+        /// The lower end.
+        lo: i64,
+        /// The upper end, which does not belong to the range.
+        hi: i64,
+    },
+    /// The ends of a range of doubles are in the wrong order, not numbers, or too far apart.
+    BadRange {
+        /// The lower end.
+        lo: f64,
+        /// The upper end.
+        hi: f64,
+    },
+    /// There is nothing to choose from.
+    EmptyChoice,
+    /// A weight is negative or not a number.
+    BadWeight {
+        /// The weight's index.
+        index: usize,
+        /// The weight.
+        weight: f64,
+    },
+    /// The weights do not sum to one.
+    BadWeightSum {
+        /// What they sum to.
+        sum: f64,
+    },
+    /// A probability is below zero, above one or not a number.
+    BadProbability {
+        /// The probability.
+        p: f64,
+    },
+    /// The operating system gave no entropy.
+    NoEntropy(getrandom::Error),
+}
+
+impl fmt::Display for NumpyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EmptyRange { lo, hi } => write!(f, "no integer is at least `{lo}` and below `{hi}`"),
+            Self::BadRange { lo, hi } => {
+                write!(f, "range from `{lo}` to `{hi}`, expected ends in order and a finite width")
+            }
+            Self::EmptyChoice => write!(f, "cannot choose from `0` items"),
+            Self::BadWeight { index, weight } => {
+                write!(f, "weight `{weight}` at index `{index}`, expected 0 or more")
+            }
+            Self::BadWeightSum { sum } => write!(f, "weights sum to `{sum}`, expected 1"),
+            Self::BadProbability { p } => write!(f, "probability is `{p}`, expected 0 to 1"),
+            Self::NoEntropy(reason) => write!(f, "no entropy from the operating system: `{reason}`"),
+        }
+    }
+}
+
+impl Error for NumpyError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::NoEntropy(reason) => Some(reason),
+            _ => None,
+        }
+    }
+}

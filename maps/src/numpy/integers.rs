@@ -1,0 +1,106 @@
+//! Integers from a range, by multiply-shift with rejection.
+
+use super::{Generator, NumpyError};
+
+impl Generator {
+    /// An integer of at least `lo` and below `hi`.
+    ///
+    /// A single possible integer is returned without a draw; up to 2³² of them take 32-bit draws, more take
+    /// 64-bit draws.
+    ///
+    /// # Errors
+    /// [`NumpyError::EmptyRange`] if `hi` is not above `lo`.
+    ///
+    /// Source: NumPy 1.26, `Generator.integers` with dtype `int64`.
+    #[inline]
+    pub fn integers(&mut self, lo: i64, hi: i64) -> Result<i64, NumpyError> {
+        if hi <= lo {
+            return Err(NumpyError::EmptyRange { lo, hi });
+        }
+        let largest = lo.abs_diff(hi) - 1;
+        Ok(lo.wrapping_add_unsigned(self.up_to(largest)))
+    }
+
+    /// The same as `n` calls of [`Generator::integers`]; of no integers, any range will do.
+    ///
+    /// # Errors
+    /// [`NumpyError::EmptyRange`] if `hi` is not above `lo` and `n` is not 0.
+    ///
+    /// Source: NumPy 1.26, `Generator.integers` with `size=n`.
+    pub fn integers_array(&mut self, lo: i64, hi: i64, n: usize) -> Result<Vec<i64>, NumpyError> {
+        (0..n).map(|_| self.integers(lo, hi)).collect()
+    }
+
+    /// An integer from 0 to `largest`, both included.
+    #[inline]
+    pub(super) fn up_to(&mut self, largest: u64) -> u64 {
+        match u32::try_from(largest) {
+            Ok(0) => 0,
+            Ok(u32::MAX) => self.next_u32().into(),
+            Ok(largest) => self.up_to_by_32_bits(largest).into(),
+            Err(_) if largest == u64::MAX => self.next_u64(),
+            Err(_) => self.up_to_by_64_bits(largest),
+        }
+    }
+
+    /// The upper half of `draw * count`; the lower half tells which draws would favour some results.
+    #[inline]
+    fn up_to_by_32_bits(&mut self, largest: u32) -> u32 {
+        let count = largest + 1;
+        let mut product = u64::from(self.next_u32()) * u64::from(count);
+        // The division is slow, and without it most draws are already known to be fair.
+        if (product as u32) < count {
+            let unfair = (u32::MAX - largest) % count;
+            while (product as u32) < unfair {
+                product = u64::from(self.next_u32()) * u64::from(count);
+            }
+        }
+        (product >> 32) as u32
+    }
+
+    #[inline]
+    fn up_to_by_64_bits(&mut self, largest: u64) -> u64 {
+        let count = largest + 1;
+        let mut product = u128::from(self.next_u64()) * u128::from(count);
+        if (product as u64) < count {
+            let unfair = (u64::MAX - largest) % count;
+            while (product as u64) < unfair {
+                product = u128::from(self.next_u64()) * u128::from(count);
+            }
+        }
+        (product >> 64) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_integer_is_not_drawn() {
+        let mut generator = Generator::seeded(5);
+        let before = generator.clone();
+        assert_eq!(generator.integers(i64::MAX - 1, i64::MAX), Ok(i64::MAX - 1));
+        assert_eq!(generator.integers(-3, -2), Ok(-3));
+        assert_eq!(generator, before);
+    }
+
+    #[test]
+    fn an_empty_range_is_refused_but_no_integers_of_it_are_not() {
+        let mut generator = Generator::seeded(5);
+        let before = generator.clone();
+        assert_eq!(generator.integers(2, 2), Err(NumpyError::EmptyRange { lo: 2, hi: 2 }));
+        assert_eq!(generator.integers_array(2, 1, 3), Err(NumpyError::EmptyRange { lo: 2, hi: 1 }));
+        assert_eq!(generator.integers_array(2, 1, 0), Ok(vec![]));
+        assert_eq!(generator, before);
+    }
+
+    #[test]
+    fn whole_ranges_are_plain_draws() {
+        let mut generator = Generator::seeded(5);
+        let mut plain = generator.clone();
+        assert_eq!(generator.up_to(u64::from(u32::MAX)), u64::from(plain.next_u32()));
+        assert_eq!(generator.up_to(u64::MAX), plain.next_u64());
+        assert_eq!(generator, plain);
+    }
+}

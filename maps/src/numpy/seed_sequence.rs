@@ -1,0 +1,144 @@
+//! From a seed of any size to the state of a generator.
+
+use super::NumpyError;
+
+const POOL_WORDS: usize = 4;
+
+const MIX_LEFT: u32 = 0xCA01_F9DD;
+const MIX_RIGHT: u32 = 0x4973_F715;
+
+/// Spreads a seed's bits over a pool, from which generators take their first state.
+///
+/// Only sequences without a spawn key are made; POGEMA never spawns.
+///
+/// Source: NumPy 1.26, `SeedSequence`, pool of four words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SeedSequence {
+    pool: [u32; POOL_WORDS],
+}
+
+impl SeedSequence {
+    /// The sequence of a seed that fits 64 bits.
+    pub fn from_u64(seed: u64) -> Self {
+        Self::from_words(&[seed as u32, (seed >> 32) as u32])
+    }
+
+    /// The sequence of a seed of any size, given in 32-bit words, lowest first.
+    ///
+    /// The words are taken as they are, as NumPy takes an array of `uint32`. To stand for one integer they must
+    /// not end in a zero word if there are more than four of them. No words at all stand for the seed 0.
+    pub fn from_words(words: &[u32]) -> Self {
+        let mut hash = Hash::absorbing();
+        let mut pool = [0; POOL_WORDS];
+        for (index, slot) in pool.iter_mut().enumerate() {
+            *slot = hash.next(words.get(index).copied().unwrap_or(0));
+        }
+        // Every slot reaches every other one, so that the last words affect the first.
+        for source in 0..POOL_WORDS {
+            for target in (0..POOL_WORDS).filter(|&target| target != source) {
+                pool[target] = mix(pool[target], hash.next(pool[source]));
+            }
+        }
+        for &word in words.iter().skip(POOL_WORDS) {
+            for slot in &mut pool {
+                *slot = mix(*slot, hash.next(word));
+            }
+        }
+        Self { pool }
+    }
+
+    /// A sequence nobody can foresee, of 128 bits from the operating system.
+    ///
+    /// # Errors
+    /// [`NumpyError::NoEntropy`] if the operating system has none to give.
+    ///
+    /// Source: NumPy 1.26, `SeedSequence(None)`.
+    pub fn from_os() -> Result<Self, NumpyError> {
+        let low = getrandom::u64().map_err(NumpyError::NoEntropy)?;
+        let high = getrandom::u64().map_err(NumpyError::NoEntropy)?;
+        Ok(Self::from_words(&[low as u32, (low >> 32) as u32, high as u32, (high >> 32) as u32]))
+    }
+
+    /// The mixed entropy.
+    pub fn pool(&self) -> [u32; POOL_WORDS] {
+        self.pool
+    }
+
+    /// The first `N` words of state that the pool gives; asking again gives the same.
+    ///
+    /// Source: NumPy 1.26, `SeedSequence.generate_state(N, uint32)`.
+    pub fn generate_state_u32<const N: usize>(&self) -> [u32; N] {
+        let mut words = self.state_words();
+        std::array::from_fn(|_| words())
+    }
+
+    /// The same state in words of 64 bits, each of two words of 32 bits, the low one first.
+    ///
+    /// Source: NumPy 1.26, `SeedSequence.generate_state(N, uint64)`.
+    pub fn generate_state_u64<const N: usize>(&self) -> [u64; N] {
+        let mut words = self.state_words();
+        std::array::from_fn(|_| {
+            let low = u64::from(words());
+            u64::from(words()) << 32 | low
+        })
+    }
+
+    /// The pool, hashed round and round.
+    fn state_words(&self) -> impl FnMut() -> u32 {
+        let mut hash = Hash::emitting();
+        let mut slots = self.pool.into_iter().cycle();
+        move || hash.next(slots.next().unwrap_or(0))
+    }
+}
+
+/// A hash whose key moves on with every word, so that equal words hash differently.
+struct Hash {
+    key: u32,
+    multiplier: u32,
+}
+
+impl Hash {
+    /// For entropy on its way into the pool.
+    fn absorbing() -> Self {
+        Self { key: 0x43B0_D7E5, multiplier: 0x931E_8875 }
+    }
+
+    /// For state on its way out of the pool.
+    fn emitting() -> Self {
+        Self { key: 0x8B51_F9DD, multiplier: 0x58F3_8DED }
+    }
+
+    fn next(&mut self, word: u32) -> u32 {
+        let keyed = word ^ self.key;
+        self.key = self.key.wrapping_mul(self.multiplier);
+        let spread = keyed.wrapping_mul(self.key);
+        spread ^ spread >> 16
+    }
+}
+
+fn mix(left: u32, right: u32) -> u32 {
+    let mixed = MIX_LEFT.wrapping_mul(left).wrapping_sub(MIX_RIGHT.wrapping_mul(right));
+    mixed ^ mixed >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_words_stand_for_seed_zero() {
+        assert_eq!(SeedSequence::from_words(&[]), SeedSequence::from_u64(0));
+    }
+
+    #[test]
+    fn zero_words_on_top_count_only_beyond_the_pool() {
+        let short = SeedSequence::from_words(&[7]);
+        assert_eq!(SeedSequence::from_words(&[7, 0, 0, 0]), short);
+        assert_ne!(SeedSequence::from_words(&[7, 0, 0, 0, 0]), short);
+    }
+
+    #[test]
+    fn the_operating_system_never_gives_the_same_twice() {
+        assert_ne!(SeedSequence::from_os().unwrap(), SeedSequence::from_os().unwrap());
+    }
+}

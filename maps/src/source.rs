@@ -1,0 +1,294 @@
+//! From a config to an instance, one reset after the other.
+
+use std::sync::Arc;
+
+use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside};
+
+use crate::components::Components;
+use crate::config::{GridConfig, Targets};
+use crate::numpy::{Generator, SeedSequence};
+use crate::place::{capacity, place_at_random};
+use crate::streams::{ComponentSource, PoolSource, Reach};
+
+/// How often POGEMA tries to place the agents before it gives up.
+const NUM_ATTEMPTS: usize = 11;
+/// Below this each agent's generator is seeded: the largest `int32`.
+const AGENT_SEEDS: i64 = i32::MAX as i64;
+
+/// An instance and what its maker wants said about it.
+#[derive(Clone, Debug)]
+pub struct Generated {
+    /// The instance.
+    pub instance: Instance,
+    /// What POGEMA, too, would warn of, a line each; cells are counted without the border.
+    pub warnings: Vec<String>,
+}
+
+/// Makes the instances of a config; each call of [`InstanceSource::generate`] is one reset of POGEMA.
+///
+/// Rule: seed/streams, seed/reset
+///
+/// Source: POGEMA 1.4.0, `grid.py`, `Grid.__init__` and `GridLifeLong.__init__`
+#[derive(Clone, Debug)]
+pub struct InstanceSource {
+    config: GridConfig,
+    registered: Option<Map>,
+    pools: Option<Pools>,
+}
+
+/// Possible starts and goals in their present order: every reset shuffles them further.
+#[derive(Clone, Debug)]
+struct Pools {
+    starts: Vec<Cell>,
+    goals: Vec<Cell>,
+}
+
+impl InstanceSource {
+    /// A source for a config. `registered` is the map that the config's `map_name` names; it takes the place of
+    /// the config's own.
+    ///
+    /// # Errors
+    /// If the config names a map that is not given.
+    ///
+    /// Rule: grid/named
+    pub fn new(config: GridConfig, registered: Option<Map>) -> Result<Self, Error> {
+        if let (Some(name), None) = (&config.map_name, &registered) {
+            return Err(Error::config("map_name", name, "the name of a registered map"));
+        }
+        let pools = match (&config.possible_agents_xy, &config.possible_targets_xy) {
+            (Some(starts), Some(goals)) if !starts.is_empty() && !goals.is_empty() => {
+                Some(Pools { starts: starts.clone(), goals: goals.clone() })
+            }
+            _ => None,
+        };
+        Ok(Self { config, registered, pools })
+    }
+
+    /// The config.
+    pub fn config(&self) -> &GridConfig {
+        &self.config
+    }
+
+    /// Makes the instance of the next reset.
+    ///
+    /// # Errors
+    /// If no instance can be made: too many agents for the map, places that do not fit the map or each other, a
+    /// next goal that could never be drawn. The source is then as it was.
+    ///
+    /// Rule: place/obstacles, place/explicit, place/pools, place/retries
+    pub fn generate(&mut self) -> Result<Generated, Error> {
+        let mut warnings = Vec::new();
+        let mut pools = self.pools.clone();
+        let (map, starts, goals) = match (&self.config.agents_xy, &self.config.targets_xy) {
+            (Some(starts), Some(targets)) if !starts.is_empty() => {
+                self.place_explicitly(starts, &targets.first(), &mut warnings)?
+            }
+            _ => match &mut pools {
+                Some(pools) => self.place_from_pools(pools)?,
+                None => self.place_at_random(&mut warnings)?,
+            },
+        };
+        let outside = self.outside(&map)?;
+        let streams = self.streams(&map, &goals, pools.as_ref())?;
+        let instance = Instance::new(map, outside, starts, streams)?;
+        self.warn_of_unreachable(&instance, &mut warnings);
+        self.pools = pools;
+        Ok(Generated { instance, warnings })
+    }
+
+    /// A fresh random stream; with a seed, the same one every time.
+    ///
+    /// Rule: seed/streams
+    fn stream(&self) -> Result<Generator, Error> {
+        match self.config.seed {
+            Some(seed) => Ok(Generator::seeded(seed)),
+            None => SeedSequence::from_os()
+                .map(|sequence| Generator::from_sequence(&sequence))
+                .map_err(|error| Error::instance(format!("the system gives no random seed: {error}"))),
+        }
+    }
+
+    /// The map before any start or goal clears a cell of it.
+    ///
+    /// Rule: place/obstacles
+    fn ground(&self) -> Result<Map, Error> {
+        if let Some(map) = self.registered.as_ref().or(self.config.map.as_ref()) {
+            return Ok(map.clone());
+        }
+        let (height, width) = (self.config.height, self.config.width);
+        self.noise(height, width)
+    }
+
+    fn noise(&self, height: usize, width: usize) -> Result<Map, Error> {
+        let mut obstacles = Vec::with_capacity(height * width);
+        let mut generator = self.stream()?;
+        let density = self.config.density;
+        generator
+            .binomial1_array(density, height * width, |obstacle| obstacles.push(obstacle))
+            .map_err(|error| Error::config("density", density, error.to_string()))?;
+        Map::new(height, width, obstacles)
+    }
+
+    /// Rule: border/outside, border/noise
+    fn outside(&self, map: &Map) -> Result<Outside, Error> {
+        if self.config.empty_outside {
+            return Ok(Outside::Free);
+        }
+        let border = 2 * self.config.obs_radius;
+        self.noise(map.height() + border, map.width() + border).map(Outside::Noise)
+    }
+
+    /// Rule: place/explicit
+    fn place_explicitly(
+        &self,
+        starts: &[Cell],
+        goals: &[Cell],
+        warnings: &mut Vec<String>,
+    ) -> Result<Placed, Error> {
+        let num_agents = self.config.num_agents;
+        Error::check_length("targets_xy", starts.len(), goals.len())?;
+        if num_agents > starts.len() {
+            let expected = format!("at most the {} agents of agents_xy", starts.len());
+            return Err(Error::config("num_agents", num_agents, expected));
+        }
+        let mut map = self.ground()?;
+        for (agent, (&start, &goal)) in starts.iter().zip(goals).enumerate().take(num_agents) {
+            for (what, cell) in [("start", start), ("goal", goal)] {
+                if !map.contains(cell) {
+                    return Err(Error::outside(agent, what, cell, map.height(), map.width()));
+                }
+                if map.clear(cell) && self.config.map.is_some() {
+                    warnings.push(format!(
+                        "the {what} of agent {agent} is on an obstacle, cell {cell} counted without the border; \
+                         the cell becomes free"
+                    ));
+                }
+            }
+        }
+        Ok((map, starts[..num_agents].to_vec(), goals[..num_agents].to_vec()))
+    }
+
+    /// Rule: place/pools
+    ///
+    /// Source: POGEMA 1.4.0, `generator.py`, `generate_from_possible_positions`
+    fn place_from_pools(&self, pools: &mut Pools) -> Result<Placed, Error> {
+        let num_agents = self.config.num_agents;
+        for (what, pool) in [("possible_agents_xy", &pools.starts), ("possible_targets_xy", &pools.goals)] {
+            if pool.len() < num_agents {
+                let expected = format!("at most the {} cells of {what}", pool.len());
+                return Err(Error::config("num_agents", num_agents, expected));
+            }
+        }
+        let mut generator = self.stream()?;
+        generator.shuffle_list(&mut pools.starts);
+        generator.shuffle_list(&mut pools.goals);
+        Ok((self.ground()?, pools.starts[..num_agents].to_vec(), pools.goals[..num_agents].to_vec()))
+    }
+
+    /// Rule: place/retries
+    fn place_at_random(&self, warnings: &mut Vec<String>) -> Result<Placed, Error> {
+        let num_agents = self.config.num_agents;
+        let draws_map = self.registered.is_none() && self.config.map.is_none();
+        // Every attempt of a seeded config is the same, and a given map never grows.
+        let num_attempts = if draws_map && self.config.seed.is_none() { NUM_ATTEMPTS } else { 1 };
+        let mut room = 0;
+        for attempt in 0..num_attempts {
+            let map = self.ground()?;
+            let components = Components::of(&map);
+            room = room.max(capacity(&components));
+            let placed = place_at_random(&map, &components, num_agents, &mut self.stream()?);
+            if let Some((starts, goals)) = placed {
+                if (1..NUM_ATTEMPTS - 1).contains(&attempt) {
+                    warnings.push(format!("the agents found room only at attempt {}", attempt + 1));
+                }
+                return Ok((map, starts, goals));
+            }
+        }
+        Err(Error::config("num_agents", num_agents, format!("at most {room}, for which the map has room")))
+    }
+
+    /// Rule: goal/restart/draw, goal/restart/pool, goal/restart/sequence, seed/goals
+    fn streams(&self, map: &Map, goals: &[Cell], pools: Option<&Pools>) -> Result<Vec<GoalStream>, Error> {
+        if self.config.on_target != OnGoal::Restart {
+            return Ok(goals.iter().copied().map(GoalStream::single).collect());
+        }
+        if let Some(targets) = &self.config.targets_xy {
+            return sequences(goals, targets);
+        }
+        let seeds = self.stream()?.integers_array(0, AGENT_SEEDS, goals.len());
+        let seeds = seeds.map_err(|error| Error::instance(error.to_string()))?;
+        let generators = seeds.into_iter().map(|seed| Generator::seeded(seed as u64));
+        let pool = pools.map(|pools| &pools.goals).or(self.config.possible_targets_xy.as_ref());
+        if let Some(pool) = pool {
+            let pool: Arc<[Cell]> = pool.clone().into();
+            let radius = self.config.obs_radius as u16;
+            check_pool(map, &pool, radius, goals)?;
+            let source = |generator| Box::new(PoolSource::new(generator, Arc::clone(&pool), radius));
+            return Ok(goals
+                .iter()
+                .zip(generators)
+                .map(|(&goal, rng)| GoalStream::drawn(goal, source(rng)))
+                .collect());
+        }
+        let reach = Arc::new(Reach::new(Components::of(map)));
+        check_reach(&reach, goals)?;
+        let source = |generator| Box::new(ComponentSource::new(generator, Arc::clone(&reach)));
+        Ok(goals.iter().zip(generators).map(|(&goal, rng)| GoalStream::drawn(goal, source(rng))).collect())
+    }
+
+    fn warn_of_unreachable(&self, instance: &Instance, warnings: &mut Vec<String>) {
+        let is_random =
+            self.pools.is_none() && (self.config.agents_xy.is_none() || self.config.targets_xy.is_none());
+        if is_random {
+            return;
+        }
+        let components = Components::of(&instance.map);
+        for (agent, (&start, goal)) in instance.starts.iter().zip(instance.first_goals()).enumerate() {
+            if components.label(start) != components.label(goal) {
+                warnings.push(format!(
+                    "agent {agent} cannot reach its goal: no path from cell {start} to cell {goal}, both counted \
+                     without the border"
+                ));
+            }
+        }
+    }
+}
+
+type Placed = (Map, Vec<Cell>, Vec<Cell>);
+
+/// Rule: goal/restart/sequence
+fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error> {
+    let Targets::Sequences(sequences) = targets else {
+        return Err(Error::config(
+            "targets_xy",
+            "one goal per agent",
+            "goal sequences with on_target `restart`",
+        ));
+    };
+    if sequences.len() < first.len() {
+        let expected = format!("a sequence for each of the {} agents", first.len());
+        return Err(Error::config("targets_xy", format!("{} sequences", sequences.len()), expected));
+    }
+    let stream = |(&goal, cells): (&Cell, &Vec<Cell>)| GoalStream::sequence(goal, cells.clone().into());
+    Ok(first.iter().zip(sequences).map(stream).collect())
+}
+
+/// Passes if every draw from the pool ends and hits the map.
+fn check_pool(map: &Map, pool: &[Cell], radius: u16, goals: &[Cell]) -> Result<(), Error> {
+    if let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) {
+        let expected = format!("cells inside the map of {} rows and {} columns", map.height(), map.width());
+        return Err(Error::config("possible_targets_xy", cell, expected));
+    }
+    let stuck = goals.iter().position(|&goal| !PoolSource::can_draw(pool, radius, goal));
+    stuck.map_or(Ok(()), |agent| {
+        Err(Error::agent(agent, "no next goal can be drawn from possible_targets_xy"))
+    })
+}
+
+/// Passes if every agent has a cell besides its goal to go to.
+fn check_reach(reach: &Reach, goals: &[Cell]) -> Result<(), Error> {
+    let stuck = goals.iter().position(|&goal| reach.from(goal).len() < 2);
+    stuck.map_or(Ok(()), |agent| {
+        Err(Error::agent(agent, "no next goal can be drawn: its goal has no free neighbour"))
+    })
+}

@@ -1,0 +1,59 @@
+//! Values that NumPy 1.26.4 gave, kept in `data/numpy_vectors.json`.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+
+mod numpy_calls;
+
+use std::collections::BTreeMap;
+
+use pogema_maps::numpy::{Generator, SeedSequence};
+use serde::Deserialize;
+
+use numpy_calls::Run;
+
+#[derive(Deserialize)]
+struct Vectors {
+    seeding: Vec<Seeding>,
+    runs: BTreeMap<String, Vec<Run>>,
+}
+
+#[derive(Deserialize)]
+struct Seeding {
+    words: Vec<u32>,
+    pool: [u32; 4],
+    state_u32: [u32; 8],
+    state_u64: [u64; 4],
+}
+
+fn vectors() -> Vectors {
+    serde_json::from_str(include_str!("data/numpy_vectors.json")).unwrap()
+}
+
+#[test]
+fn seeds_of_every_size_give_the_pool_and_state_of_numpy() {
+    for Seeding { words, pool, state_u32, state_u64 } in vectors().seeding {
+        let sequence = SeedSequence::from_words(&words);
+        assert_eq!(sequence.pool(), pool, "{words:?}");
+        assert_eq!(sequence.generate_state_u32(), state_u32, "{words:?}");
+        assert_eq!(sequence.generate_state_u64(), state_u64, "{words:?}");
+    }
+}
+
+#[test]
+fn a_seed_of_64_bits_is_a_seed_of_two_words() {
+    for seed in [0, 1, 42, (1 << 31) - 1, 1 << 32, (1 << 63) - 2, u64::MAX] {
+        let words = [seed as u32, (seed >> 32) as u32];
+        let sequence = SeedSequence::from_words(&words);
+        assert_eq!(SeedSequence::from_u64(seed), sequence);
+        assert_eq!(Generator::seeded(seed), Generator::from_sequence(&sequence));
+    }
+}
+
+#[test]
+fn every_call_gives_the_answer_of_numpy() {
+    for (topic, runs) in vectors().runs {
+        for run in runs {
+            run.replay(&topic);
+        }
+    }
+}

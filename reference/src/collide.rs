@@ -1,0 +1,137 @@
+//! Who may move: the three collision systems.
+
+use std::collections::HashMap;
+
+use pogema_core::{Action, Cell, Collision, Occupancy};
+
+use crate::Reference;
+use crate::grid::place;
+
+/// Which active agent stands where before the step.
+type Occupants = HashMap<(i32, i32), usize>;
+
+impl Reference {
+    /// Moves the active agents as their actions and the collision system allow.
+    ///
+    /// Rule: move/actions, move/inactive
+    ///
+    /// Source: POGEMA 1.4.0, `envs.py`, `Pogema.move_agents`
+    pub(crate) fn move_agents(&mut self, actions: &[Action]) {
+        match self.config.collision {
+            Collision::Priority => self.move_by_priority(actions),
+            Collision::BlockBoth => self.move_blocking_both(actions),
+            Collision::Soft => self.move_softly(actions),
+        }
+        if self.config.occupancy == Occupancy::Exact {
+            self.occupy_exactly();
+        }
+    }
+
+    /// One agent after the other, the lowest index first, onto any cell that is free at that moment.
+    ///
+    /// Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
+    fn move_by_priority(&mut self, actions: &[Action]) {
+        for agent in self.active_agents() {
+            let target = self.target(agent, actions);
+            if !self.obstacles.get(target) && !self.occupied.get(target) {
+                self.put(agent, target);
+            }
+        }
+    }
+
+    /// Onto a cell that was empty before the step and that no other agent wants.
+    ///
+    /// Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
+    fn move_blocking_both(&mut self, actions: &[Action]) {
+        let occupied_before = self.occupied.clone();
+        let mut num_contenders: HashMap<_, usize> = HashMap::new();
+        for agent in self.active_agents() {
+            *num_contenders.entry(self.target(agent, actions)).or_default() += 1;
+        }
+        for agent in self.active_agents() {
+            let target = self.target(agent, actions);
+            if !self.obstacles.get(target) && !occupied_before.get(target) && num_contenders[&target] == 1 {
+                self.put(agent, target);
+            }
+        }
+    }
+
+    /// Everybody at once, except where that is impossible.
+    ///
+    /// Rule: collide/soft, occupancy/as-released
+    fn move_softly(&mut self, actions: &[Action]) {
+        let occupants: HashMap<_, _> =
+            self.active_agents().into_iter().map(|agent| (place(self.cells[agent]), agent)).collect();
+        let mut moves = self.moves_possible_alone(actions, &occupants);
+        loop {
+            let hindered = self.find_hindered(&moves, actions, &occupants);
+            if hindered.is_empty() {
+                break;
+            }
+            for agent in hindered {
+                moves[agent] = false;
+            }
+        }
+        for agent in self.active_agents() {
+            let target = if moves[agent] { self.target(agent, actions) } else { place(self.cells[agent]) };
+            self.put(agent, target);
+        }
+    }
+
+    /// Which agents move if no other move fails: all but those that wait, aim at an obstacle or swap.
+    ///
+    /// Rule: collide/soft/stay, collide/soft/swap
+    fn moves_possible_alone(&self, actions: &[Action], occupants: &Occupants) -> Vec<bool> {
+        let mut moves = vec![false; self.cells.len()];
+        for agent in self.active_agents() {
+            let target = self.target(agent, actions);
+            let swaps = occupants
+                .get(&target)
+                .is_some_and(|&other| self.target(other, actions) == place(self.cells[agent]));
+            // A wait is a swap with oneself.
+            moves[agent] = !self.obstacles.get(target) && !swaps;
+        }
+        moves
+    }
+
+    /// The moving agents whose cell stays occupied, or goes to a lower index.
+    ///
+    /// Rule: collide/soft/contest, collide/soft/chain
+    fn find_hindered(&self, moves: &[bool], actions: &[Action], occupants: &Occupants) -> Vec<usize> {
+        let mut winners = HashMap::new();
+        let mut hindered = Vec::new();
+        for agent in self.active_agents().into_iter().filter(|&agent| moves[agent]) {
+            let target = self.target(agent, actions);
+            let occupant_stays = occupants.get(&target).is_some_and(|&occupant| !moves[occupant]);
+            let wins = *winners.entry(target).or_insert(agent) == agent;
+            if occupant_stays || !wins {
+                hindered.push(agent);
+            }
+        }
+        hindered
+    }
+
+    /// The cell an agent wants to be on after the step.
+    fn target(&self, agent: usize, actions: &[Action]) -> (i32, i32) {
+        self.cells[agent].toward(actions[agent])
+    }
+
+    /// Moves one agent and its mark. Where a lower index has already entered the cell that this agent leaves,
+    /// its mark is lost: agents vanish this way under `soft`.
+    ///
+    /// Rule: occupancy/as-released
+    fn put(&mut self, agent: usize, target: (i32, i32)) {
+        self.occupied.set(place(self.cells[agent]), false);
+        self.occupied.set(target, true);
+        self.cells[agent] = Cell::new(target.0 as u16, target.1 as u16);
+    }
+
+    /// Marks the cell of every active agent.
+    ///
+    /// Rule: occupancy/exact
+    fn occupy_exactly(&mut self) {
+        for agent in self.active_agents() {
+            self.occupied.set(place(self.cells[agent]), true);
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! The rules of POGEMA 1.4.0, written to be read.
+//!
+//! [`Reference`] plays one environment with plain vectors, one agent after the other. It draws no random
+//! numbers, starts no threads and is never made fast: what it does *is* the semantics, and every other engine is
+//! measured against it. Each function names the rule of the spec that it states.
+//!
+//! | file | phase |
+//! | --- | --- |
+//! | `grid` | the map with its border, and the occupancy grid |
+//! | `step` | one step, as a table of contents |
+//! | `collide` | who may move |
+//! | `goals` | what reaching a goal does; rewards and ends |
+//! | `observe` | what agents see |
+//! | `history` | steps kept and taken back |
+//!
+//! ```
+//! use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, Outside, StepOut};
+//! use pogema_reference::Reference;
+//!
+//! let map = Map::from_rows(&["..."])?;
+//! let goals = vec![GoalStream::single(Cell::new(0, 1))];
+//! let instance = Instance::new(map, Outside::Free, vec![Cell::new(0, 0)], goals)?;
+//! let mut environment = Reference::new(Config { num_agents: 1, ..Config::default() })?;
+//! environment.reset(&instance)?;
+//! let (mut rewards, mut terminated, mut truncated) = ([0.0], [false], [false]);
+//! let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+//! environment.step(&[Action::Right], out)?;
+//! assert_eq!((rewards, terminated), ([1.0], [true]));
+//! # Ok::<(), pogema_core::Error>(())
+//! ```
+
+mod collide;
+mod goals;
+mod grid;
+mod history;
+mod observe;
+mod step;
+
+pub use step::Reference;
