@@ -1,2 +1,35 @@
-//! x
-fn main() {}
+//! `pogema`: run, check and inspect POGEMA episodes.
+
+mod conform;
+mod run;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Multi-agent path finding by POGEMA 1.4.0's rules, bit for bit.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Play one episode and print its metrics
+    Run(run::Run),
+    /// Check that all engines follow the rules; exit status 0 only if they do
+    Conform(conform::Conform),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
+        Command::Conform(conform) => conform.run(),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        ExitCode::from(2)
+    })
+}

@@ -4,10 +4,11 @@ import json
 from typing import Any
 
 import numpy as np
-from deadline import LIMIT, Timeout, deadline
 from numpy.typing import NDArray
 from pogema import BatchAStarAgent, GridConfig, pogema_v0
 from pogema.wrappers.metrics import AgentsDensityWrapper
+
+from deadline import LIMIT, Timeout, deadline
 
 Record = dict[str, Any]
 Array = NDArray[Any]

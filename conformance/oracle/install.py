@@ -1,8 +1,11 @@
 """Makes the oracle's virtual environment: `python3.11 install.py DIR` prints the path of its python as the last line.
 
 Does nothing when DIR is complete, that is, when its stamp holds the hash of requirements.txt. The stamp is written
-last, so an interrupted run is done again from the start. A lock beside DIR makes a second process wait for the first.
+last, so an interrupted run is done again from the start. A lock beside DIR makes a second process wait for the first,
+and for the children of a first that was killed, which inherit it.
 """
+
+from __future__ import annotations  # an older Python gets as far as the message that it is too old
 
 import fcntl
 import hashlib
@@ -42,7 +45,7 @@ def is_complete(directory: Path) -> bool:
 
 def run(command: list[str], otherwise: str) -> None:
     """Runs a command with its output on stderr; its failure is ours."""
-    code = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr).returncode
+    code = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, close_fds=False).returncode
     if code != 0:
         fail(f"{otherwise} (exit code {code})")
 
@@ -82,6 +85,7 @@ def main(arguments: list[str]) -> None:
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
         with open(directory.with_name(directory.name + ".lock"), "w") as lock:
+            os.set_inheritable(lock.fileno(), True)
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not is_complete(directory):
                 build(directory)

@@ -29,10 +29,11 @@ try:
 
     if pogema.__version__ != VERSION:
         raise ImportError(f"pogema {VERSION} is needed, this is {pogema.__version__}")
-    from deadline import LIMIT, Timeout, deadline, disarm
-    from episodes import Episodes, ProtocolError, Record
     from pogema import GridConfig
     from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+    from deadline import LIMIT, Timeout, deadline, disarm
+    from episodes import Episodes, ProtocolError, Record
 except (ImportError, ValueError) as failure:
     sys.exit(f"oracle: {' '.join(str(failure).split())}")
 

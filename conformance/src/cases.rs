@@ -16,6 +16,7 @@
 //! `config` is a POGEMA config. `start` says what holds after the reset, each step what holds after it; only what
 //! is written is checked. `error` says what the last operation, or the config, is refused with.
 
+mod draw;
 mod expect;
 
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ use serde_json::Value;
 
 use crate::request::{Op, Record, Registered, Request, Response};
 
-pub use expect::Expect;
+pub use expect::{Expect, Sees};
 
 /// One hand-written case.
 #[derive(Clone, Debug, Deserialize)]
@@ -44,6 +45,9 @@ pub struct Case {
     /// Whether to measure the density of agents.
     #[serde(default)]
     pub density: bool,
+    /// Whether to count collisions.
+    #[serde(default)]
+    pub collisions: bool,
     /// What holds after the reset.
     #[serde(default)]
     pub start: Expect,
@@ -126,13 +130,15 @@ impl Case {
             config: self.config.clone(),
             register: self.register.clone(),
             density: self.density,
+            collisions: self.collisions,
             ops,
         })
     }
 
     /// Whether POGEMA can be asked: it does not know our own fields.
     pub fn is_for_pogema(&self) -> bool {
-        !["occupancy", "reward", "limits"].iter().any(|field| self.config.get(field).is_some())
+        !self.collisions
+            && !["occupancy", "reward", "limits"].iter().any(|field| self.config.get(field).is_some())
     }
 
     /// The first thing in an answer that is not as the case says, in words.

@@ -40,7 +40,7 @@ impl Dice {
 
     /// A list in random order.
     pub fn shuffle<T>(&mut self, list: &mut [T]) {
-        self.0.shuffle_list(list);
+        self.0.shuffle(list);
     }
 }
 
@@ -108,8 +108,10 @@ fn draw_once(dice: &mut Dice) -> Request {
     let (height, width) = draw_size(dice);
     let ground = draw_ground(dice, on_target);
     let register = put_ground(dice, &mut config, ground, height, width);
-    let density = config["observation_type"] != "default" && dice.chance(0.5);
-    Request { id: 0, config: Value::Object(config), register, density, ops: Vec::new() }
+    // From a window without a free cell, which a start on an obstacle can have, POGEMA's density divides by zero.
+    let may_measure = config["observation_type"] != "default" && !config.contains_key("possible_agents_xy");
+    let density = may_measure && dice.chance(0.5);
+    Request { id: 0, config: Value::Object(config), register, density, collisions: false, ops: Vec::new() }
 }
 
 fn draw_seed(dice: &mut Dice) -> u64 {

@@ -1,6 +1,6 @@
 //! Recordings of POGEMA 1.4.0, kept on disk as compressed JSON lines.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
@@ -20,6 +20,11 @@ pub struct Recording {
 /// The recordings that come with this crate.
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/pogema-1.4.0")
+}
+
+/// Every mismatch that was ever seen, in the same form, with the right answer.
+pub fn found_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("found")
 }
 
 /// The files of a folder with an ending, in the order of their names.
@@ -48,14 +53,8 @@ pub fn files(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, Error> {
 /// # Errors
 /// [`Error::Io`] with the line that cannot be read.
 pub fn read(path: &Path) -> Result<Vec<Recording>, Error> {
-    let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
-    let input: Box<dyn Read> = if path.extension().is_some_and(|ending| ending == "zst") {
-        Box::new(zstd::Decoder::new(file).map_err(|error| Error::io(path, error))?)
-    } else {
-        Box::new(file)
-    };
     let mut recordings = Vec::new();
-    for (index, line) in BufReader::new(input).lines().enumerate() {
+    for (index, line) in crate::files::open(path)?.lines().enumerate() {
         let line = line.map_err(|error| Error::io(path, error))?;
         let recording = serde_json::from_str(&line)
             .map_err(|error| Error::io(path, format!("line {}: {error}", index + 1)))?;
@@ -69,19 +68,10 @@ pub fn read(path: &Path) -> Result<Vec<Recording>, Error> {
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.
 pub fn write(path: &Path, recordings: &[Recording]) -> Result<(), Error> {
-    let failed = |error: std::io::Error| Error::io(path, error);
     let mut text = Vec::new();
     for recording in recordings {
         serde_json::to_writer(&mut text, recording).map_err(|error| Error::io(path, error))?;
         text.push(b'\n');
     }
-    if path.extension().is_some_and(|ending| ending == "zst") {
-        text = zstd::encode_all(text.as_slice(), 19).map_err(failed)?;
-    }
-    let folder = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    file.write_all(&text).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    crate::files::write(path, &text)
 }

@@ -6,10 +6,23 @@ use pogema_core::{Collision, Occupancy, OnGoal, Snapshot};
 use pogema_maps::GridConfig;
 
 use crate::request::{Record, Request, Response};
+use crate::tally::{Families, families_of};
 
-/// The first law that an answer breaks, in words, with the operation that broke it.
-pub fn broken_law(request: &Request, response: &Response) -> Option<(usize, String)> {
+/// A law that an answer breaks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BrokenLaw {
+    /// The operation that broke it.
+    pub op: usize,
+    /// The rule that promises it.
+    pub rule: &'static str,
+    /// What happened, in words.
+    pub text: String,
+}
+
+/// The first law that an answer breaks.
+pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
     let config = GridConfig::from_value(&request.config).ok()?;
+    let families = families_of(&config);
     let mut before: Option<&Snapshot> = None;
     let mut obstacles: Vec<Vec<u8>> = Vec::new();
     for (op, record) in response.records.iter().enumerate() {
@@ -17,65 +30,72 @@ pub fn broken_law(request: &Request, response: &Response) -> Option<(usize, Stri
             obstacles = reset.map.iter().map(|row| row.bytes().collect()).collect();
         }
         let Some(state) = record.state() else { continue };
-        let broken = of_state(&config, state).or_else(|| match (record.step(), before) {
-            (Some(_), Some(before)) => of_step(&config, &obstacles, before, state),
+        let broken = of_state(families, &config, state).or_else(|| match (record.step(), before) {
+            (Some(_), Some(before)) => of_step(families, &config, &obstacles, before, state),
             _ => None,
         });
-        if let Some(law) = broken {
-            return Some((op, law));
+        if let Some((rule, text)) = broken {
+            return Some(BrokenLaw { op, rule, text });
         }
         before = Some(state);
     }
     None
 }
 
-fn of_state(config: &GridConfig, state: &Snapshot) -> Option<String> {
+fn of_state(families: Families, config: &GridConfig, state: &Snapshot) -> Option<(&'static str, String)> {
     let active = || (0..state.cells.len()).filter(|&agent| state.active[agent]);
     let mut seen = HashSet::new();
     if let Some(agent) = active().find(|&agent| !seen.insert(state.cells[agent])) {
-        return Some(format!("agent {agent} shares cell {} with another active agent", state.cells[agent]));
+        return Some((
+            families.collide,
+            format!("agent {agent} shares cell {} with another active agent", state.cells[agent]),
+        ));
     }
     let occupied: HashSet<_> = state.occupied.iter().copied().collect();
     if let Some(cell) = occupied.iter().find(|cell| !seen.contains(cell)) {
-        return Some(format!("cell {cell} is marked as occupied without an active agent"));
+        return Some((
+            families.occupancy,
+            format!("cell {cell} is marked as occupied without an active agent"),
+        ));
     }
     let shows_all = config.collision_system != Collision::Soft || config.occupancy == Occupancy::Exact;
     if shows_all && occupied.len() != seen.len() {
-        return Some("the occupancy grid does not show every active agent".into());
+        return Some((families.occupancy, "the occupancy grid does not show every active agent".into()));
     }
     if config.on_target != OnGoal::Finish && active().count() != state.cells.len() {
-        return Some("an agent became inactive".into());
+        return Some((families.goal, "an agent became inactive".into()));
     }
     None
 }
 
 fn of_step(
+    families: Families,
     config: &GridConfig,
     obstacles: &[Vec<u8>],
     before: &Snapshot,
     after: &Snapshot,
-) -> Option<String> {
+) -> Option<(&'static str, String)> {
     for agent in 0..before.cells.len() {
         let (from, to) = (before.cells[agent], after.cells[agent]);
         let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
         if distance > u16::from(before.active[agent]) {
-            return Some(format!("agent {agent} went from {from} to {to}"));
+            return Some(("move/actions", format!("agent {agent} went from {from} to {to}")));
         }
         if from != to && obstacles[usize::from(to.row)][usize::from(to.col)] == b'#' {
-            return Some(format!("agent {agent} entered the obstacle at {to}"));
+            return Some((families.collide, format!("agent {agent} entered the obstacle at {to}")));
         }
         if after.active[agent] && !before.active[agent] {
-            return Some(format!("agent {agent} came back"));
+            return Some((families.goal, format!("agent {agent} came back")));
         }
         let swaps = (0..agent).any(|other| {
             let both = before.active[agent] && before.active[other] && from != to;
             both && before.cells[other] == to && after.cells[other] == from
         });
         if swaps {
-            return Some(format!("agent {agent} swapped cells with another"));
+            return Some((families.collide, format!("agent {agent} swapped cells with another")));
         }
         if config.on_target != OnGoal::Restart && before.goals[agent] != after.goals[agent] {
-            return Some(format!("the goal of agent {agent} changed"));
+            return Some((families.goal, format!("the goal of agent {agent} changed")));
         }
     }
     None

@@ -19,6 +19,7 @@ pub mod cases;
 mod compare;
 mod draw;
 mod events;
+pub mod files;
 pub mod golden;
 mod laws;
 mod literal;
@@ -28,11 +29,12 @@ mod request;
 mod runner;
 mod script;
 mod tally;
+mod windows;
 
 pub use compare::{Divergence, compare};
 pub use draw::draw_request;
 pub use events::Events;
-pub use laws::broken_law;
+pub use laws::{BrokenLaw, broken_law};
 pub use literal::Literal;
 pub use oracle::{Oracle, find_oracle_python};
 pub use play::{Engine, play, play_on, pogema_team, sample};
@@ -42,3 +44,4 @@ pub use request::{
 pub use runner::{Fault, Part, Progress, Report};
 pub use script::{Script, play_script};
 pub use tally::{Tally, families_of};
+pub use windows::Windows;

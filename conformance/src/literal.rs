@@ -88,6 +88,12 @@ impl Literal {
         (0..self.active.len()).filter(|&agent| self.active[agent]).collect()
     }
 
+    fn priority(&mut self, actions: &[Action]) {
+        for agent in self.active_agents() {
+            self.try_move(agent, actions[agent]);
+        }
+    }
+
     fn block_both(&mut self, actions: &[Action]) {
         let mut blocked: HashMap<Place, bool> = HashMap::new();
         for agent in self.active_agents() {
@@ -220,9 +226,7 @@ impl Environment for Literal {
         Error::check_length("actions", self.config.num_agents, actions.len())?;
         out.check(self.config.num_agents)?;
         match self.config.collision {
-            Collision::Priority => {
-                self.active_agents().iter().for_each(|&agent| self.try_move(agent, actions[agent]))
-            }
+            Collision::Priority => self.priority(actions),
             Collision::BlockBoth => self.block_both(actions),
             Collision::Soft => self.soft(actions),
         }

@@ -1,19 +1,18 @@
 //! Our own answers to a request.
 
-use std::fmt::Write as _;
-
 use pogema_core::{
-    Action, Cell, Change, Config, DensityMeter, Environment, EpisodeMeter, Error, GoalStream, Instance,
-    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded, PomapfOut,
+    Action, Cell, Change, CollisionMeter, Config, DensityMeter, Environment, EpisodeMeter, Error, GoalStream,
+    Instance, MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded,
     Snapshot, StepOut, TraceStep, changes, states_at_every_step,
 };
 use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource, Targets};
-use pogema_planners::{AStarTeam, View};
+use pogema_planners::AStarTeam;
 
 use crate::request::{
     Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
 };
+use crate::windows::{Windows, pack, pairs};
 
 /// An engine to play with.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +73,7 @@ pub(crate) struct Player {
     warnings: Vec<String>,
     meter: EpisodeMeter,
     density: Option<DensityMeter>,
+    collisions: Option<CollisionMeter>,
     past: Vec<Snapshot>,
     team: AStarTeam,
     sampler: Generator,
@@ -93,6 +93,7 @@ impl Player {
             warnings: Vec::new(),
             meter: EpisodeMeter::new(&rules),
             density: request.density.then(DensityMeter::default),
+            collisions: request.collisions.then(CollisionMeter::default),
             past: Vec::new(),
             team: pogema_team(),
             sampler: Generator::seeded(config.seed.unwrap_or(0)),
@@ -141,6 +142,7 @@ impl Player {
         if let Some(density) = &mut self.density {
             density.reset();
         }
+        self.collisions = self.collisions.map(|_| CollisionMeter::default());
         self.feed_density()?;
         let goal_lists = if self.config.on_target == OnGoal::Restart {
             foretold_goals(&self.config, &generated.instance)
@@ -177,6 +179,7 @@ impl Player {
         let state = self.state();
         self.past.push(self.environment.snapshot());
         self.feed_density()?;
+        self.count_collisions(&before, &actions, &state);
         let metrics = self.metrics(&state, &terminated, &truncated);
         let observations = Some(self.observed(false)?);
         let actions_after = self.actions_after(&before, &actions, &state);
@@ -209,8 +212,16 @@ impl Player {
         let figures = self.meter.feed(&state.on_goal, terminated, truncated)?;
         let figures = if self.config.persistent { Metrics::default() } else { figures };
         let avg_agents_density = self.density.as_ref().map(DensityMeter::mean);
-        let metrics = Metrics { avg_agents_density, ..figures };
+        let collisions = self.collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
+        let (a_collisions, o_collisions) = collisions.unzip();
+        let metrics = Metrics { avg_agents_density, a_collisions, o_collisions, ..figures };
         (metrics != Metrics::default()).then_some(metrics)
+    }
+
+    fn count_collisions(&mut self, before: &Snapshot, actions: &[Action], after: &Snapshot) {
+        if let (Some(meter), Some(instance)) = (&mut self.collisions, &self.instance) {
+            meter.feed(&instance.map, &before.cells, &before.active, actions, &after.cells);
+        }
     }
 
     fn feed_density(&mut self) -> Result<(), Error> {
@@ -280,52 +291,6 @@ impl Player {
     }
 }
 
-/// The arrays of the `POMAPF` observation.
-pub(crate) struct Windows {
-    side: usize,
-    obstacles: Vec<f32>,
-    agents: Vec<f32>,
-    cells: Vec<i32>,
-    goals: Vec<i32>,
-}
-
-impl Windows {
-    pub(crate) fn of(environment: &dyn Environment) -> Result<Self, Error> {
-        let config = environment.config();
-        let (num_agents, side) = (config.num_agents, config.side());
-        let mut windows = Self {
-            side,
-            obstacles: vec![0.0; num_agents * side * side],
-            agents: vec![0.0; num_agents * side * side],
-            cells: vec![0; 2 * num_agents],
-            goals: vec![0; 2 * num_agents],
-        };
-        environment.observe_pomapf(PomapfOut {
-            obstacles: &mut windows.obstacles,
-            agents: &mut windows.agents,
-            cells: &mut windows.cells,
-            goals: &mut windows.goals,
-        })?;
-        Ok(windows)
-    }
-
-    pub(crate) fn views(&self) -> impl Iterator<Item = View<'_>> {
-        let obstacles = self.obstacles.chunks(self.side * self.side);
-        let places = pairs(&self.cells).into_iter().zip(pairs(&self.goals));
-        obstacles.zip(places).map(|(obstacles, (cell, goal))| View { cell, goal, obstacles, side: self.side })
-    }
-
-    /// For each agent how many agents and how many free cells it sees.
-    fn counts(&self) -> Vec<(u32, u32)> {
-        let area = self.side * self.side;
-        let count =
-            |window: &[f32], wanted: bool| window.iter().filter(|&&value| (value != 0.0) == wanted).count();
-        let agents = self.agents.chunks(area).map(|window| count(window, true) as u32);
-        let free = self.obstacles.chunks(area).map(|window| count(window, false) as u32);
-        agents.zip(free).collect()
-    }
-}
-
 /// POGEMA's A* policy: every agent draws its random moves from a generator of seed 0.
 ///
 /// Rule: policy/astar
@@ -385,19 +350,4 @@ fn foretold_to_one(mut stream: GoalStream, start: Cell, max_steps: i64) -> Optio
 
 fn distance(one: Cell, other: Cell) -> i64 {
     i64::from(one.row.abs_diff(other.row)) + i64::from(one.col.abs_diff(other.col))
-}
-
-fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
-    values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
-}
-
-/// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
-fn pack(window: &[f32]) -> String {
-    let byte = |cells: &[f32]| {
-        cells.iter().enumerate().fold(0u8, |byte, (at, &value)| byte | (u8::from(value != 0.0) << (7 - at)))
-    };
-    window.chunks(8).fold(String::new(), |mut text, cells| {
-        let _ = write!(text, "{:02x}", byte(cells));
-        text
-    })
 }

@@ -18,6 +18,9 @@ pub struct Request {
     /// Whether to measure the density of agents.
     #[serde(default)]
     pub density: bool,
+    /// Whether to count collisions, which POGEMA itself does not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub collisions: bool,
     /// What to do, in order.
     pub ops: Vec<Op>,
 }

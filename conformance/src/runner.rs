@@ -110,7 +110,7 @@ impl Report {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn check_cases(&mut self, folder: &Path, engine: Engine) -> Result<(), Error> {
+    pub fn check_cases(&mut self, part: &str, folder: &Path, engine: Engine) -> Result<(), Error> {
         let mut results = Vec::new();
         for path in golden::files(folder, ".yaml")? {
             let case = cases::read(&path)?;
@@ -119,10 +119,10 @@ impl Report {
             checked.events.watch(&response);
             let mismatch = case.mismatch(&response);
             checked.tally.count(&case.rule, mismatch.is_none());
-            checked.fault = mismatch.map(|text| fault("cases", &path.display().to_string(), text));
+            checked.fault = mismatch.map(|text| fault(part, &path.display().to_string(), text));
             results.push(checked);
         }
-        self.take("cases", results);
+        self.take(part, results);
         Ok(())
     }
 
@@ -147,10 +147,10 @@ impl Report {
                 let name = format!("case {case} of seed {seed}");
                 let mut checked = Checked::default();
                 checked.events.watch(&expected);
-                let law = broken_law(&request, &expected);
-                checked.tally.count("laws", law.is_none());
-                if let Some((op, law)) = law {
-                    checked.fault = Some(fault("fresh", &name, format!("operation {op}: {law}")));
+                if let Some(law) = broken_law(&request, &expected) {
+                    checked.tally.count(law.rule, false);
+                    let text = format!("operation {}: {} (rule {})", law.op, law.text, law.rule);
+                    checked.fault = Some(fault("fresh", &name, text));
                 }
                 for &engine in others {
                     let got = play_on(engine, &request);
@@ -265,7 +265,10 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
     let name: String = fault.name.chars().map(|letter| if letter == ' ' { '-' } else { letter }).collect();
     let path = folder.join(format!("{}-{name}.jsonl", fault.part));
     let recording = Recording { request: request.clone(), response: expected.clone() };
-    match golden::write(&path, &[recording]) {
+    let kept = std::fs::create_dir_all(folder)
+        .map_err(|error| Error::io(folder, error))
+        .and_then(|()| golden::write(&path, &[recording]));
+    match kept {
         Ok(()) => fault.kept = Some(path),
         Err(error) => fault.text = format!("{}\n  could not be kept: {error}", fault.text),
     }

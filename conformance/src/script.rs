@@ -60,7 +60,7 @@ fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, res
     }
     let max_steps = player.config.max_episode_steps.clamp(1, MOST_STEPS as i64) as usize;
     let num_extra = if dice.chance(0.2) { 2 } else { 0 };
-    let can_go_back = player.config.persistent && script != Script::Astar && !loses_agents(player);
+    let can_go_back = player.config.persistent && script != Script::Astar && can_compare_back(player);
     let mut ended = 0;
     for _ in 0..max_steps + num_extra {
         let op = match script {
@@ -90,9 +90,10 @@ fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, res
     }
 }
 
-/// Taking steps back is compared only where POGEMA's occupancy is right; where it has lost agents it goes wrong.
-fn loses_agents(player: &Player) -> bool {
-    player.config.collision_system == pogema_core::Collision::Soft
+/// Taking steps back goes wrong in POGEMA where its occupancy has lost agents, and back onto an obstacle.
+fn can_compare_back(player: &Player) -> bool {
+    player.config.collision_system != pogema_core::Collision::Soft
+        && player.config.possible_agents_xy.is_none()
 }
 
 fn perform(player: &mut Player, op: Op, request: &mut Request, response: &mut Response) -> bool {

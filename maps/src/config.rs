@@ -8,6 +8,7 @@ mod write;
 use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, Reward};
 
 pub use fields::{FIELDS, nearest};
+pub use read::{value_from_json, value_from_yaml};
 
 /// A config under POGEMA's names, checked and with everything derived that POGEMA derives.
 ///

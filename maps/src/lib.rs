@@ -13,6 +13,7 @@
 //! # Ok::<(), pogema_core::Error>(())
 //! ```
 
+mod catalogue;
 mod components;
 mod config;
 pub mod numpy;
@@ -21,8 +22,11 @@ mod source;
 mod streams;
 mod text;
 
+pub use catalogue::{map_names, named_map};
 pub use components::{ComponentCells, Components};
-pub use config::{FIELDS, GridConfig, Integration, Limits, Targets, nearest};
+pub use config::{
+    FIELDS, GridConfig, Integration, Limits, Targets, nearest, value_from_json, value_from_yaml,
+};
 pub use place::{capacity, place_at_random};
 pub use source::{Generated, InstanceSource};
 pub use text::{MapText, parse_map_text};

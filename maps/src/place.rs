@@ -25,7 +25,7 @@ pub fn place_at_random(
     }
     let mut order: Vec<u32> =
         (0..map.obstacles().len() as u32).filter(|&at| !map.obstacles()[at as usize]).collect();
-    generator.shuffle_list(&mut order);
+    generator.shuffle(&mut order);
     let mut num_left = components.sizes().to_vec();
     let mut waiting = vec![NOBODY; components.len()];
     let mut starts = Vec::with_capacity(num_agents);

@@ -180,8 +180,8 @@ impl InstanceSource {
             }
         }
         let mut generator = self.stream()?;
-        generator.shuffle_list(&mut pools.starts);
-        generator.shuffle_list(&mut pools.goals);
+        generator.shuffle(&mut pools.starts);
+        generator.shuffle(&mut pools.goals);
         Ok((self.ground()?, pools.starts[..num_agents].to_vec(), pools.goals[..num_agents].to_vec()))
     }
 

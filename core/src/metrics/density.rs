@@ -17,9 +17,11 @@ impl DensityMeter {
     }
 
     /// Takes one moment in (the one after the reset too): for each agent how many agents and how many free
-    /// cells its window holds.
+    /// cells its window holds. A window without a free cell counts as empty; POGEMA divides by zero there.
     pub fn feed(&mut self, windows: impl Iterator<Item = (u32, u32)>) {
-        let shares: Vec<f64> = windows.map(|(agents, free)| f64::from(agents) / f64::from(free)).collect();
+        let share =
+            |(agents, free): (u32, u32)| if free == 0 { 0.0 } else { f64::from(agents) / f64::from(free) };
+        let shares: Vec<f64> = windows.map(share).collect();
         self.means.push(pairwise_mean(&shares));
     }
 

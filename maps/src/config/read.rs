@@ -19,11 +19,10 @@ impl GridConfig {
     ///
     /// Rule: config/fields
     pub fn from_yaml(text: &str) -> Result<Self, Error> {
-        if text.trim().is_empty() {
-            return Ok(Self::default());
+        match value_from_yaml(text)? {
+            Value::Null => Ok(Self::default()),
+            value => Self::from_value(&value),
         }
-        let value: Value = serde_saphyr::from_str(text).map_err(|error| syntax(&error))?;
-        Self::from_value(&value)
     }
 
     /// Reads a config from JSON.
@@ -33,8 +32,7 @@ impl GridConfig {
     ///
     /// Rule: config/fields
     pub fn from_json(text: &str) -> Result<Self, Error> {
-        let value: Value = serde_json::from_str(text).map_err(|error| syntax(&error))?;
-        Self::from_value(&value)
+        Self::from_value(&value_from_json(text)?)
     }
 
     /// Reads a config from an already parsed object.
@@ -134,7 +132,7 @@ impl GridConfig {
         Ok(())
     }
 
-    /// Rule: config/map, config/letters
+    /// Rule: config/map
     fn read_map(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
         let map = match fields.optional("map") {
             None => return Ok(()),
@@ -150,7 +148,7 @@ impl GridConfig {
         Ok(())
     }
 
-    /// Rule: config/letters, grid/pools
+    /// Rule: grid/letters, grid/pools
     fn take_map_text(&mut self, text: MapText) -> Result<Map, Error> {
         let both_given = self.agents_xy.is_some() && self.targets_xy.is_some();
         if !text.starts.is_empty() {
@@ -170,6 +168,25 @@ impl GridConfig {
         }
         Ok(text.map)
     }
+}
+
+/// Parses YAML; an empty text is null.
+///
+/// # Errors
+/// [`Error::Syntax`] with the place.
+pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
+    if text.trim().is_empty() {
+        return Ok(Value::Null);
+    }
+    serde_saphyr::from_str(text).map_err(|error| syntax(&error))
+}
+
+/// Parses JSON.
+///
+/// # Errors
+/// [`Error::Syntax`] with the place.
+pub fn value_from_json(text: &str) -> Result<Value, Error> {
+    serde_json::from_str(text).map_err(|error| syntax(&error))
 }
 
 fn syntax(error: &dyn std::fmt::Display) -> Error {

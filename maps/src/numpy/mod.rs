@@ -8,7 +8,7 @@
 //!
 //! let mut generator = Generator::seeded(42);
 //! let mut order: Vec<usize> = (0..10).collect();
-//! generator.shuffle_list(&mut order);
+//! generator.shuffle(&mut order);
 //! assert_eq!(order, [5, 6, 0, 7, 3, 2, 4, 9, 1, 8]);
 //!
 //! let wall = generator.binomial1(0.3)?;
@@ -22,7 +22,7 @@
 //! | [`SeedSequence`] | `SeedSequence`: a seed of any size becomes the state of a generator |
 //! | [`Generator`] | `default_rng`: PCG64 and the 32-bit half that it keeps for later |
 //! | [`Generator::integers`], [`Generator::choice_index`] | multiply-shift with rejection (Lemire) |
-//! | [`Generator::shuffle_list`] | mask with rejection, for lists and for arrays |
+//! | [`Generator::shuffle`] | mask with rejection, for lists and for arrays |
 //! | [`Generator::choice_weighted`] | one double, looked up in the running sums of the weights |
 //! | [`Generator::binomial1`], [`Binomial1`] | one double against one threshold |
 //!

@@ -13,7 +13,7 @@ impl Generator {
     /// draw.
     ///
     /// Source: NumPy 1.26, `Generator.shuffle`.
-    pub fn shuffle_list<T>(&mut self, items: &mut [T]) {
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
         let mut num_left = items.len();
         while num_left as u64 > 1 << 32 {
             num_left -= 1;
@@ -83,8 +83,8 @@ mod tests {
     #[test]
     fn a_single_item_is_not_drawn() {
         let mut generator = Generator::seeded(6);
-        generator.shuffle_list::<u8>(&mut []);
-        generator.shuffle_list(&mut [1]);
+        generator.shuffle::<u8>(&mut []);
+        generator.shuffle(&mut [1]);
         assert_eq!(generator, Generator::seeded(6));
     }
 }

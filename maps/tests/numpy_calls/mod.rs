@@ -102,7 +102,7 @@ impl Call {
             }
             Self::ShuffleList { n } | Self::ShuffleArray { n } | Self::ShuffleRows { n } => {
                 let mut items: Vec<usize> = (0..*n).collect();
-                generator.shuffle_list(&mut items);
+                generator.shuffle(&mut items);
                 json!(items)
             }
             Self::Binomial1 { p } => json!(generator.binomial1(p.0).ok()),

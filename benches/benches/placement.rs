@@ -1,0 +1,29 @@
+//! From config to instance: the time one reset needs.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use pogema_maps::{GridConfig, InstanceSource};
+use serde_json::json;
+
+/// Side, agents: from a training map to the largest instance of POGEMA's paper.
+const SIZES: [(usize, usize); 4] = [(32, 64), (256, 10_000), (1024, 100_000), (3072, 1_000_000)];
+
+fn placement(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("placement");
+    group.sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
+    for (side, num_agents) in SIZES {
+        let fields = json!({"size": side, "density": 0.3, "num_agents": num_agents, "seed": 0});
+        let config = GridConfig::from_value(&fields).unwrap_or_default();
+        let Ok(mut source) = InstanceSource::new(config, None) else { continue };
+        group.throughput(Throughput::Elements(num_agents as u64));
+        group.bench_function(format!("{side}x{side}, {num_agents} agents"), |bencher| {
+            bencher.iter(|| black_box(source.generate()));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, placement);
+criterion_main!(benches);

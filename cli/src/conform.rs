@@ -1,0 +1,108 @@
+//! `pogema conform`: every engine against everything there is to check.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+use pogema_conformance::{Engine, Report, cases, files, find_oracle_python, golden};
+use pogema_core::Error;
+
+/// How many divergences are told in full.
+const MOST_TOLD: usize = 5;
+
+#[derive(Args, Debug)]
+pub struct Conform {
+    /// How many cases to draw
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    cases: u64,
+    /// Seed of the drawn cases
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+    /// Compare the drawn cases with POGEMA 1.4.0 itself too; needs Python 3.11
+    #[arg(long)]
+    oracle: bool,
+    /// Where POGEMA 1.4.0 is installed if need be
+    #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
+    oracle_folder: PathBuf,
+    /// Write the whole report to this file as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Where cases that diverge are kept
+    #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
+    keep: PathBuf,
+}
+
+impl Conform {
+    pub fn run(&self) -> Result<ExitCode, Error> {
+        let engines = [Engine::REFERENCE, Engine::LITERAL];
+        let mut report = Report::default();
+        for engine in engines {
+            let name = |part: &str| format!("{part}, {}", engine.name);
+            report.check_recordings(&name("golden"), &golden::folder(), engine)?;
+            report.check_recordings(&name("found"), &golden::found_folder(), engine)?;
+            report.check_cases(&name("cases"), &cases::folder(), engine)?;
+        }
+        let bar = self.bar("fresh cases");
+        report.check_fresh(&engines, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        if self.oracle {
+            let python = find_oracle_python(&self.oracle_folder)?;
+            report.check_cases_with_oracle(&cases::folder(), &python)?;
+            let bar = self.bar("POGEMA 1.4.0");
+            report.check_oracle(Engine::REFERENCE, &python, self.cases, self.seed, &self.keep, &|| {
+                bar.inc(1)
+            })?;
+            bar.finish_and_clear();
+        }
+        if let Some(path) = &self.json {
+            let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
+            files::write(path, &text)?;
+        }
+        print(&report);
+        Ok(if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+
+    fn bar(&self, what: &'static str) -> ProgressBar {
+        let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}, {eta} left");
+        let bar = ProgressBar::new(self.cases).with_message(what);
+        style.map_or(bar.clone(), |style| bar.with_style(style))
+    }
+}
+
+fn print(report: &Report) {
+    let mut parts = table(&["part", "checked", "failed"]);
+    for part in &report.parts {
+        parts.add_row([part.name.clone(), part.checked.to_string(), part.failed.to_string()]);
+    }
+    let mut rules = table(&["rule", "comparisons", "diverged"]);
+    for (rule, count) in &report.tally.rules {
+        rules.add_row([rule.clone(), count.checked.to_string(), count.diverged.to_string()]);
+    }
+    let mut events = table(&["what happened", "times"]);
+    for (name, count) in report.events.named() {
+        events.add_row([name.to_owned(), count.to_string()]);
+    }
+    println!("{rules}\n\n{events}\n\n{parts}\n");
+    for fault in report.failures.iter().take(MOST_TOLD) {
+        println!("{}: {}\n{}", fault.part, fault.name, fault.text);
+        if let Some(kept) = &fault.kept {
+            println!("kept as {}\n", kept.display());
+        }
+    }
+    match report.failures.len() {
+        0 => println!("all agree: 0 divergences"),
+        1 => println!("1 divergence"),
+        number => println!("{number} divergences"),
+    }
+}
+
+fn table(head: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(head.to_vec());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

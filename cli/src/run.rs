@@ -1,0 +1,96 @@
+//! `pogema run`: one episode.
+
+mod episode;
+mod policy;
+mod settings;
+mod show;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use pogema_core::Error;
+use serde_json::json;
+
+use episode::Episode;
+use policy::{Policy, PolicyName};
+
+#[derive(Args, Debug)]
+pub struct Run {
+    #[command(flatten)]
+    settings: settings::Settings,
+    /// Who chooses the actions
+    #[arg(long, value_enum, default_value_t = PolicyName::Random)]
+    policy: PolicyName,
+    /// The actions for `--policy file`: a trace, or a JSON list of action numbers per line
+    #[arg(long, value_name = "FILE")]
+    actions: Option<PathBuf>,
+    /// Draw every step in the terminal
+    #[arg(long)]
+    render: bool,
+    /// Frames per second of `--render` on a terminal
+    #[arg(long, value_name = "N", default_value_t = 8.0)]
+    fps: f64,
+    /// Write what happened to this file, as JSON lines; compressed if it ends in `.zst`
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run {
+    pub fn run(&self) -> Result<(), Error> {
+        let config = self.settings.config()?;
+        let mut policy = Policy::new(self.policy, self.actions.as_deref(), &config)?;
+        let mut episode = Episode::start(config, self.trace.is_some())?;
+        for warning in episode.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        let mut screen = self.render.then(|| show::Screen::new(self.fps));
+        loop {
+            if let Some(screen) = &mut screen {
+                screen.draw(&episode)?;
+            }
+            if episode.is_over() {
+                break;
+            }
+            let Some(actions) = policy.act(&episode)? else { break };
+            episode.step(actions)?;
+        }
+        if let (Some(path), Some(trace)) = (&self.trace, episode.trace()) {
+            let mut text = Vec::new();
+            trace.write(&mut text)?;
+            pogema_conformance::files::write(path, &text)?;
+        }
+        self.summarise(&episode);
+        Ok(())
+    }
+
+    fn summarise(&self, episode: &Episode) {
+        if self.json {
+            let summary = json!({
+                "config": episode.config().to_value(),
+                "policy": self.policy.to_string(),
+                "steps": episode.num_steps(),
+                "ended": episode.is_over(),
+                "metrics": episode.metrics(),
+                "warnings": episode.warnings(),
+            });
+            println!("{summary}");
+            return;
+        }
+        let figures: Vec<String> = episode
+            .metrics()
+            .named()
+            .iter()
+            .map(|(name, value)| format!("{name}={}", short(*value)))
+            .collect();
+        println!("{} steps  {}", episode.num_steps(), figures.join("  "));
+    }
+}
+
+/// A figure with at most four decimals and no trailing zeros.
+fn short(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}

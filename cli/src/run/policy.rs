@@ -1,0 +1,93 @@
+//! Who chooses the actions.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use clap::ValueEnum;
+use pogema_conformance::{files, pogema_team, sample};
+use pogema_core::{Action, Error, Trace};
+use pogema_maps::GridConfig;
+use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_planners::AStarTeam;
+
+use super::episode::Episode;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PolicyName {
+    /// What POGEMA's `sample_actions` draws
+    Random,
+    /// POGEMA's own A* agent, one for each agent
+    Astar,
+    /// Nobody moves
+    Stay,
+    /// Actions from a file
+    File,
+}
+
+impl std::fmt::Display for PolicyName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let value = self.to_possible_value();
+        f.write_str(value.as_ref().map_or("", clap::builder::PossibleValue::get_name))
+    }
+}
+
+/// A policy at work.
+pub enum Policy {
+    Random(Box<Generator>),
+    Astar(AStarTeam),
+    Stay,
+    File(std::vec::IntoIter<Vec<Action>>),
+}
+
+impl Policy {
+    pub fn new(name: PolicyName, file: Option<&Path>, config: &GridConfig) -> Result<Self, Error> {
+        match (name, file) {
+            (PolicyName::File, Some(path)) => Ok(Self::File(read_actions(path)?.into_iter())),
+            (PolicyName::File, None) => {
+                Err(Error::State { reason: "`--policy file` needs `--actions FILE`".into() })
+            }
+            (_, Some(_)) => Err(Error::State { reason: "`--actions` needs `--policy file`".into() }),
+            (PolicyName::Random, None) => Ok(Self::Random(Box::new(generator(config)?))),
+            (PolicyName::Astar, None) => Ok(Self::Astar(pogema_team())),
+            (PolicyName::Stay, None) => Ok(Self::Stay),
+        }
+    }
+
+    /// The actions of the next step; none when a file has no more.
+    pub fn act(&mut self, episode: &Episode) -> Result<Option<Vec<Action>>, Error> {
+        let num_agents = episode.config().num_agents;
+        Ok(match self {
+            Self::Random(generator) => Some(sample(generator, num_agents)),
+            Self::Astar(team) => Some(episode.ask(team)?),
+            Self::Stay => Some(vec![Action::Stay; num_agents]),
+            Self::File(steps) => steps.next(),
+        })
+    }
+}
+
+fn generator(config: &GridConfig) -> Result<Generator, Error> {
+    match config.seed {
+        Some(seed) => Ok(Generator::seeded(seed)),
+        None => SeedSequence::from_os()
+            .map(|sequence| Generator::from_sequence(&sequence))
+            .map_err(|error| Error::State { reason: error.to_string() }),
+    }
+}
+
+/// The actions of a trace, or of a file with a list of numbers per line.
+fn read_actions(path: &Path) -> Result<Vec<Vec<Action>>, Error> {
+    let lines: Vec<String> =
+        files::open(path)?.lines().collect::<Result<_, _>>().map_err(|error| Error::io(path, error))?;
+    if lines.first().is_some_and(|line| line.starts_with('{')) {
+        let trace = Trace::read(lines.join("\n").as_bytes()).map_err(|error| Error::io(path, error))?;
+        return Ok(trace.steps.into_iter().map(|step| step.actions).collect());
+    }
+    let mut steps = Vec::new();
+    for (index, line) in lines.iter().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let wrong = |error: &dyn std::fmt::Display| Error::io(path, format!("line {}: {error}", index + 1));
+        let numbers: Vec<i64> = serde_json::from_str(line).map_err(|error| wrong(&error))?;
+        let actions = numbers.iter().enumerate().map(|(agent, &number)| Action::from_number(agent, number));
+        steps.push(actions.collect::<Result<_, _>>().map_err(|error| wrong(&error))?);
+    }
+    Ok(steps)
+}

@@ -1,0 +1,175 @@
+//! The engines agree with the recordings and with each other, on episodes that meet every kind of conflict; and a
+//! wrong engine is caught, under the rule it breaks.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_conformance::{Engine, Report, golden};
+use pogema_core::{Action, Collision, Config, Environment, Error, OnGoal, Reward};
+use pogema_core::{Instance, MapfOut, Occupancy, PomapfOut, Snapshot, StepOut};
+use pogema_reference::Reference;
+
+#[test]
+fn engines_give_what_was_recorded() {
+    for engine in [Engine::REFERENCE, Engine::LITERAL] {
+        let mut report = Report::default();
+        report.check_recordings("golden", &golden::folder(), engine).unwrap();
+        report.check_recordings("found", &golden::found_folder(), engine).unwrap();
+        assert!(report.agrees(), "{}: {}", engine.name, report.failures[0].text);
+        assert!(report.parts[0].checked >= 3500, "only {} recordings", report.parts[0].checked);
+    }
+}
+
+fn fresh(engines: &[Engine], num_cases: u64) -> Report {
+    let keep = tempfile::tempdir().unwrap();
+    let mut report = Report::default();
+    report.check_fresh(engines, num_cases, 77, keep.path(), &|| ()).unwrap();
+    report
+}
+
+#[test]
+fn engines_agree_on_crowded_episodes_of_every_kind() {
+    let report = fresh(&[Engine::REFERENCE, Engine::LITERAL], 1500);
+    assert!(report.agrees(), "{}", report.failures[0].text);
+    for (name, count) in report.events.named() {
+        let least = if name == "cycles" { 50 } else { 500 };
+        assert!(count >= least, "only {count} {name}");
+    }
+}
+
+/// The reference, but for one thing.
+struct Wrong {
+    inner: Reference,
+    config: Config,
+    after_step: fn(&mut StepOut<'_>, &Snapshot),
+    observe: fn(&mut [f32]),
+}
+
+impl Wrong {
+    fn make(
+        config: Config,
+        bend: fn(Config) -> Config,
+        after_step: fn(&mut StepOut<'_>, &Snapshot),
+        observe: fn(&mut [f32]),
+    ) -> Result<Box<dyn Environment>, Error> {
+        Ok(Box::new(Self { inner: Reference::new(bend(config))?, config, after_step, observe }))
+    }
+
+    fn rules(config: Config, bend: fn(Config) -> Config) -> Result<Box<dyn Environment>, Error> {
+        Self::make(config, bend, |_, _| (), |_| ())
+    }
+}
+
+impl Environment for Wrong {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
+        self.inner.reset(instance)
+    }
+    fn step(&mut self, actions: &[Action], mut out: StepOut<'_>) -> Result<(), Error> {
+        let inner = StepOut { rewards: out.rewards, terminated: out.terminated, truncated: out.truncated };
+        self.inner.step(actions, inner)?;
+        (self.after_step)(&mut out, &self.inner.snapshot());
+        Ok(())
+    }
+    fn step_back(&mut self) -> Result<bool, Error> {
+        self.inner.step_back()
+    }
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        self.inner.observe(out)?;
+        (self.observe)(out);
+        Ok(())
+    }
+    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+        self.inner.observe_pomapf(out)
+    }
+    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+        self.inner.observe_mapf(out)
+    }
+    fn snapshot(&self) -> Snapshot {
+        self.inner.snapshot()
+    }
+}
+
+/// Wrong engines, and the rule under which each must be caught.
+const WRONG: [(&str, Engine); 8] = [
+    (
+        "occupancy/as-released",
+        Engine {
+            name: "shows every agent",
+            make: |config| Wrong::rules(config, |config| Config { occupancy: Occupancy::Exact, ..config }),
+        },
+    ),
+    (
+        "collide/priority",
+        Engine {
+            name: "blocks both",
+            make: |config| {
+                Wrong::rules(config, |config| match config.collision {
+                    Collision::Priority => Config { collision: Collision::BlockBoth, ..config },
+                    _ => config,
+                })
+            },
+        },
+    ),
+    (
+        "collide/soft",
+        Engine {
+            name: "goes by priority",
+            make: |config| Wrong::rules(config, |config| Config { collision: Collision::Priority, ..config }),
+        },
+    ),
+    (
+        "goal/finish",
+        Engine {
+            name: "keeps finished agents",
+            make: |config| {
+                Wrong::rules(config, |config| match config.on_goal {
+                    OnGoal::Finish => Config { on_goal: OnGoal::Nothing, ..config },
+                    _ => config,
+                })
+            },
+        },
+    ),
+    (
+        "reward/own",
+        Engine {
+            name: "shares rewards",
+            make: |config| Wrong::rules(config, |config| Config { reward: Reward::Shared, ..config }),
+        },
+    ),
+    (
+        "end/truncated",
+        Engine {
+            name: "cuts off late",
+            make: |config| {
+                Wrong::rules(config, |config| Config { max_steps: config.max_steps.max(1) + 1, ..config })
+            },
+        },
+    ),
+    (
+        "end/terminated",
+        Engine {
+            name: "terminates the first agent",
+            make: |config| Wrong::make(config, |config| config, |out, _| out.terminated[0] = true, |_| ()),
+        },
+    ),
+    (
+        "observe/default",
+        Engine {
+            name: "sees one thing more",
+            make: |config| Wrong::make(config, |config| config, |_, _| (), |seen| seen[0] = 1.0 - seen[0]),
+        },
+    ),
+];
+
+#[test]
+fn wrong_engines_are_caught_under_the_rule_they_break() {
+    for (rule, engine) in WRONG {
+        let report = fresh(&[Engine::REFERENCE, engine], 200);
+        let blamed = report.tally.rules.get(rule).map_or(0, |count| count.diverged);
+        assert!(blamed > 0, "an engine that {} was not caught under {rule}", engine.name);
+        let kept = report.failures.iter().all(|fault| fault.kept.is_some());
+        assert!(kept, "divergences of an engine that {} were not kept", engine.name);
+    }
+}

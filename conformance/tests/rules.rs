@@ -1,0 +1,201 @@
+//! Every rule has one statement, code, a case and a picture, and nobody cites a rule that does not exist.
+//!
+//! The pictures and the index in `docs/spec` are made from the cases. With the environment variable `BLESS` set,
+//! this test writes them instead of comparing.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use pogema_conformance::{cases, golden, play};
+
+/// Crates whose sources may state rules.
+const SOURCES: [&str; 6] = ["core", "maps", "reference", "planners", "conformance", "cli"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+}
+
+/// A path as it reads from the root of the repository.
+fn local(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap().display().to_string()
+}
+
+#[derive(Default)]
+struct Rule {
+    chapter: String,
+    statement: String,
+    code: BTreeSet<String>,
+    cases: BTreeSet<String>,
+    pictures: usize,
+}
+
+fn is_id(text: &str) -> bool {
+    let part =
+        |part: &str| !part.is_empty() && part.bytes().all(|byte| byte == b'-' || byte.is_ascii_lowercase());
+    text.contains('/') && text.split('/').all(part)
+}
+
+fn chapters() -> Vec<PathBuf> {
+    let files = golden::files(&root().join("docs/spec"), ".md").unwrap();
+    files.into_iter().filter(|path| !path.ends_with("index.md")).collect()
+}
+
+/// The rules that the spec defines, and what is wrong with the definitions.
+fn defined(wrong: &mut Vec<String>) -> BTreeMap<String, Rule> {
+    let mut rules: BTreeMap<String, Rule> = BTreeMap::new();
+    for path in chapters() {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut current = None;
+        for line in text.lines() {
+            if let Some(title) = line.strip_prefix("## ") {
+                current = is_id(title).then(|| title.to_owned());
+                if let Some(id) = &current {
+                    let rule = Rule { chapter: local(&path), ..Rule::default() };
+                    if rules.insert(id.clone(), rule).is_some() {
+                        wrong.push(format!("{id} is defined twice, the second time in {}", local(&path)));
+                    }
+                }
+            } else if let Some(rule) = current.as_ref().and_then(|id| rules.get_mut(id)) {
+                rule.pictures += usize::from(line.starts_with("<!-- case: "));
+                if rule.statement.is_empty() && rule.pictures == 0 {
+                    line.trim().clone_into(&mut rule.statement);
+                }
+            }
+        }
+    }
+    rules
+}
+
+/// The rules that sources cite, with the files that do.
+fn cited_in_code() -> Vec<(String, String)> {
+    let mut cited = Vec::new();
+    for source in SOURCES {
+        for path in golden::files(&root().join(source).join("src"), ".rs").unwrap() {
+            let text = std::fs::read_to_string(&path).unwrap();
+            for line in text.lines().filter(|line| line.trim_start().starts_with("//")) {
+                let Some((_, ids)) = line.split_once("Rule: ") else { continue };
+                cited.extend(
+                    ids.split(',').map(|id| (id.trim().trim_end_matches('.').to_owned(), local(&path))),
+                );
+            }
+        }
+    }
+    cited
+}
+
+/// The rules that reports can blame.
+fn cited_in_reports() -> BTreeSet<String> {
+    let mut cited = BTreeSet::new();
+    for path in golden::files(&root().join("conformance/src"), ".rs").unwrap() {
+        let text = std::fs::read_to_string(&path).unwrap();
+        cited.extend(text.split('"').skip(1).step_by(2).filter(|word| is_id(word)).map(str::to_owned));
+    }
+    cited
+}
+
+#[test]
+fn every_rule_has_a_statement_code_a_case_and_a_picture() {
+    let mut wrong = Vec::new();
+    let mut rules = defined(&mut wrong);
+    for (id, file) in cited_in_code() {
+        match rules.get_mut(&id) {
+            Some(rule) => drop(rule.code.insert(file)),
+            None => wrong.push(format!("{file} cites `{id}`, which is not defined")),
+        }
+    }
+    for path in golden::files(&cases::folder(), ".yaml").unwrap() {
+        let (id, file) = (cases::read(&path).unwrap().rule, local(&path));
+        match rules.get_mut(&id) {
+            Some(rule) => drop(rule.cases.insert(file)),
+            None => wrong.push(format!("{file} shows `{id}`, which is not defined")),
+        }
+    }
+    let family = |id: &str| id.split('/').next().map(str::to_owned);
+    let families: BTreeSet<_> = rules.keys().filter_map(|id| family(id)).collect();
+    for id in cited_in_reports() {
+        if family(&id).is_some_and(|name| families.contains(&name)) && !rules.contains_key(&id) {
+            wrong.push(format!("reports cite `{id}`, which is not defined"));
+        }
+    }
+    for (id, rule) in &rules {
+        let missing = [
+            ("statement", rule.statement.len() < 40),
+            ("code", rule.code.is_empty()),
+            ("case", rule.cases.is_empty()),
+            ("picture", rule.pictures == 0),
+        ];
+        wrong.extend(
+            missing
+                .iter()
+                .filter(|(_, is_missing)| *is_missing)
+                .map(|(what, _)| format!("{id} has no {what}")),
+        );
+    }
+    assert!(rules.len() > 40, "only {} rules found", rules.len());
+    check_text(&root().join("docs/spec/index.md"), &index(&rules), &mut wrong);
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_picture_is_the_one_its_case_makes() {
+    let mut wrong = Vec::new();
+    for path in chapters() {
+        let text = std::fs::read_to_string(&path).unwrap();
+        check_text(&path, &with_pictures(&text, &mut wrong), &mut wrong);
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+fn check_text(path: &Path, wanted: &str, wrong: &mut Vec<String>) {
+    if std::fs::read_to_string(path).is_ok_and(|text| text == wanted) {
+        return;
+    }
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(path, wanted).unwrap();
+    } else {
+        wrong.push(format!("{} is out of date; `BLESS=1 ./check rules` writes it", local(path)));
+    }
+}
+
+/// The page with all rules, made from the chapters.
+fn index(rules: &BTreeMap<String, Rule>) -> String {
+    let mut text = String::from(
+        "# All rules\n\nThis page is made by the checks from the chapters, the sources and the cases.\n\n\
+         | rule | code | cases |\n| --- | --- | --- |\n",
+    );
+    for (id, rule) in rules {
+        let chapter = rule.chapter.trim_start_matches("docs/spec/");
+        let anchor = id.replace('/', "");
+        let code: Vec<String> = rule.code.iter().map(|file| format!("`{file}`")).collect();
+        let _ = writeln!(text, "| [{id}]({chapter}#{anchor}) | {} | {} |", code.join(" "), rule.cases.len());
+    }
+    text
+}
+
+/// A chapter with every picture block filled in.
+fn with_pictures(text: &str, wrong: &mut Vec<String>) -> String {
+    let mut result = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        let _ = writeln!(result, "{line}");
+        let Some(name) = line.strip_prefix("<!-- case: ").and_then(|rest| rest.strip_suffix(" -->")) else {
+            continue;
+        };
+        let path = cases::folder().join(format!("{name}.yaml"));
+        match cases::read(&path) {
+            Ok(case) => {
+                let picture = case.draw(&play(&case.request().unwrap()));
+                let _ = write!(result, "```text\n{picture}\n```\n");
+            }
+            Err(error) => wrong.push(error.to_string()),
+        }
+        if !lines.by_ref().any(|line| line == "<!-- /case -->") {
+            wrong.push(format!("the picture of {name} has no end"));
+        }
+        result.push_str("<!-- /case -->\n");
+    }
+    result
+}
