@@ -101,6 +101,9 @@ pub enum Record {
     Sample(Box<StepRecord>),
     Back(Back),
     History(History),
+    /// What fits none of these.
+    #[serde(untagged)]
+    Odd(Value),
 }
 
 /// The instance and the state after a reset.
@@ -172,7 +175,7 @@ impl Record {
     pub fn step(&self) -> Option<&StepRecord> {
         match self {
             Self::Step(step) | Self::Astar(step) | Self::Sample(step) => Some(step),
-            Self::Reset(_) | Self::Back(_) | Self::History(_) => None,
+            Self::Reset(_) | Self::Back(_) | Self::History(_) | Self::Odd(_) => None,
         }
     }
 
@@ -182,7 +185,7 @@ impl Record {
             Self::Reset(reset) => Some(&reset.state),
             Self::Step(step) | Self::Astar(step) | Self::Sample(step) => Some(&step.step.state),
             Self::Back(back) => Some(&back.state),
-            Self::History(_) => None,
+            Self::History(_) | Self::Odd(_) => None,
         }
     }
 }

@@ -86,6 +86,7 @@ fn head(step: Option<&CaseStep>, record: &Record) -> String {
         (_, Record::Step(step) | Record::Astar(step) | Record::Sample(step)) => word(step),
         (_, Record::Back(_)) => "back".into(),
         (_, Record::History(_)) => "history".into(),
+        (_, Record::Odd(_)) => "?".into(),
     }
 }
 

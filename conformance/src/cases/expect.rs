@@ -86,6 +86,7 @@ impl Expect {
             Record::Step(step) | Record::Astar(step) | Record::Sample(step) => self.of_step(step),
             Record::Back(back) => differ("moved", self.moved.as_ref(), &back.moved),
             Record::History(history) => differ("changes", self.changes.as_ref(), &history.changes),
+            Record::Odd(record) => Some(format!("the record fits no operation: {record}")),
         };
         state.flatten().or(rest)
     }
