@@ -1,5 +1,6 @@
 //! `pogema conform`: every engine against everything there is to check.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -8,6 +9,8 @@ use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::{Engine, Report, cases, files, find_oracle_python, golden};
 use pogema_core::Error;
+
+use crate::output::say;
 
 /// How many divergences are told in full.
 const MOST_TOLD: usize = 5;
@@ -51,16 +54,15 @@ impl Conform {
             let python = find_oracle_python(&self.oracle_folder)?;
             report.check_cases_with_oracle(&cases::folder(), &python)?;
             let bar = self.bar("POGEMA 1.4.0");
-            report.check_oracle(Engine::REFERENCE, &python, self.cases, self.seed, &self.keep, &|| {
-                bar.inc(1)
-            })?;
+            let tick = || bar.inc(1);
+            report.check_oracle(Engine::REFERENCE, &python, self.cases, self.seed, &self.keep, &tick)?;
             bar.finish_and_clear();
         }
         if let Some(path) = &self.json {
             let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
             files::write(path, &text)?;
         }
-        print(&report);
+        say(&tell(&report))?;
         Ok(if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
@@ -71,7 +73,8 @@ impl Conform {
     }
 }
 
-fn print(report: &Report) {
+/// The report as tables and words.
+fn tell(report: &Report) -> String {
     let mut parts = table(&["part", "checked", "failed"]);
     for part in &report.parts {
         parts.add_row([part.name.clone(), part.checked.to_string(), part.failed.to_string()]);
@@ -84,18 +87,19 @@ fn print(report: &Report) {
     for (name, count) in report.events.named() {
         events.add_row([name.to_owned(), count.to_string()]);
     }
-    println!("{rules}\n\n{events}\n\n{parts}\n");
+    let mut text = format!("{rules}\n\n{events}\n\n{parts}\n\n");
     for fault in report.failures.iter().take(MOST_TOLD) {
-        println!("{}: {}\n{}", fault.part, fault.name, fault.text);
+        let _ = writeln!(text, "{}: {}\n{}", fault.part, fault.name, fault.text);
         if let Some(kept) = &fault.kept {
-            println!("kept as {}\n", kept.display());
+            let _ = writeln!(text, "kept as {}\n", kept.display());
         }
     }
-    match report.failures.len() {
-        0 => println!("all agree: 0 divergences"),
-        1 => println!("1 divergence"),
-        number => println!("{number} divergences"),
-    }
+    text.push_str(&match report.failures.len() {
+        0 => "all agree: 0 divergences".into(),
+        1 => "1 divergence".into(),
+        number => format!("{number} divergences"),
+    });
+    text
 }
 
 fn table(head: &[&str]) -> Table {

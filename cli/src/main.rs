@@ -1,6 +1,7 @@
 //! `pogema`: run, check and inspect POGEMA episodes.
 
 mod conform;
+mod output;
 mod run;
 
 use std::process::ExitCode;

@@ -11,6 +11,7 @@ use clap::Args;
 use pogema_core::Error;
 use serde_json::json;
 
+use crate::output::say;
 use episode::Episode;
 use policy::{Policy, PolicyName};
 
@@ -62,11 +63,10 @@ impl Run {
             trace.write(&mut text)?;
             pogema_conformance::files::write(path, &text)?;
         }
-        self.summarise(&episode);
-        Ok(())
+        self.summarise(&episode)
     }
 
-    fn summarise(&self, episode: &Episode) {
+    fn summarise(&self, episode: &Episode) -> Result<(), Error> {
         if self.json {
             let summary = json!({
                 "config": episode.config().to_value(),
@@ -76,8 +76,7 @@ impl Run {
                 "metrics": episode.metrics(),
                 "warnings": episode.warnings(),
             });
-            println!("{summary}");
-            return;
+            return say(&summary.to_string());
         }
         let figures: Vec<String> = episode
             .metrics()
@@ -85,7 +84,7 @@ impl Run {
             .iter()
             .map(|(name, value)| format!("{name}={}", short(*value)))
             .collect();
-        println!("{} steps  {}", episode.num_steps(), figures.join("  "));
+        say(&format!("{} steps  {}", episode.num_steps(), figures.join("  ")))
     }
 }
 

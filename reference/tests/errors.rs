@@ -1,0 +1,113 @@
+//! A refused call says why and changes nothing.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, MapfOut, OnGoal};
+use pogema_core::{Outside, PomapfOut, StepOut};
+use pogema_reference::Reference;
+
+fn config() -> Config {
+    Config { num_agents: 2, radius: 1, on_goal: OnGoal::Restart, ..Config::default() }
+}
+
+fn instance() -> Instance {
+    let map = Map::from_rows(&["...", ".#."]).unwrap();
+    let goals = [Cell::new(0, 2), Cell::new(1, 2)].map(GoalStream::single).to_vec();
+    Instance::new(map, Outside::Free, vec![Cell::new(0, 0), Cell::new(1, 0)], goals).unwrap()
+}
+
+/// Steps with buffers of the given lengths.
+fn step(environment: &mut Reference, actions: &[Action], lengths: [usize; 3]) -> Result<(), Error> {
+    let (mut rewards, mut terminated, mut truncated) =
+        (vec![0.5; lengths[0]], vec![true; lengths[1]], vec![true; lengths[2]]);
+    let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+    let result = environment.step(actions, out);
+    if result.is_err() {
+        assert!(
+            rewards.iter().all(|&reward| reward == 0.5)
+                && terminated.iter().chain(&truncated).all(|&flag| flag)
+        );
+    }
+    result
+}
+
+#[test]
+fn nothing_works_before_the_first_reset() {
+    let mut environment = Reference::new(config()).unwrap();
+    let wanted = "the environment was not reset yet";
+    assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), wanted);
+    assert_eq!(environment.observe(&mut [0.0; 54]).unwrap_err().to_string(), wanted);
+    assert_eq!(environment.step_back().unwrap_err().to_string(), wanted);
+    assert!(environment.snapshot().cells.is_empty());
+}
+
+#[test]
+fn a_refused_step_leaves_state_and_buffers_as_they_were() {
+    let mut environment = Reference::new(config()).unwrap();
+    environment.reset(&instance()).unwrap();
+    step(&mut environment, &[Action::Right, Action::Stay], [2; 3]).unwrap();
+    let before = environment.snapshot();
+    let refusals = [
+        (1, [2, 2, 2], "actions has length 1, expected 2"),
+        (3, [2, 2, 2], "actions has length 3, expected 2"),
+        (2, [1, 2, 2], "rewards has length 1, expected 2"),
+        (2, [2, 3, 2], "terminated has length 3, expected 2"),
+        (2, [2, 2, 0], "truncated has length 0, expected 2"),
+    ];
+    for (num_actions, lengths, wanted) in refusals {
+        let error = step(&mut environment, &vec![Action::Right; num_actions], lengths).unwrap_err();
+        assert_eq!(error.to_string(), wanted);
+        assert_eq!(environment.snapshot(), before);
+    }
+    assert_eq!(environment.step_back().unwrap_err().to_string(), "steps are only kept with persistent: true");
+    assert_eq!(environment.snapshot(), before);
+}
+
+#[test]
+fn a_refused_reset_leaves_the_episode_as_it_was() {
+    let mut environment = Reference::new(config()).unwrap();
+    environment.reset(&instance()).unwrap();
+    let before = environment.snapshot();
+    let mut lonely = instance();
+    lonely.starts.pop();
+    lonely.goals.pop();
+    assert_eq!(environment.reset(&lonely).unwrap_err().to_string(), "starts has length 1, expected 2");
+    let noise = Map::from_rows(&["....", "....", "....", "...."]).unwrap();
+    let narrow = Instance { outside: Outside::Noise(noise), ..instance() };
+    assert_eq!(
+        environment.reset(&narrow).unwrap_err().to_string(),
+        "columns of noise has length 4, expected 5"
+    );
+    assert_eq!(environment.snapshot(), before);
+}
+
+#[test]
+fn a_buffer_of_the_wrong_length_is_not_written() {
+    let mut environment = Reference::new(config()).unwrap();
+    environment.reset(&instance()).unwrap();
+    let mut short = [0.5; 53];
+    assert_eq!(
+        environment.observe(&mut short).unwrap_err().to_string(),
+        "observations has length 53, expected 54"
+    );
+    assert!(short.iter().all(|&value| value == 0.5));
+    let (mut windows, mut agents, mut cells, mut goals) = ([0.0; 18], [0.0; 18], [0; 4], [0; 3]);
+    let out =
+        PomapfOut { obstacles: &mut windows, agents: &mut agents, cells: &mut cells, goals: &mut goals };
+    assert_eq!(environment.observe_pomapf(out).unwrap_err().to_string(), "goals has length 3, expected 4");
+    let mut obstacles = [0; 19];
+    let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut [0; 4] };
+    let wanted = "global obstacles has length 19, expected 20";
+    assert_eq!(environment.observe_mapf(out).unwrap_err().to_string(), wanted);
+}
+
+#[test]
+fn a_config_out_of_range_makes_no_environment() {
+    let no_agents = Config { num_agents: 0, ..config() };
+    assert_eq!(
+        Reference::new(no_agents).unwrap_err().to_string(),
+        "config: `num_agents` is `0`, expected at least 1"
+    );
+    let blind = Config { radius: 0, ..config() };
+    assert_eq!(Reference::new(blind).unwrap_err().to_string(), "config: `radius` is `0`, expected 1 to 128");
+}
