@@ -17,6 +17,7 @@
 
 pub mod cases;
 mod compare;
+mod dice;
 mod draw;
 mod events;
 pub mod files;
@@ -25,6 +26,7 @@ mod laws;
 mod literal;
 mod oracle;
 mod play;
+mod policies;
 mod request;
 mod runner;
 mod script;
@@ -37,7 +39,8 @@ pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};
 pub use literal::Literal;
 pub use oracle::{Oracle, find_oracle_python};
-pub use play::{Engine, play, play_on, pogema_team, sample};
+pub use play::{Engine, play, play_on};
+pub use policies::{pogema_team, sample};
 pub use request::{
     Back, Derived, Failure, History, Op, Record, Registered, Request, ResetRecord, Response, StepRecord, When,
 };

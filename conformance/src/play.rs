@@ -1,14 +1,15 @@
 //! Our own answers to a request.
 
 use pogema_core::{
-    Action, Cell, Change, CollisionMeter, Config, DensityMeter, Environment, EpisodeMeter, Error, GoalStream,
-    Instance, MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded,
-    Snapshot, StepOut, TraceStep, changes, states_at_every_step,
+    Action, Change, CollisionMeter, Config, DensityMeter, Environment, EpisodeMeter, Error, Instance,
+    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded, Snapshot, StepOut,
+    TraceStep, changes, states_at_every_step,
 };
 use pogema_maps::numpy::Generator;
-use pogema_maps::{GridConfig, InstanceSource, Targets};
+use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
 use pogema_planners::AStarTeam;
 
+use crate::policies::{pogema_team, sample};
 use crate::request::{
     Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
 };
@@ -289,65 +290,4 @@ impl Player {
         let (global_xy, global_target_xy) = (pairs(&cells), pairs(&goals));
         Ok(Observed::Mapf(ObservedMapf { pomapf, global_obstacles, global_xy, global_target_xy }))
     }
-}
-
-/// POGEMA's A* policy: every agent draws its random moves from a generator of seed 0.
-///
-/// Rule: policy/astar
-pub fn pogema_team() -> AStarTeam {
-    AStarTeam::new(Box::new(|| {
-        let mut generator = Generator::seeded(0);
-        Box::new(move || random_action(&mut generator))
-    }))
-}
-
-/// POGEMA's random policy: what `sample_actions` draws.
-///
-/// Rule: seed/actions
-pub fn sample(generator: &mut Generator, num_agents: usize) -> Vec<Action> {
-    (0..num_agents).map(|_| random_action(generator)).collect()
-}
-
-fn random_action(generator: &mut Generator) -> Action {
-    // INVARIANT: a range from 0 to 5 is never empty, and each of its numbers is an action.
-    let number = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
-    Action::ALL[number as usize]
-}
-
-/// The goals POGEMA foretells: until an agent walking straight from goal to goal would need the whole episode.
-/// None where it would go on for ever, since only the goal just reached can be drawn again.
-///
-/// Rule: goal/restart/foretold
-///
-/// Source: POGEMA 1.4.0, `envs.py`, `PogemaLifeLong.get_lifelong_targets_xy`
-fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Vec<Cell>>> {
-    if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
-        return Some(sequences.clone());
-    }
-    let agents = instance.goals.iter().zip(&instance.starts);
-    agents.map(|(stream, &start)| foretold_to_one(stream.clone(), start, config.max_episode_steps)).collect()
-}
-
-fn foretold_to_one(mut stream: GoalStream, start: Cell, max_steps: i64) -> Option<Vec<Cell>> {
-    /// So many equal draws in a row are no chance.
-    const MOST_REPEATS: usize = 10_000;
-    let mut at = stream.first();
-    let mut goals = vec![at];
-    let mut length = distance(start, at);
-    let mut num_repeats = 0;
-    while length < max_steps {
-        let next = stream.advance(at);
-        num_repeats = if next == at { num_repeats + 1 } else { 0 };
-        if num_repeats > MOST_REPEATS {
-            return None;
-        }
-        length += distance(at, next);
-        goals.push(next);
-        at = next;
-    }
-    Some(goals)
-}
-
-fn distance(one: Cell, other: Cell) -> i64 {
-    i64::from(one.row.abs_diff(other.row)) + i64::from(one.col.abs_diff(other.col))
 }

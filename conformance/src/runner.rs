@@ -40,6 +40,8 @@ pub struct Part {
     pub checked: u64,
     /// Those that failed.
     pub failed: u64,
+    /// What happened in their episodes.
+    pub events: Events,
 }
 
 /// One thing that went wrong.
@@ -77,15 +79,17 @@ impl Report {
     }
 
     fn take(&mut self, name: &str, results: Vec<Checked>) {
-        let mut part = Part { name: name.into(), checked: results.len() as u64, failed: 0 };
+        let checked = results.len() as u64;
+        let mut part = Part { name: name.into(), checked, failed: 0, events: Events::default() };
         for checked in results {
             self.tally.add(&checked.tally);
-            self.events.add(&checked.events);
+            part.events.add(&checked.events);
             if let Some(fault) = checked.fault {
                 part.failed += 1;
                 self.failures.push(fault);
             }
         }
+        self.events.add(&part.events);
         self.parts.push(part);
     }
 
@@ -235,9 +239,6 @@ impl Report {
 }
 
 fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
     let mut files = golden::files(folder, ".jsonl")?;
     files.extend(golden::files(folder, ".jsonl.zst")?);
     Ok(files)

@@ -2,7 +2,7 @@
 
 use pogema_core::{Action, Cell, Map, Snapshot};
 
-use crate::draw::Dice;
+use crate::dice::Dice;
 use crate::play::{Engine, Player};
 use crate::request::{Op, Record, Request, Response};
 

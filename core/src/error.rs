@@ -4,12 +4,12 @@ use crate::Cell;
 
 /// Everything that can be wrong with input, each told in one line.
 ///
-/// An error leaves the state that it came from as it was.
+/// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A config field holds what it may not hold.
-    #[error("config: `{field}` is `{value}`, expected {expected}")]
+    #[error("{}", one_line(format_args!("config: `{field}` is `{value}`, expected {expected}")))]
     Config {
         /// The field, by the name the file gives it.
         field: String,
@@ -19,13 +19,13 @@ pub enum Error {
         expected: String,
     },
     /// A config could not be read at all.
-    #[error("config: {reason}")]
+    #[error("{}", one_line(format_args!("config: {reason}")))]
     Syntax {
         /// What the parser says, with its place.
         reason: String,
     },
     /// A map text is wrong.
-    #[error("map: line {line}, column {column}: {reason}")]
+    #[error("{}", one_line(format_args!("map: line {line}, column {column}: {reason}")))]
     Map {
         /// Line of the map, counted from 1.
         line: usize,
@@ -35,13 +35,13 @@ pub enum Error {
         reason: String,
     },
     /// The instance as a whole cannot be played.
-    #[error("instance: {reason}")]
+    #[error("{}", one_line(format_args!("instance: {reason}")))]
     Instance {
         /// What is wrong.
         reason: String,
     },
     /// One agent of an instance cannot be played.
-    #[error("instance: agent {agent}: {reason}")]
+    #[error("{}", one_line(format_args!("instance: agent {agent}: {reason}")))]
     Agent {
         /// The agent's index.
         agent: usize,
@@ -67,13 +67,13 @@ pub enum Error {
         got: usize,
     },
     /// A call that the state does not allow, such as a step before the first reset.
-    #[error("{reason}")]
+    #[error("{}", one_line(reason))]
     State {
         /// What has to happen first.
         reason: String,
     },
     /// A file could not be read or written.
-    #[error("{path}: {reason}")]
+    #[error("{}", one_line(format_args!("{path}: {reason}")))]
     Io {
         /// The file.
         path: String,
@@ -81,7 +81,7 @@ pub enum Error {
         reason: String,
     },
     /// A trace that cannot be read.
-    #[error("trace: line {line}: {reason}")]
+    #[error("{}", one_line(format_args!("trace: line {line}: {reason}")))]
     Trace {
         /// Line of the trace, counted from 1.
         line: usize,
@@ -126,12 +126,22 @@ impl Error {
     }
 }
 
-/// Keeps a quoted value on one line of bearable length.
-fn shorten(value: &str) -> String {
+/// A value for a message, cut off where it gets too long to read.
+pub fn shorten(value: &str) -> String {
     const LONGEST: usize = 60;
-    let line = value.replace(['\n', '\r'], " ");
-    if line.chars().count() <= LONGEST {
-        return line;
+    match value.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &value[..end]),
+        None => value.to_owned(),
     }
-    line.chars().take(LONGEST).chain("…".chars()).collect()
+}
+
+/// A text with its control characters written out, so that quoted input can neither end the line nor move the
+/// cursor.
+fn one_line(text: impl std::fmt::Display) -> String {
+    let is_unfit = |letter: char| letter.is_control() || matches!(letter, '\u{2028}' | '\u{2029}');
+    let mut line = String::new();
+    for letter in text.to_string().chars() {
+        if is_unfit(letter) { line.extend(letter.escape_debug()) } else { line.push(letter) }
+    }
+    line
 }

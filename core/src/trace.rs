@@ -4,7 +4,7 @@ use std::io::{BufRead, Write};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
+use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot, shorten};
 
 /// The format this version reads and writes.
 const FORMAT: &str = "pogema-trace/1";
@@ -167,19 +167,30 @@ impl TraceHeader {
         Instance::new(self.map.clone(), self.outside.clone(), self.starts.clone(), streams)
     }
 
+    /// Passes if an engine can play what the header describes.
     fn check(&self) -> Result<(), Error> {
-        let wrong = |what: &str, got: &str, want: &str| Error::Trace {
-            line: 1,
-            reason: format!("the {what} is `{got}`, expected `{want}`"),
-        };
-        if self.format != FORMAT {
-            return Err(wrong("format", &self.format, FORMAT));
-        }
-        if self.spec != SPEC {
-            return Err(wrong("spec", &self.spec, SPEC));
-        }
         self.config.check()?;
-        Error::check_length("starts", self.config.num_agents, self.starts.len())
+        Error::check_length("starts", self.config.num_agents, self.starts.len())?;
+        self.instance().map(|_| ())
+    }
+}
+
+/// What every version of the format says of itself on the first line, whatever else stands there.
+#[derive(Deserialize)]
+struct Versions {
+    format: String,
+    spec: String,
+}
+
+impl Versions {
+    fn check(&self) -> Result<(), Error> {
+        for (what, got, want) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
+            if got != want {
+                let reason = format!("the {what} is `{}`, expected `{want}`", shorten(got));
+                return Err(Error::Trace { line: 1, reason });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -189,23 +200,32 @@ impl Trace {
     /// # Errors
     /// [`Error::Trace`] with the line that is wrong.
     pub fn read(input: impl BufRead) -> Result<Self, Error> {
-        let mut lines = input.lines().enumerate().map(|(index, line)| match line {
-            Ok(text) => Ok((index + 1, text)),
-            Err(error) => Err(Error::Trace { line: index + 1, reason: error.to_string() }),
+        let mut lines = (1..).zip(input.lines()).map(|(line, text)| match text {
+            Ok(text) => Ok((line, text)),
+            Err(error) => Err(Error::Trace { line, reason: error.to_string() }),
         });
-        let header: TraceHeader = parse_next(&mut lines, "the header")?;
-        header.check()?;
-        let start = parse_next(&mut lines, "the start")?;
-        let mut steps = Vec::new();
+        let ends_before =
+            |line, what| move || Error::Trace { line, reason: format!("the trace ends before {what}") };
+        let (line, text) = lines.next().ok_or_else(ends_before(1, "the header"))??;
+        parse::<Versions>(line, &text)?.check()?;
+        let header: TraceHeader = parse(line, &text)?;
+        header.check().map_err(|error| Error::Trace { line, reason: error.to_string() })?;
+        let num_agents = header.config.num_agents;
+        let (line, text) = lines.next().ok_or_else(ends_before(2, "the start"))??;
+        let mut start: TraceStart = parse(line, &text)?;
+        start.state.step = 0;
+        check_state(line, num_agents, &start.state)?;
+        let mut steps: Vec<TraceStep> = Vec::new();
         for line in lines {
-            let (number, text) = line?;
+            let (line, text) = line?;
             if !text.trim().is_empty() {
-                steps.push(parse(number, &text)?);
+                let mut step: TraceStep = parse(line, &text)?;
+                step.check(line, num_agents)?;
+                step.state.step = steps.len() as u64 + 1;
+                steps.push(step);
             }
         }
-        let trace = Self { header, start, steps };
-        trace.check_lengths()?;
-        Ok(trace)
+        Ok(Self { header, start, steps })
     }
 
     /// Writes the trace as JSON Lines.
@@ -217,32 +237,40 @@ impl Trace {
         write_line(&mut output, &self.start)?;
         self.steps.iter().try_for_each(|step| write_line(&mut output, step))
     }
+}
 
-    fn check_lengths(&self) -> Result<(), Error> {
-        let want = self.header.config.num_agents;
-        let states = std::iter::once(&self.start.state).chain(self.steps.iter().map(|step| &step.state));
-        for (index, state) in states.enumerate() {
-            let lengths = [state.cells.len(), state.goals.len(), state.active.len(), state.on_goal.len()];
-            if lengths.iter().any(|&length| length != want) {
-                let reason = format!("expected {want} agents in every list");
-                return Err(Error::Trace { line: index + 2, reason });
-            }
-        }
-        self.steps.iter().try_for_each(|step| Error::check_length("actions", want, step.actions.len()))
+impl TraceStep {
+    fn check(&self, line: usize, num_agents: usize) -> Result<(), Error> {
+        check_state(line, num_agents, &self.state)?;
+        check_list(line, num_agents, "actions", &self.actions)?;
+        check_list(line, num_agents, "rewards", &self.rewards)?;
+        check_list(line, num_agents, "terminated", &self.terminated)?;
+        check_list(line, num_agents, "truncated", &self.truncated)
     }
 }
 
-fn parse_next<T: serde::de::DeserializeOwned>(
-    lines: &mut impl Iterator<Item = Result<(usize, String), Error>>,
-    what: &str,
-) -> Result<T, Error> {
-    let missing = || Error::Trace { line: 1, reason: format!("the trace ends before {what}") };
-    let (number, text) = lines.next().ok_or_else(missing)??;
-    parse(number, &text)
+fn check_state(line: usize, num_agents: usize, state: &Snapshot) -> Result<(), Error> {
+    check_list(line, num_agents, "cells", &state.cells)?;
+    check_list(line, num_agents, "goals", &state.goals)?;
+    check_list(line, num_agents, "active", &state.active)?;
+    check_list(line, num_agents, "on_goal", &state.on_goal)
+}
+
+fn check_list<T>(line: usize, num_agents: usize, name: &str, list: &[T]) -> Result<(), Error> {
+    if list.len() == num_agents {
+        return Ok(());
+    }
+    let reason = format!("`{name}` has length {}, expected {num_agents}, one for each agent", list.len());
+    Err(Error::Trace { line, reason })
 }
 
 fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, Error> {
-    serde_json::from_str(text).map_err(|error| Error::Trace { line, reason: error.to_string() })
+    serde_json::from_str(text).map_err(|error| {
+        // The parser sees one line at a time, so to it every line is the first.
+        let (column, message) = (error.column(), error.to_string());
+        let bare = message.strip_suffix(&format!(" at line 1 column {column}")).unwrap_or(&message);
+        Error::Trace { line, reason: format!("column {column}: {bare}") }
+    })
 }
 
 fn write_line(output: &mut impl Write, value: &impl Serialize) -> Result<(), Error> {

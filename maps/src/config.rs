@@ -2,13 +2,14 @@
 
 mod check;
 mod fields;
+mod parse;
 mod read;
 mod write;
 
 use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, Reward};
 
 pub use fields::{FIELDS, nearest};
-pub use read::{value_from_json, value_from_yaml};
+pub use parse::{value_from_json, value_from_yaml};
 
 /// A config under POGEMA's names, checked and with everything derived that POGEMA derives.
 ///
@@ -115,6 +116,8 @@ pub enum Integration {
 }
 
 /// How large maps and crowds may be.
+///
+/// Rule: config/limits
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Limits {
     /// As POGEMA 1.4.0: sides up to 4096, up to 10,000,000 agents.

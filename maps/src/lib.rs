@@ -16,6 +16,7 @@
 mod catalogue;
 mod components;
 mod config;
+mod foretell;
 pub mod numpy;
 mod place;
 mod source;
@@ -27,6 +28,7 @@ pub use components::{ComponentCells, Components};
 pub use config::{
     FIELDS, GridConfig, Integration, Limits, Targets, nearest, value_from_json, value_from_yaml,
 };
+pub use foretell::foretold_goals;
 pub use place::{capacity, place_at_random};
 pub use source::{Generated, InstanceSource};
 pub use text::{MapText, parse_map_text};

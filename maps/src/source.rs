@@ -173,7 +173,9 @@ impl InstanceSource {
     /// Source: POGEMA 1.4.0, `generator.py`, `generate_from_possible_positions`
     fn place_from_pools(&self, pools: &mut Pools) -> Result<Placed, Error> {
         let num_agents = self.config.num_agents;
+        let map = self.ground()?;
         for (what, pool) in [("possible_agents_xy", &pools.starts), ("possible_targets_xy", &pools.goals)] {
+            check_on_map(&map, what, pool)?;
             if pool.len() < num_agents {
                 let expected = format!("at most the {} cells of {what}", pool.len());
                 return Err(Error::config("num_agents", num_agents, expected));
@@ -182,7 +184,7 @@ impl InstanceSource {
         let mut generator = self.stream()?;
         generator.shuffle(&mut pools.starts);
         generator.shuffle(&mut pools.goals);
-        Ok((self.ground()?, pools.starts[..num_agents].to_vec(), pools.goals[..num_agents].to_vec()))
+        Ok((map, pools.starts[..num_agents].to_vec(), pools.goals[..num_agents].to_vec()))
     }
 
     /// Rule: place/retries
@@ -273,12 +275,16 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
     Ok(first.iter().zip(sequences).map(stream).collect())
 }
 
+/// Passes if every cell of a pool is on the map.
+fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
+    let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
+    let expected = format!("cells inside the map of {} rows and {} columns", map.height(), map.width());
+    Err(Error::config(field, cell, expected))
+}
+
 /// Passes if every draw from the pool ends and hits the map.
 fn check_pool(map: &Map, pool: &[Cell], radius: u16, goals: &[Cell]) -> Result<(), Error> {
-    if let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) {
-        let expected = format!("cells inside the map of {} rows and {} columns", map.height(), map.width());
-        return Err(Error::config("possible_targets_xy", cell, expected));
-    }
+    check_on_map(map, "possible_targets_xy", pool)?;
     let stuck = goals.iter().position(|&goal| !PoolSource::can_draw(pool, radius, goal));
     stuck.map_or(Ok(()), |agent| {
         Err(Error::agent(agent, "no next goal can be drawn from possible_targets_xy"))

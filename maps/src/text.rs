@@ -32,8 +32,11 @@ pub fn parse_map_text(text: &str) -> Result<MapText, Error> {
     for (line, words) in text.lines().enumerate() {
         for word in words.split_whitespace() {
             // Both are slices of one line, so the distance between them is where the word begins.
-            let column = words[..word.as_ptr() as usize - words.as_ptr() as usize].chars().count();
-            reader.read_row(word, line, column)?;
+            let begin = word.as_ptr() as usize - words.as_ptr() as usize;
+            reader.read_row(word).map_err(|Fault { col, reason }| {
+                let column = words[..begin].chars().count() + col + 1;
+                Error::Map { line: line + 1, column, reason }
+            })?;
         }
     }
     reader.finish()
@@ -51,16 +54,23 @@ struct Reader {
     has_pools: bool,
 }
 
+/// What is wrong with a row, and at which of its cells.
+struct Fault {
+    col: usize,
+    reason: String,
+}
+
 impl Reader {
-    fn read_row(&mut self, row: &str, line: usize, column: usize) -> Result<(), Error> {
+    fn read_row(&mut self, row: &str) -> Result<(), Fault> {
+        let coordinate = |number: usize, col: usize| {
+            let reason = |_| format!("the map has more than {} rows or columns", u16::MAX);
+            u16::try_from(number).map_err(reason).map_err(|reason| Fault { col, reason })
+        };
         for (col, character) in row.chars().enumerate() {
-            let place = |number: usize| u16::try_from(number).ok();
-            let too_large = || Error::instance(format!("the map has more than {} rows or columns", u16::MAX));
-            let row = place(self.height).ok_or_else(too_large)?;
-            let cell = Cell::new(row, place(col).ok_or_else(too_large)?);
+            let cell = Cell::new(coordinate(self.height, col)?, coordinate(col, col)?);
             if !self.read_cell(character, cell) {
                 let reason = format!("unknown character `{character}`, expected one of `.#@$!`, a-z or A-Z");
-                return Err(Error::Map { line: line + 1, column: column + col + 1, reason });
+                return Err(Fault { col, reason });
             }
         }
         let length = row.chars().count();
@@ -68,7 +78,7 @@ impl Reader {
             self.width = length;
         } else if length != self.width {
             let reason = format!("the row has {length} cells, expected {} as in the first row", self.width);
-            return Err(Error::Map { line: line + 1, column: column + length.min(self.width) + 1, reason });
+            return Err(Fault { col: length.min(self.width), reason });
         }
         self.height += 1;
         Ok(())
@@ -102,6 +112,10 @@ impl Reader {
     }
 
     fn finish(self) -> Result<MapText, Error> {
+        if self.height == 0 {
+            let reason = "the map has no cell, expected some of `.#@$!`, a-z and A-Z".into();
+            return Err(Error::Map { line: 1, column: 1, reason });
+        }
         let (num_starts, num_goals) = (self.starts.len(), self.goals.len());
         if num_starts != num_goals {
             let reason = format!(

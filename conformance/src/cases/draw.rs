@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use pogema_core::{Map, picture};
+use serde::Serialize;
 use serde_json::Value;
 
-use super::{Case, CaseStep, Sees};
+use super::{Case, CaseStep, Expect, Sees};
 use crate::request::{Record, Response, StepRecord};
 
 /// Frames in one row of a picture.
@@ -32,16 +33,7 @@ impl Case {
         }
         let expectations = std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect));
         for (op, (record, expect)) in response.records.iter().zip(expectations).enumerate() {
-            if let Some(sees) = &expect.sees {
-                let _ = write!(text, "\n{}", draw_window(op, sees));
-            }
-            if let Some(metrics) = record.step().and_then(|step| step.step.metrics)
-                && expect.metrics.is_some()
-            {
-                let figures: Vec<String> =
-                    metrics.named().iter().map(|(name, value)| format!("{name} {value}")).collect();
-                let _ = writeln!(text, "\nafter step {op}: {}", figures.join(", "));
-            }
+            text.push_str(&draw_facts(op, record, expect));
         }
         if let Some(error) = &response.error {
             let _ = writeln!(text, "\nerror: {}", error.message);
@@ -109,13 +101,63 @@ fn beside(frames: &[Frame]) -> String {
     text
 }
 
-fn draw_window(op: usize, sees: &Sees) -> String {
+/// What a case checks of one moment besides the picture.
+fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
+    let moment = if op == 0 { "reset".to_owned() } else { format!("operation {op}") };
+    let mut facts = Vec::new();
+    let mut tell =
+        |what: &str, value: Option<String>| facts.extend(value.map(|value| format!("{what} {value}")));
+    tell("cells", list(expect.cells.as_ref()));
+    tell("goals", list(expect.goals.as_ref()));
+    tell("active", list(expect.active.as_ref()));
+    tell("on goal", list(expect.on_goal.as_ref()));
+    tell("rewards", list(expect.rewards.as_ref()));
+    tell("terminated", list(expect.terminated.as_ref()));
+    tell("truncated", list(expect.truncated.as_ref()));
+    tell("caller's actions", list(expect.actions_after.as_ref()));
+    tell("xy", list(expect.xy.as_ref()));
+    tell("target_xy", list(expect.target_xy.as_ref()));
+    tell("global_xy", list(expect.global_xy.as_ref()));
+    tell("global_target_xy", list(expect.global_target_xy.as_ref()));
+    tell("derived", expect.derived.as_ref().map(Value::to_string));
+    tell("goals foretold", list(expect.foretold.as_ref()));
+    tell("padded dtype", expect.padded_dtype.clone());
+    tell("taken back", expect.moved.map(|moved| moved.to_string()));
+    tell("changes", list(expect.changes.as_ref()));
+    tell("metrics", expect.metrics.and(record.step()).map(draw_metrics));
+    let mut text = String::new();
+    if !facts.is_empty() {
+        let _ = writeln!(text, "\nafter {moment}: {}", facts.join("; "));
+    }
+    let pictures = [("occupancy", &expect.occupied), ("with its border", &expect.padded)];
+    let frame = |(what, picture): (&str, &Option<String>)| {
+        Some(Frame { head: format!("{what} after {moment}"), body: picture.as_ref()?.trim_end().to_owned() })
+    };
+    let frames: Vec<Frame> = pictures.into_iter().filter_map(frame).collect();
+    if !frames.is_empty() {
+        let _ = write!(text, "\n{}", beside(&frames));
+    }
+    if let Some(sees) = &expect.sees {
+        let _ = write!(text, "\n{}", draw_window(&moment, sees));
+    }
+    text
+}
+
+fn list<T: Serialize>(values: Option<&Vec<T>>) -> Option<String> {
+    serde_json::to_string(values?).ok()
+}
+
+fn draw_metrics(step: &StepRecord) -> String {
+    let Some(metrics) = step.step.metrics else { return "none".into() };
+    metrics.named().iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ")
+}
+
+fn draw_window(moment: &str, sees: &Sees) -> String {
     let windows = [("obstacles", &sees.obstacles), ("agents", &sees.agents), ("goal", &sees.goal)];
     let frame = |(name, window): (&str, &Option<String>)| {
         let body = window.as_ref()?.lines().map(str::trim).collect::<Vec<_>>().join("\n");
         Some(Frame { head: name.into(), body })
     };
     let frames: Vec<Frame> = windows.into_iter().filter_map(frame).collect();
-    let moment = if op == 0 { "reset".to_owned() } else { format!("step {op}") };
     format!("agent {} sees after {moment}:\n{}", sees.agent, beside(&frames))
 }

@@ -1,5 +1,7 @@
 //! What a case expects of one moment; only what is written is checked.
 
+use std::collections::BTreeMap;
+
 use pogema_core::{Cell, Change, Map, Metrics, Observed, Snapshot, picture};
 use serde::Deserialize;
 use serde_json::Value;
@@ -56,6 +58,9 @@ pub struct Expect {
     pub moved: Option<bool>,
     /// For each agent its changes: row, column, goal row, goal column, step, active.
     pub changes: Option<Vec<Vec<Change>>>,
+    /// Keys that mean nothing: a misspelt expectation must not pass unseen.
+    #[serde(flatten)]
+    pub unknown: BTreeMap<String, Value>,
 }
 
 /// The windows of one agent, as lines of `.` for 0 and anything else for 1.
@@ -80,6 +85,9 @@ impl Expect {
 
     /// The first thing that is not as expected, in words.
     pub fn mismatch(&self, record: &Record, map: &Map) -> Option<String> {
+        if let Some(key) = self.unknown.keys().next() {
+            return Some(format!("`{key}` is no expectation"));
+        }
         let state = record.state().map(|state| self.of_state(state, map));
         let rest = match record {
             Record::Reset(reset) => self.of_reset(reset),

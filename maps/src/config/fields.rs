@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use pogema_core::{Cell, Error};
+use pogema_core::{Cell, Error, shorten};
 use serde_json::{Map as Object, Value};
 
 /// Every key a config may have, POGEMA's first, ours last.
@@ -42,6 +42,11 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     known.into_iter().max_by(|one, other| likeness(one).total_cmp(&likeness(other)))
 }
 
+/// A key of the input for a message.
+pub(super) fn quoted(key: &str) -> String {
+    format!("`{}`", shorten(key))
+}
+
 /// The fields of a config as they stand in the file.
 pub(super) struct Fields<'a>(&'a Object<String, Value>);
 
@@ -50,9 +55,8 @@ impl<'a> Fields<'a> {
     pub fn new(object: &'a Object<String, Value>) -> Result<Self, Error> {
         if let Some(key) = object.keys().find(|key| !FIELDS.contains(&key.as_str())) {
             let hint = nearest(key, FIELDS).unwrap_or_default();
-            return Err(Error::Syntax {
-                reason: format!("unknown field `{key}`, the nearest known one is `{hint}`"),
-            });
+            let reason = format!("unknown field {}, the nearest known one is `{hint}`", quoted(key));
+            return Err(Error::Syntax { reason });
         }
         Ok(Self(object))
     }

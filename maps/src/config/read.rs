@@ -4,6 +4,7 @@ use pogema_core::{Cell, Collision, Error, Map, Observation, Occupancy, OnGoal, R
 use serde_json::{Value, json};
 
 use super::fields::{Fields, cells};
+use super::parse::{value_from_json, value_from_yaml};
 use super::{GridConfig, Integration, Limits, Targets};
 use crate::text::{MapText, parse_map_text};
 
@@ -42,9 +43,7 @@ impl GridConfig {
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {
-        let object = value
-            .as_object()
-            .ok_or_else(|| Error::Syntax { reason: "expected an object of fields and values".into() })?;
+        let object = value.as_object().ok_or_else(|| no_object(value))?;
         let fields = Fields::new(object)?;
         check_constants(&fields)?;
         let limits = fields
@@ -75,6 +74,8 @@ impl GridConfig {
         (self.width, self.height) = match (width, height) {
             (Some(width), Some(height)) => (width as usize, height as usize),
             (None, None) => (size, size),
+            // A map brings its own.
+            _ if fields.optional("map").is_some() => (size, size),
             (Some(width), None) => return Err(Error::config("width", width, "a height to go with it")),
             (None, Some(height)) => return Err(Error::config("height", height, "a width to go with it")),
         };
@@ -170,29 +171,16 @@ impl GridConfig {
     }
 }
 
-/// Parses YAML; an empty text is null.
-///
-/// # Errors
-/// [`Error::Syntax`] with the place.
-pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
-    if text.trim().is_empty() {
-        return Ok(Value::Null);
-    }
-    serde_saphyr::from_str(text).map_err(|error| syntax(&error))
-}
-
-/// Parses JSON.
-///
-/// # Errors
-/// [`Error::Syntax`] with the place.
-pub fn value_from_json(text: &str) -> Result<Value, Error> {
-    serde_json::from_str(text).map_err(|error| syntax(&error))
-}
-
-fn syntax(error: &dyn std::fmt::Display) -> Error {
-    let text = error.to_string();
-    let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("unreadable").to_owned();
-    Error::Syntax { reason: line }
+fn no_object(value: &Value) -> Error {
+    let found = match value {
+        Value::Null => "nothing",
+        Value::Bool(_) => "true or false",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
+    };
+    Error::Syntax { reason: format!("found {found}, expected fields and values such as `size: 8`") }
 }
 
 /// POGEMA lets a config redefine these; we accept only what every rule is written for.
@@ -229,6 +217,9 @@ fn read_targets(value: &Value) -> Result<Targets, Error> {
 
 /// Rule: config/map
 fn map_from_rows(rows: &[Value]) -> Result<Map, Error> {
+    if rows.iter().all(|row| row.as_array().is_some_and(Vec::is_empty)) {
+        return Err(Error::config("map", Value::from(rows), "at least one row of at least one cell"));
+    }
     let mut obstacles = Vec::new();
     let mut width = 0;
     for (index, row) in rows.iter().enumerate() {

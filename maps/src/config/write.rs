@@ -6,8 +6,10 @@ use serde_json::{Value, json};
 use super::{GridConfig, Integration, Limits, Targets};
 
 impl GridConfig {
-    /// The config as an object under POGEMA's names, everything derived written out.
+    /// The config as an object under POGEMA's names, everything derived written out but for the sides of a given
+    /// map, which may be longer than the fields for them allow.
     pub fn to_value(&self) -> Value {
+        let side = |length: usize| self.map.is_none().then_some(length);
         json!({
             "on_target": match self.on_target {
                 OnGoal::Finish => "finish",
@@ -15,8 +17,8 @@ impl GridConfig {
                 OnGoal::Restart => "restart",
             },
             "seed": self.seed,
-            "width": self.width,
-            "height": self.height,
+            "width": side(self.width),
+            "height": side(self.height),
             "density": self.density,
             "obs_radius": self.obs_radius,
             "agents_xy": self.agents_xy,

@@ -1,0 +1,28 @@
+//! POGEMA's own policies, with the random numbers they draw.
+
+use pogema_core::Action;
+use pogema_maps::numpy::Generator;
+use pogema_planners::AStarTeam;
+
+/// POGEMA's A* policy: every agent draws its random moves from a generator of seed 0.
+///
+/// Rule: policy/astar
+pub fn pogema_team() -> AStarTeam {
+    AStarTeam::new(Box::new(|| {
+        let mut generator = Generator::seeded(0);
+        Box::new(move || random_action(&mut generator))
+    }))
+}
+
+/// POGEMA's random policy: what `sample_actions` draws.
+///
+/// Rule: seed/actions
+pub fn sample(generator: &mut Generator, num_agents: usize) -> Vec<Action> {
+    (0..num_agents).map(|_| random_action(generator)).collect()
+}
+
+fn random_action(generator: &mut Generator) -> Action {
+    // INVARIANT: a range from 0 to 5 is never empty, and each of its numbers is an action.
+    let number = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
+    Action::ALL[number as usize]
+}

@@ -1,0 +1,164 @@
+//! From text to an object of fields: YAML and JSON, where nothing is guessed and nothing is lost in silence.
+
+use std::fmt;
+
+use pogema_core::Error;
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map as Object, Number, Value};
+use serde_saphyr::budget::BudgetBreach;
+use serde_saphyr::options::NonFiniteFloatPolicy;
+use serde_saphyr::{Error as YamlError, MessageFormatter, Options, UserMessageFormatter};
+
+use super::fields::quoted;
+
+/// Parses YAML; an empty text is null.
+///
+/// # Errors
+/// [`Error::Syntax`] with the place.
+pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
+    if text.trim().is_empty() {
+        return Ok(Value::Null);
+    }
+    let document: Document =
+        serde_saphyr::from_str_with_options(text, options(text)).map_err(|error| yaml_error(&error))?;
+    Ok(document.0)
+}
+
+/// Parses JSON.
+///
+/// # Errors
+/// [`Error::Syntax`] with the place.
+pub fn value_from_json(text: &str) -> Result<Value, Error> {
+    let document: Document = serde_json::from_str(text).map_err(|error| {
+        let (line, column) = (error.line(), error.column());
+        let message = error.to_string();
+        let bare = message.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&message);
+        syntax(line as u64, column as u64, bare)
+    })?;
+    Ok(document.0)
+}
+
+fn options(text: &str) -> Options {
+    // A text has at most a node and two events per character, so beyond that only aliases can have made it grow.
+    let (spare_nodes, spare_events) = (250_000, 1_000_000);
+    serde_saphyr::options! {
+        budget: serde_saphyr::budget! {
+            max_nodes: text.len() + spare_nodes,
+            max_events: 2 * text.len() + spare_events,
+        },
+        // `Node` refuses them, with the name of the field.
+        non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
+        // A map such as `!..` is a tag with nothing behind it: without this, no map at all.
+        reject_unsupported_tags: true,
+        with_snippet: false,
+    }
+}
+
+fn yaml_error(error: &YamlError) -> Error {
+    let place = error.location().unwrap_or(serde_saphyr::Location::UNKNOWN);
+    syntax(place.line(), place.column(), &yaml_reason(error))
+}
+
+fn yaml_reason(error: &YamlError) -> String {
+    match error.without_snippet() {
+        YamlError::AliasError { error, .. } => yaml_reason(error),
+        YamlError::DuplicateMappingKey { key: Some(key), .. } => twice(key),
+        YamlError::MultipleDocuments { .. } => "a second document, expected one".into(),
+        YamlError::UnknownAnchor { .. } => "unknown alias".into(),
+        YamlError::RecursiveReferencesRequireWeakTypes { .. } => "an alias of what it is a part of".into(),
+        YamlError::Budget { breach: BudgetBreach::Depth { .. }, .. } => "too many levels of nesting".into(),
+        YamlError::Budget { .. } | YamlError::AliasReplayLimitExceeded { .. } => {
+            "too large, or too many aliases".into()
+        }
+        other => UserMessageFormatter.format_message(other).into_owned(),
+    }
+}
+
+fn twice(key: &str) -> String {
+    format!("{} stands twice", quoted(key))
+}
+
+fn syntax(line: u64, column: u64, reason: &str) -> Error {
+    // Parsers count from 1 and say 0 where they do not know.
+    let place = if line == 0 { String::new() } else { format!("line {line}, column {column}: ") };
+    Error::Syntax { reason: place + reason }
+}
+
+struct Document(Value);
+
+impl<'de> Deserialize<'de> for Document {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Node { field: "the config" }.deserialize(deserializer).map(Document)
+    }
+}
+
+/// A value that refuses what [`Value`] would swallow: it makes NaN and infinities null and keeps the last of two
+/// equal keys.
+#[derive(Clone, Copy)]
+struct Node<'a> {
+    /// The innermost key above the value, for messages.
+    field: &'a str,
+}
+
+impl<'de> DeserializeSeed<'de> for Node<'_> {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Node<'_> {
+    type Value = Value;
+
+    fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str("a value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, flag: bool) -> Result<Value, E> {
+        Ok(flag.into())
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Value, E> {
+        Ok(number.into())
+    }
+
+    fn visit_u64<E>(self, number: u64) -> Result<Value, E> {
+        Ok(number.into())
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Value, E> {
+        let finite = Number::from_f64(number).map(Value::Number);
+        finite.ok_or_else(|| {
+            E::custom(format!("{} is `{number}`, expected a finite number", quoted(self.field)))
+        })
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(text.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut list = Vec::new();
+        while let Some(item) = items.next_element_seed(self)? {
+            list.push(item);
+        }
+        Ok(list.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Object::new();
+        while let Some(key) = entries.next_key::<String>()? {
+            if object.contains_key(&key) {
+                return Err(A::Error::custom(twice(&key)));
+            }
+            let value = entries.next_value_seed(Node { field: &key })?;
+            object.insert(key, value);
+        }
+        Ok(object.into())
+    }
+}

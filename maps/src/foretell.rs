@@ -1,0 +1,43 @@
+//! The goals an agent of a lifelong episode is going to have.
+
+use pogema_core::{Cell, GoalStream, Instance};
+
+use crate::config::{GridConfig, Targets};
+
+/// The goals POGEMA foretells: until an agent walking straight from goal to goal would need the whole episode.
+/// None where it would go on for ever, since only the goal just reached can be drawn again.
+///
+/// Rule: goal/restart/foretold
+///
+/// Source: POGEMA 1.4.0, `envs.py`, `PogemaLifeLong.get_lifelong_targets_xy`
+pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Vec<Cell>>> {
+    if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
+        return Some(sequences.clone());
+    }
+    let agents = instance.goals.iter().zip(&instance.starts);
+    agents.map(|(stream, &start)| foretold_to_one(stream.clone(), start, config.max_episode_steps)).collect()
+}
+
+fn foretold_to_one(mut stream: GoalStream, start: Cell, max_steps: i64) -> Option<Vec<Cell>> {
+    /// So many equal draws in a row are no chance.
+    const MOST_REPEATS: usize = 10_000;
+    let mut at = stream.first();
+    let mut goals = vec![at];
+    let mut length = distance(start, at);
+    let mut num_repeats = 0;
+    while length < max_steps {
+        let next = stream.advance(at);
+        num_repeats = if next == at { num_repeats + 1 } else { 0 };
+        if num_repeats > MOST_REPEATS {
+            return None;
+        }
+        length += distance(at, next);
+        goals.push(next);
+        at = next;
+    }
+    Some(goals)
+}
+
+fn distance(one: Cell, other: Cell) -> i64 {
+    i64::from(one.row.abs_diff(other.row)) + i64::from(one.col.abs_diff(other.col))
+}
