@@ -94,11 +94,12 @@ fn tell(report: &Report) -> String {
             let _ = writeln!(text, "kept as {}\n", kept.display());
         }
     }
-    text.push_str(&match report.failures.len() {
+    let verdict = match report.failures.len() {
         0 => "all agree: 0 divergences".into(),
         1 => "1 divergence".into(),
         number => format!("{number} divergences"),
-    });
+    };
+    text.push_str(&verdict);
     text
 }
 

@@ -95,9 +95,13 @@ fn of_agent(agent: Option<usize>) -> String {
 }
 
 impl Error {
+    /// So much of a value of the input is quoted. Units: characters.
+    pub const LONGEST_QUOTE: usize = 60;
+
     /// An error about one config field.
     pub fn config(field: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
-        Self::Config { field: field.into(), value: shorten(&value.to_string()), expected: expected.into() }
+        let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
+        Self::Config { field: field.into(), value, expected: expected.into() }
     }
 
     /// An error about an instance as a whole.
@@ -126,12 +130,11 @@ impl Error {
     }
 }
 
-/// A value for a message, cut off where it gets too long to read.
-pub fn shorten(value: &str) -> String {
-    const LONGEST: usize = 60;
-    match value.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", &value[..end]),
-        None => value.to_owned(),
+/// The beginning of a text, for a message that quotes it.
+pub fn shorten(text: &str, longest: usize) -> String {
+    match text.char_indices().nth(longest) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

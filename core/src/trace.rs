@@ -186,7 +186,8 @@ impl Versions {
     fn check(&self) -> Result<(), Error> {
         for (what, got, want) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
             if got != want {
-                let reason = format!("the {what} is `{}`, expected `{want}`", shorten(got));
+                let reason =
+                    format!("the {what} is `{}`, expected `{want}`", shorten(got, Error::LONGEST_QUOTE));
                 return Err(Error::Trace { line: 1, reason });
             }
         }
@@ -264,12 +265,15 @@ fn check_list<T>(line: usize, num_agents: usize, name: &str, list: &[T]) -> Resu
     Err(Error::Trace { line, reason })
 }
 
+/// Parsers quote unknown words in full, however long they are.
+const LONGEST_REASON: usize = 240;
+
 fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, Error> {
     serde_json::from_str(text).map_err(|error| {
         // The parser sees one line at a time, so to it every line is the first.
         let (column, message) = (error.column(), error.to_string());
         let bare = message.strip_suffix(&format!(" at line 1 column {column}")).unwrap_or(&message);
-        Error::Trace { line, reason: format!("column {column}: {bare}") }
+        Error::Trace { line, reason: format!("column {column}: {}", shorten(bare, LONGEST_REASON)) }
     })
 }
 

@@ -1,18 +1,180 @@
-//! Traces as files: whatever stands in one, reading it ends with a trace or a line that says what is wrong, and what
-//! was written is read back as it was.
+//! Traces as files: whatever stands in one, reading it ends with a trace or with a line that says what is wrong, and
+//! what was written is read back as it was.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod mutate;
 
-use std::sync::LazyLock;
-
 use mutate::{assert_one_line, mutated, odd_value};
-use pogema_core::{
-    Action, Cell, Collision, Config, GoalStream, Instance, Map, Metrics, Observation, Observed, Occupancy, OnGoal,
-    Outside, Reward, Snapshot, Trace, TraceHeader, TraceStart, TraceStep,
-};
+use pogema_core::Trace;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::sample::{Index, select};
+use proptest::sample::Index;
 use serde_json::Value;
+
+const VALID: &str = r##"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":2,"radius":1,"max_steps":4,"collision":"soft","on_goal":"finish","observation":"default"},"map":["..","#."],"outside":{"noise":["....","....","....","...."]},"starts":[[0,0],[1,1]],"goals":[[[0,1]],[[0,0],[1,1]]]}
+{"cells":[[0,0],[1,1]],"goals":[[0,1],[0,0]],"active":[true,true],"on_goal":[false,false],"occupied":[[0,0],[1,1]]}
+{"actions":[4,0],"cells":[[0,1],[1,1]],"goals":[[0,1],[0,0]],"active":[false,true],"on_goal":[true,false],"occupied":[[1,1]],"rewards":[1.0,0.0],"terminated":[true,false],"truncated":[false,false],"observations":{"type":"default","dtype":"float32","windows":["00","ff"]},"metrics":{"ISR":0.5}}
+"##;
+
+const TOKENS: [&str; 16] = [
+    "", "[", "]", "{", "}", ",", ":", "\"", "\\u0000", "\n", "null", "-1", "65536", "1e999", "\u{7f}",
+    "[[0,0]]",
+];
+
+/// What stands in the valid trace, what takes its place, and the line that this is refused with.
+const REFUSED: [(&str, &str, &str); 15] = [
+    (
+        "pogema-trace/1",
+        "pogema-trace/2",
+        "trace: line 1: the format is `pogema-trace/2`, expected `pogema-trace/1`",
+    ),
+    (
+        "pogema-1.4.0/1",
+        "pogema-2.0/1",
+        "trace: line 1: the spec is `pogema-2.0/1`, expected `pogema-1.4.0/1`",
+    ),
+    // The version comes first, for the rest may be wrong because of it.
+    (
+        "\"pogema-1.4.0/1\",\"config\":{",
+        "\"pogema-2.0/1\",\"config\":{\"new\":1,",
+        "trace: line 1: the spec is `pogema-2.0/1`, expected `pogema-1.4.0/1`",
+    ),
+    ("\"format\":\"pogema-trace/1\",", "", "trace: line 1: column 454: missing field `format`"),
+    (
+        "\"num_agents\":2",
+        "\"num_agents\":0",
+        "trace: line 1: config: `num_agents` is `0`, expected at least 1",
+    ),
+    ("\"num_agents\":2", "\"num_agents\":3", "trace: line 1: starts has length 2, expected 3"),
+    ("\"radius\":1", "\"radius\":129", "trace: line 1: config: `radius` is `129`, expected 1 to 128"),
+    (
+        "\"..\",\"#.\"",
+        "\"..\",\"#\"",
+        "trace: line 1: column 206: map: line 2, column 2: the line has 1 cells, expected 2 as in line 1",
+    ),
+    (
+        "[[0,0],[1,1]],\"goals\":[[[0,1]]",
+        "[[0,0],[0,0]],\"goals\":[[[0,1]]",
+        "trace: line 1: instance: agent 1: start (0, 0) is the start of agent 0 too",
+    ),
+    ("\"goals\":[[[0,1]]", "\"goals\":[[]", "trace: line 1: instance: agent 0: has no goal"),
+    ("\"goals\":[[[0,1]],", "\"goals\":[", "trace: line 1: goals has length 1, expected 2"),
+    (
+        "\"on_goal\":[false,false]",
+        "\"on_goal\":[false]",
+        "trace: line 2: `on_goal` has length 1, expected 2, one for each agent",
+    ),
+    (
+        "\"rewards\":[1.0,0.0]",
+        "\"rewards\":[]",
+        "trace: line 3: `rewards` has length 0, expected 2, one for each agent",
+    ),
+    (
+        "\"actions\":[4,0]",
+        "\"actions\":[5,0]",
+        "trace: line 3: column 289: action is `5`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)",
+    ),
+    ("\"ISR\":0.5}}", "\"ISR\":0.5}", "trace: line 3: column 288: EOF while parsing an object"),
+];
+
+fn read(text: &str) -> Result<Trace, String> {
+    Trace::read(text.as_bytes()).map_err(|error| error.to_string())
+}
+
+fn written(trace: &Trace) -> String {
+    let mut text = Vec::new();
+    trace.write(&mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+/// Reading ends; what was read is written and read again without a change.
+fn check(text: &str) -> Result<(), TestCaseError> {
+    match read(text) {
+        Ok(trace) => prop_assert_eq!(&read(&written(&trace)).unwrap(), &trace),
+        Err(message) => {
+            assert_one_line(&message);
+            prop_assert!(message.starts_with("trace: line "), "{message}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn wrong_lines_are_refused_with_their_number() {
+    let steps = read(VALID).unwrap().steps;
+    assert_eq!(steps[0].state.step, 1);
+    for (right, wrong, expected) in REFUSED {
+        assert!(VALID.contains(right), "{right}");
+        assert_eq!(read(&VALID.replacen(right, wrong, 1)).unwrap_err(), expected);
+    }
+    let lines: Vec<&str> = VALID.lines().collect();
+    assert_eq!(read("").unwrap_err(), "trace: line 1: the trace ends before the header");
+    assert_eq!(read(lines[0]).unwrap_err(), "trace: line 2: the trace ends before the start");
+    let after_blanks = format!("{}\n{}\n\n \n{{}}", lines[0], lines[1]);
+    assert_eq!(read(&after_blanks).unwrap_err(), "trace: line 5: column 2: missing field `actions`");
+    assert!(Trace::read(&b"\xff"[..]).unwrap_err().to_string().starts_with("trace: line 1: "));
+}
+
+#[test]
+fn a_long_word_is_not_quoted_in_full() {
+    let long = format!("\"format\":\"{}\"", "pogema".repeat(1000));
+    assert_one_line(&read(&VALID.replacen("\"format\":\"pogema-trace/1\"", &long, 1)).unwrap_err());
+    let long = format!("\"{}\":1,\"radius\"", "radius".repeat(1000));
+    assert_one_line(&read(&VALID.replacen("\"radius\"", &long, 1)).unwrap_err());
+}
+
+/// Every place within a value, by the keys that lead to it.
+fn places(value: &Value, at: &str) -> Vec<String> {
+    let mut all = vec![at.to_owned()];
+    match value {
+        Value::Array(list) => {
+            all.extend((0..).zip(list).flat_map(|(key, part)| places(part, &format!("{at}/{key}"))))
+        }
+        Value::Object(object) => {
+            all.extend(object.iter().flat_map(|(key, part)| places(part, &format!("{at}/{key}"))));
+        }
+        _ => {}
+    }
+    all
+}
+
+/// A valid trace with up to three values replaced by odd ones.
+fn almost_valid() -> impl Strategy<Value = String> {
+    let edits = vec((any::<Index>(), any::<Index>(), odd_value()), 1..4);
+    edits.prop_map(|edits| {
+        let mut lines: Vec<Value> = VALID.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        for (line, place, value) in edits {
+            let line = line.get_mut(&mut lines);
+            let places = places(line, "");
+            *line.pointer_mut(place.get(&places)).unwrap() = value;
+        }
+        lines.iter().map(|line| format!("{line}\n")).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
+
+    #[test]
+    fn any_text_is_read_or_refused(text in any::<String>()) {
+        check(&text)?;
+    }
+
+    #[test]
+    fn any_bytes_are_read_or_refused(bytes in vec(any::<u8>(), 0..200)) {
+        if let Err(error) = Trace::read(&bytes[..]) {
+            assert_one_line(&error.to_string());
+        }
+    }
+
+    #[test]
+    fn a_mutated_trace_is_read_or_refused(text in mutated(&[VALID], &TOKENS)) {
+        check(&text)?;
+    }
+
+    #[test]
+    fn an_almost_valid_trace_is_read_or_refused(text in almost_valid()) {
+        check(&text)?;
+    }
+}

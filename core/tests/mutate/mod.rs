@@ -6,7 +6,10 @@ use proptest::sample::{Index, select};
 use serde_json::{Value, json};
 
 /// A text after up to four cuts, insertions and repetitions, each of up to eight characters.
-pub fn mutated(texts: &'static [&'static str], tokens: &'static [&'static str]) -> impl Strategy<Value = String> {
+pub fn mutated(
+    texts: &'static [&'static str],
+    tokens: &'static [&'static str],
+) -> impl Strategy<Value = String> {
     let edit = (any::<Index>(), 0..8_usize, select(tokens), any::<bool>());
     (select(texts), vec(edit, 1..5)).prop_map(|(text, edits)| {
         let mut letters: Vec<char> = text.chars().collect();
@@ -25,9 +28,12 @@ pub fn odd_value() -> impl Strategy<Value = Value> {
     let numbers = [json!(0), json!(1), json!(2), json!(-1), json!(0.5), json!(1e300), json!(-0.0)];
     let limits = [json!(i64::MIN), json!(i64::MAX), json!(u64::MAX), json!(65_535), json!(65_536)];
     let texts = ["", ".", "..\n.#", "aA", "@$", "\n\r\u{1b}\u{2028}", "NaN", "💥"].map(Value::from);
-    let lists = [json!([]), json!([0]), json!([0, 0]), json!([1, 0]), json!([0, 0, 0]), json!([65_535, 65_535])];
-    let cells = [json!([[0, 0]]), json!([[0, 0], [0, 1]]), json!([[[0, 0], [0, 1]]]), json!([[]]), json!([["."]])];
-    let others = [Value::Null, json!(true), json!(false), json!({}), json!({ "a": 1 }), json!({ "": [null] })];
+    let lists =
+        [json!([]), json!([0]), json!([0, 0]), json!([1, 0]), json!([0, 0, 0]), json!([65_535, 65_535])];
+    let cells =
+        [json!([[0, 0]]), json!([[0, 0], [0, 1]]), json!([[[0, 0], [0, 1]]]), json!([[]]), json!([["."]])];
+    let others =
+        [Value::Null, json!(true), json!(false), json!({}), json!({ "a": 1 }), json!({ "": [null] })];
     let all = [&numbers[..], &limits, &texts, &lists, &cells, &others].concat();
     select(all)
 }

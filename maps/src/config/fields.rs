@@ -44,7 +44,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 
 /// A key of the input for a message.
 pub(super) fn quoted(key: &str) -> String {
-    format!("`{}`", shorten(key))
+    format!("`{}`", shorten(key, Error::LONGEST_QUOTE))
 }
 
 /// The fields of a config as they stand in the file.
