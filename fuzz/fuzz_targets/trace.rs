@@ -1,0 +1,16 @@
+//! Traces: refused in one line, or read and then written and read again as the same.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use pogema_core::Trace;
+
+fuzz_target!(|text: &[u8]| {
+    match Trace::read(text) {
+        Err(error) => assert_eq!(error.to_string().lines().count(), 1),
+        Ok(trace) => {
+            let mut written = Vec::new();
+            trace.write(&mut written).expect("writing to memory");
+            assert_eq!(Trace::read(written.as_slice()).as_ref(), Ok(&trace));
+        }
+    }
+});
