@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::{Engine, Report, cases, files, find_oracle_python, golden};
 use pogema_core::Error;
 
-use crate::output::say;
+use crate::output::{check_writable, say};
 
 /// How many divergences are told in full.
 const MOST_TOLD: usize = 5;
@@ -39,6 +39,7 @@ pub struct Conform {
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
+        self.json.as_deref().map_or(Ok(()), check_writable)?;
         let engines = [Engine::REFERENCE, Engine::LITERAL];
         let mut report = Report::default();
         for engine in engines {

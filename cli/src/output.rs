@@ -1,14 +1,42 @@
-//! What the program says on standard output.
+//! What the program says on standard output and writes to files.
 
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 use pogema_core::Error;
 
 /// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
 pub fn say(text: &str) -> Result<(), Error> {
     let mut output = std::io::stdout().lock();
-    match writeln!(output, "{text}").and_then(|()| output.flush()) {
+    said(writeln!(output, "{text}").and_then(|()| output.flush()))
+}
+
+/// The outcome of writing to standard output; ends the program quietly if nobody reads any more.
+pub fn said(outcome: std::io::Result<()>) -> Result<(), Error> {
+    match outcome {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
-        result => result.map_err(|error| Error::io("standard output", error)),
+        outcome => outcome.map_err(|error| Error::io("standard output", error)),
     }
+}
+
+/// Passes if a file can be written here, so that a long run does not find out at its end that it was for nothing.
+///
+/// # Errors
+/// [`Error::Io`] if the folder takes no file, or something other than a file is in the way.
+pub fn check_writable(path: &Path) -> Result<(), Error> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match std::fs::metadata(folder) {
+        Ok(there) if !there.is_dir() => {
+            return Err(Error::io(path, format!("`{}` is no folder", folder.display())));
+        }
+        Ok(_) => {}
+        Err(error) => return Err(Error::io(path, format!("`{}`: {error}", folder.display()))),
+    }
+    // What is written takes the place of what was there, which would be the end of a device or a pipe.
+    let is_taken = std::fs::metadata(path).is_ok_and(|there| !there.is_file());
+    if is_taken || path.file_name().is_none() {
+        return Err(Error::io(path, "is no file"));
+    }
+    // A file without a name: nothing is left of it, however the run ends.
+    tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
 }

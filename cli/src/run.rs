@@ -11,7 +11,7 @@ use clap::Args;
 use pogema_core::Error;
 use serde_json::json;
 
-use crate::output::say;
+use crate::output::{check_writable, say};
 use episode::Episode;
 use policy::{Policy, PolicyName};
 
@@ -42,6 +42,7 @@ pub struct Run {
 impl Run {
     pub fn run(&self) -> Result<(), Error> {
         let config = self.settings.config()?;
+        self.trace.as_deref().map_or(Ok(()), check_writable)?;
         let mut policy = Policy::new(self.policy, self.actions.as_deref(), &config)?;
         let mut episode = Episode::start(config, self.trace.is_some())?;
         for warning in episode.warnings() {

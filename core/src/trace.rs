@@ -273,8 +273,24 @@ fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, E
         // The parser sees one line at a time, so to it every line is the first.
         let (column, message) = (error.column(), error.to_string());
         let bare = message.strip_suffix(&format!(" at line 1 column {column}")).unwrap_or(&message);
-        Error::Trace { line, reason: format!("column {column}: {}", shorten(bare, LONGEST_REASON)) }
+        let reason = match bare.rsplit_once(", expected ") {
+            Some((found, expected)) => format!("{found}, expected {}", in_words(expected)),
+            None => bare.to_owned(),
+        };
+        Error::Trace { line, reason: format!("column {column}: {}", shorten(&reason, LONGEST_REASON)) }
     })
+}
+
+/// What a Rust type is to somebody who writes traces in another language.
+fn in_words(expected: &str) -> &str {
+    match expected {
+        "u16" | "i32" | "i64" | "u64" | "usize" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a string" | "variant identifier" => "a text",
+        "a sequence" => "a list",
+        _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
+        _ => expected,
+    }
 }
 
 fn write_line(output: &mut impl Write, value: &impl Serialize) -> Result<(), Error> {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use pogema_conformance::{files, pogema_team, sample};
-use pogema_core::{Action, Error, Trace};
+use pogema_core::{Action, Error, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_maps::numpy::{Generator, SeedSequence};
 use pogema_planners::AStarTeam;
@@ -42,7 +42,9 @@ pub enum Policy {
 impl Policy {
     pub fn new(name: PolicyName, file: Option<&Path>, config: &GridConfig) -> Result<Self, Error> {
         match (name, file) {
-            (PolicyName::File, Some(path)) => Ok(Self::File(read_actions(path)?.into_iter())),
+            (PolicyName::File, Some(path)) => {
+                Ok(Self::File(read_actions(path, config.num_agents)?.into_iter()))
+            }
             (PolicyName::File, None) => {
                 Err(Error::State { reason: "`--policy file` needs `--actions FILE`".into() })
             }
@@ -74,20 +76,28 @@ fn generator(config: &GridConfig) -> Result<Generator, Error> {
     }
 }
 
-/// The actions of a trace, or of a file with a list of numbers per line.
-fn read_actions(path: &Path) -> Result<Vec<Vec<Action>>, Error> {
-    let lines: Vec<String> =
-        files::open(path)?.lines().collect::<Result<_, _>>().map_err(|error| Error::io(path, error))?;
+/// The actions of a trace, or of a file with a list of numbers per line, as many as there are agents.
+fn read_actions(path: &Path, num_agents: usize) -> Result<Vec<Vec<Action>>, Error> {
+    let failed = |error: std::io::Error| Error::io(path, error);
+    let lines: Vec<String> = files::open(path)?.lines().collect::<Result<_, _>>().map_err(failed)?;
     if lines.first().is_some_and(|line| line.starts_with('{')) {
         let trace = Trace::read(lines.join("\n").as_bytes()).map_err(|error| Error::io(path, error))?;
+        Error::check_length("actions", num_agents, trace.header.starts.len())
+            .map_err(|error| Error::io(path, error))?;
         return Ok(trace.steps.into_iter().map(|step| step.actions).collect());
     }
-    let mut steps = Vec::new();
-    for (index, line) in lines.iter().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let wrong = |error: &dyn std::fmt::Display| Error::io(path, format!("line {}: {error}", index + 1));
-        let numbers: Vec<i64> = serde_json::from_str(line).map_err(|error| wrong(&error))?;
-        let actions = numbers.iter().enumerate().map(|(agent, &number)| Action::from_number(agent, number));
-        steps.push(actions.collect::<Result<_, _>>().map_err(|error| wrong(&error))?);
-    }
-    Ok(steps)
+    let texts = (1..).zip(&lines).filter(|(_, text)| !text.trim().is_empty());
+    let read = |(line, text): (usize, &String)| {
+        read_step(text, num_agents).map_err(|reason| Error::io(path, format!("line {line}: {reason}")))
+    };
+    texts.map(read).collect()
+}
+
+fn read_step(text: &str, num_agents: usize) -> Result<Vec<Action>, Error> {
+    let numbers: Vec<i64> = serde_json::from_str(text).map_err(|_| {
+        let found = shorten(text.trim(), Error::LONGEST_QUOTE);
+        Error::State { reason: format!("found `{found}`, expected a list of action numbers such as [0, 4]") }
+    })?;
+    Error::check_length("actions", num_agents, numbers.len())?;
+    (0..).zip(numbers).map(|(agent, number)| Action::from_number(agent, number)).collect()
 }

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
-use pogema_maps::{GridConfig, map_names, named_map, nearest};
-use serde_json::{Map as Object, Value};
+use pogema_maps::{GridConfig, map_names, named_map, nearest, parse_map_text};
+use serde_json::{Map as Object, Number, Value};
 
 #[derive(Args, Debug)]
 pub struct Settings {
@@ -73,7 +73,7 @@ impl Settings {
         set("seed", self.seed.map(Into::into));
         set("num_agents", self.num_agents.map(Into::into));
         set("size", self.size.map(Into::into));
-        set("density", self.density.map(Into::into));
+        set("density", self.density.map(number));
         set("obs_radius", self.obs_radius.map(Into::into));
         set("max_episode_steps", self.steps.map(Into::into));
         set("on_target", word(self.on_target).map(Into::into));
@@ -97,6 +97,11 @@ fn word(choice: Option<impl ValueEnum>) -> Option<String> {
     choice?.to_possible_value().map(|value| value.get_name().to_owned())
 }
 
+/// JSON has no NaN and would make it null, so it is left to the config to refuse the word.
+fn number(value: f64) -> Value {
+    Number::from_f64(value).map_or_else(|| value.to_string().into(), Value::Number)
+}
+
 fn value_of(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|_| text.into())
 }
@@ -109,7 +114,7 @@ fn fields_of(path: &Path) -> Result<Object<String, Value>, Error> {
     match value.map_err(|error| Error::io(path, error))? {
         Value::Object(fields) => Ok(fields),
         Value::Null => Ok(Object::new()),
-        _ => Err(Error::io(path, "expected an object of fields and values")),
+        _ => Err(Error::io(path, "expected fields and values such as `size: 8`")),
     }
 }
 
@@ -118,8 +123,11 @@ fn map_text(name: &str) -> Result<String, Error> {
     if let Ok(map) = named_map(name) {
         return Ok(map.rows().join("\n"));
     }
-    std::fs::read_to_string(name).map_err(|error| {
+    let text = std::fs::read_to_string(name).map_err(|error| {
         let hint = nearest(name, map_names()).unwrap_or_default();
         Error::io(name, format!("{error}; it is no known map either, the nearest of those is `{hint}`"))
-    })
+    })?;
+    // Read here for the sake of the file's name in the error.
+    parse_map_text(&text).map_err(|error| Error::io(name, error))?;
+    Ok(text)
 }

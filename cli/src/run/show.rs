@@ -7,6 +7,7 @@ use pogema_core::picture::{Mark, agent_letter, marks};
 use pogema_core::{Error, Map, Snapshot};
 
 use super::episode::Episode;
+use crate::output::said;
 use crate::output::say;
 
 /// A terminal that shows one frame over the other, or any other output that gets them one after the other.
@@ -27,14 +28,13 @@ impl Screen {
     }
 
     pub fn draw(&mut self, episode: &Episode) -> Result<(), Error> {
-        let failed = |error: std::io::Error| Error::io("terminal", error);
         let frame = frame(&episode.instance().map, &episode.snapshot(), episode.num_steps());
         if !self.terminal.is_term() {
             return say(&frame);
         }
-        self.terminal.clear_last_lines(self.num_lines).map_err(failed)?;
+        said(self.terminal.clear_last_lines(self.num_lines))?;
         self.num_lines = frame.lines().count();
-        self.terminal.write_line(&frame).map_err(failed)?;
+        said(self.terminal.write_line(&frame))?;
         std::thread::sleep(self.pause);
         Ok(())
     }

@@ -1,0 +1,197 @@
+//! What the program says to bad input: one line, exit status 2, nothing on standard output, nothing written.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const TRACE: &str = r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":1,"radius":1,"max_steps":4,"collision":"soft","on_goal":"finish","observation":"default"},"map":[".."],"starts":[[0,0]],"goals":[[[0,1]]]}
+{"cells":[[0,0]],"goals":[[0,1]],"active":[true],"on_goal":[false],"occupied":[[0,0]]}
+"#;
+
+/// The files of the folder that every run begins in.
+const FILES: [(&str, &str); 17] = [
+    ("unreadable.yaml", "size: 8\nmap: [\n"),
+    ("unknown-key.yaml", "colision_system: soft\n"),
+    ("wrong-type.yaml", "size: 8\nnum_agents: two\n"),
+    ("out-of-range.yaml", "obs_radius: 129\n"),
+    ("nan.yaml", "density: .nan\n"),
+    ("list.yaml", "- size: 8\n"),
+    ("ragged.yaml", "map: |\n  ...\n  ..\n"),
+    ("odd.txt", "..#\n.?.\n"),
+    ("twins.yaml", "{agents_xy: [[0, 0], [0, 0]], targets_xy: [[0, 1], [1, 0]]}"),
+    ("goals.yaml", "{agents_xy: [[0, 0], [0, 1]], targets_xy: [[1, 0]]}"),
+    ("two.json", r#"{"map": "aA\nbB"}"#),
+    ("one-action.jsonl", "[4, 4]\n\n[0]\n"),
+    ("action-9.jsonl", "[4, 9]\n"),
+    ("no-actions.jsonl", "[4, 4]\nup, down\n"),
+    ("trace.jsonl", TRACE),
+    ("old.jsonl", "what was there before\n"),
+    ("blank.yaml", ""),
+];
+
+/// Arguments and the line they are answered with.
+const REFUSED: [(&str, &str); 28] = [
+    ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
+    (
+        "run unknown-key.yaml",
+        "config: unknown field `colision_system`, the nearest known one is `collision_system`",
+    ),
+    ("run wrong-type.yaml", "config: `num_agents` is `\"two\"`, expected a whole number from 1 to 10000000"),
+    ("run --set persistent=1", "config: `persistent` is `1`, expected true or false"),
+    ("run out-of-range.yaml", "config: `obs_radius` is `129`, expected a whole number from 1 to 128"),
+    ("run --size 1", "config: `size` is `1`, expected a whole number from 2 to 4096"),
+    ("run --density 1.5", "config: `density` is `1.5`, expected a number from 0 to 1"),
+    ("run --density nan", "config: `density` is `\"NaN\"`, expected a number from 0 to 1"),
+    ("run nan.yaml", "nan.yaml: config: line 1, column 10: `density` is `NaN`, expected a finite number"),
+    ("run list.yaml", "list.yaml: expected fields and values such as `size: 8`"),
+    ("run --set size", "config: `--set size`, expected FIELD=VALUE"),
+    ("run ragged.yaml", "map: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
+    (
+        "run --map odd.txt",
+        "odd.txt: map: line 2, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
+    ),
+    (
+        "run --map five-rooms",
+        "five-rooms: No such file or directory (os error 2); it is no known map either, the nearest of those is \
+         `four-rooms`",
+    ),
+    ("run twins.yaml", "instance: agent 1: start (0, 0) is the start of agent 0 too"),
+    ("run goals.yaml", "targets_xy has length 1, expected 2"),
+    (
+        "run --size 3 --density 0 --seed 1 --num-agents 5",
+        "config: `num_agents` is `5`, expected at most 4, for which the map has room",
+    ),
+    ("run missing.yaml", "missing.yaml: No such file or directory (os error 2)"),
+    (
+        "run two.json --policy file --actions missing.jsonl",
+        "missing.jsonl: No such file or directory (os error 2)",
+    ),
+    (
+        "run two.json --policy file --actions one-action.jsonl --trace new.jsonl",
+        "one-action.jsonl: line 3: actions has length 1, expected 2",
+    ),
+    (
+        "run two.json --policy file --actions action-9.jsonl --trace old.jsonl",
+        "action-9.jsonl: line 1: action of agent 1 is `9`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 \
+         (right)",
+    ),
+    (
+        "run two.json --policy file --actions no-actions.jsonl",
+        "no-actions.jsonl: line 2: found `up, down`, expected a list of action numbers such as [0, 4]",
+    ),
+    ("run two.json --policy file --actions trace.jsonl", "trace.jsonl: actions has length 1, expected 2"),
+    ("run two.json --policy file", "`--policy file` needs `--actions FILE`"),
+    ("run two.json --actions trace.jsonl", "`--actions` needs `--policy file`"),
+    // Long runs, which would only end long after the tests' patience.
+    (
+        "run --steps 9000000000 --policy stay --trace no/where.jsonl",
+        "no/where.jsonl: `no`: No such file or directory (os error 2)",
+    ),
+    ("run --steps 9000000000 --policy stay --trace blank.yaml/x", "blank.yaml/x: `blank.yaml` is no folder"),
+    ("conform --cases 9000000000 --json ./", "./: is no file"),
+];
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in FILES {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+/// Every file of a folder and what it holds.
+fn contents(folder: &Path) -> BTreeMap<String, String> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let read = |path: &Path| std::fs::read_to_string(path).unwrap();
+    entries.map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), read(&path))).collect()
+}
+
+fn lines(text: &[u8]) -> Vec<&str> {
+    std::str::from_utf8(text).unwrap().lines().collect()
+}
+
+/// Passes if the run is refused with one line and leaves no trace of itself.
+fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
+    let output = run(folder, arguments);
+    assert_eq!(lines(&output.stderr), [format!("error: {expected}")], "{arguments:?}");
+    assert_eq!(output.stdout, b"", "{arguments:?}");
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    let files = FILES.map(|(name, text)| (name.to_owned(), text.to_owned()));
+    assert_eq!(contents(folder), BTreeMap::from(files), "{arguments:?}");
+}
+
+#[test]
+fn bad_input_is_refused_with_one_line() {
+    let folder = folder();
+    for (arguments, expected) in REFUSED {
+        assert_refused(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), expected);
+    }
+}
+
+#[test]
+fn a_trace_of_another_version_is_refused() {
+    for (what, old, new) in
+        [("spec", "pogema-1.4.0/1", "pogema-2.0/1"), ("format", "pogema-trace/1", "other/7")]
+    {
+        let folder = folder();
+        let trace = TRACE.replace(old, new).replace("\"soft\"", "\"softer\"");
+        let path = folder.path().join("trace.jsonl");
+        std::fs::write(&path, trace).unwrap();
+        let output = run(folder.path(), &["run", "--policy", "file", "--actions", "trace.jsonl"]);
+        let expected = format!("error: trace.jsonl: trace: line 1: the {what} is `{new}`, expected `{old}`");
+        assert_eq!(lines(&output.stderr), [expected]);
+        assert_eq!((output.stdout.len(), output.status.code()), (0, Some(2)));
+    }
+}
+
+#[test]
+fn input_cannot_break_the_line() {
+    let folder = folder();
+    let field = "a\nb\u{1b}[2J=1";
+    let expected = "config: unknown field `a\\nb\\u{1b}[2J`, the nearest known one is `map`";
+    assert_refused(folder.path(), &["run", "--set", field], expected);
+    assert_refused(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_is_no_file_to_write() {
+    use std::os::unix::fs::FileTypeExt;
+
+    let folder = folder();
+    assert_refused(folder.path(), &["run", "--trace", "/dev/null"], "/dev/null: is no file");
+    assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+}
+
+#[test]
+fn an_obstacle_under_a_start_is_warned_of() {
+    let folder = folder();
+    let config = "{map: '.#.', agents_xy: [[0, 1]], targets_xy: [[0, 2]]}";
+    std::fs::write(folder.path().join("start.yaml"), config).unwrap();
+    let output = run(folder.path(), &["run", "start.yaml", "--policy", "stay", "--trace", "out.jsonl"]);
+    let expected = "warning: the start of agent 0 is on an obstacle, cell (0, 1) counted without the border; the \
+                    cell becomes free";
+    assert_eq!(lines(&output.stderr), [expected]);
+    assert_eq!((lines(&output.stdout).len(), output.status.code()), (1, Some(0)));
+    let again = run(folder.path(), &["run", "start.yaml", "--policy", "file", "--actions", "out.jsonl"]);
+    assert_eq!(again.stdout, output.stdout);
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let mut process = Command::new(env!("CARGO_BIN_EXE_pogema"))
+        .args(["run", "--seed", "1", "--steps", "2000", "--render", "--policy", "stay"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(process.stdout.take());
+    let output = process.wait_with_output().unwrap();
+    assert_eq!((lines(&output.stderr).len(), output.status.code()), (0, Some(0)));
+}

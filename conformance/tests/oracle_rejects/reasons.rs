@@ -1,0 +1,95 @@
+//! Why we refuse what POGEMA accepts: every reason there is, each as narrow as its decision.
+
+use serde_json::Value;
+
+const INTEGERS: [&str; 7] =
+    ["seed", "width", "height", "size", "obs_radius", "num_agents", "max_episode_steps"];
+const FLAGS: [&str; 3] = ["empty_outside", "persistent", "auto_reset"];
+const OURS: [&str; 3] = ["occupancy", "reward", "limits"];
+const POOLS: [&str; 2] = ["possible_agents_xy", "possible_targets_xy"];
+const POSITIONS: [&str; 4] = ["agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy"];
+
+/// What we refused and what we said.
+struct Refusal<'a> {
+    config: &'a Value,
+    message: &'a str,
+}
+
+impl Refusal<'_> {
+    fn says(&self, text: &str) -> bool {
+        self.message.contains(text)
+    }
+
+    /// Whether the message is about one of these fields, and the value there is as it says.
+    fn is_about(&self, fields: &[&str], has: impl Fn(&Value) -> bool) -> bool {
+        let field = self.message.strip_prefix("config: `").and_then(|rest| rest.split('`').next());
+        field.is_some_and(|field| fields.contains(&field) && self.config.get(field).is_some_and(has))
+    }
+}
+
+type Holds = fn(&Refusal<'_>) -> bool;
+
+const REASONS: [(&str, Holds); 21] = [
+    ("a key that is no field", |no| no.says("config: unknown field `")),
+    ("a whole number with a decimal point", |no| no.is_about(&INTEGERS, Value::is_f64)),
+    ("a number as a text", |no| no.is_about(&numbers(), Value::is_string)),
+    ("true or false as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
+    ("a constant in another form", |no| {
+        no.is_about(&["FREE", "OBSTACLE"], |value| value.is_boolean() || value.is_f64())
+    }),
+    ("a flag as a number or a word", |no| {
+        no.is_about(&FLAGS, |value| value.is_number() || value.is_string())
+    }),
+    ("a name that is a number", |no| {
+        no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a text")
+    }),
+    ("true or false as a coordinate", |no| no.is_about(&POSITIONS, holds_flag) && no.says("expected a pair")),
+    ("a pool that is no list of cells", |no| {
+        no.is_about(&POOLS, |_| true) && (no.says("expected a pair") || no.says("expected a list of"))
+    }),
+    ("an episode longer than 64 bits can count", |no| {
+        no.is_about(&["max_episode_steps"], |value| value.is_u64() && !value.is_i64())
+    }),
+    ("other moves", |no| no.is_about(&["MOVES"], Value::is_array)),
+    ("letters with lifelong goals", |no| {
+        no.says("config: `targets_xy` is `one goal per agent`") && no.config["map"].is_string()
+    }),
+    ("cells other than 0 and 1", |no| {
+        no.says("is not 0 (free) or 1 (obstacle)") && no.config["map"].is_array()
+    }),
+    ("an unknown map", |no| no.is_about(&["map_name"], Value::is_string) && no.says("a registered map")),
+    ("two agents with one start", |no| no.says("is the start of agent")),
+    ("a pool that leaves the map", |no| {
+        no.is_about(&POOLS, Value::is_array) && no.says("expected cells inside")
+    }),
+    ("a pool without a next goal", |no| no.says("no next goal can be drawn from possible_targets_xy")),
+    ("sequences for some agents only", |no| no.says("expected a sequence for each of the")),
+    ("throughput over no steps", |no| no.is_about(&["max_episode_steps"], |value| *value == 0)),
+    ("a bad value of a field of ours", |no| no.is_about(&OURS, |_| true)),
+    ("a named map that is too small", |no| {
+        no.says("for which the map has room") && no.config["map_name"].is_string()
+    }),
+];
+
+fn numbers() -> Vec<&'static str> {
+    INTEGERS.into_iter().chain(["density"]).collect()
+}
+
+fn holds_flag(value: &Value) -> bool {
+    match value {
+        Value::Bool(_) => true,
+        Value::Array(list) => list.iter().any(holds_flag),
+        _ => false,
+    }
+}
+
+/// The name of the reason, if there is a known one.
+pub fn reason(config: &Value, message: &str) -> Option<&'static str> {
+    let refusal = Refusal { config, message };
+    REASONS.iter().find(|(_, holds)| holds(&refusal)).map(|(name, _)| *name)
+}
+
+/// The names of all reasons.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    REASONS.iter().map(|(name, _)| *name)
+}
