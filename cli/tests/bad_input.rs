@@ -32,7 +32,9 @@ const FILES: [(&str, &str); 17] = [
 ];
 
 /// Arguments and the line they are answered with.
-const REFUSED: [(&str, &str); 28] = [
+const REFUSED: [(&str, &str); 30] = [
+    ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
+    ("run --sped 3", "unexpected argument '--sped' found"),
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
     (
         "run unknown-key.yaml",

@@ -15,6 +15,9 @@ use crate::request::{
 };
 use crate::windows::{Windows, pack, pairs};
 
+/// Longer episodes have too many goals to list; the oracle lists none for them either.
+const MOST_FORETOLD_STEPS: i64 = 4096;
+
 /// An engine to play with.
 #[derive(Clone, Copy, Debug)]
 pub struct Engine {
@@ -84,8 +87,8 @@ pub(crate) struct Player {
 impl Player {
     pub(crate) fn new(engine: Engine, request: &Request) -> Result<Self, Error> {
         let config = GridConfig::from_value(&request.config)?;
-        let registered =
-            request.register.as_ref().map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
+        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
+        let registered = named.map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
         let rules = config.rules();
         Ok(Self {
             source: InstanceSource::new(config.clone(), registered)?,
@@ -145,11 +148,9 @@ impl Player {
         }
         self.collisions = self.collisions.map(|_| CollisionMeter::default());
         self.feed_density()?;
-        let goal_lists = if self.config.on_target == OnGoal::Restart {
-            foretold_goals(&self.config, &generated.instance)
-        } else {
-            None
-        };
+        let may_foretell =
+            self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MOST_FORETOLD_STEPS;
+        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, &generated.instance)).flatten();
         let record = ResetRecord {
             derived: Derived {
                 width: self.config.width,

@@ -61,6 +61,7 @@ impl InstanceSource {
             }
             _ => None,
         };
+        let registered = registered.filter(|_| config.map_name.is_some());
         Ok(Self { config, registered, pools })
     }
 
