@@ -52,7 +52,7 @@ def choice_weighted(generator, weights):
     return int(generator.choice(len(weights), p=[to_double(weight) for weight in weights]))
 
 
-def shuffle(generator, n):
+def shuffle_list(generator, n):
     items = list(range(n))
     generator.shuffle(items)
     return items
@@ -83,7 +83,7 @@ CALLS = {
     "integers_array": lambda generator, lo, hi, n: generator.integers(lo, hi, size=n).tolist(),
     "choice_index": choice_index,
     "choice_weighted": choice_weighted,
-    "shuffle": shuffle,
+    "shuffle_list": shuffle_list,
     "shuffle_rows": shuffle_rows,
     "shuffle_array": shuffle_array,
     "binomial1": lambda generator, p: bool(generator.binomial(1, to_double(p))),

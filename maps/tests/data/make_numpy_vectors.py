@@ -54,7 +54,7 @@ def calls_by_topic():
         "integers_array": [{"call": "integers_array", "n": 5} | pair for pair in ends],
         "choice_index": [{"call": "choice_index", "n": n} for n in LENGTHS],
         "choice_weighted": [{"call": "choice_weighted"} | weights for weights in lists],
-        "shuffle": [{"call": "shuffle", "n": n} for n in LENGTHS],
+        "shuffle_list": [{"call": "shuffle_list", "n": n} for n in LENGTHS],
         "shuffle_rows": [{"call": "shuffle_rows", "n": n} for n in LENGTHS],
         "shuffle_array": [{"call": "shuffle_array", "n": n} for n in LENGTHS],
         "binomial1": [{"call": "binomial1"} | chance for chance in chances],
@@ -84,7 +84,7 @@ def main():
     assert {call["call"] for calls in topics.values() for call in calls} == {*CALLS}
     runs = {topic: [run(42, calls)] for topic, calls in topics.items()}
     runs["mixed"] = [run(seed, mixed(topics)) for seed in SEEDS]
-    runs["long_shuffle"] = [run(42, [{"call": "shuffle", "n": 400}])]
+    runs["long_shuffle"] = [run(42, [{"call": "shuffle_list", "n": 400}])]
     uneven = {"call": "choice_weighted", "weights": [to_bits(0.5), to_bits(0.5 + 2**-26)]}
     near = [*topics["binomial1"], uneven]
     runs["near"] = [made for call in near for made in runs_near(call)]
