@@ -78,10 +78,10 @@ impl Environment for Literal {
     }
 
     fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
-        Error::check_length("starts", self.config.num_agents, instance.starts.len())?;
+        instance.check_fits(&self.config)?;
         let radius = self.config.radius;
-        let (height, width) = (instance.map.height() + 2 * radius, instance.map.width() + 2 * radius);
-        let mut obstacles = match &instance.outside {
+        let (height, width) = (instance.map().height() + 2 * radius, instance.map().width() + 2 * radius);
+        let mut obstacles = match instance.outside() {
             Outside::Free => vec![vec![0; width]; height],
             Outside::Noise(noise) => noise
                 .obstacles()
@@ -95,20 +95,20 @@ impl Environment for Literal {
             row[radius - 1] = 1;
             row[width - radius] = 1;
         }
-        for (row, flags) in instance.map.obstacles().chunks(instance.map.width()).enumerate() {
+        for (row, flags) in instance.map().obstacles().chunks(instance.map().width()).enumerate() {
             for (col, &flag) in flags.iter().enumerate() {
                 obstacles[row + radius][col + radius] = u8::from(flag);
             }
         }
         self.obstacles = obstacles;
         self.positions = vec![vec![0; width]; height];
-        self.starts = instance.starts.iter().map(|&cell| self.pad(cell)).collect();
+        self.starts = instance.starts().iter().map(|&cell| self.pad(cell)).collect();
         for &(row, col) in &self.starts {
             self.positions[row][col] = 1;
         }
         self.places.clone_from(&self.starts);
         self.goals = instance.first_goals().into_iter().map(|cell| self.pad(cell)).collect();
-        self.streams.clone_from(&instance.goals);
+        self.streams = instance.goals().to_vec();
         self.active = vec![true; self.config.num_agents];
         self.elapsed = 0;
         self.note_goals();

@@ -159,7 +159,7 @@ impl Player {
                 density: self.config.density,
                 num_agents: self.config.num_agents,
             },
-            map: generated.instance.map.rows(),
+            map: generated.instance.map().rows(),
             padded: self.padded(&generated.instance)?,
             state: self.state(),
             observations,
@@ -222,7 +222,7 @@ impl Player {
 
     fn count_collisions(&mut self, before: &Snapshot, actions: &[Action], after: &Snapshot) {
         if let (Some(meter), Some(instance)) = (&mut self.collisions, &self.instance) {
-            meter.feed(&instance.map, &before.cells, &before.active, actions, &after.cells);
+            meter.feed(instance.map(), &before.cells, &before.active, actions, &after.cells);
         }
     }
 
@@ -252,7 +252,7 @@ impl Player {
 
     fn padded(&self, instance: &Instance) -> Result<Padded, Error> {
         let border = 2 * self.config.obs_radius;
-        let (height, width) = (instance.map.height() + border, instance.map.width() + border);
+        let (height, width) = (instance.map().height() + border, instance.map().width() + border);
         let (mut obstacles, mut places) = (vec![0; height * width], vec![0; 4 * self.config.num_agents]);
         let (cells, goals) = places.split_at_mut(2 * self.config.num_agents);
         self.environment.observe_mapf(MapfOut { obstacles: &mut obstacles, cells, goals })?;

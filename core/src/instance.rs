@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Cell, Error, GoalStream, Map};
+use crate::{Cell, Config, Error, GoalStream, Map};
 
 /// What agents see beyond the wall around the map.
 ///
@@ -22,16 +22,14 @@ pub enum Outside {
 }
 
 /// A map, what surrounds it, and where each agent starts and wants to go.
+///
+/// Engines rely on what [`Instance::new`] has checked, so its parts can be read but not changed.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// The map without its border.
-    pub map: Map,
-    /// What lies beyond the wall.
-    pub outside: Outside,
-    /// Where each agent starts.
-    pub starts: Vec<Cell>,
-    /// The goals of each agent, in order.
-    pub goals: Vec<GoalStream>,
+    map: Map,
+    outside: Outside,
+    starts: Vec<Cell>,
+    goals: Vec<GoalStream>,
 }
 
 impl Instance {
@@ -53,6 +51,46 @@ impl Instance {
             }
         }
         Ok(Self { map, outside, starts, goals })
+    }
+
+    /// The map without its border.
+    pub fn map(&self) -> &Map {
+        &self.map
+    }
+
+    /// What lies beyond the wall.
+    pub fn outside(&self) -> &Outside {
+        &self.outside
+    }
+
+    /// Where each agent starts.
+    pub fn starts(&self) -> &[Cell] {
+        &self.starts
+    }
+
+    /// The goals of each agent, in order.
+    pub fn goals(&self) -> &[GoalStream] {
+        &self.goals
+    }
+
+    /// The goals of each agent, and nothing else, without copying them.
+    pub fn into_goals(self) -> Vec<GoalStream> {
+        self.goals
+    }
+
+    /// Passes if the instance can be played with a config: one start and goal per agent, and noise as large as
+    /// the map with the border that the radius asks for.
+    ///
+    /// # Errors
+    /// [`Error::Length`] naming what does not fit.
+    pub fn check_fits(&self, config: &Config) -> Result<(), Error> {
+        Error::check_length("starts", config.num_agents, self.starts.len())?;
+        if let Outside::Noise(noise) = &self.outside {
+            let border = 2 * config.radius;
+            Error::check_length("rows of noise", self.map.height() + border, noise.height())?;
+            Error::check_length("columns of noise", self.map.width() + border, noise.width())?;
+        }
+        Ok(())
     }
 
     /// The first goal of each agent.

@@ -147,10 +147,10 @@ impl TraceHeader {
             format: FORMAT.into(),
             spec: SPEC.into(),
             config,
-            map: instance.map.clone(),
-            outside: instance.outside.clone(),
-            starts: instance.starts.clone(),
-            goals: instance.goals.iter().map(|stream| stream.list(num_goals.max(1))).collect(),
+            map: instance.map().clone(),
+            outside: instance.outside().clone(),
+            starts: instance.starts().to_vec(),
+            goals: instance.goals().iter().map(|stream| stream.list(num_goals.max(1))).collect(),
         }
     }
 

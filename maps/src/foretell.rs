@@ -14,7 +14,7 @@ pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Ve
     if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
         return Some(sequences.clone());
     }
-    let agents = instance.goals.iter().zip(&instance.starts);
+    let agents = instance.goals().iter().zip(instance.starts());
     agents.map(|(stream, &start)| foretold_to_one(stream.clone(), start, config.max_episode_steps)).collect()
 }
 

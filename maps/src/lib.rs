@@ -9,7 +9,7 @@
 //! let config = GridConfig::from_yaml("{size: 8, num_agents: 2, seed: 0}")?;
 //! let mut source = InstanceSource::new(config, None)?;
 //! let instance = source.generate()?.instance;
-//! assert_eq!(instance.starts[0], pogema_core::Cell::new(0, 2));
+//! assert_eq!(instance.starts()[0], pogema_core::Cell::new(0, 2));
 //! # Ok::<(), pogema_core::Error>(())
 //! ```
 

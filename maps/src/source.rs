@@ -245,8 +245,8 @@ impl InstanceSource {
         if is_random {
             return;
         }
-        let components = Components::of(&instance.map);
-        for (agent, (&start, goal)) in instance.starts.iter().zip(instance.first_goals()).enumerate() {
+        let components = Components::of(instance.map());
+        for (agent, (&start, goal)) in instance.starts().iter().zip(instance.first_goals()).enumerate() {
             if components.label(start) != components.label(goal) {
                 warnings.push(format!(
                     "agent {agent} cannot reach its goal: no path from cell {start} to cell {goal}, both counted \

@@ -95,8 +95,8 @@ fn check_instances(config: GridConfig) {
     for _reset in 0..2 {
         match source.generate() {
             Ok(generated) => {
-                assert_eq!(generated.instance.starts.len(), source.config().num_agents);
-                generated.instance.goals.iter().for_each(|goals| assert_eq!(goals.list(8).len(), 8));
+                assert_eq!(generated.instance.starts().len(), source.config().num_agents);
+                generated.instance.goals().iter().for_each(|goals| assert_eq!(goals.list(8).len(), 8));
                 generated.warnings.iter().for_each(|warning| assert_one_line(warning));
             }
             Err(error) => assert_one_line(&error.to_string()),

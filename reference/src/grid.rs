@@ -45,9 +45,9 @@ pub fn place(cell: Cell) -> (i32, i32) {
 ///
 /// Source: POGEMA 1.4.0, `grid.py`, `Grid.add_artificial_border`
 pub fn obstacles_with_border(instance: &Instance, radius: usize) -> Grid {
-    let (height, width) = (instance.map.height(), instance.map.width());
+    let (height, width) = (instance.map().height(), instance.map().width());
     let mut grid = Grid::empty(height, width, radius);
-    if let Outside::Noise(noise) = &instance.outside {
+    if let Outside::Noise(noise) = instance.outside() {
         for (row, cells) in grid.rows.iter_mut().zip(noise.obstacles().chunks(noise.width())) {
             row.copy_from_slice(cells);
         }
@@ -61,8 +61,8 @@ pub fn obstacles_with_border(instance: &Instance, radius: usize) -> Grid {
         grid.set((row, -1), true);
         grid.set((row, right), true);
     }
-    for (index, &obstacle) in instance.map.obstacles().iter().enumerate() {
-        grid.set(place(instance.map.cell_at(index)), obstacle);
+    for (index, &obstacle) in instance.map().obstacles().iter().enumerate() {
+        grid.set(place(instance.map().cell_at(index)), obstacle);
     }
     grid
 }

@@ -1,8 +1,6 @@
 //! One environment and one step of it, as a table of contents.
 
-use pogema_core::{
-    Action, Cell, Config, Environment, Error, GoalStream, Instance, MapfOut, Outside, PomapfOut,
-};
+use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, MapfOut, PomapfOut};
 use pogema_core::{Snapshot, StepOut};
 
 use crate::grid::{Grid, obstacles_with_border, place};
@@ -58,17 +56,6 @@ impl Reference {
     pub(crate) fn active_agents(&self) -> Vec<usize> {
         (0..self.active.len()).filter(|&agent| self.active[agent]).collect()
     }
-
-    fn check_fits(&self, instance: &Instance) -> Result<(), Error> {
-        Error::check_length("starts", self.config.num_agents, instance.starts.len())?;
-        Error::check_length("goals", self.config.num_agents, instance.goals.len())?;
-        if let Outside::Noise(noise) = &instance.outside {
-            let border = 2 * self.config.radius;
-            Error::check_length("rows of noise", instance.map.height() + border, noise.height())?;
-            Error::check_length("columns of noise", instance.map.width() + border, noise.width())?;
-        }
-        Ok(())
-    }
 }
 
 impl Environment for Reference {
@@ -78,16 +65,16 @@ impl Environment for Reference {
 
     /// Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
     fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
-        self.check_fits(instance)?;
-        let map = &instance.map;
+        instance.check_fits(&self.config)?;
+        let map = instance.map();
         self.obstacles = obstacles_with_border(instance, self.config.radius);
         self.occupied = Grid::empty(map.height(), map.width(), self.config.radius);
-        for &start in &instance.starts {
+        for &start in instance.starts() {
             self.occupied.set(place(start), true);
         }
-        self.starts.clone_from(&instance.starts);
-        self.streams.clone_from(&instance.goals);
-        self.cells.clone_from(&instance.starts);
+        self.starts = instance.starts().to_vec();
+        self.streams = instance.goals().to_vec();
+        self.cells = instance.starts().to_vec();
         self.goals = instance.first_goals();
         self.active = vec![true; self.config.num_agents];
         self.step = 0;

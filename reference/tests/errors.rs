@@ -68,12 +68,13 @@ fn a_refused_reset_leaves_the_episode_as_it_was() {
     let mut environment = Reference::new(config()).unwrap();
     environment.reset(&instance()).unwrap();
     let before = environment.snapshot();
-    let mut lonely = instance();
-    lonely.starts.pop();
-    lonely.goals.pop();
+    let first = instance();
+    let (map, starts, goals) = (first.map(), first.starts(), first.goals());
+    let lonely =
+        Instance::new(map.clone(), Outside::Free, starts[..1].to_vec(), goals[..1].to_vec()).unwrap();
     assert_eq!(environment.reset(&lonely).unwrap_err().to_string(), "starts has length 1, expected 2");
     let noise = Map::from_rows(&["....", "....", "....", "...."]).unwrap();
-    let narrow = Instance { outside: Outside::Noise(noise), ..instance() };
+    let narrow = Instance::new(map.clone(), Outside::Noise(noise), starts.to_vec(), goals.to_vec()).unwrap();
     assert_eq!(
         environment.reset(&narrow).unwrap_err().to_string(),
         "columns of noise has length 4, expected 5"

@@ -59,7 +59,7 @@ impl Episode {
         let state = self.environment.snapshot();
         self.num_steps += 1;
         self.density.feed(Windows::of(&self.environment)?.counts().into_iter());
-        self.collisions.feed(&self.instance.map, &before.cells, &before.active, &actions, &state.cells);
+        self.collisions.feed(self.instance.map(), &before.cells, &before.active, &actions, &state.cells);
         let figures = self.meter.feed(&state.on_goal, &terminated, &truncated);
         self.is_over = figures.is_some();
         self.metrics = Metrics {

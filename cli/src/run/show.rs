@@ -28,7 +28,7 @@ impl Screen {
     }
 
     pub fn draw(&mut self, episode: &Episode) -> Result<(), Error> {
-        let frame = frame(&episode.instance().map, &episode.snapshot(), episode.num_steps());
+        let frame = frame(episode.instance().map(), &episode.snapshot(), episode.num_steps());
         if !self.terminal.is_term() {
             return say(&frame);
         }
