@@ -37,10 +37,12 @@ pub struct Conform {
     keep: PathBuf,
 }
 
+const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
         self.json.as_deref().map_or(Ok(()), check_writable)?;
-        let engines = [Engine::REFERENCE, Engine::LITERAL];
+        let engines = [Engine::REFERENCE, FAST, Engine::LITERAL];
         let mut report = Report::default();
         for engine in engines {
             let name = |part: &str| format!("{part}, {}", engine.name);
@@ -56,7 +58,14 @@ impl Conform {
             report.check_cases_with_oracle(&cases::folder(), &python)?;
             let bar = self.bar("POGEMA 1.4.0");
             let tick = || bar.inc(1);
-            report.check_oracle(Engine::REFERENCE, &python, self.cases, self.seed, &self.keep, &tick)?;
+            report.check_oracle(
+                &[Engine::REFERENCE, FAST],
+                &python,
+                self.cases,
+                self.seed,
+                &self.keep,
+                &tick,
+            )?;
             bar.finish_and_clear();
         }
         if let Some(path) = &self.json {

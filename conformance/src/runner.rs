@@ -72,6 +72,25 @@ struct Checked {
     fault: Option<Fault>,
 }
 
+impl Checked {
+    /// Compares one engine's answer; the first fault stays.
+    fn compare(
+        &mut self,
+        part: &str,
+        name: &str,
+        engine: Engine,
+        (request, expected): (&Request, &Response),
+        got: &Response,
+    ) {
+        let found = compare(request, expected, got, &mut self.tally);
+        let fault = found.map(|found| {
+            let fault = diverged(part, name, found);
+            Fault { text: format!("{}:\n{}", engine.name, fault.text), ..fault }
+        });
+        self.fault = self.fault.take().or(fault);
+    }
+}
+
 impl Report {
     /// Whether everything agreed.
     pub fn agrees(&self) -> bool {
@@ -158,10 +177,7 @@ impl Report {
                 }
                 for &engine in others {
                     let got = play_on(engine, &request);
-                    checked.fault = checked.fault.or_else(|| {
-                        let found = compare(&request, &expected, &got, &mut checked.tally)?;
-                        Some(diverged("fresh", &name, found))
-                    });
+                    checked.compare("fresh", &name, engine, (&request, &expected), &got);
                 }
                 keep_fault(&mut checked, keep, &request, &expected);
                 progress();
@@ -172,13 +188,13 @@ impl Report {
         Ok(())
     }
 
-    /// Checks an engine against POGEMA itself on freshly drawn cases.
+    /// Checks engines against POGEMA itself on freshly drawn cases.
     ///
     /// # Errors
     /// If POGEMA cannot be started or ends.
     pub fn check_oracle(
         &mut self,
-        engine: Engine,
+        engines: &[Engine],
         python: &Path,
         num_cases: u64,
         seed: u64,
@@ -189,13 +205,17 @@ impl Report {
             num_cases,
             || Oracle::start(python),
             |oracle, case| {
-                let request = play_script(engine, draw_request(seed, case), seed).0;
+                let request = play_script(Engine::REFERENCE, draw_request(seed, case), seed).0;
                 // POGEMA works on its answer while we work on ours.
                 oracle.send(&request)?;
-                let got = play_on(engine, &request);
+                let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
                 let expected = oracle.receive()?;
                 let name = format!("case {case} of seed {seed}");
-                let mut checked = check("oracle", &name, &request, &expected, &got);
+                let mut checked = Checked::default();
+                checked.events.watch(&expected);
+                for (engine, got) in engines.iter().zip(&answers) {
+                    checked.compare("oracle", &name, *engine, (&request, &expected), got);
+                }
                 keep_fault(&mut checked, keep, &request, &expected);
                 progress();
                 Ok(checked)

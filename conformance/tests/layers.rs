@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 /// A crate uses lower layers only, never its own.
-const LAYERS: [(&str, u8); 7] = [
+const LAYERS: [(&str, u8); 8] = [
     ("pogema-core", 0),
     ("pogema-reference", 1),
+    ("pogema-fast", 1),
     ("pogema-maps", 1),
     ("pogema-planners", 1),
     ("pogema-conformance", 2),

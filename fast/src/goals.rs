@@ -1,0 +1,79 @@
+//! What reaching a goal does; rewards and ends.
+
+use pogema_core::{OnGoal, Reward};
+
+use crate::Engine;
+
+impl Engine {
+    /// Notes which active agents stand on their goals.
+    ///
+    /// Rule: goal/finish, goal/nothing, goal/restart
+    pub(crate) fn mark_on_goal(&mut self) {
+        let places = self.cells.iter().zip(&self.goals).zip(&self.active);
+        let mut num_on_goal = 0;
+        for (on_goal, ((cell, goal), &active)) in self.on_goal.iter_mut().zip(places) {
+            *on_goal = active && cell == goal;
+            num_on_goal += usize::from(*on_goal);
+        }
+        self.num_on_goal = num_on_goal;
+    }
+
+    fn all_on_goal(&self) -> bool {
+        self.num_on_goal == self.on_goal.len()
+    }
+
+    /// Rule: reward/own, reward/shared
+    pub(crate) fn pay(&self, rewards: &mut [f32]) {
+        match (self.config.reward, self.config.on_goal) {
+            (Reward::Shared, _) => rewards.fill(self.num_on_goal as f32 / self.on_goal.len() as f32),
+            (Reward::Own, OnGoal::Nothing) => rewards.fill(f32::from(u8::from(self.all_on_goal()))),
+            (Reward::Own, OnGoal::Finish | OnGoal::Restart) => {
+                for (reward, &on_goal) in rewards.iter_mut().zip(&self.on_goal) {
+                    *reward = f32::from(u8::from(on_goal));
+                }
+            }
+        }
+    }
+
+    /// Rule: end/terminated
+    pub(crate) fn terminate(&self, terminated: &mut [bool]) {
+        match self.config.on_goal {
+            OnGoal::Finish => {
+                for (ended, (cell, goal)) in terminated.iter_mut().zip(self.cells.iter().zip(&self.goals)) {
+                    *ended = cell == goal;
+                }
+            }
+            OnGoal::Nothing => terminated.fill(self.all_on_goal()),
+            OnGoal::Restart => terminated.fill(false),
+        }
+    }
+
+    /// Rule: end/truncated, end/after
+    pub(crate) fn truncate(&self, truncated: &mut [bool]) {
+        truncated.fill(i64::try_from(self.step).is_ok_and(|step| step >= self.config.max_steps));
+    }
+
+    /// Rule: goal/finish/leave, goal/nothing, goal/restart/next
+    pub(crate) fn change_goals(&mut self) {
+        if self.num_on_goal == 0 || self.config.on_goal == OnGoal::Nothing {
+            return;
+        }
+        for agent in 0..self.on_goal.len() {
+            if !self.on_goal[agent] {
+                continue;
+            }
+            if self.config.on_goal == OnGoal::Finish {
+                self.leave(agent);
+            } else {
+                self.goals[agent] = self.streams[agent].advance(self.cells[agent]);
+            }
+        }
+    }
+
+    fn leave(&mut self, agent: usize) {
+        let (cell, radius) = (self.cells[agent], self.config.radius);
+        self.active[agent] = false;
+        self.vacate(self.board.place(cell), agent);
+        self.occupied.clear(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
+    }
+}

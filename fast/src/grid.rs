@@ -1,0 +1,204 @@
+//! The map with its border, once as bits for the windows and once as squares for the moves.
+
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+
+use pogema_core::{Cell, Error, Instance, Outside};
+
+/// One bit per cell of a map with its border, cut into vertical strips.
+///
+/// A strip holds one word per row. It begins 32 columns after the one before and is 64 columns wide, so that every
+/// cell is in two strips, and a window of up to 33 columns lies in one: its rows are neighbours in memory, each
+/// a shift away. An empty strip stands before the first, so that every cell really is in two.
+#[derive(Debug, Default)]
+pub struct Strips {
+    words: Vec<AtomicU64>,
+    num_rows: usize,
+}
+
+/// Columns from one strip to the next.
+pub const STRIDE: usize = 32;
+
+impl Strips {
+    /// Strips without any bit set.
+    pub fn empty(height: usize, width: usize) -> Result<Self, Error> {
+        let num_strips = width.div_ceil(STRIDE) + 2;
+        let words = reserve(num_strips.checked_mul(height), || AtomicU64::new(0))?;
+        Ok(Self { words, num_rows: height })
+    }
+
+    /// Number of rows, border included.
+    pub fn num_rows(&self) -> usize {
+        self.num_rows
+    }
+
+    /// Number of words in all strips.
+    pub fn num_words(&self) -> usize {
+        self.words.len()
+    }
+
+    /// The words of a window's first strip from its first row on, and the shift that brings its first column to
+    /// bit 0. The strips to the right follow at distances of [`Strips::num_rows`].
+    pub fn window(&self, row: usize, col: usize) -> (&[AtomicU64], u32) {
+        let first = (col / STRIDE + 1) * self.num_rows + row;
+        (&self.words[first..], (col % STRIDE) as u32)
+    }
+
+    /// The two words of a cell, and its bit in the first of them; in the second it is 32 bits higher.
+    fn words_of(&self, row: usize, col: usize) -> (&AtomicU64, &AtomicU64, u64) {
+        let here = (col / STRIDE + 1) * self.num_rows + row;
+        (&self.words[here], &self.words[here - self.num_rows], 1 << (col % STRIDE))
+    }
+
+    pub fn get(&self, row: usize, col: usize) -> bool {
+        let (word, _, bit) = self.words_of(row, col);
+        word.load(Relaxed) & bit != 0
+    }
+
+    /// Sets a bit; `SHARED` if other threads may be setting bits too.
+    pub fn set<const SHARED: bool>(&self, row: usize, col: usize) {
+        let (word, other, bit) = self.words_of(row, col);
+        if SHARED {
+            word.fetch_or(bit, Relaxed);
+            other.fetch_or(bit << STRIDE, Relaxed);
+        } else {
+            word.store(word.load(Relaxed) | bit, Relaxed);
+            other.store(other.load(Relaxed) | bit << STRIDE, Relaxed);
+        }
+    }
+
+    /// Clears one bit.
+    pub fn clear(&self, row: usize, col: usize) {
+        let (word, other, bit) = self.words_of(row, col);
+        word.fetch_and(!bit, Relaxed);
+        other.fetch_and(!(bit << STRIDE), Relaxed);
+    }
+
+    /// Clears a bit and its neighbours in the same words.
+    pub fn blank(&self, row: usize, col: usize) {
+        let (word, other, _) = self.words_of(row, col);
+        word.store(0, Relaxed);
+        other.store(0, Relaxed);
+    }
+
+    pub fn clear_all(&mut self) {
+        self.words.fill_with(AtomicU64::default);
+    }
+
+    /// Sets the bits of a row from column `first` on.
+    fn write_row(&mut self, row: usize, first: usize, flags: &[bool]) {
+        let mut col = first;
+        let mut rest = flags;
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at(rest.len().min(STRIDE - col % STRIDE));
+            let bits =
+                now.iter().rev().fold(0u64, |bits, &flag| bits << 1 | u64::from(flag)) << (col % STRIDE);
+            let mask = (u64::MAX >> (64 - now.len())) << (col % STRIDE);
+            let here = (col / STRIDE + 1) * self.num_rows + row;
+            replace(self.words[here].get_mut(), mask, bits);
+            replace(self.words[here - self.num_rows].get_mut(), mask << STRIDE, bits << STRIDE);
+            col += now.len();
+            rest = later;
+        }
+    }
+
+    /// The obstacles of an instance with its border: what lies outside, then the wall, then the map.
+    ///
+    /// Rule: border/ring, border/outside, border/noise
+    pub fn write_obstacles(&mut self, instance: &Instance, radius: usize) {
+        self.clear_all();
+        let (height, width) = (instance.map().height(), instance.map().width());
+        if let Outside::Noise(noise) = instance.outside() {
+            for (row, flags) in noise.obstacles().chunks(noise.width()).enumerate() {
+                self.write_row(row, 0, flags);
+            }
+        }
+        let wall = vec![true; width + 2];
+        self.write_row(radius - 1, radius - 1, &wall);
+        self.write_row(radius + height, radius - 1, &wall);
+        for (row, flags) in instance.map().obstacles().chunks(width).enumerate() {
+            self.write_row(radius + row, radius - 1, &[true]);
+            self.write_row(radius + row, radius, flags);
+            self.write_row(radius + row, radius + width, &[true]);
+        }
+    }
+}
+
+fn replace(word: &mut u64, mask: u64, bits: u64) {
+    *word = *word & !mask | bits;
+}
+
+/// What the moves need to know of one cell.
+#[derive(Debug)]
+pub struct Square {
+    /// The active agent that stands here, or [`FREE`], or [`OBSTACLE`].
+    pub agent: AtomicU32,
+    /// While a step is played: the agent that may come here, or [`NOBODY`].
+    pub claim: AtomicU32,
+}
+
+pub const FREE: u32 = u32::MAX - 1;
+pub const OBSTACLE: u32 = u32::MAX;
+pub const NOBODY: u32 = u32::MAX;
+
+/// The squares of a map and of the wall around it, so that no move needs a bounds test of its own.
+#[derive(Debug, Default)]
+pub struct Board {
+    squares: Vec<Square>,
+    width: u32,
+}
+
+impl Board {
+    /// A board of walls.
+    pub fn walls(height: usize, width: usize) -> Result<Self, Error> {
+        let wall = || Square { agent: OBSTACLE.into(), claim: NOBODY.into() };
+        let squares = reserve((width + 2).checked_mul(height + 2), wall)?;
+        Ok(Self { squares, width: width as u32 + 2 })
+    }
+
+    pub fn num_bytes(&self) -> usize {
+        size_of::<Square>() * self.squares.len()
+    }
+
+    /// Where the square of a cell is.
+    pub fn place(&self, cell: Cell) -> u32 {
+        (u32::from(cell.row) + 1) * self.width + u32::from(cell.col) + 1
+    }
+
+    /// What to add to a place, wrapping, for each action in the order of their numbers.
+    pub fn offsets(&self) -> [u32; 5] {
+        [0, self.width.wrapping_neg(), self.width, u32::MAX, 1]
+    }
+
+    pub fn square(&self, place: u32) -> &Square {
+        &self.squares[place as usize]
+    }
+
+    /// Takes over the obstacles of a map of the board's size, with no agent anywhere.
+    pub fn write_obstacles(&mut self, obstacles: &[bool]) {
+        let width = self.width as usize;
+        let rows = self.squares.chunks_mut(width).skip(1);
+        for (squares, obstacles) in rows.zip(obstacles.chunks(width - 2)) {
+            for (square, &obstacle) in squares[1..].iter_mut().zip(obstacles) {
+                *square.agent.get_mut() = if obstacle { OBSTACLE } else { FREE };
+            }
+        }
+    }
+}
+
+/// A list of so many equal entries, or an error where memory does not suffice.
+pub fn reserve<T>(number: Option<usize>, entry: impl FnMut() -> T) -> Result<Vec<T>, Error> {
+    let mut list = Vec::new();
+    let is_had = number.is_some_and(|number| list.try_reserve_exact(number).is_ok());
+    match number {
+        Some(number) if is_had => list.resize_with(number, entry),
+        _ => {
+            let bytes = number.and_then(|number| number.checked_mul(size_of::<T>()));
+            let bytes =
+                bytes.map_or("more bytes than can be counted".into(), |bytes| format!("{bytes} bytes"));
+            return Err(Error::instance(format!(
+                "the environment needs {bytes} of memory at once, too much"
+            )));
+        }
+    }
+    Ok(list)
+}

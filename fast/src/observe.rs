@@ -1,0 +1,174 @@
+//! What agents see.
+
+use std::ops::Range;
+
+use pogema_core::{Cell, Error, MapfOut, PomapfOut};
+use rayon::prelude::*;
+
+use crate::Engine;
+use crate::simd::{Channels, Path, Scene, Value, lead_of, pack, per_line};
+
+/// Words on the stack for the bits of some agents; enough for one agent of any radius.
+const NUM_WORDS: usize = 3200;
+/// The same where windows are small, so that less has to be cleared.
+const FEW_WORDS: usize = 400;
+/// Buffers of more bytes are written around the cache.
+const BEYOND_CACHE: usize = 64 << 20;
+/// Agents that one thread takes at a time.
+const CHUNK: usize = 1024;
+
+impl Engine {
+    /// Writes the `default` observation of some agents as `f32` or `u8`.
+    ///
+    /// Shape: `[agents, 3, side, side]`; channels obstacles, agents, goal; every value 0 or 1.
+    ///
+    /// # Errors
+    /// Before the first reset, for agents that are not there, or for a buffer of the wrong length.
+    ///
+    /// Rule: observe/default
+    pub fn observe_agents<V: Value>(&self, agents: Range<usize>, out: &mut [V]) -> Result<(), Error> {
+        self.check_agents(&agents)?;
+        let per_agent = 3 * self.config.side() * self.config.side();
+        Error::check_length("observations", agents.len() * per_agent, out.len())?;
+        self.write_values(agents, Channels::All, out);
+        Ok(())
+    }
+
+    /// Writes the `default` observation of some agents as bits, each agent's from a new word on: channel after
+    /// channel, row after row, the first cell in the lowest bit.
+    ///
+    /// Shape: `[agents, words]` with [`words_per_agent`] words.
+    ///
+    /// # Errors
+    /// As for [`Engine::observe_agents`].
+    ///
+    /// Rule: observe/default
+    pub fn observe_bits(&self, agents: Range<usize>, out: &mut [u64]) -> Result<(), Error> {
+        self.check_agents(&agents)?;
+        let per_agent = words_per_agent(self.config.radius);
+        Error::check_length("observations", agents.len() * per_agent, out.len())?;
+        let scene = self.scene();
+        let write = |(first, out): (usize, &mut [u64])| {
+            let agents = first..first + out.len() / per_agent;
+            pack(self.path, &scene, agents, Channels::All, (0, true), out);
+        };
+        match self.pool.as_ref().filter(|_| agents.len() > CHUNK) {
+            Some(pool) => pool.install(|| {
+                let chunks = out.par_chunks_mut(CHUNK * per_agent).enumerate();
+                chunks.for_each(|(chunk, out)| write((agents.start + chunk * CHUNK, out)));
+            }),
+            None => write((agents.start, out)),
+        }
+        Ok(())
+    }
+
+    fn check_agents(&self, agents: &Range<usize>) -> Result<(), Error> {
+        self.check_started()?;
+        if agents.start > agents.end || agents.end > self.config.num_agents {
+            let expected = format!("within 0..{}", self.config.num_agents);
+            return Err(Error::config("agents", format!("{agents:?}"), expected));
+        }
+        Ok(())
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene {
+            obstacles: &self.obstacles,
+            occupied: &self.occupied,
+            cells: &self.cells,
+            goals: &self.goals,
+            radius: self.config.radius,
+        }
+    }
+
+    fn write_values<V: Value>(&self, agents: Range<usize>, channels: Channels, out: &mut [V]) {
+        let per_agent = channels.number() * self.config.side() * self.config.side();
+        let scene = self.scene();
+        let beyond_cache = size_of_val(out) > BEYOND_CACHE;
+        let write = |(first, out): (usize, &mut [V])| {
+            if per_agent.div_ceil(64) < FEW_WORDS / 16 {
+                write_blocks::<V, FEW_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
+            } else {
+                write_blocks::<V, NUM_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
+            }
+        };
+        match self.pool.as_ref().filter(|_| agents.len() > CHUNK) {
+            Some(pool) => pool.install(|| {
+                let chunks = out.par_chunks_mut(CHUNK * per_agent).enumerate();
+                chunks.for_each(|(chunk, out)| write((agents.start + chunk * CHUNK, out)));
+            }),
+            None => write((agents.start, out)),
+        }
+    }
+
+    /// Rule: observe/pomapf, observe/pomapf/relative
+    pub(crate) fn write_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+        let num_agents = self.config.num_agents;
+        let num_values = num_agents * self.config.side() * self.config.side();
+        Error::check_length("obstacles", num_values, out.obstacles.len())?;
+        Error::check_length("agents", num_values, out.agents.len())?;
+        Error::check_length("cells", 2 * num_agents, out.cells.len())?;
+        Error::check_length("goals", 2 * num_agents, out.goals.len())?;
+        self.write_values(0..num_agents, Channels::Obstacles, out.obstacles);
+        self.write_values(0..num_agents, Channels::Agents, out.agents);
+        let from_start = |start: &Cell| (-i32::from(start.row), -i32::from(start.col));
+        write_places(out.cells, &self.cells, self.starts.iter().map(from_start));
+        write_places(out.goals, &self.goals, self.starts.iter().map(from_start));
+        Ok(())
+    }
+
+    /// Rule: observe/mapf, observe/mapf/global
+    pub(crate) fn write_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+        let border = self.config.radius;
+        let (height, width) = (self.height + 2 * border, self.width + 2 * border);
+        let num_agents = self.config.num_agents;
+        Error::check_length("global obstacles", height * width, out.obstacles.len())?;
+        Error::check_length("global cells", 2 * num_agents, out.cells.len())?;
+        Error::check_length("global goals", 2 * num_agents, out.goals.len())?;
+        for (row, values) in out.obstacles.chunks_mut(width).enumerate() {
+            for (col, value) in values.iter_mut().enumerate() {
+                *value = u8::from(self.obstacles.get(row, col));
+            }
+        }
+        let from_border = std::iter::repeat((border as i32, border as i32));
+        write_places(out.cells, &self.cells, from_border.clone());
+        write_places(out.goals, &self.goals, from_border);
+        Ok(())
+    }
+}
+
+/// Words that the bits of one agent's `default` observation take.
+pub fn words_per_agent(radius: usize) -> usize {
+    (3 * (2 * radius + 1) * (2 * radius + 1)).div_ceil(64)
+}
+
+/// Writes the values of the agents from `first` on, as many agents at a time as have room on the stack.
+fn write_blocks<V: Value, const WORDS: usize>(
+    path: Path,
+    scene: &Scene<'_>,
+    first: usize,
+    channels: Channels,
+    out: &mut [V],
+    beyond_cache: bool,
+) {
+    let per_agent = channels.number() * scene.side() * scene.side();
+    // The last word of an agent may touch the one after it, and the first bits may be left out.
+    let room = (WORDS - 2) / per_agent.div_ceil(64);
+    // So many agents end where a line of memory does.
+    let whole = room - room % per_line::<V>();
+    let per_block = if whole > 0 { whole } else { room };
+    let mut words = [0; WORDS];
+    for (block, out) in out.chunks_mut(per_block * per_agent).enumerate() {
+        let first = first + block * per_block;
+        let lead = lead_of(out);
+        let agents = first..first + out.len() / per_agent;
+        pack(path, scene, agents, channels, (lead, false), &mut words);
+        V::spread(path, &words, lead, out, beyond_cache);
+    }
+}
+
+fn write_places(out: &mut [i32], cells: &[Cell], offsets: impl Iterator<Item = (i32, i32)>) {
+    for ((place, cell), (down, right)) in out.chunks_mut(2).zip(cells).zip(offsets) {
+        place.copy_from_slice(&[i32::from(cell.row) + down, i32::from(cell.col) + right]);
+    }
+}

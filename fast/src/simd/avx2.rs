@@ -1,0 +1,93 @@
+//! Bits to values, 32 bytes at a time.
+
+use std::arch::x86_64::{
+    __m256i, _mm256_and_si256, _mm256_castsi256_ps, _mm256_cmpeq_epi8, _mm256_cmpeq_epi32, _mm256_set1_epi8,
+    _mm256_set1_epi32, _mm256_set1_epi64x, _mm256_setr_epi8, _mm256_setr_epi32, _mm256_shuffle_epi8,
+    _mm256_storeu_ps, _mm256_storeu_si256,
+};
+
+use super::scalar;
+
+const F32_PER_VECTOR: usize = 8;
+const U8_PER_VECTOR: usize = 32;
+
+pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32]) {
+    let value = |bit: u32| f32::from_bits(bit * 1f32.to_bits());
+    let (head, body) = split(lead, out, F32_PER_VECTOR);
+    scalar::spread(words, lead, head, value);
+    let first = (lead + head.len()) / F32_PER_VECTOR;
+    let num_vectors = body.len() / F32_PER_VECTOR;
+    let (body, tail) = body.split_at_mut(num_vectors * F32_PER_VECTOR);
+    // SAFETY: the path is only taken where AVX2 is there (`Path::check`); `body` holds `num_vectors` vectors, and
+    // `check_enough` has seen that `words` hold a bit for each value.
+    unsafe { spread_f32_vectors(words.as_ptr().cast::<u8>().add(first), num_vectors, body.as_mut_ptr()) };
+    let (words, lead) = words_from(words, lead, head.len() + body.len());
+    scalar::spread(words, lead, tail, value);
+}
+
+pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8]) {
+    let value = |bit: u32| bit as u8;
+    let (head, body) = split(lead, out, U8_PER_VECTOR);
+    scalar::spread(words, lead, head, value);
+    let first = (lead + head.len()) / U8_PER_VECTOR;
+    let num_vectors = body.len() / U8_PER_VECTOR;
+    let (body, tail) = body.split_at_mut(num_vectors * U8_PER_VECTOR);
+    // SAFETY: as in `spread_f32`.
+    unsafe { spread_u8_vectors(words.as_ptr().cast::<u32>().add(first), num_vectors, body.as_mut_ptr()) };
+    let (words, lead) = words_from(words, lead, head.len() + body.len());
+    scalar::spread(words, lead, tail, value);
+}
+
+/// The values before the first whole vector of bits, and the rest.
+fn split<V>(lead: usize, out: &mut [V], per_vector: usize) -> (&mut [V], &mut [V]) {
+    let num_before = lead.next_multiple_of(per_vector) - lead;
+    out.split_at_mut(num_before.min(out.len()))
+}
+
+/// The words from the one on that holds the bit of value `index`, and which bit of it that is.
+fn words_from(words: &[u64], lead: usize, index: usize) -> (&[u64], usize) {
+    let bit = lead + index;
+    (&words[(bit / 64).min(words.len())..], bit % 64)
+}
+
+/// # Safety
+/// AVX2; `bytes` and `out` hold `num_vectors` vectors.
+#[target_feature(enable = "avx2")]
+unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32) {
+    let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    let one = _mm256_set1_epi32(1f32.to_bits() as i32);
+    for index in 0..num_vectors {
+        // SAFETY: `index` is below `num_vectors`.
+        unsafe {
+            let byte = _mm256_set1_epi32(i32::from(*bytes.add(index)));
+            let is_set = _mm256_cmpeq_epi32(_mm256_and_si256(byte, bits), bits);
+            let values = _mm256_castsi256_ps(_mm256_and_si256(is_set, one));
+            _mm256_storeu_ps(out.add(F32_PER_VECTOR * index), values);
+        }
+    }
+}
+
+/// # Safety
+/// AVX2; `words` and `out` hold `num_vectors` vectors.
+#[target_feature(enable = "avx2")]
+unsafe fn spread_u8_vectors(words: *const u32, num_vectors: usize, out: *mut u8) {
+    let bits = _mm256_set1_epi64x(0x8040_2010_0804_0201_u64 as i64);
+    let byte_of = byte_of_each();
+    let one = _mm256_set1_epi8(1);
+    for index in 0..num_vectors {
+        // SAFETY: `index` is below `num_vectors`.
+        unsafe {
+            let word = _mm256_shuffle_epi8(_mm256_set1_epi32(*words.add(index) as i32), byte_of);
+            let is_set = _mm256_cmpeq_epi8(_mm256_and_si256(word, bits), bits);
+            _mm256_storeu_si256(out.add(U8_PER_VECTOR * index).cast(), _mm256_and_si256(is_set, one));
+        }
+    }
+}
+
+/// Which byte of four holds the bit of each of 32 values.
+#[target_feature(enable = "avx2")]
+fn byte_of_each() -> __m256i {
+    _mm256_setr_epi8(
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3,
+    )
+}

@@ -1,0 +1,217 @@
+//! The one place for machine code: windows cut out of the strips, and bits spread to values.
+//!
+//! Every path does what `scalar` does, bit for bit; the tests run all that the machine has.
+
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "256-bit intrinsics")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "512-bit intrinsics")]
+mod avx512;
+mod scalar;
+
+use std::fmt;
+use std::ops::Range;
+
+use pogema_core::{Cell, Error};
+
+use crate::grid::Strips;
+
+/// How observations are computed. What comes out is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Path {
+    /// No intrinsics; on every machine.
+    Scalar,
+    /// AVX2.
+    Avx2,
+    /// AVX-512 F, BW, DQ and VL, and BMI2.
+    Avx512,
+}
+
+impl Path {
+    /// All paths, the plainest first.
+    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
+
+    /// The environment variable that forces a path.
+    pub const VARIABLE: &'static str = "POGEMA_SIMD";
+
+    /// Whether this machine has it.
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("bmi2")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// The widest path that this machine has.
+    pub fn best() -> Self {
+        Self::ALL.into_iter().rev().find(|path| path.is_available()).unwrap_or(Self::Scalar)
+    }
+
+    /// The path that the variable `POGEMA_SIMD` names, else the widest.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the variable holds anything but the name of a path that this machine has.
+    pub fn from_environment() -> Result<Self, Error> {
+        let Some(value) = std::env::var_os(Self::VARIABLE) else { return Ok(Self::best()) };
+        let name = value.to_string_lossy();
+        let path = Self::ALL.into_iter().find(|path| path.to_string() == name);
+        let path =
+            path.ok_or_else(|| Error::config(Self::VARIABLE, &name, "`scalar`, `avx2` or `avx512`"))?;
+        path.check().map(|()| path)
+    }
+
+    pub(crate) fn check(self) -> Result<(), Error> {
+        if self.is_available() {
+            return Ok(());
+        }
+        Err(Error::config(Self::VARIABLE, self, format!("at most `{}` on this machine", Self::best())))
+    }
+}
+
+impl fmt::Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        })
+    }
+}
+
+/// Which channels of a window are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Channels {
+    /// Obstacles, agents, goal.
+    All,
+    /// Obstacles alone.
+    Obstacles,
+    /// Agents alone.
+    Agents,
+}
+
+impl Channels {
+    pub fn number(self) -> usize {
+        if self == Self::All { 3 } else { 1 }
+    }
+}
+
+/// What agents look at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scene<'a> {
+    pub obstacles: &'a Strips,
+    pub occupied: &'a Strips,
+    pub cells: &'a [Cell],
+    pub goals: &'a [Cell],
+    pub radius: usize,
+}
+
+impl Scene<'_> {
+    pub fn side(&self) -> usize {
+        2 * self.radius + 1
+    }
+
+    /// The index of the goal, or of the rim towards it, within a window.
+    ///
+    /// Rule: observe/default/goal
+    pub fn goal_index(&self, agent: usize) -> usize {
+        let (cell, goal, radius) = (self.cells[agent], self.goals[agent], self.radius as i32);
+        let down = (i32::from(goal.row) - i32::from(cell.row)).clamp(-radius, radius) + radius;
+        let right = (i32::from(goal.col) - i32::from(cell.col)).clamp(-radius, radius) + radius;
+        down as usize * self.side() + right as usize
+    }
+}
+
+/// A type that observations are made of.
+pub trait Value: Copy + Send + Sync + Default + PartialEq + fmt::Debug + sealed::Spread {}
+
+impl Value for f32 {}
+impl Value for u8 {}
+
+pub(crate) mod sealed {
+    use super::Path;
+
+    pub trait Spread: Sized {
+        /// Makes a value of each bit, but not of the first `lead`, fewer than 64, of which the caller says that
+        /// they bring `out` to a line of memory. `beyond_cache` if the values will not be read soon.
+        fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool);
+    }
+}
+
+impl sealed::Spread for f32 {
+    fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+        check_enough(words, lead + out.len());
+        match path {
+            Path::Scalar => scalar::spread(words, lead, out, |bit| Self::from_bits(bit * 1f32.to_bits())),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx2 => avx2::spread_f32(words, lead, out),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512 => avx512::spread_f32(words, lead, out, beyond_cache),
+            #[cfg(not(target_arch = "x86_64"))]
+            Path::Avx2 | Path::Avx512 => unreachable!("a path is checked when an engine is made"),
+        }
+    }
+}
+
+impl sealed::Spread for u8 {
+    fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+        check_enough(words, lead + out.len());
+        match path {
+            Path::Scalar => scalar::spread(words, lead, out, |bit| bit as u8),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx2 => avx2::spread_u8(words, lead, out),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512 => avx512::spread_u8(words, lead, out, beyond_cache),
+            #[cfg(not(target_arch = "x86_64"))]
+            Path::Avx2 | Path::Avx512 => unreachable!("a path is checked when an engine is made"),
+        }
+    }
+}
+
+fn check_enough(words: &[u64], num_bits: usize) {
+    assert!(num_bits <= 64 * words.len(), "{num_bits} bits do not fit {} words", words.len());
+}
+
+/// Values of a type from one line of memory to the next.
+pub(crate) fn per_line<V>() -> usize {
+    64 / size_of::<V>()
+}
+
+/// How many values `out` begins after a line of memory.
+pub(crate) fn lead_of<V>(out: &[V]) -> usize {
+    out.as_ptr().addr() / size_of::<V>() % per_line::<V>()
+}
+
+/// Writes the windows of some agents as bits, one after the other from bit `lead` on; if `apart`, each agent's
+/// begin a new word.
+///
+/// Rule: observe/default, observe/default/window, observe/default/agents, observe/default/inactive
+pub(crate) fn pack(
+    path: Path,
+    scene: &Scene<'_>,
+    agents: Range<usize>,
+    channels: Channels,
+    (lead, apart): (usize, bool),
+    words: &mut [u64],
+) {
+    #[cfg(target_arch = "x86_64")]
+    if path == Path::Avx512
+        && channels == Channels::All
+        && avx512::pack(scene, agents.clone(), lead, apart, words)
+    {
+        return;
+    }
+    let _ = path;
+    scalar::pack(scene, agents, channels, (lead, apart), words);
+}

@@ -1,0 +1,78 @@
+//! What the other paths are measured against.
+
+use std::ops::Range;
+use std::sync::atomic::Ordering::Relaxed;
+
+use crate::bits::BitWriter;
+use crate::grid::{STRIDE, Strips};
+
+use super::{Channels, Scene};
+
+/// Widest window that lies in one strip.
+const NARROW: usize = 64 - STRIDE + 1;
+
+pub fn pack(
+    scene: &Scene<'_>,
+    agents: Range<usize>,
+    channels: Channels,
+    (lead, apart): (usize, bool),
+    words: &mut [u64],
+) {
+    let side = scene.side();
+    let mut writer = BitWriter::new(words, lead);
+    for agent in agents {
+        let cell = scene.cells[agent];
+        let (row, col) = (usize::from(cell.row), usize::from(cell.col));
+        if channels != Channels::Agents {
+            write_window(scene.obstacles, row, col, side, &mut writer);
+        }
+        if channels != Channels::Obstacles {
+            write_window(scene.occupied, row, col, side, &mut writer);
+        }
+        if channels == Channels::All {
+            writer.push_one_of(scene.goal_index(agent), side * side);
+        }
+        if apart {
+            writer.end_word();
+        }
+    }
+    writer.end_word();
+}
+
+fn write_window(strips: &Strips, row: usize, col: usize, side: usize, writer: &mut BitWriter<'_>) {
+    let (words, shift) = strips.window(row, col);
+    if side <= NARROW {
+        let mask = u64::MAX >> (64 - side);
+        // As many rows at a time as fit a word.
+        for rows in words[..side].chunks(64 / side) {
+            let row_bits = |word: &std::sync::atomic::AtomicU64| (word.load(Relaxed) >> shift) & mask;
+            let bits = rows.iter().rev().fold(0, |bits, word| bits << side | row_bits(word));
+            writer.push(bits, (rows.len() * side) as u32);
+        }
+        return;
+    }
+    for down in 0..side {
+        for right in (0..side).step_by(STRIDE) {
+            let width = STRIDE.min(side - right);
+            let word = words[right / STRIDE * strips.num_rows() + down].load(Relaxed);
+            writer.push((word >> shift) & (u64::MAX >> (64 - width)), width as u32);
+        }
+    }
+}
+
+pub fn spread<V>(words: &[u64], lead: usize, out: &mut [V], value: impl Fn(u32) -> V) {
+    let mut bits = lead;
+    for part in split_by_words(lead, out) {
+        let word = words[bits / 64] >> (bits % 64);
+        for (index, slot) in part.iter_mut().enumerate() {
+            *slot = value((word >> index & 1) as u32);
+        }
+        bits += part.len();
+    }
+}
+
+/// The values of each word of bits, the first of which begins with `lead` bits that have none.
+fn split_by_words<V>(lead: usize, out: &mut [V]) -> impl Iterator<Item = &mut [V]> {
+    let (first, rest) = out.split_at_mut(out.len().min((64 - lead % 64) % 64));
+    std::iter::once(first).chain(rest.chunks_mut(64)).filter(|part| !part.is_empty())
+}
