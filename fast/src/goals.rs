@@ -5,6 +5,11 @@ use pogema_core::{OnGoal, Reward};
 use crate::Engine;
 
 impl Engine {
+    /// Which active agents stood on their goals after the last move, before goals changed.
+    pub fn on_goal(&self) -> &[bool] {
+        &self.on_goal
+    }
+
     /// Notes which active agents stand on their goals.
     ///
     /// Rule: goal/finish, goal/nothing, goal/restart

@@ -38,6 +38,7 @@ impl Strips {
 
     /// The words of a window's first strip from its first row on, and the shift that brings its first column to
     /// bit 0. The strips to the right follow at distances of [`Strips::num_rows`].
+    #[inline]
     pub fn window(&self, row: usize, col: usize) -> (&[AtomicU64], u32) {
         let first = (col / STRIDE + 1) * self.num_rows + row;
         (&self.words[first..], (col % STRIDE) as u32)

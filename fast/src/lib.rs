@@ -4,6 +4,8 @@
 //! same file names, so that the two open side by side; that they do the same is proven by tests which play them in
 //! lockstep, and by every recording of POGEMA.
 //!
+//! [`Batch`] plays many environments by one call, each with its own episodes, on as many threads as it is given.
+//!
 //! | file | phase |
 //! | --- | --- |
 //! | `grid` | the map with its border as bits, and the board that moves are made on |
@@ -12,6 +14,7 @@
 //! | `goals` | what reaching a goal does; rewards and ends |
 //! | `observe` | what agents see |
 //! | `history` | steps kept and taken back |
+//! | `batch` | many environments |
 //! | `simd` | windows to bits to values, plainly and with AVX2 or AVX-512 |
 //!
 //! ```
@@ -33,6 +36,7 @@
 //! # Ok::<(), pogema_core::Error>(())
 //! ```
 
+mod batch;
 mod bits;
 mod collide;
 mod goals;
@@ -42,6 +46,7 @@ mod observe;
 mod simd;
 mod step;
 
+pub use batch::{Batch, Instances, Observations};
 pub use observe::words_per_agent;
 pub use simd::{Path, Value};
 pub use step::Engine;

@@ -6,7 +6,7 @@ use pogema_core::{Cell, Error, MapfOut, PomapfOut};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::simd::{Channels, Path, Scene, Value, lead_of, pack, per_line};
+use crate::simd::{Channels, MOST_WORDS, Path, Scene, Value, lead_of, pack, per_line};
 
 /// Words on the stack for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;
@@ -152,8 +152,8 @@ fn write_blocks<V: Value, const WORDS: usize>(
     beyond_cache: bool,
 ) {
     let per_agent = channels.number() * scene.side() * scene.side();
-    // The last word of an agent may touch the one after it, and the first bits may be left out.
-    let room = (WORDS - 2) / per_agent.div_ceil(64);
+    // The first bits may be left out, and an agent may touch more words than it fills.
+    let room = (WORDS - MOST_WORDS) / per_agent.div_ceil(64);
     // So many agents end where a line of memory does.
     let whole = room - room % per_line::<V>();
     let per_block = if whole > 0 { whole } else { room };

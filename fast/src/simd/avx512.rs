@@ -10,71 +10,85 @@ use std::ops::Range;
 
 use crate::grid::Strips;
 
-use super::Scene;
+use super::{MOST_WORDS, Scene, per_line};
 
-const F32_PER_VECTOR: usize = 16;
-const U8_PER_VECTOR: usize = 64;
+const F32_PER_LINE: usize = per_line::<f32>();
+const U8_PER_LINE: usize = per_line::<u8>();
 
 /// Writes all three channels of some agents, or says that the windows are too large for this.
 pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, words: &mut [u64]) -> bool {
     // SAFETY: the path is only taken where its features are there (`Path::check`).
     unsafe {
-        match scene.radius {
-            1 => pack_side::<3>(scene, agents, lead, apart, words),
-            2 => pack_side::<5>(scene, agents, lead, apart, words),
-            3 => pack_side::<7>(scene, agents, lead, apart, words),
-            4 => pack_side::<9>(scene, agents, lead, apart, words),
-            5 => pack_side::<11>(scene, agents, lead, apart, words),
+        match (scene.radius, apart) {
+            (1, false) => pack_on::<3>(scene, agents, lead, words),
+            (2, false) => pack_on::<5>(scene, agents, lead, words),
+            (3, false) => pack_on::<7>(scene, agents, lead, words),
+            (4, false) => pack_on::<9>(scene, agents, lead, words),
+            (5, false) => pack_on::<11>(scene, agents, lead, words),
+            (1, true) => pack_apart::<3, 1>(scene, agents, words),
+            (2, true) => pack_apart::<5, 2>(scene, agents, words),
+            (3, true) => pack_apart::<7, 3>(scene, agents, words),
+            (4, true) => pack_apart::<9, 4>(scene, agents, words),
+            (5, true) => pack_apart::<11, 6>(scene, agents, words),
             _ => return false,
         }
     }
     true
 }
 
-/// Words that the bits of one agent can touch, if they may begin at any bit of the first one.
-const fn most_words(side: usize, apart: bool) -> usize {
-    let before = if apart { 0 } else { 63 };
-    (3 * side * side + before).div_ceil(64)
+/// Each agent's bits right after those of the agent before.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi2")]
+fn pack_on<const SIDE: usize>(scene: &Scene<'_>, agents: Range<usize>, lead: usize, words: &mut [u64]) {
+    let area = SIDE * SIDE;
+    let mut bit = lead;
+    // The first word of an agent keeps what stands in it already.
+    words[0] = 0;
+    for agent in agents {
+        let parts = windows::<SIDE>(scene, agent);
+        let (first, shift) = (bit / 64, bit % 64);
+        let carry = |part: u64| part >> 1 >> (63 - shift);
+        let out = &mut words[first..first + MOST_WORDS];
+        out[0] |= parts[0] << shift;
+        out[1] = carry(parts[0]) | parts[1] << shift;
+        out[2] = carry(parts[1]) | parts[2] << shift;
+        out[3] = carry(parts[2]) | parts[3] << shift;
+        out[4] = carry(parts[3]);
+        out[5] = 0;
+        out[6] = 0;
+        let goal = shift + 2 * area + scene.goal_index(agent);
+        out[(goal / 64).min(MOST_WORDS - 1)] |= 1 << (goal % 64);
+        bit += 3 * area;
+    }
 }
 
+/// Each agent's bits in words of its own.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi2")]
-fn pack_side<const SIDE: usize>(
+fn pack_apart<const SIDE: usize, const WORDS: usize>(
     scene: &Scene<'_>,
     agents: Range<usize>,
-    lead: usize,
-    apart: bool,
     words: &mut [u64],
 ) {
     let area = SIDE * SIDE;
-    let mut bit = lead;
-    // A word keeps what stands in it, so the first one has to be empty.
-    words[0] = 0;
-    for agent in agents {
-        let cell = scene.cells[agent];
-        let (row, col) = (usize::from(cell.row), usize::from(cell.col));
-        let obstacles = window::<SIDE>(scene.obstacles, row, col);
-        let occupied = window::<SIDE>(scene.occupied, row, col);
-        let low = obstacles | occupied << area;
-        let high = occupied >> (128 - area);
-        let parts = [low as u64, (low >> 64) as u64, high as u64, (high >> 64) as u64];
-        let (first, shift) = (bit / 64, bit % 64);
-        let out = &mut words[first..first + most_words(SIDE, apart)];
-        let mut carry = out[0];
-        for (index, word) in out.iter_mut().enumerate() {
-            let part = if index < 4 { parts[index] } else { 0 };
-            *word = part << shift | carry;
-            carry = part >> 1 >> (63 - shift);
-        }
-        let goal = bit + 2 * area + scene.goal_index(agent);
-        words[goal / 64] |= 1 << (goal % 64);
-        bit += 3 * area;
-        if apart {
-            bit = bit.next_multiple_of(64);
-            if let Some(next) = words.get_mut(bit / 64) {
-                *next = 0;
-            }
-        }
+    for (agent, out) in agents.zip(words.as_chunks_mut::<WORDS>().0) {
+        let parts = windows::<SIDE>(scene, agent);
+        *out = std::array::from_fn(|index| if index < 4 { parts[index] } else { 0 });
+        let goal = 2 * area + scene.goal_index(agent);
+        out[goal / 64] |= 1 << (goal % 64);
     }
+}
+
+/// The bits of an agent's first two channels.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi2")]
+#[inline]
+fn windows<const SIDE: usize>(scene: &Scene<'_>, agent: usize) -> [u64; 4] {
+    let area = SIDE * SIDE;
+    let cell = scene.cells[agent];
+    let (row, col) = (usize::from(cell.row), usize::from(cell.col));
+    let obstacles = window::<SIDE>(scene.obstacles, row, col);
+    let occupied = window::<SIDE>(scene.occupied, row, col);
+    let low = obstacles | occupied << area;
+    let high = occupied >> (128 - area);
+    [low as u64, (low >> 64) as u64, high as u64, (high >> 64) as u64]
 }
 
 /// The bits of a window, row by row.
@@ -107,53 +121,49 @@ fn window<const SIDE: usize>(strips: &Strips, row: usize, col: usize) -> u128 {
 pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: bool) {
     // SAFETY: the path is only taken where AVX-512 is there (`Path::check`), and `check_enough` has seen that
     // `words` hold a bit for each value.
-    unsafe { spread_f32_lines(words, lead, out, beyond_cache) }
+    unsafe {
+        if beyond_cache {
+            spread_f32_lines::<true>(words, lead, out);
+        } else {
+            spread_f32_lines::<false>(words, lead, out);
+        }
+    }
 }
 
 pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool) {
     // SAFETY: as in `spread_f32`.
-    unsafe { spread_u8_lines(words, lead, out, beyond_cache) }
+    unsafe {
+        if beyond_cache {
+            spread_u8_lines::<true>(words, lead, out);
+        } else {
+            spread_u8_lines::<false>(words, lead, out);
+        }
+    }
 }
 
 /// # Safety
 /// `words` hold `lead` bits and one for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
-unsafe fn spread_f32_lines(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: bool) {
-    let lead_lines = lead / F32_PER_VECTOR;
-    let lead = lead % F32_PER_VECTOR;
+unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [f32]) {
     let one = _mm512_set1_ps(1.0);
-    let end = lead + out.len();
-    // SAFETY: there are `end` bits after the lines that are left out.
-    let masks = unsafe { words.as_ptr().cast::<u16>().add(lead_lines) };
-    // May point before `out`: whatever lies there is masked.
-    let lines = out.as_mut_ptr().wrapping_sub(lead);
-    let num_lines = end.div_ceil(F32_PER_VECTOR);
-    let may_align = lines.addr().is_multiple_of(64);
-    for line in 0..num_lines {
-        let first = line * F32_PER_VECTOR;
-        // SAFETY: `line` is below `num_lines`; the mask leaves out what lies before or after `out`.
+    let masks = words.as_ptr().cast::<u16>();
+    let lines = Lines::of(out, lead);
+    for (line, inside) in lines.cut {
+        // SAFETY: the line holds values of `out`, and the mask leaves out what lies before or after it.
         unsafe {
             let values = _mm512_maskz_mov_ps(*masks.add(line), one);
-            let place = lines.wrapping_add(first);
-            if may_align && first >= lead && first + F32_PER_VECTOR <= end {
-                if beyond_cache {
-                    _mm512_stream_ps(place, values);
-                } else {
-                    _mm512_store_ps(place, values);
-                }
-            } else {
-                let mut inside = u16::MAX;
-                if first < lead {
-                    inside <<= lead - first;
-                }
-                if end - first < F32_PER_VECTOR {
-                    inside &= (1 << (end - first)) - 1;
-                }
-                _mm512_mask_storeu_ps(place, inside, values);
-            }
+            _mm512_mask_storeu_ps(lines.start.wrapping_add(line * F32_PER_LINE), inside as u16, values);
         }
     }
-    if beyond_cache {
+    for line in lines.whole {
+        // SAFETY: the whole line lies in `out` and, as `Lines` says, at its place in memory.
+        unsafe {
+            let values = _mm512_maskz_mov_ps(*masks.add(line), one);
+            let place = lines.start.wrapping_add(line * F32_PER_LINE);
+            if AROUND_CACHE { _mm512_stream_ps(place, values) } else { _mm512_store_ps(place, values) }
+        }
+    }
+    if AROUND_CACHE {
         _mm_sfence();
     }
 }
@@ -161,37 +171,53 @@ unsafe fn spread_f32_lines(words: &[u64], lead: usize, out: &mut [f32], beyond_c
 /// # Safety
 /// `words` hold `lead` bits and one for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
-unsafe fn spread_u8_lines(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool) {
+unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [u8]) {
     let one = _mm512_set1_epi8(1);
-    let end = lead + out.len();
-    // May point before `out`: whatever lies there is masked.
-    let lines = out.as_mut_ptr().wrapping_sub(lead);
-    let may_align = lines.addr().is_multiple_of(64);
-    for (line, &mask) in words[..end.div_ceil(U8_PER_VECTOR)].iter().enumerate() {
-        let first = line * U8_PER_VECTOR;
-        // SAFETY: the mask leaves out what lies before or after `out`.
+    let masks = words.as_ptr();
+    let lines = Lines::of(out, lead);
+    for (line, inside) in lines.cut {
+        // SAFETY: the line holds values of `out`, and the mask leaves out what lies before or after it.
         unsafe {
-            let values = _mm512_maskz_mov_epi8(mask, one);
-            let place = lines.wrapping_add(first);
-            if may_align && first >= lead && first + U8_PER_VECTOR <= end {
-                if beyond_cache {
-                    _mm512_stream_si512(place.cast(), values);
-                } else {
-                    _mm512_store_si512(place.cast(), values);
-                }
-            } else {
-                let mut inside = u64::MAX;
-                if first < lead {
-                    inside <<= lead - first;
-                }
-                if end - first < U8_PER_VECTOR {
-                    inside &= (1 << (end - first)) - 1;
-                }
-                _mm512_mask_storeu_epi8(place.cast(), inside, values);
-            }
+            let values = _mm512_maskz_mov_epi8(*masks.add(line), one);
+            _mm512_mask_storeu_epi8(lines.start.wrapping_add(line * U8_PER_LINE).cast(), inside, values);
         }
     }
-    if beyond_cache {
+    for line in lines.whole {
+        // SAFETY: the whole line lies in `out` and, as `Lines` says, at its place in memory.
+        unsafe {
+            let values = _mm512_maskz_mov_epi8(*masks.add(line), one);
+            let place = lines.start.wrapping_add(line * U8_PER_LINE).cast();
+            if AROUND_CACHE { _mm512_stream_si512(place, values) } else { _mm512_store_si512(place, values) }
+        }
+    }
+    if AROUND_CACHE {
         _mm_sfence();
+    }
+}
+
+/// The lines of memory that a buffer lies in.
+struct Lines<V> {
+    /// Where the line begins that holds bit 0; it may lie before the buffer.
+    start: *mut V,
+    /// The lines that the buffer fills.
+    whole: Range<usize>,
+    /// The first and the last line, with a mask of the values that lie in the buffer.
+    cut: [(usize, u64); 2],
+}
+
+impl<V> Lines<V> {
+    /// The lines of a buffer whose first value is at bit `lead`.
+    fn of(out: &mut [V], lead: usize) -> Self {
+        let per_line = per_line::<V>();
+        let (start, end) = (out.as_mut_ptr().wrapping_sub(lead), lead + out.len());
+        assert!(start.addr().is_multiple_of(64) && !out.is_empty(), "the lead leads to no line of memory");
+        let (first, last) = (lead / per_line, (end - 1) / per_line);
+        let inside = |line: usize| {
+            let begin = lead.saturating_sub(line * per_line);
+            let behind = per_line - (end - line * per_line).min(per_line);
+            (u64::MAX << begin) & (u64::MAX >> (64 - per_line) >> behind)
+        };
+        let whole = lead.div_ceil(per_line)..end / per_line;
+        Self { start, whole, cut: [(first, inside(first)), (last, inside(last))] }
     }
 }

@@ -125,6 +125,7 @@ impl Scene<'_> {
     /// The index of the goal, or of the rim towards it, within a window.
     ///
     /// Rule: observe/default/goal
+    #[inline]
     pub fn goal_index(&self, agent: usize) -> usize {
         let (cell, goal, radius) = (self.cells[agent], self.goals[agent], self.radius as i32);
         let down = (i32::from(goal.row) - i32::from(cell.row)).clamp(-radius, radius) + radius;
@@ -184,7 +185,7 @@ fn check_enough(words: &[u64], num_bits: usize) {
 }
 
 /// Values of a type from one line of memory to the next.
-pub(crate) fn per_line<V>() -> usize {
+pub(crate) const fn per_line<V>() -> usize {
     64 / size_of::<V>()
 }
 
@@ -192,6 +193,9 @@ pub(crate) fn per_line<V>() -> usize {
 pub(crate) fn lead_of<V>(out: &[V]) -> usize {
     out.as_ptr().addr() / size_of::<V>() % per_line::<V>()
 }
+
+/// Words that have to follow the one in which the bits of the last agent begin.
+pub(crate) const MOST_WORDS: usize = 7;
 
 /// Writes the windows of some agents as bits, one after the other from bit `lead` on; if `apart`, each agent's
 /// begin a new word.

@@ -1,0 +1,219 @@
+//! A batch plays each lane as the reference would alone, on any number of threads, and begins the next episode with
+//! the instance that POGEMA makes of the next seed.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_core::{
+    Action, Collision, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut,
+};
+use pogema_fast::{Batch, Observations, words_per_agent};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+use serde_json::json;
+
+const NUM_LANES: usize = 9;
+const NUM_AGENTS: usize = 12;
+const NUM_STEPS: u64 = 60;
+
+fn config(on_goal: OnGoal) -> Config {
+    let collision = Collision::Soft;
+    Config { num_agents: NUM_AGENTS, radius: 3, max_steps: 11, collision, on_goal, ..Config::default() }
+}
+
+/// The instance of a seed of its own for each lane and episode.
+fn instance(on_goal: OnGoal, lane: usize, episode: u64) -> Result<Instance, Error> {
+    let mode = match on_goal {
+        OnGoal::Finish => "finish",
+        OnGoal::Nothing => "nothing",
+        OnGoal::Restart => "restart",
+    };
+    let seed = 1000 * lane as u64 + episode;
+    let fields = json!({"size": 9, "density": 0.2, "num_agents": NUM_AGENTS, "obs_radius": 3, "seed": seed,
+                        "on_target": mode, "max_episode_steps": 11, "collision_system": "soft"});
+    Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
+}
+
+/// Some action for each lane, agent and step.
+fn actions(step: u64) -> Vec<Action> {
+    let action =
+        |agent: usize| Action::ALL[((agent as u64 * 2_654_435_761 + step * 40_503) >> 7) as usize % 5];
+    (0..NUM_LANES * NUM_AGENTS).map(action).collect()
+}
+
+/// Everything that a batch gave, step by step.
+#[derive(Debug, Default, PartialEq)]
+struct Played {
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+    observed: Vec<f32>,
+    terminal: Vec<f32>,
+    metrics: Vec<Metrics>,
+}
+
+fn new_batch(on_goal: OnGoal, num_threads: usize) -> Batch {
+    let source = move |lane, episode| instance(on_goal, lane, episode);
+    Batch::new(config(on_goal), NUM_LANES, num_threads, source).unwrap()
+}
+
+fn play_batch(on_goal: OnGoal, num_threads: usize) -> Played {
+    let mut batch = new_batch(on_goal, num_threads);
+    batch.reset().unwrap();
+    let num_observed = config(on_goal).num_observed();
+    let mut played = Played::default();
+    let mut observed = vec![0.5; NUM_LANES * num_observed];
+    batch.observe(Observations::F32(&mut observed)).unwrap();
+    played.observed.extend(&observed);
+    for step in 0..NUM_STEPS {
+        let (mut rewards, mut terminated) =
+            (vec![0.0; NUM_LANES * NUM_AGENTS], vec![false; NUM_LANES * NUM_AGENTS]);
+        let mut truncated = terminated.clone();
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        batch.step(&actions(step), out, Observations::F32(&mut observed)).unwrap();
+        played.rewards.extend(rewards);
+        played.terminated.extend(terminated);
+        played.truncated.extend(truncated);
+        played.observed.extend(&observed);
+        for lane in (0..NUM_LANES).filter(|&lane| batch.has_just_ended(lane).unwrap()) {
+            let (engine, metrics) = batch.ended(lane).unwrap().unwrap();
+            let mut terminal = vec![0.5; num_observed];
+            engine.observe(&mut terminal).unwrap();
+            played.terminal.extend(terminal);
+            played.metrics.push(metrics);
+        }
+    }
+    played
+}
+
+/// The same lanes, one reference each.
+fn play_references(on_goal: OnGoal) -> Played {
+    let config = config(on_goal);
+    let mut played = Played::default();
+    let mut observed = vec![0.0; config.num_observed()];
+    let mut lanes = Vec::new();
+    for lane in 0..NUM_LANES {
+        let mut environment = Reference::new(config).unwrap();
+        environment.reset(&instance(on_goal, lane, 0).unwrap()).unwrap();
+        environment.observe(&mut observed).unwrap();
+        played.observed.extend(&observed);
+        lanes.push((environment, EpisodeMeter::new(&config), 0));
+    }
+    for step in 0..NUM_STEPS {
+        let actions = actions(step);
+        for (lane, (environment, meter, episode)) in lanes.iter_mut().enumerate() {
+            let (mut rewards, mut terminated) = (vec![0.0; NUM_AGENTS], vec![false; NUM_AGENTS]);
+            let mut truncated = terminated.clone();
+            let out =
+                StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+            environment.step(&actions[lane * NUM_AGENTS..][..NUM_AGENTS], out).unwrap();
+            if let Some(metrics) = meter.feed(&environment.snapshot().on_goal, &terminated, &truncated) {
+                environment.observe(&mut observed).unwrap();
+                played.terminal.extend(&observed);
+                played.metrics.push(metrics);
+                *episode += 1;
+                environment.reset(&instance(on_goal, lane, *episode).unwrap()).unwrap();
+            }
+            environment.observe(&mut observed).unwrap();
+            played.observed.extend(&observed);
+            played.rewards.extend(rewards);
+            played.terminated.extend(terminated);
+            played.truncated.extend(truncated);
+        }
+    }
+    played
+}
+
+#[test]
+fn a_batch_plays_what_references_play_alone_on_any_number_of_threads() {
+    for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
+        let expected = play_references(on_goal);
+        assert!(expected.metrics.len() >= 5 * NUM_LANES, "only {} episodes ended", expected.metrics.len());
+        for num_threads in [1, 2, 8] {
+            assert_eq!(play_batch(on_goal, num_threads), expected, "{on_goal:?}, {num_threads} threads");
+        }
+    }
+}
+
+#[test]
+fn every_form_of_observation_holds_the_same_bits() {
+    let mut batch = new_batch(OnGoal::Restart, 2);
+    batch.reset().unwrap();
+    let per_agent = 3 * 7 * 7;
+    let num_values = NUM_LANES * NUM_AGENTS * per_agent;
+    let (mut floats, mut bytes) = (vec![0.5; num_values], vec![9; num_values]);
+    let mut words = vec![u64::MAX; NUM_LANES * NUM_AGENTS * words_per_agent(3)];
+    batch.observe(Observations::F32(&mut floats)).unwrap();
+    batch.observe(Observations::U8(&mut bytes)).unwrap();
+    batch.observe(Observations::Bits(&mut words)).unwrap();
+    for (index, (&float, &byte)) in floats.iter().zip(&bytes).enumerate() {
+        let (agent, value) = (index / per_agent, index % per_agent);
+        let bit = words[agent * words_per_agent(3) + value / 64] >> (value % 64) & 1;
+        assert_eq!((float, byte), (bit as f32, bit as u8), "agent {agent}, value {value}");
+    }
+}
+
+fn refusal<T>(result: Result<T, Error>) -> String {
+    result.err().unwrap().to_string()
+}
+
+#[test]
+fn wrong_calls_name_both_numbers_and_change_nothing() {
+    let source = |lane, episode| instance(OnGoal::Finish, lane, episode);
+    let new = |lanes, threads| refusal(Batch::new(config(OnGoal::Finish), lanes, threads, source));
+    assert_eq!(new(0, 1), "config: `num_lanes` is `0`, expected at least 1");
+    assert_eq!(new(2, 3), "config: `num_threads` is `3`, expected 1 to 2, the number of lanes");
+    assert_eq!(new(2, 0), "config: `num_threads` is `0`, expected 1 to 2, the number of lanes");
+    let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
+    assert_eq!(refusal(batch.observe(Observations::None)), "the batch was not reset yet");
+    batch.reset().unwrap();
+    let before = [0, 1].map(|lane| batch.lane(lane).unwrap().snapshot());
+    let mut step = |num_actions: usize, num_rewards: usize, num_observed: usize| {
+        let (mut rewards, mut terminated, mut truncated) = (vec![0.0; num_rewards], [false; 24], [false; 24]);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        let mut observed = vec![0; num_observed];
+        refusal(batch.step(&vec![Action::Up; num_actions], out, Observations::U8(&mut observed)))
+    };
+    assert_eq!(step(23, 24, 3528), "actions has length 23, expected 24");
+    assert_eq!(step(24, 25, 3528), "rewards has length 25, expected 24");
+    assert_eq!(step(24, 24, 3527), "observations has length 3527, expected 3528");
+    assert_eq!([0, 1].map(|lane| batch.lane(lane).unwrap().snapshot()), before);
+    let expected = "config: `lane` is `2`, expected below 2, the number of lanes";
+    assert_eq!(refusal(batch.lane(2)), expected);
+    assert_eq!(refusal(batch.ended(2)), expected);
+}
+
+#[test]
+fn an_episode_that_cannot_begin_is_told_at_the_next_step() {
+    let source = |lane, episode| match (lane, episode) {
+        (1, 1) => Err(Error::instance("there is no more")),
+        _ => instance(OnGoal::Finish, lane, episode),
+    };
+    let mut batch = Batch::new(config(OnGoal::Finish), 2, 2, source).unwrap();
+    batch.reset().unwrap();
+    let (mut rewards, mut terminated, mut truncated) = ([0.0; 24], [false; 24], [false; 24]);
+    for step in 0..12 {
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        let result = batch.step(&[Action::Stay; 24], out, Observations::None);
+        assert_eq!(result.is_ok(), step < 11, "step {step}");
+    }
+    assert!(truncated.iter().all(|&cut| cut));
+    let (ended, _) = batch.ended(1).unwrap().unwrap();
+    assert_eq!(ended.snapshot(), batch.lane(1).unwrap().snapshot());
+    assert_eq!(refusal(batch.reset()), "instance: there is no more");
+}
+
+#[test]
+fn a_lane_of_another_shape_and_a_panic_of_the_source_are_refused() {
+    let source = |lane: usize, episode: u64| {
+        assert!(episode == 0, "no second episode");
+        let mut fields =
+            json!({"size": 9, "density": 0.2, "num_agents": NUM_AGENTS, "obs_radius": 3, "seed": 1});
+        fields["size"] = (9 + lane).into();
+        Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
+    };
+    let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
+    assert_eq!(refusal(batch.reset()), "rows of the lane's map has length 10, expected 9");
+    let mut batch = Batch::new(config(OnGoal::Finish), 1, 1, source).unwrap();
+    batch.reset().unwrap();
+    assert_eq!(refusal(batch.reset()), "instance: the source panicked at lane 0, episode 1");
+}

@@ -1,0 +1,148 @@
+//! The work of one call, cut into parts for the threads.
+
+use pogema_core::{Action, Config, Error, StepOut};
+use rayon::ThreadPool;
+
+use crate::words_per_agent;
+
+use super::Lane;
+
+/// Where observations of a batch go, if anywhere.
+#[derive(Debug)]
+pub enum Observations<'a> {
+    /// None are wanted.
+    None,
+    /// Shape: `[lanes, agents, 3, side, side]`
+    F32(&'a mut [f32]),
+    /// Shape: `[lanes, agents, 3, side, side]`
+    U8(&'a mut [u8]),
+    /// Shape: `[lanes, agents, words]` with [`words_per_agent`] words; as [`crate::Engine::observe_bits`] writes
+    /// them.
+    Bits(&'a mut [u64]),
+}
+
+impl Observations<'_> {
+    /// Entries per lane.
+    fn per_lane(&self, config: &Config) -> usize {
+        match self {
+            Self::None => 0,
+            Self::F32(_) | Self::U8(_) => config.num_observed(),
+            Self::Bits(_) => config.num_agents * words_per_agent(config.radius),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::F32(out) => out.len(),
+            Self::U8(out) => out.len(),
+            Self::Bits(out) => out.len(),
+        }
+    }
+
+    pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
+        Error::check_length("observations", num_lanes * self.per_lane(config), self.len())
+    }
+
+    fn split_at(self, index: usize) -> (Self, Self) {
+        match self {
+            Self::None => (Self::None, Self::None),
+            Self::F32(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::F32(left), Self::F32(right))
+            }
+            Self::U8(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::U8(left), Self::U8(right))
+            }
+            Self::Bits(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::Bits(left), Self::Bits(right))
+            }
+        }
+    }
+
+    fn write(self, lane: &Lane) -> Result<(), Error> {
+        let agents = 0..lane.engine.on_goal().len();
+        match self {
+            Self::None => Ok(()),
+            Self::F32(out) => lane.engine.observe_agents(agents, out),
+            Self::U8(out) => lane.engine.observe_agents(agents, out),
+            Self::Bits(out) => lane.engine.observe_bits(agents, out),
+        }
+    }
+}
+
+/// Some lanes, the actions and buffers of their step if there is one, and where their observations go.
+pub(super) struct Jobs<'a> {
+    pub lanes: &'a mut [Lane],
+    pub steps: Option<(&'a [Action], StepOut<'a>)>,
+    pub observations: Observations<'a>,
+}
+
+/// What is done to a lane that steps.
+type Play<'a> = &'a (dyn Fn(&mut Lane, &[Action], StepOut<'_>) -> Result<(), Error> + Sync);
+
+impl Jobs<'_> {
+    /// Plays and observes all lanes, on the threads of a pool if there is one.
+    pub fn run(self, pool: Option<&ThreadPool>, play: Play<'_>) -> Result<(), Error> {
+        // Parts small enough that no thread waits long for another.
+        const PARTS_PER_THREAD: usize = 4;
+        match pool {
+            None => self.run_here(play),
+            Some(pool) => {
+                let most = self.lanes.len().div_ceil(PARTS_PER_THREAD * pool.current_num_threads());
+                pool.install(|| self.run_in_parts(most, play))
+            }
+        }
+    }
+
+    fn run_in_parts(self, most: usize, play: Play<'_>) -> Result<(), Error> {
+        if self.lanes.len() <= most {
+            return self.run_here(play);
+        }
+        let middle = self.lanes.len() / 2;
+        let (left, right) = self.split_at(middle);
+        let (left, right) = rayon::join(|| left.run_in_parts(most, play), || right.run_in_parts(most, play));
+        left.and(right)
+    }
+
+    fn run_here(mut self, play: Play<'_>) -> Result<(), Error> {
+        while !self.lanes.is_empty() {
+            let (first, rest) = self.split_at(1);
+            let lane = &mut first.lanes[0];
+            if let Some((actions, out)) = first.steps {
+                play(lane, actions, out)?;
+            }
+            first.observations.write(lane)?;
+            self = rest;
+        }
+        Ok(())
+    }
+
+    fn split_at(self, num_lanes: usize) -> (Self, Self) {
+        let Some(lane) = self.lanes.first() else { unreachable!("split only while there are lanes") };
+        let config = pogema_core::Environment::config(&lane.engine);
+        let (num_agents, per_lane) = (num_lanes * config.num_agents, self.observations.per_lane(config));
+        let (left, right) = self.observations.split_at(num_lanes * per_lane);
+        let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
+        let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
+        (
+            Self { lanes: left_lanes, steps: left_steps, observations: left },
+            Self { lanes: right_lanes, steps: right_steps, observations: right },
+        )
+    }
+}
+
+type Steps<'a> = (&'a [Action], StepOut<'a>);
+
+fn split_steps((actions, out): Steps<'_>, index: usize) -> (Steps<'_>, Steps<'_>) {
+    let (left, right) = actions.split_at(index);
+    let (left_rewards, right_rewards) = out.rewards.split_at_mut(index);
+    let (left_terminated, right_terminated) = out.terminated.split_at_mut(index);
+    let (left_truncated, right_truncated) = out.truncated.split_at_mut(index);
+    let left_out = StepOut { rewards: left_rewards, terminated: left_terminated, truncated: left_truncated };
+    let right_out =
+        StepOut { rewards: right_rewards, terminated: right_terminated, truncated: right_truncated };
+    ((left, left_out), (right, right_out))
+}
