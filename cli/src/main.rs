@@ -1,5 +1,6 @@
 //! `pogema`: run, check and inspect POGEMA episodes.
 
+mod bench;
 mod conform;
 mod output;
 mod run;
@@ -23,6 +24,8 @@ enum Command {
     Run(run::Run),
     /// Check that all engines follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
+    /// Measure the speed of this machine, and of POGEMA 1.4.0 beside it
+    Bench(bench::Bench),
 }
 
 fn main() -> ExitCode {
@@ -37,6 +40,7 @@ fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
+        Command::Bench(bench) => bench.run(),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error}");

@@ -1,0 +1,157 @@
+//! `pogema bench`: how fast this machine steps and observes, beside the filling of memory and POGEMA.
+
+mod bars;
+mod show;
+mod timing;
+mod work;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use pogema_conformance::{files, find_oracle_python};
+use pogema_core::Error;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::output::{check_writable, say};
+
+use bars::{Bar, bars};
+use work::{Speed, Work};
+
+#[derive(Args, Debug)]
+pub struct Bench {
+    /// Time POGEMA 1.4.0 in the same run too; needs Python 3.11
+    #[arg(long)]
+    peers: bool,
+    /// Where POGEMA 1.4.0 is installed if need be
+    #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
+    oracle_folder: PathBuf,
+    /// Only the rows whose names contain this
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    rows: String,
+    /// Time for each figure, in seconds
+    #[arg(long, value_name = "S", default_value_t = 0.25)]
+    seconds: f64,
+    /// Write all figures to this file as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// One row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    name: String,
+    work: Work,
+    speed: Speed,
+    /// POGEMA's figures for the same work, where it was timed.
+    pogema: Option<Peer>,
+}
+
+/// What POGEMA did in a second.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Peer {
+    observations: f64,
+    resets: f64,
+}
+
+/// Everything that was measured.
+#[derive(Debug, Serialize)]
+struct Report {
+    machine: String,
+    path: String,
+    rows: Vec<Row>,
+    bars: Vec<Bar>,
+}
+
+/// On more agents POGEMA takes minutes for a reset.
+const MOST_AGENTS_OF_POGEMA: usize = 10_000;
+
+impl Bench {
+    pub fn run(&self) -> Result<ExitCode, Error> {
+        self.json.as_deref().map_or(Ok(()), check_writable)?;
+        let budget = Duration::try_from_secs_f64(self.seconds).ok().filter(|budget| !budget.is_zero());
+        let budget = budget.ok_or_else(|| Error::config("seconds", self.seconds, "a time above 0"))?;
+        let python = self.peers.then(|| find_oracle_python(&self.oracle_folder)).transpose()?;
+        let works: Vec<_> = works().into_iter().filter(|work| work.name().contains(&self.rows)).collect();
+        if works.is_empty() {
+            return Err(Error::config("rows", &self.rows, "a part of a row's name, such as `64 agents`"));
+        }
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}");
+        let bar = ProgressBar::new(works.len() as u64);
+        let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
+        let mut rows = Vec::new();
+        for work in works {
+            bar.set_message(work.name());
+            let pogema = match &python {
+                Some(python) if has_peer(&work) => Some(time_pogema(python, &work)?),
+                _ => None,
+            };
+            rows.push(Row { name: work.name(), speed: work.measure(budget)?, work, pogema });
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let path = pogema_fast::Path::from_environment()?.to_string();
+        let report = Report { machine: machine(), path, bars: bars(&rows), rows };
+        say(&show::tell(&report.machine, &report.path, &report.rows, &report.bars))?;
+        if let Some(path) = &self.json {
+            let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
+            files::write(path, &text)?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The paper's table, crowds on large maps, and batches.
+fn works() -> Vec<Work> {
+    let single = |num_agents, size, lifelong| Work { lanes: None, threads: 1, num_agents, size, lifelong };
+    let mut works = Vec::new();
+    for lifelong in [false, true] {
+        for size in [32, 64] {
+            works.extend([1, 32, 64].map(|num_agents| single(num_agents, size, lifelong)));
+        }
+    }
+    works.push(single(10_000, 256, false));
+    works.extend([1_000, 10_000, 100_000].map(|num_agents| single(num_agents, 3072, false)));
+    for threads in [1, 2] {
+        works.push(Work { threads, ..single(1_000_000, 3072, false) });
+    }
+    let batch = |lanes, threads| Work { lanes: Some(lanes), threads, ..single(64, 32, true) };
+    works.extend([1, 16, 256, 4096].map(|lanes| batch(lanes, 1)));
+    works.extend([16, 256, 4096].map(|lanes| batch(lanes, 2)));
+    works
+}
+
+fn has_peer(work: &Work) -> bool {
+    work.lanes.is_none() && work.num_agents <= MOST_AGENTS_OF_POGEMA && work.size <= 256
+}
+
+fn time_pogema(python: &Path, work: &Work) -> Result<Peer, Error> {
+    const SCRIPT: &str = include_str!("pogema_speed.py");
+    let failed =
+        |error: &dyn std::fmt::Display| Error::io(python, format!("POGEMA cannot be timed: {error}"));
+    let mut child = Command::new(python)
+        .args(["-c", SCRIPT])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| failed(&error))?;
+    if let Some(mut input) = child.stdin.take() {
+        let configs = Value::Array(vec![work.config()]).to_string();
+        input.write_all(configs.as_bytes()).map_err(|error| failed(&error))?;
+    }
+    let output = child.wait_with_output().map_err(|error| failed(&error))?;
+    serde_json::from_slice(&output.stdout).map_err(|error| failed(&error))
+}
+
+/// The processor and how many of it there are.
+fn machine() -> String {
+    let number = std::thread::available_parallelism().map_or(1, usize::from);
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let model = model.map_or(std::env::consts::ARCH, |(_, model)| model.trim());
+    format!("{model}, {number} threads")
+}

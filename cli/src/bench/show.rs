@@ -1,0 +1,83 @@
+//! The tables of a run.
+
+use comfy_table::{CellAlignment, Table, presets};
+
+use super::{Bar, Row};
+
+/// The tables, as Markdown.
+pub fn tell(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
+    let speeds = speeds(rows);
+    let bars = bar_table(bars);
+    format!(
+        "{machine}; observations by the {path} path; windows of 11 x 11, density 0.3, random actions\n\n\
+         Millions per second: agent steps, observations, both; observations if they were only zeros\n\n{speeds}\n\n\
+         {bars}"
+    )
+}
+
+fn speeds(rows: &[Row]) -> Table {
+    let mut table = table(&[
+        "work",
+        "step",
+        "f32",
+        "u8",
+        "bits",
+        "step + f32",
+        "zeros f32",
+        "zeros u8",
+        "f32 of zeros",
+        "POGEMA",
+        "times",
+        "reset",
+    ]);
+    for row in rows {
+        let speed = &row.speed;
+        let millions =
+            [speed.step, speed.f32, speed.u8, speed.bits, speed.step_f32, speed.fill_f32, speed.fill_u8];
+        let mut cells = vec![row.name.clone()];
+        cells.extend(millions.map(|rate| figure(rate / 1e6)));
+        cells.push(format!("{:.0} %", 100.0 * speed.f32 / speed.fill_f32));
+        let peer = row.pogema.map(|peer| (peer.observations, speed.step_f32 / peer.observations));
+        cells.push(peer.map_or_else(String::new, |(theirs, _)| format!("{:.3}", theirs / 1e6)));
+        cells.push(peer.map_or_else(String::new, |(_, times)| format!("{times:.0}")));
+        cells.push(seconds(1.0 / speed.reset));
+        table.add_row(cells);
+    }
+    table
+}
+
+fn bar_table(bars: &[Bar]) -> Table {
+    let mut table = table(&["bar", "wanted", "measured", "met"]);
+    for bar in bars {
+        let sign = if bar.is_limit { "at most" } else { "at least" };
+        let met = match bar.is_met() {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "not measured",
+        };
+        let got = bar.got.map_or_else(String::new, figure);
+        table.add_row([bar.name.clone(), format!("{sign} {}", bar.want), got, met.into()]);
+    }
+    table
+}
+
+fn figure(number: f64) -> String {
+    if number >= 100.0 { format!("{number:.0}") } else { format!("{number:.2}") }
+}
+
+fn seconds(time: f64) -> String {
+    match time {
+        _ if time >= 1.0 => format!("{time:.2} s"),
+        _ if time >= 1e-3 => format!("{:.2} ms", time * 1e3),
+        _ => format!("{:.1} us", time * 1e6),
+    }
+}
+
+fn table(head: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN).set_header(head.to_vec());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

@@ -1,0 +1,221 @@
+//! What is measured: single environments and batches.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use pogema_core::{Action, Environment, Error, StepOut};
+use pogema_fast::{Batch, Engine, Observations, words_per_agent};
+use pogema_maps::numpy::Generator;
+use pogema_maps::{GridConfig, InstanceSource};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::timing::{calls_per_second, fills_per_second};
+
+/// Steps whose actions are drawn beforehand.
+const NUM_ACTION_LISTS: usize = 16;
+
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Work {
+    /// Environments; a batch if there is a number.
+    pub lanes: Option<usize>,
+    pub threads: usize,
+    pub num_agents: usize,
+    pub size: usize,
+    /// Whether agents get new goals.
+    pub lifelong: bool,
+}
+
+/// What came out, each per second.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Speed {
+    /// Agent steps.
+    pub step: f64,
+    /// Observations, nothing else.
+    pub f32: f64,
+    pub u8: f64,
+    pub bits: f64,
+    /// Agent steps, each with its observation.
+    pub step_f32: f64,
+    pub step_u8: f64,
+    /// Observations, if they were nothing but zeros.
+    pub fill_f32: f64,
+    pub fill_u8: f64,
+    /// Seeded resets: generation, placement and the engine's own.
+    pub reset: f64,
+    /// Of the engine, beside buffers. Units: bytes.
+    pub bytes: usize,
+}
+
+impl Work {
+    /// The config in POGEMA's words: the paper's, with a random policy under way.
+    pub fn config(&self) -> Value {
+        json!({
+            "num_agents": self.num_agents, "size": self.size, "density": 0.3, "obs_radius": 5, "seed": 0,
+            "collision_system": "soft", "on_target": if self.lifelong { "restart" } else { "nothing" },
+            "max_episode_steps": if self.lanes.is_some() { 256 } else { 1_000_000_000 },
+        })
+    }
+
+    pub fn name(&self) -> String {
+        let agents = format!("{} agent{}", self.num_agents, if self.num_agents == 1 { "" } else { "s" });
+        let mode = if self.lifelong { "LMAPF" } else { "MAPF" };
+        let size = self.size;
+        let name = match self.lanes {
+            None => format!("{agents}, {size} x {size}, {mode}"),
+            Some(1) => format!("1 lane of {agents}, {size} x {size}, {mode}"),
+            Some(lanes) => format!("{lanes} lanes of {agents}, {size} x {size}, {mode}"),
+        };
+        if self.threads == 1 { name } else { format!("{name}, {} threads", self.threads) }
+    }
+
+    pub fn measure(&self, budget: Duration) -> Result<Speed, Error> {
+        match self.lanes {
+            None => self.measure_engine(budget),
+            Some(lanes) => self.measure_batch(budget, lanes),
+        }
+    }
+
+    fn measure_engine(&self, budget: Duration) -> Result<Speed, Error> {
+        let config = GridConfig::from_value(&self.config())?;
+        let mut source = InstanceSource::new(config.clone(), None)?;
+        let mut engine = Engine::new(config.rules())?;
+        let pool = self.pool()?;
+        if let Some(pool) = &pool {
+            engine = engine.with_pool(Arc::clone(pool));
+        }
+        let mut failure = Ok(());
+        let reset = calls_per_second(budget, || {
+            failure = source.generate().and_then(|generated| engine.start(generated.instance));
+        });
+        failure?;
+        let mut speed = Speed { reset, bytes: engine.num_bytes(), ..Speed::default() };
+        let agents = || 0..self.num_agents;
+        let actions = self.actions(1)?;
+        let mut ends = Ends::new(self.num_agents);
+        let mut index = 0;
+        let mut step = |engine: &mut Engine| {
+            index += 1;
+            engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())
+        };
+        let mut rate = Rate { budget, num_agents: self.num_agents, failure: Ok(()) };
+        speed.step = rate.of(|| step(&mut engine));
+        let (mut floats, mut bytes, mut words) = self.buffers(1)?;
+        speed.fill_f32 = self.num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut floats);
+        speed.f32 = rate.of(|| engine.observe_agents(agents(), &mut floats));
+        speed.step_f32 = rate.of(|| {
+            step(&mut engine)?;
+            engine.observe_agents(agents(), &mut floats)
+        });
+        speed.fill_u8 = self.num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut bytes);
+        speed.u8 = rate.of(|| engine.observe_agents(agents(), &mut bytes));
+        speed.step_u8 = rate.of(|| {
+            step(&mut engine)?;
+            engine.observe_agents(agents(), &mut bytes)
+        });
+        speed.bits = rate.of(|| engine.observe_bits(agents(), &mut words));
+        rate.failure.map(|()| speed)
+    }
+
+    fn measure_batch(&self, budget: Duration, lanes: usize) -> Result<Speed, Error> {
+        let config = self.config();
+        let rules = GridConfig::from_value(&config)?.rules();
+        let source = move |lane: usize, episode: u64| {
+            let mut config = config.clone();
+            config["seed"] = (episode * lanes as u64 + lane as u64).into();
+            let mut source = InstanceSource::new(GridConfig::from_value(&config)?, None)?;
+            Ok(source.generate()?.instance)
+        };
+        let pool = self.pool()?;
+        let mut batch = Batch::new(rules, lanes, self.threads, source)?;
+        let mut failure = Ok(());
+        let reset = lanes as f64 * calls_per_second(budget, || failure = batch.reset());
+        failure?;
+        let bytes = (0..lanes).map(|lane| batch.lane(lane).map(Engine::num_bytes)).sum::<Result<_, _>>()?;
+        let mut speed = Speed { reset, bytes, ..Speed::default() };
+        let num_agents = lanes * self.num_agents;
+        let actions = self.actions(lanes)?;
+        let mut ends = Ends::new(num_agents);
+        let mut index = 0;
+        let mut step = |batch: &mut Batch, observations: Observations<'_>| {
+            index += 1;
+            batch.step(&actions[index % NUM_ACTION_LISTS], ends.out(), observations)
+        };
+        let mut rate = Rate { budget, num_agents, failure: Ok(()) };
+        speed.step = rate.of(|| step(&mut batch, Observations::None));
+        let (mut floats, mut bytes, mut words) = self.buffers(lanes)?;
+        speed.fill_f32 = num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut floats);
+        speed.f32 = rate.of(|| batch.observe(Observations::F32(&mut floats)));
+        speed.step_f32 = rate.of(|| step(&mut batch, Observations::F32(&mut floats)));
+        speed.fill_u8 = num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut bytes);
+        speed.u8 = rate.of(|| batch.observe(Observations::U8(&mut bytes)));
+        speed.step_u8 = rate.of(|| step(&mut batch, Observations::U8(&mut bytes)));
+        speed.bits = rate.of(|| batch.observe(Observations::Bits(&mut words)));
+        rate.failure.map(|()| speed)
+    }
+
+    fn pool(&self) -> Result<Option<Arc<ThreadPool>>, Error> {
+        let pool = (self.threads > 1).then(|| ThreadPoolBuilder::new().num_threads(self.threads).build());
+        let pool = pool.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
+        Ok(pool.map(Arc::new))
+    }
+
+    fn actions(&self, lanes: usize) -> Result<Vec<Vec<Action>>, Error> {
+        let mut generator = Generator::seeded(0);
+        let mut list = || {
+            let numbers = generator.integers_array(0, 5, lanes * self.num_agents);
+            let numbers = numbers.map_err(|error| Error::State { reason: error.to_string() })?;
+            Ok(numbers.into_iter().map(|number| Action::ALL[number as usize]).collect())
+        };
+        (0..NUM_ACTION_LISTS).map(|_| list()).collect()
+    }
+
+    fn buffers(&self, lanes: usize) -> Result<Buffers, Error> {
+        let config = GridConfig::from_value(&self.config())?.rules();
+        let num_values = lanes * config.num_observed();
+        let num_words = lanes * self.num_agents * words_per_agent(config.radius);
+        Ok((vec![0.0; num_values], vec![0; num_values], vec![0; num_words]))
+    }
+}
+
+/// For observations as `f32`, `u8` and bits.
+type Buffers = (Vec<f32>, Vec<u8>, Vec<u64>);
+
+/// Times work that all agents have part in.
+struct Rate {
+    budget: Duration,
+    num_agents: usize,
+    failure: Result<(), Error>,
+}
+
+impl Rate {
+    fn of(&mut self, mut work: impl FnMut() -> Result<(), Error>) -> f64 {
+        let calls = calls_per_second(self.budget, || {
+            if let Err(error) = work() {
+                self.failure = Err(error);
+            }
+        });
+        calls * self.num_agents as f64
+    }
+}
+
+/// Buffers for the results of a step.
+struct Ends {
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+}
+
+impl Ends {
+    fn new(num_agents: usize) -> Self {
+        let (terminated, truncated) = (vec![false; num_agents], vec![false; num_agents]);
+        Self { rewards: vec![0.0; num_agents], terminated, truncated }
+    }
+
+    fn out(&mut self) -> StepOut<'_> {
+        let Self { rewards, terminated, truncated } = self;
+        StepOut { rewards, terminated, truncated }
+    }
+}
