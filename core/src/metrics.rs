@@ -76,9 +76,12 @@ pub struct EpisodeMeter {
     max_steps: i64,
     step: u64,
     num_reached: u64,
-    /// Units: steps, 0-based: when each agent came to its goal.
-    arrived: Vec<Option<u64>>,
+    /// Units: steps, 0-based: when each agent came to its goal, or [`NEVER`].
+    arrived: Vec<u64>,
 }
+
+/// Later than any step.
+const NEVER: u64 = u64::MAX;
 
 impl EpisodeMeter {
     /// A meter for episodes of this config.
@@ -88,7 +91,7 @@ impl EpisodeMeter {
             max_steps: config.max_steps,
             step: 0,
             num_reached: 0,
-            arrived: vec![None; config.num_agents],
+            arrived: vec![NEVER; config.num_agents],
         }
     }
 
@@ -96,21 +99,19 @@ impl EpisodeMeter {
     pub fn reset(&mut self) {
         self.step = 0;
         self.num_reached = 0;
-        self.arrived.fill(None);
+        self.arrived.fill(NEVER);
     }
 
     /// Takes one step in; gives the figures if the episode ended with it.
     pub fn feed(&mut self, on_goal: &[bool], terminated: &[bool], truncated: &[bool]) -> Option<Metrics> {
         let finished = terminated.iter().all(|&ended| ended) || truncated.iter().all(|&cut| cut);
         self.num_reached += on_goal.iter().filter(|&&reached| reached).count() as u64;
+        // What is no longer reached counts no more, but on the last step an agent that just left its goal keeps its
+        // earlier arrival.
+        let forgets = self.on_goal_mode == OnGoal::Nothing && !finished;
         for (arrived, &reached) in self.arrived.iter_mut().zip(on_goal) {
-            if arrived.is_none() && (reached || finished) {
-                *arrived = Some(self.step);
-            }
-            // On the last step an agent that just left its goal keeps its earlier arrival.
-            if self.on_goal_mode == OnGoal::Nothing && !reached && !finished {
-                *arrived = None;
-            }
+            let now = if reached || finished { self.step } else { NEVER };
+            *arrived = if forgets && !reached { NEVER } else { now.min(*arrived) };
         }
         let metrics = finished.then(|| self.figures(on_goal));
         self.step += 1;
@@ -123,7 +124,7 @@ impl EpisodeMeter {
     fn figures(&self, on_goal: &[bool]) -> Metrics {
         let num_agents = self.arrived.len() as f64;
         let num_steps = self.step as f64 + 1.0;
-        let arrived = || self.arrived.iter().copied().flatten();
+        let arrived = || self.arrived.iter().copied();
         match self.on_goal_mode {
             OnGoal::Finish => Metrics {
                 isr: Some(self.num_reached as f64 / num_agents),

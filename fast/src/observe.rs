@@ -13,7 +13,7 @@ const NUM_WORDS: usize = 3200;
 /// The same where windows are small, so that less has to be cleared.
 const FEW_WORDS: usize = 400;
 /// Buffers of more bytes are written around the cache.
-const BEYOND_CACHE: usize = 64 << 20;
+const BEYOND_CACHE: usize = 16 << 20;
 /// Agents that one thread takes at a time.
 const CHUNK: usize = 1024;
 
@@ -30,8 +30,13 @@ impl Engine {
         self.check_agents(&agents)?;
         let per_agent = 3 * self.config.side() * self.config.side();
         Error::check_length("observations", agents.len() * per_agent, out.len())?;
-        self.write_values(agents, Channels::All, out);
+        self.write_values(agents, Channels::All, out, is_beyond_cache(size_of_val(out)));
         Ok(())
+    }
+
+    /// Writes the `default` observation of all agents, as part of a larger buffer.
+    pub(crate) fn observe_all<V: Value>(&self, out: &mut [V], beyond_cache: bool) {
+        self.write_values(0..self.config.num_agents, Channels::All, out, beyond_cache);
     }
 
     /// Writes the `default` observation of some agents as bits, each agent's from a new word on: channel after
@@ -81,10 +86,15 @@ impl Engine {
         }
     }
 
-    fn write_values<V: Value>(&self, agents: Range<usize>, channels: Channels, out: &mut [V]) {
+    fn write_values<V: Value>(
+        &self,
+        agents: Range<usize>,
+        channels: Channels,
+        out: &mut [V],
+        beyond_cache: bool,
+    ) {
         let per_agent = channels.number() * self.config.side() * self.config.side();
         let scene = self.scene();
-        let beyond_cache = size_of_val(out) > BEYOND_CACHE;
         let write = |(first, out): (usize, &mut [V])| {
             if per_agent.div_ceil(64) < FEW_WORDS / 16 {
                 write_blocks::<V, FEW_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
@@ -109,8 +119,8 @@ impl Engine {
         Error::check_length("agents", num_values, out.agents.len())?;
         Error::check_length("cells", 2 * num_agents, out.cells.len())?;
         Error::check_length("goals", 2 * num_agents, out.goals.len())?;
-        self.write_values(0..num_agents, Channels::Obstacles, out.obstacles);
-        self.write_values(0..num_agents, Channels::Agents, out.agents);
+        self.write_values(0..num_agents, Channels::Obstacles, out.obstacles, false);
+        self.write_values(0..num_agents, Channels::Agents, out.agents, false);
         let from_start = |start: &Cell| (-i32::from(start.row), -i32::from(start.col));
         write_places(out.cells, &self.cells, self.starts.iter().map(from_start));
         write_places(out.goals, &self.goals, self.starts.iter().map(from_start));
@@ -135,6 +145,11 @@ impl Engine {
         write_places(out.goals, &self.goals, from_border);
         Ok(())
     }
+}
+
+/// Whether a buffer of so many bytes is better written around the cache.
+pub(crate) fn is_beyond_cache(num_bytes: usize) -> bool {
+    num_bytes > BEYOND_CACHE
 }
 
 /// Words that the bits of one agent's `default` observation take.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use pogema_conformance::sample;
 use pogema_core::{Action, Environment, Error, StepOut};
 use pogema_fast::{Batch, Engine, Observations, words_per_agent};
 use pogema_maps::numpy::Generator;
@@ -93,7 +94,7 @@ impl Work {
         failure?;
         let mut speed = Speed { reset, bytes: engine.num_bytes(), ..Speed::default() };
         let agents = || 0..self.num_agents;
-        let actions = self.actions(1)?;
+        let actions = self.actions(1);
         let mut ends = Ends::new(self.num_agents);
         let mut index = 0;
         let mut step = |engine: &mut Engine| {
@@ -136,7 +137,7 @@ impl Work {
         let bytes = (0..lanes).map(|lane| batch.lane(lane).map(Engine::num_bytes)).sum::<Result<_, _>>()?;
         let mut speed = Speed { reset, bytes, ..Speed::default() };
         let num_agents = lanes * self.num_agents;
-        let actions = self.actions(lanes)?;
+        let actions = self.actions(lanes);
         let mut ends = Ends::new(num_agents);
         let mut index = 0;
         let mut step = |batch: &mut Batch, observations: Observations<'_>| {
@@ -162,14 +163,9 @@ impl Work {
         Ok(pool.map(Arc::new))
     }
 
-    fn actions(&self, lanes: usize) -> Result<Vec<Vec<Action>>, Error> {
+    fn actions(&self, lanes: usize) -> Vec<Vec<Action>> {
         let mut generator = Generator::seeded(0);
-        let mut list = || {
-            let numbers = generator.integers_array(0, 5, lanes * self.num_agents);
-            let numbers = numbers.map_err(|error| Error::State { reason: error.to_string() })?;
-            Ok(numbers.into_iter().map(|number| Action::ALL[number as usize]).collect())
-        };
-        (0..NUM_ACTION_LISTS).map(|_| list()).collect()
+        (0..NUM_ACTION_LISTS).map(|_| sample(&mut generator, lanes * self.num_agents)).collect()
     }
 
     fn buffers(&self, lanes: usize) -> Result<Buffers, Error> {

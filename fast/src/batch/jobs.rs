@@ -3,7 +3,7 @@
 use pogema_core::{Action, Config, Error, StepOut};
 use rayon::ThreadPool;
 
-use crate::words_per_agent;
+use crate::observe::{is_beyond_cache, words_per_agent};
 
 use super::Lane;
 
@@ -62,14 +62,24 @@ impl Observations<'_> {
         }
     }
 
-    fn write(self, lane: &Lane) -> Result<(), Error> {
-        let agents = 0..lane.engine.on_goal().len();
+    /// Whether a buffer for all lanes is better written around the cache.
+    pub(super) fn is_beyond_cache(&self) -> bool {
         match self {
-            Self::None => Ok(()),
-            Self::F32(out) => lane.engine.observe_agents(agents, out),
-            Self::U8(out) => lane.engine.observe_agents(agents, out),
-            Self::Bits(out) => lane.engine.observe_bits(agents, out),
+            Self::None => false,
+            Self::F32(out) => is_beyond_cache(size_of_val(*out)),
+            Self::U8(out) => is_beyond_cache(size_of_val(*out)),
+            Self::Bits(out) => is_beyond_cache(size_of_val(*out)),
         }
+    }
+
+    fn write(self, lane: &Lane, beyond_cache: bool) -> Result<(), Error> {
+        match self {
+            Self::None => {}
+            Self::F32(out) => lane.engine.observe_all(out, beyond_cache),
+            Self::U8(out) => lane.engine.observe_all(out, beyond_cache),
+            Self::Bits(out) => lane.engine.observe_bits(0..lane.engine.on_goal().len(), out)?,
+        }
+        Ok(())
     }
 }
 
@@ -78,6 +88,8 @@ pub(super) struct Jobs<'a> {
     pub lanes: &'a mut [Lane],
     pub steps: Option<(&'a [Action], StepOut<'a>)>,
     pub observations: Observations<'a>,
+    /// Whether the observations of all lanes together are better written around the cache.
+    pub beyond_cache: bool,
 }
 
 /// What is done to a lane that steps.
@@ -114,7 +126,7 @@ impl Jobs<'_> {
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
             }
-            first.observations.write(lane)?;
+            first.observations.write(lane, first.beyond_cache)?;
             self = rest;
         }
         Ok(())
@@ -124,12 +136,13 @@ impl Jobs<'_> {
         let Some(lane) = self.lanes.first() else { unreachable!("split only while there are lanes") };
         let config = pogema_core::Environment::config(&lane.engine);
         let (num_agents, per_lane) = (num_lanes * config.num_agents, self.observations.per_lane(config));
+        let beyond_cache = self.beyond_cache;
         let (left, right) = self.observations.split_at(num_lanes * per_lane);
         let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
         let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
         (
-            Self { lanes: left_lanes, steps: left_steps, observations: left },
-            Self { lanes: right_lanes, steps: right_steps, observations: right },
+            Self { lanes: left_lanes, steps: left_steps, observations: left, beyond_cache },
+            Self { lanes: right_lanes, steps: right_steps, observations: right, beyond_cache },
         )
     }
 }

@@ -131,7 +131,9 @@ impl Batch {
         }
         let size = self.lanes[0].engine.size();
         let preparer = &self.preparer;
-        let jobs = Jobs { lanes: &mut self.lanes, steps: Some((actions, out)), observations };
+        let beyond_cache = observations.is_beyond_cache();
+        let steps = Some((actions, out));
+        let jobs = Jobs { lanes: &mut self.lanes, steps, observations, beyond_cache };
         jobs.run(self.pool.as_ref(), &|lane, actions, out| {
             lane.step(actions, out)?;
             if lane.has_just_ended {
@@ -150,7 +152,8 @@ impl Batch {
     pub fn observe(&mut self, observations: Observations<'_>) -> Result<(), Error> {
         self.check_started()?;
         observations.check(self.lanes.len(), &self.config)?;
-        let jobs = Jobs { lanes: &mut self.lanes, steps: None, observations };
+        let beyond_cache = observations.is_beyond_cache();
+        let jobs = Jobs { lanes: &mut self.lanes, steps: None, observations, beyond_cache };
         jobs.run(self.pool.as_ref(), &|_, _, _| Ok(()))
     }
 

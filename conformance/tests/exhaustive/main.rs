@@ -1,0 +1,62 @@
+//! The fast engine does what the reference does in every situation of a small scope.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod one_step;
+mod scope;
+mod two_steps;
+
+use scope::{Scope, count_over_maps};
+
+/// Rows, columns and most agents.
+type Bound = (usize, usize, usize);
+
+/// The scopes of some sizes, with 1 agent up to the most.
+fn scopes(bounds: &[Bound]) -> Vec<Scope> {
+    let scope =
+        |&(height, width, most): &Bound| (1..=most).map(move |agents| Scope::new(height, width, agents));
+    bounds.iter().flat_map(scope).collect()
+}
+
+fn check_one_step(scopes: &[Scope], num_steps: u64) {
+    let counted = count_over_maps(scopes, one_step::check_map);
+    assert_eq!(counted, scopes.iter().map(|&scope| one_step::num_steps(scope)).sum::<u64>());
+    assert_eq!(counted, num_steps);
+}
+
+#[test]
+fn every_step_on_small_maps() {
+    const SMALL: [Bound; 9] =
+        [(1, 1, 3), (1, 2, 3), (1, 3, 3), (2, 1, 3), (2, 2, 3), (2, 3, 3), (3, 1, 3), (3, 2, 3), (3, 3, 2)];
+    check_one_step(&scopes(&SMALL), 18_196_380);
+}
+
+#[test]
+fn every_two_steps_with_all_goals_on_2_x_2() {
+    let scopes = scopes(&[(2, 2, 2)]);
+    let counted = count_over_maps(&scopes, two_steps::check_map);
+    assert_eq!(counted, scopes.iter().map(|&scope| two_steps::num_steps(scope)).sum::<u64>());
+    assert_eq!(counted, 9_054_720);
+}
+
+#[test]
+#[ignore = "minutes: cargo test --release -p pogema-conformance --test exhaustive -- --ignored"]
+fn every_step_of_3_agents_on_3_x_3() {
+    check_one_step(&[Scope::new(3, 3, 3)], 193_536_000);
+}
+
+#[test]
+#[ignore = "minutes: cargo test --release -p pogema-conformance --test exhaustive -- --ignored"]
+fn every_step_of_up_to_3_agents_on_2_x_4() {
+    check_one_step(&scopes(&[(2, 4, 3)]), 66_723_840);
+}
+
+/// All four are on the map; with any of them gone there would be sixteen times as many steps.
+#[test]
+#[ignore = "minutes: cargo test --release -p pogema-conformance --test exhaustive -- --ignored"]
+fn every_step_of_4_agents_on_2_x_4() {
+    let scope = Scope::new(2, 4, 4);
+    let counted = count_over_maps(&[scope], one_step::check_map_of_all);
+    assert_eq!(counted, one_step::num_steps_of_all(scope));
+    assert_eq!(counted, 100_800_000);
+}

@@ -1,0 +1,123 @@
+//! Every step there is from every placement, any of the agents gone.
+
+use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+use pogema_fast::Engine;
+use pogema_reference::Reference;
+
+use crate::scope::{RULES, Results, Scope, cells_of, placements, write_actions};
+
+/// Steps that [`check_map`] compares over all maps: each placement, with each set of active agents, each joint
+/// action and all rules.
+pub fn num_steps(scope: Scope) -> u64 {
+    num_steps_of_all(scope) << scope.num_agents
+}
+
+/// Steps that [`check_map_of_all`] compares over all maps.
+pub fn num_steps_of_all(scope: Scope) -> u64 {
+    scope.num_placements() * scope.num_actions() as u64 * RULES.len() as u64
+}
+
+/// Compares all steps on a map, any of the agents gone, and counts them.
+pub fn check_map(scope: Scope, map: &Map) -> u64 {
+    (0..1 << scope.num_agents).map(|gone| check_without(gone, scope, map)).sum()
+}
+
+/// Compares all steps on a map that all agents are on, and counts them.
+pub fn check_map_of_all(scope: Scope, map: &Map) -> u64 {
+    check_without(0, scope, map)
+}
+
+/// Compares all steps on a map where some agents, as bits, are gone.
+fn check_without(gone: usize, scope: Scope, map: &Map) -> u64 {
+    let starts = placements(map, scope.num_agents);
+    // Agents leave by finishing; where none does, goals are left out of it.
+    let on_goal = if gone == 0 { OnGoal::Nothing } else { OnGoal::Finish };
+    let mut count = 0;
+    for (collision, occupancy) in RULES {
+        let num_agents = scope.num_agents;
+        let config = Config { num_agents, radius: 1, collision, on_goal, occupancy, ..Config::default() };
+        let mut both = Both::new(config, gone);
+        for starts in &starts {
+            count += both.check_placement(map, starts);
+        }
+    }
+    count
+}
+
+/// Both engines, and the agents that leave before the step which is compared.
+struct Both {
+    reference: Reference,
+    engine: Engine,
+    gone: usize,
+    results: Results,
+    /// What the reference gives, by joint action.
+    wanted: Vec<Option<Snapshot>>,
+}
+
+impl Both {
+    fn new(config: Config, gone: usize) -> Self {
+        Self {
+            reference: Reference::new(config).unwrap(),
+            engine: Engine::new(config).unwrap(),
+            gone,
+            results: Results::new(config.num_agents),
+            wanted: vec![None; 5usize.pow(config.num_agents as u32)],
+        }
+    }
+
+    fn is_gone(&self, agent: usize) -> bool {
+        self.gone >> agent & 1 == 1
+    }
+
+    fn check_placement(&mut self, map: &Map, starts: &[Cell]) -> u64 {
+        let goal = |agent: usize| {
+            GoalStream::single(if self.is_gone(agent) { starts[agent] } else { far_from(map, starts[agent]) })
+        };
+        let goals = (0..starts.len()).map(goal).collect();
+        let instance = Instance::new(map.clone(), Outside::Free, starts.to_vec(), goals).unwrap();
+        let waits = vec![Action::Stay; starts.len()];
+        self.reference.reset(&instance).unwrap();
+        if self.gone != 0 {
+            self.reference.step(&waits, self.results.out()).unwrap();
+        }
+        let active: Vec<bool> = (0..starts.len()).map(|agent| !self.is_gone(agent)).collect();
+        assert_eq!(self.reference.snapshot().active, active, "{starts:?} on\n{}", map.rows().join("\n"));
+        let config = *self.engine.config();
+        let mut actions = waits.clone();
+        for number in 0..self.wanted.len() {
+            self.engine.reset(&instance).unwrap();
+            if self.gone != 0 {
+                self.engine.step(&waits, self.results.out()).unwrap();
+            }
+            write_actions(number, &mut actions);
+            self.engine.step(&actions, self.results.out()).unwrap();
+            let got = self.engine.snapshot();
+            let want = self.want(number, &actions);
+            assert_eq!(want, &got, "{starts:?} {actions:?} {instance:?} {config:?}");
+        }
+        self.wanted.len() as u64
+    }
+
+    /// What the reference gives. It is asked once for all actions of those who are gone, since those do not count
+    /// (rule: move/inactive); the one where they wait comes first.
+    fn want(&mut self, number: usize, actions: &[Action]) -> &Snapshot {
+        let digit = |agent: usize| 5usize.pow(agent as u32);
+        let gone = (0..actions.len()).filter(|&agent| self.is_gone(agent));
+        let asked = number - gone.map(|agent| number / digit(agent) % 5 * digit(agent)).sum::<usize>();
+        if asked == number {
+            let mut reference = self.reference.clone();
+            reference.step(actions, self.results.out()).unwrap();
+            self.wanted[number] = Some(reference.snapshot());
+        }
+        self.wanted[asked].as_ref().unwrap()
+    }
+}
+
+/// A goal that one step from a start does not reach, if there is one; and never the start itself.
+fn far_from(map: &Map, start: Cell) -> Cell {
+    let distance = |cell: &Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col);
+    let is_far = |cell: &Cell| *cell != start && (map.is_obstacle(*cell) || distance(cell) > 1);
+    let cells = cells_of(map);
+    let far = cells.iter().copied().find(is_far);
+    far.or_else(|| cells.into_iter().find(|&cell| cell != start)).unwrap_or(start)
+}

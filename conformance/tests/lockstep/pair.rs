@@ -1,0 +1,193 @@
+//! The reference and the fast engine on every path, played side by side.
+
+use std::fmt::Debug;
+use std::ops::Range;
+
+use pogema_core::{Action, Config, Environment, Error, Instance, MapfOut, PomapfOut, Snapshot, StepOut};
+use pogema_fast::{Engine, Path, words_per_agent};
+use pogema_reference::Reference;
+
+/// What a value is before an engine writes it.
+const UNWRITTEN: u8 = 7;
+
+/// What went wrong, in words.
+pub type Outcome<T> = Result<T, String>;
+
+/// One environment, played by all.
+pub struct Pair {
+    pub reference: Reference,
+    pub engines: Vec<(Path, Engine)>,
+    /// Rows and columns of the map; 0 before the first reset.
+    size: (usize, usize),
+}
+
+/// What a step gives besides the state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Results {
+    pub rewards: Vec<f32>,
+    pub terminated: Vec<bool>,
+    pub truncated: Vec<bool>,
+}
+
+/// All arrays of `POMAPF` and `MAPF`.
+#[derive(Clone, Debug, PartialEq)]
+struct Arrays {
+    obstacles: Vec<f32>,
+    agents: Vec<f32>,
+    places: [Vec<i32>; 4],
+    global_obstacles: Vec<u8>,
+}
+
+impl Pair {
+    pub fn new(config: Config) -> Self {
+        let available = Path::ALL.into_iter().filter(|path| path.is_available());
+        let engines = available.map(|path| (path, Engine::with_path(config, path).unwrap())).collect();
+        Self { reference: Reference::new(config).unwrap(), engines, size: (0, 0) }
+    }
+
+    pub fn config(&self) -> Config {
+        *self.reference.config()
+    }
+
+    pub fn reset(&mut self, instance: &Instance) -> Outcome<()> {
+        self.size = (instance.map().height(), instance.map().width());
+        let want = self.reference.reset(instance);
+        for (path, engine) in &mut self.engines {
+            same(*path, "reset", &want, &engine.reset(instance))?;
+        }
+        self.check_state().map(|_| ())
+    }
+
+    pub fn step(&mut self, actions: &[Action]) -> Outcome<(Snapshot, Results)> {
+        let want = results(&mut self.reference, actions);
+        for (path, engine) in &mut self.engines {
+            same(*path, "results of the step", &want, &results(engine, actions))?;
+        }
+        let results = want.map_err(|error| error.to_string())?;
+        Ok((self.check_state()?, results))
+    }
+
+    pub fn step_back(&mut self) -> Outcome<()> {
+        let want = self.reference.step_back();
+        for (path, engine) in &mut self.engines {
+            same(*path, "step back", &want, &engine.step_back())?;
+        }
+        self.check_state().map(|_| ())
+    }
+
+    /// Compares the states and what is kept of earlier ones.
+    pub fn check_state(&self) -> Outcome<Snapshot> {
+        let want = self.reference.snapshot();
+        for (path, engine) in &self.engines {
+            same(*path, "state", &want, &engine.snapshot())?;
+            same(*path, "past", &self.reference.past(), &engine.past())?;
+        }
+        Ok(want)
+    }
+
+    /// Compares everything that can be observed; some agents once more by themselves.
+    pub fn check_observations(&self, some: Range<usize>) -> Outcome<()> {
+        let config = self.config();
+        let mut want = vec![f32::from(UNWRITTEN); config.num_observed()];
+        let outcome = self.reference.observe(&mut want);
+        for (path, engine) in &self.engines {
+            let mut got = vec![f32::from(UNWRITTEN); config.num_observed()];
+            same(*path, "observing", &outcome, &engine.observe(&mut got))?;
+            same(*path, "observation", &bits_of(&want), &bits_of(&got))?;
+        }
+        if outcome.is_ok() {
+            self.check_ranges(&want, &[0..config.num_agents, some])?;
+        }
+        let want = arrays(&self.reference, config, self.size);
+        for (path, engine) in &self.engines {
+            same(*path, "arrays of POMAPF and MAPF", &want, &arrays(engine, config, self.size))?;
+        }
+        Ok(())
+    }
+
+    fn check_ranges(&self, whole: &[f32], ranges: &[Range<usize>]) -> Outcome<()> {
+        let per_agent = whole.len() / self.config().num_agents;
+        for agents in ranges {
+            let want = &whole[agents.start * per_agent..agents.end * per_agent];
+            for (path, engine) in &self.engines {
+                let mut values = vec![f32::from(UNWRITTEN); want.len()];
+                let mut bytes = vec![UNWRITTEN; want.len()];
+                let mut words = vec![u64::MAX; agents.len() * words_per_agent(self.config().radius)];
+                let observed = engine
+                    .observe_agents(agents.clone(), &mut values)
+                    .and_then(|()| engine.observe_agents(agents.clone(), &mut bytes))
+                    .and_then(|()| engine.observe_bits(agents.clone(), &mut words));
+                observed.map_err(|error| error.to_string())?;
+                let from_bytes: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte)).collect();
+                same(*path, "f32 of some agents", &bits_of(want), &bits_of(&values))?;
+                same(*path, "u8 of some agents", &want, &from_bytes.as_slice())?;
+                same(
+                    *path,
+                    "bits of some agents",
+                    &want,
+                    &unpack(&words, agents.len(), per_agent)?.as_slice(),
+                )?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Passes if the fast engine gives what the reference gives.
+fn same<T: PartialEq + Debug>(path: Path, what: &str, want: &T, got: &T) -> Outcome<()> {
+    if want == got {
+        return Ok(());
+    }
+    Err(format!("{path}: {what} differs\n reference: {want:?}\n      fast: {got:?}"))
+}
+
+fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<Results, Error> {
+    let num_agents = actions.len();
+    // The opposite of what most steps give, so that a place left out shows.
+    let flags = vec![true; num_agents];
+    let mut results =
+        Results { rewards: vec![-1.0; num_agents], terminated: flags.clone(), truncated: flags };
+    let Results { rewards, terminated, truncated } = &mut results;
+    environment.step(actions, StepOut { rewards, terminated, truncated })?;
+    Ok(results)
+}
+
+fn arrays(
+    environment: &impl Environment,
+    config: Config,
+    (height, width): (usize, usize),
+) -> Result<Arrays, Error> {
+    let (num_agents, border) = (config.num_agents, 2 * config.radius);
+    let windows = vec![f32::from(UNWRITTEN); num_agents * config.side() * config.side()];
+    let places = vec![i32::MIN; 2 * num_agents];
+    let mut out = Arrays {
+        obstacles: windows.clone(),
+        agents: windows,
+        places: [places.clone(), places.clone(), places.clone(), places],
+        global_obstacles: vec![UNWRITTEN; (height + border) * (width + border)],
+    };
+    let [cells, goals, global_cells, global_goals] = &mut out.places;
+    let (obstacles, agents) = (&mut out.obstacles, &mut out.agents);
+    environment.observe_pomapf(PomapfOut { obstacles, agents, cells, goals })?;
+    let obstacles = &mut out.global_obstacles;
+    environment.observe_mapf(MapfOut { obstacles, cells: global_cells, goals: global_goals })?;
+    Ok(out)
+}
+
+/// Tells 0 from -0.
+fn bits_of(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// The values of some agents from their bits; the bits that no value has must be 0.
+fn unpack(words: &[u64], num_agents: usize, per_agent: usize) -> Outcome<Vec<f32>> {
+    let mut values = Vec::with_capacity(num_agents * per_agent);
+    for words in words.chunks(per_agent.div_ceil(64)) {
+        let bit = |index: usize| words[index / 64] >> (index % 64) & 1;
+        values.extend((0..per_agent).map(|index| f32::from(bit(index) as u8)));
+        if (per_agent..64 * words.len()).any(|index| bit(index) != 0) {
+            return Err("a bit after the last value is set".into());
+        }
+    }
+    Ok(values)
+}

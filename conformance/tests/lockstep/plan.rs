@@ -1,0 +1,227 @@
+//! Random plans: a config, instances and what is done with them, mostly small and crowded.
+
+use std::sync::Arc;
+
+use pogema_core::{
+    Action, Cell, Collision, Config, GoalStream, Instance, Map, Observation, Occupancy, OnGoal, Outside,
+    Reward, Snapshot,
+};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::select;
+
+/// Longest side of a map, unless it is a corridor.
+const LONGEST_SIDE: usize = 14;
+/// Most cells of a map.
+const MOST_CELLS: usize = LONGEST_SIDE * LONGEST_SIDE;
+/// Most agents.
+const MOST_AGENTS: usize = 30;
+/// Values of all windows together stay below this, so that wide windows do not take all the time.
+const MOST_SEEN: usize = 70_000;
+
+/// What is played.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub config: Config,
+    pub instances: Vec<Instance>,
+    pub ops: Vec<Op>,
+}
+
+/// One operation.
+#[derive(Clone, Debug)]
+pub enum Op {
+    /// Where the agents drift, and for each agent a number that says whether it drifts along.
+    Step(Drift, Vec<u8>),
+    Back,
+    /// Resets to one of the instances.
+    Reset(usize),
+}
+
+/// Where agents go that do not choose for themselves.
+#[derive(Clone, Copy, Debug)]
+pub enum Drift {
+    /// All the same way: queues.
+    Along(Action),
+    /// Round each 2 x 2 block: rings.
+    Round,
+    /// Towards the neighbour in the other column of two: swaps.
+    Across,
+    /// One step towards the goal.
+    ToGoal,
+}
+
+impl Drift {
+    fn action(self, cell: Cell, goal: Cell) -> Action {
+        match self {
+            Self::Along(action) => action,
+            Self::Round => match (cell.row % 2, cell.col % 2) {
+                (0, 0) => Action::Right,
+                (0, _) => Action::Down,
+                (_, 0) => Action::Up,
+                _ => Action::Left,
+            },
+            Self::Across if cell.col.is_multiple_of(2) => Action::Right,
+            Self::Across => Action::Left,
+            Self::ToGoal if goal.row < cell.row => Action::Up,
+            Self::ToGoal if goal.row > cell.row => Action::Down,
+            Self::ToGoal if goal.col < cell.col => Action::Left,
+            Self::ToGoal if goal.col > cell.col => Action::Right,
+            Self::ToGoal => Action::Stay,
+        }
+    }
+
+    /// The actions of all agents in a state.
+    pub fn actions(self, choices: &[u8], state: &Snapshot) -> Vec<Action> {
+        let places = state.cells.iter().zip(&state.goals);
+        let choose = |(&choice, (&cell, &goal)): (&u8, (&Cell, &Cell))| {
+            Action::ALL.get(usize::from(choice)).copied().unwrap_or_else(|| self.action(cell, goal))
+        };
+        choices.iter().zip(places).map(choose).collect()
+    }
+}
+
+/// The numbers that an instance is made of; each of them shrinks by itself.
+#[derive(Clone, Debug)]
+struct Ground {
+    height: usize,
+    width: usize,
+    /// Obstacles per 100 cells.
+    density: u8,
+    /// Below the density, the cell holds an obstacle.
+    heights: Vec<u8>,
+    /// The agents start on the cells with the lowest numbers.
+    order: Vec<u16>,
+    starts_on_obstacles: bool,
+    goals: Vec<Vec<u16>>,
+    noise: Option<u64>,
+}
+
+impl Ground {
+    fn cell(&self, pick: u16) -> Cell {
+        let index = usize::from(pick) % (self.height * self.width);
+        Cell::new((index / self.width) as u16, (index % self.width) as u16)
+    }
+
+    fn stream(&self, picks: &[u16]) -> GoalStream {
+        let cells: Vec<Cell> = picks.iter().map(|&pick| self.cell(pick)).collect();
+        if cells.len() == 1 {
+            return GoalStream::single(cells[0]);
+        }
+        GoalStream::sequence(cells[0], Arc::from(cells))
+    }
+
+    fn instance(&self, num_agents: usize, radius: usize) -> Instance {
+        let num_cells = self.height * self.width;
+        let obstacles: Vec<bool> = self.heights[..num_cells].iter().map(|&own| own < self.density).collect();
+        let mut indices: Vec<usize> = (0..num_cells).collect();
+        indices.sort_by_key(|&index| (obstacles[index] && !self.starts_on_obstacles, self.order[index]));
+        let map = Map::new(self.height, self.width, obstacles).unwrap();
+        let starts = indices[..num_agents].iter().map(|&index| map.cell_at(index)).collect();
+        let goals = self.goals[..num_agents].iter().map(|picks| self.stream(picks)).collect();
+        let outside = self.noise.map_or(Outside::Free, |seed| {
+            let (height, width) = (self.height + 2 * radius, self.width + 2 * radius);
+            let is_obstacle = |index: usize| mix(seed, index).is_multiple_of(3);
+            Outside::Noise(Map::new(height, width, (0..height * width).map(is_obstacle).collect()).unwrap())
+        });
+        Instance::new(map, outside, starts, goals).unwrap()
+    }
+}
+
+/// A number that looks random.
+fn mix(seed: u64, index: usize) -> u64 {
+    let mixed = (seed ^ index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    (mixed ^ mixed >> 31).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 33
+}
+
+fn grounds() -> impl Strategy<Value = Ground> {
+    let side = || prop_oneof![6 => 1..=5usize, 3 => 1..=LONGEST_SIDE];
+    let across = || 1..=2usize;
+    let along = || 1..=MOST_CELLS / 2;
+    let extent = prop_oneof![8 => (side(), side()), 1 => (across(), along()), 1 => (along(), across())];
+    let density = prop_oneof![3 => Just(0u8), 3 => 1..=25u8, 1 => 25..=80u8, 1 => Just(100u8)];
+    let noise = prop_oneof![3 => Just(None), 1 => any::<u64>().prop_map(Some)];
+    let goals = vec(vec(any::<u16>(), 1..=3), MOST_AGENTS);
+    let numbers = (vec(0..100u8, MOST_CELLS), vec(any::<u16>(), MOST_CELLS), proptest::bool::weighted(0.08));
+    (extent, density, numbers, goals, noise).prop_map(
+        |((height, width), density, (heights, order, starts_on_obstacles), goals, noise)| Ground {
+            height,
+            width,
+            density,
+            heights,
+            order,
+            starts_on_obstacles,
+            goals,
+            noise,
+        },
+    )
+}
+
+fn configs() -> impl Strategy<Value = Config> {
+    let radius = prop_oneof![
+        20 => 1..=4usize,
+        10 => select(vec![5usize, 6, 7, 8, 15, 16, 17]),
+        1 => select(vec![31usize, 32, 33, 64, 128]),
+        1 => 1..=Config::LARGEST_RADIUS,
+    ];
+    let collision = select(vec![Collision::Priority, Collision::BlockBoth, Collision::Soft, Collision::Soft]);
+    let on_goal = select(vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart]);
+    let occupancy = select(vec![Occupancy::AsReleased, Occupancy::Exact]);
+    let reward = select(vec![Reward::Own, Reward::Shared]);
+    let max_steps = select(vec![-1i64, 0, 1, 2, 3, 7, 64]);
+    let rules = (collision, on_goal, occupancy, reward);
+    (radius, rules, max_steps, proptest::bool::weighted(0.3)).prop_map(
+        |(radius, (collision, on_goal, occupancy, reward), max_steps, persistent)| Config {
+            num_agents: 1,
+            radius,
+            max_steps,
+            collision,
+            on_goal,
+            observation: Observation::Default,
+            occupancy,
+            reward,
+            persistent,
+        },
+    )
+}
+
+fn ops() -> impl Strategy<Value = Vec<Op>> {
+    let drift = prop_oneof![
+        2 => select(Action::ALL[1..].to_vec()).prop_map(Drift::Along),
+        4 => Just(Drift::Round),
+        1 => Just(Drift::Across),
+        2 => Just(Drift::ToGoal),
+    ];
+    // Mostly everybody drifts, often nobody does.
+    let choice = |most: u8| vec(0..most, MOST_AGENTS);
+    let choices = prop_oneof![1 => choice(5), 2 => choice(10), 3 => choice(60)];
+    let op = prop_oneof![
+        16 => (drift, choices).prop_map(|(drift, choices)| Op::Step(drift, choices)),
+        2 => Just(Op::Back),
+        1 => (0..2usize).prop_map(Op::Reset),
+    ];
+    vec(op, 0..=14)
+}
+
+/// Plans that differ in everything the engines can be told.
+pub fn plans() -> impl Strategy<Value = Plan> {
+    // Crowds come from here: this share of the cells, in quarters, has an agent.
+    (configs(), vec(grounds(), 2), any::<bool>(), 0..=4usize, 0..MOST_AGENTS, ops()).prop_map(
+        |(config, mut grounds, same_size, quarters, few, mut ops)| {
+            if same_size {
+                (grounds[1].height, grounds[1].width) = (grounds[0].height, grounds[0].width);
+            }
+            let num_cells = grounds.iter().map(|ground| ground.height * ground.width).min().unwrap_or(1);
+            let wanted = if quarters == 0 { few % num_cells } else { num_cells * quarters / 4 };
+            let most = (MOST_SEEN / (config.side() * config.side())).min(MOST_AGENTS).min(num_cells);
+            let num_agents = wanted.clamp(1, most.max(1));
+            let config = Config { num_agents, ..config };
+            let instances = grounds.iter().map(|ground| ground.instance(num_agents, config.radius)).collect();
+            for op in &mut ops {
+                if let Op::Step(_, choices) = op {
+                    choices.truncate(num_agents);
+                }
+            }
+            Plan { config, instances, ops }
+        },
+    )
+}

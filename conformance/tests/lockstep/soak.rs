@@ -1,0 +1,94 @@
+//! Long episodes of a crowd on one map, in which a mistake that needs many steps to show has the time.
+
+use std::sync::Arc;
+
+use pogema_core::{Action, Cell, Collision, Config, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+
+use crate::pair::Pair;
+
+const NUM_AGENTS: usize = 500;
+const SIDE: usize = 40;
+/// Everything that agents see is compared once in so many steps.
+const OBSERVED_EVERY: u64 = 100;
+
+/// Numbers that look random, the same in every run.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % limit
+    }
+}
+
+/// A map of which a fifth is obstacles; goals near the starts follow each other for ever.
+fn crowd(numbers: &mut Numbers) -> Instance {
+    let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(5) == 0).collect();
+    let map = Map::new(SIDE, SIDE, obstacles).unwrap();
+    let cells = (0..SIDE * SIDE).map(|index| map.cell_at(index));
+    let mut free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
+    for index in (1..free.len()).rev() {
+        free.swap(index, numbers.below(index + 1));
+    }
+    let mut stream = |&start: &Cell| {
+        let is_near = |cell: &&Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col) < 6;
+        let near: Vec<Cell> = free.iter().filter(is_near).copied().collect();
+        let goals: Vec<Cell> = (0..5).map(|_| near[numbers.below(near.len())]).collect();
+        GoalStream::sequence(goals[0], Arc::from(goals))
+    };
+    let goals = free[..NUM_AGENTS].iter().map(&mut stream).collect();
+    let starts = free[..NUM_AGENTS].to_vec();
+    Instance::new(map, Outside::Free, starts, goals).unwrap()
+}
+
+/// Half of the agents head for their goals, the others go anywhere.
+fn choose_actions(numbers: &mut Numbers, state: &Snapshot, actions: &mut [Action]) {
+    for (agent, action) in actions.iter_mut().enumerate() {
+        let (cell, goal) = (state.cells[agent], state.goals[agent]);
+        *action = match numbers.below(10) {
+            0..5 => Action::ALL[numbers.below(5)],
+            5..8 if goal.row != cell.row => [Action::Up, Action::Down][usize::from(goal.row > cell.row)],
+            _ if goal.col != cell.col => [Action::Left, Action::Right][usize::from(goal.col > cell.col)],
+            _ => Action::Stay,
+        };
+    }
+}
+
+/// Plays so many steps with each collision system.
+fn soak(num_steps: u64) {
+    for (seed, collision) in
+        [Collision::Priority, Collision::BlockBoth, Collision::Soft].into_iter().enumerate()
+    {
+        let mut numbers = Numbers(seed as u64);
+        let on_goal = OnGoal::Restart;
+        let config = Config { num_agents: NUM_AGENTS, collision, on_goal, ..Config::default() };
+        let mut pair = Pair::new(config);
+        pair.reset(&crowd(&mut numbers)).unwrap();
+        let mut state = pair.check_state().unwrap();
+        let mut actions = vec![Action::Stay; NUM_AGENTS];
+        let mut num_reached = 0;
+        for step in 1..=num_steps {
+            choose_actions(&mut numbers, &state, &mut actions);
+            let (after, _) =
+                pair.step(&actions).unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
+            num_reached += after.on_goal.iter().filter(|&&reached| reached).count() as u64;
+            state = after;
+            if step % OBSERVED_EVERY == 0 {
+                pair.check_observations(17..400)
+                    .unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
+            }
+        }
+        assert!(num_reached > num_steps, "only {num_reached} goals were reached under {collision:?}");
+    }
+}
+
+#[test]
+fn a_crowd_stays_in_step() {
+    soak(2_000);
+}
+
+#[test]
+#[ignore = "minutes: cargo test --release -p pogema-conformance --test lockstep -- --ignored"]
+fn a_crowd_stays_in_step_for_100_000_steps() {
+    soak(100_000);
+}

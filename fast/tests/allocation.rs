@@ -1,0 +1,136 @@
+//! After a reset nothing is allocated.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use allocation_counter::measure;
+use pogema_core::{
+    Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, MapfOut, Occupancy, OnGoal,
+    Outside, PomapfOut, Reward, StepOut,
+};
+use pogema_fast::{Engine, Path, words_per_agent};
+
+const NUM_AGENTS: usize = 24;
+const SIDE: usize = 9;
+const NUM_STEPS: usize = 40;
+
+/// Agents in the upper half of a small map, each with one goal or three.
+fn instance(num_goals: usize) -> Instance {
+    let obstacles = (0..SIDE * SIDE).map(|index| index % 11 == 3).collect();
+    let map = Map::new(SIDE, SIDE, obstacles).unwrap();
+    let cells = (0..SIDE * SIDE).map(|index| map.cell_at(index));
+    let free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
+    let stream = |agent: usize| {
+        let goals: Vec<Cell> = (1..=num_goals).map(|index| free[(agent + index) % free.len()]).collect();
+        if num_goals == 1 {
+            GoalStream::single(goals[0])
+        } else {
+            GoalStream::sequence(goals[0], goals.into())
+        }
+    };
+    let goals = (0..NUM_AGENTS).map(stream).collect();
+    Instance::new(map, Outside::Free, free[..NUM_AGENTS].to_vec(), goals).unwrap()
+}
+
+/// Buffers of a caller.
+struct Buffers {
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+    values: Vec<f32>,
+    bytes: Vec<u8>,
+    words: Vec<u64>,
+    windows: [Vec<f32>; 2],
+    global_obstacles: Vec<u8>,
+    places: [Vec<i32>; 2],
+}
+
+impl Buffers {
+    fn new(config: &Config) -> Self {
+        let padded = SIDE + 2 * config.radius;
+        let windows = vec![0.0; config.num_observed() / 3];
+        Self {
+            rewards: vec![0.0; NUM_AGENTS],
+            terminated: vec![false; NUM_AGENTS],
+            truncated: vec![false; NUM_AGENTS],
+            values: vec![0.0; config.num_observed()],
+            bytes: vec![0; config.num_observed()],
+            words: vec![0; NUM_AGENTS * words_per_agent(config.radius)],
+            windows: [windows.clone(), windows],
+            global_obstacles: vec![0; padded * padded],
+            places: [vec![0; 2 * NUM_AGENTS], vec![0; 2 * NUM_AGENTS]],
+        }
+    }
+}
+
+/// Plays some steps, observing in every way; says how many goals were reached.
+fn play(engine: &mut Engine, buffers: &mut Buffers) -> f32 {
+    let mut num_reached = 0.0;
+    for step in 0..NUM_STEPS {
+        let mut actions = [Action::Stay; NUM_AGENTS];
+        for (agent, action) in actions.iter_mut().enumerate() {
+            *action = Action::ALL[(agent * 7 + step * step + agent * step) % 5];
+        }
+        let Buffers { rewards, terminated, truncated, .. } = buffers;
+        engine.step(&actions, StepOut { rewards, terminated, truncated }).unwrap();
+        num_reached += buffers.rewards.iter().sum::<f32>();
+        observe(engine, buffers);
+    }
+    num_reached
+}
+
+fn observe(engine: &Engine, buffers: &mut Buffers) {
+    let (per_agent, words) = (buffers.values.len() / NUM_AGENTS, buffers.words.len() / NUM_AGENTS);
+    engine.observe(&mut buffers.values).unwrap();
+    engine.observe_agents(0..NUM_AGENTS, &mut buffers.bytes).unwrap();
+    engine.observe_bits(0..NUM_AGENTS, &mut buffers.words).unwrap();
+    engine.observe_agents(3..5, &mut buffers.values[per_agent..3 * per_agent]).unwrap();
+    engine.observe_agents(7..23, &mut buffers.bytes[1..=16 * per_agent]).unwrap();
+    engine.observe_bits(1..2, &mut buffers.words[..words]).unwrap();
+    let ([obstacles, agents], [cells, goals]) = (&mut buffers.windows, &mut buffers.places);
+    engine.observe_pomapf(PomapfOut { obstacles, agents, cells, goals }).unwrap();
+    let ([cells, goals], obstacles) = (&mut buffers.places, &mut buffers.global_obstacles);
+    engine.observe_mapf(MapfOut { obstacles, cells, goals }).unwrap();
+}
+
+fn check(config: Config, path: Path) {
+    for num_goals in [1, 3] {
+        let mut engine = Engine::with_path(config, path).unwrap();
+        engine.reset(&instance(num_goals)).unwrap();
+        let mut buffers = Buffers::new(&config);
+        let mut num_reached = 0.0;
+        let info = measure(|| num_reached = play(&mut engine, &mut buffers));
+        assert_eq!(info.count_total, 0, "{path} {num_goals} goals {config:?}");
+        // Without goals reached, nothing that happens at goals was seen.
+        assert!(config.on_goal == OnGoal::Nothing || num_reached > 0.0, "{config:?}");
+    }
+}
+
+#[test]
+fn nothing_is_allocated_after_a_reset() {
+    assert_ne!(measure(|| drop(std::hint::black_box(vec![0u8; 100]))).count_total, 0, "nothing is counted");
+    for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+        for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
+            for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
+                for (radius, occupancy, reward) in [
+                    (1, Occupancy::Exact, Reward::Own),
+                    (5, Occupancy::AsReleased, Reward::Shared),
+                    (17, Occupancy::Exact, Reward::Own),
+                ] {
+                    let num_agents = NUM_AGENTS;
+                    check(
+                        Config {
+                            num_agents,
+                            radius,
+                            collision,
+                            on_goal,
+                            occupancy,
+                            reward,
+                            ..Config::default()
+                        },
+                        path,
+                    );
+                }
+            }
+        }
+    }
+}

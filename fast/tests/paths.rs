@@ -1,0 +1,155 @@
+//! Every path of this machine writes what the plain one writes, wherever a buffer begins, and nothing beside it.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::ffi::{OsStr, OsString};
+use std::process::Command;
+
+use pogema_core::{Cell, Collision, Config, Environment, GoalStream, Instance, Map, Outside};
+use pogema_fast::{Engine, Path, Value, words_per_agent};
+
+const MOST_AGENTS: usize = 70;
+const MOST_OFFSET: usize = 70;
+
+/// Agents all over a map whose columns lie in several strips.
+fn instance(num_agents: usize) -> Instance {
+    let (height, width) = (24, 75);
+    let obstacles = (0..height * width).map(|index| index * index % 13 < 4).collect();
+    let map = Map::new(height, width, obstacles).unwrap();
+    // 1009 has no divisor in common with the number of cells, so that no cell comes twice.
+    let cell = |index: usize| map.cell_at(index * 1009 % (height * width));
+    let starts: Vec<Cell> = (0..num_agents).map(cell).collect();
+    let goals = (0..num_agents).map(|agent| GoalStream::single(cell(agent * 3 + 5))).collect();
+    Instance::new(map, Outside::Free, starts, goals).unwrap()
+}
+
+fn engine(num_agents: usize, radius: usize, path: Path) -> Engine {
+    let config = Config { num_agents, radius, collision: Collision::Soft, ..Config::default() };
+    let mut engine = Engine::with_path(config, path).unwrap();
+    engine.start(instance(num_agents)).unwrap();
+    engine
+}
+
+fn available() -> impl Iterator<Item = Path> {
+    Path::ALL.into_iter().filter(|path| path.is_available())
+}
+
+/// Writes into a part of a buffer that begins `offset` values after its beginning; checks all of the buffer.
+fn check_part<V: Value + From<u8>>(engine: &Engine, want: &[u8], offset: usize, about: &str) {
+    let num_agents = engine.config().num_agents;
+    let beside = V::from(9);
+    let mut buffer = vec![beside; offset + want.len() + MOST_OFFSET];
+    engine.observe_agents(0..num_agents, &mut buffer[offset..offset + want.len()]).unwrap();
+    let (before, rest) = buffer.split_at(offset);
+    let (values, after) = rest.split_at(want.len());
+    assert!(before.iter().chain(after).all(|&value| value == beside), "{about}: wrote beside the buffer");
+    let wrong = values.iter().zip(want).position(|(&value, &byte)| value != V::from(byte));
+    assert_eq!(wrong, None, "{about}: the first wrong value");
+}
+
+fn check_parts(num_agents: usize, radius: usize, offset: usize) {
+    let mut want = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
+    engine(num_agents, radius, Path::Scalar).observe_agents(0..num_agents, &mut want).unwrap();
+    for path in available() {
+        let engine = engine(num_agents, radius, path);
+        let about = format!("{path}, {num_agents} agents, radius {radius}, offset {offset}");
+        check_part::<u8>(&engine, &want, offset, &about);
+        check_part::<f32>(&engine, &want, offset, &about);
+    }
+}
+
+#[test]
+fn paths_write_the_same_wherever_a_buffer_begins() {
+    for radius in 1..=20 {
+        for offset in 0..=MOST_OFFSET {
+            // All numbers of agents come up with every radius.
+            check_parts(1 + (offset * 13 + radius) % MOST_AGENTS, radius, offset);
+        }
+    }
+}
+
+#[test]
+fn paths_write_the_same_windows_of_great_radius() {
+    for (radius, most_agents) in [(33, 7), (64, 4), (128, 2)] {
+        for offset in 0..=MOST_OFFSET {
+            check_parts(1 + offset % most_agents, radius, offset);
+        }
+    }
+}
+
+/// More agents than fit one block, and buffers larger than any cache, which are written another way.
+#[test]
+fn paths_write_the_same_into_buffers_beyond_the_cache() {
+    for (num_agents, offset) in [(90, 0), (90, 5), (345, 0), (345, 5)] {
+        check_parts(num_agents, 128, offset);
+    }
+}
+
+#[test]
+fn paths_give_the_same_bits_of_any_agents() {
+    for radius in (1..=20).chain([33, 64, 128]) {
+        let per_agent = words_per_agent(radius);
+        let mut want = vec![u64::MAX; MOST_AGENTS * per_agent];
+        engine(MOST_AGENTS, radius, Path::Scalar).observe_bits(0..MOST_AGENTS, &mut want).unwrap();
+        for path in available() {
+            let engine = engine(MOST_AGENTS, radius, path);
+            for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
+                let mut got = vec![u64::MAX; (last - first) * per_agent + 2];
+                engine.observe_bits(first..last, &mut got[1..=(last - first) * per_agent]).unwrap();
+                let (got, after) = got.split_at((last - first) * per_agent + 1);
+                let about = format!("{path}, agents {first}..{last}, radius {radius}");
+                assert_eq!(got[1..], want[first * per_agent..last * per_agent], "{about}");
+                assert_eq!((got[0], after), (u64::MAX, [u64::MAX].as_slice()), "{about}");
+            }
+        }
+    }
+}
+
+/// Set in the child processes of the test below, which are told to do something else then.
+const IS_CHILD: &str = "POGEMA_FAST_TEST_CHILD";
+
+#[test]
+fn the_variable_names_a_path_or_is_an_error() {
+    if std::env::var_os(IS_CHILD).is_some() {
+        let made = Engine::new(Config::default()).map(|_| ());
+        let path = Path::from_environment();
+        assert_eq!(path.as_ref().err(), made.as_ref().err());
+        println!("<{}>", path.map_or_else(|error| error.to_string(), |path| path.to_string()));
+        return;
+    }
+    assert_eq!(child(None), Path::best().to_string());
+    for path in Path::ALL {
+        let too_much =
+            format!("config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", Path::best());
+        let want = if path.is_available() { path.to_string() } else { too_much };
+        assert_eq!(child(Some(path.to_string().as_ref())), want);
+    }
+    for name in ["", "AVX2", "sse", "scalar ", "avx512,avx2"] {
+        let want = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
+        assert_eq!(child(Some(name.as_ref())), want);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_variable_that_is_no_text_is_an_error() {
+    use std::os::unix::ffi::OsStringExt;
+    let name = OsString::from_vec(vec![b'a', 0xff]);
+    let want = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
+    assert_eq!(child(Some(&name)), want);
+}
+
+/// What another process says of its path, with the variable set there.
+fn child(variable: Option<&OsStr>) -> String {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", "the_variable_names_a_path_or_is_an_error", "--nocapture"]);
+    command.env(IS_CHILD, "1").env_remove(Path::VARIABLE);
+    if let Some(value) = variable {
+        command.env(Path::VARIABLE, value);
+    }
+    let output = command.output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{text}");
+    let (_, answer) = text.split_once('<').unwrap();
+    answer.split_once('>').unwrap().0.to_owned()
+}

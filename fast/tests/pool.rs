@@ -1,0 +1,126 @@
+//! An engine that shares its work among threads does the same as one that does not.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::Arc;
+
+use pogema_core::{
+    Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, Occupancy, OnGoal, Outside,
+    Snapshot, StepOut,
+};
+use pogema_fast::{Engine, words_per_agent};
+
+const SIDE: usize = 150;
+const NUM_AGENTS: usize = 9000;
+const NUM_STEPS: usize = 20;
+/// Agents that are observed by themselves too, enough for several threads.
+const SOME: std::ops::Range<usize> = 1234..8765;
+
+/// Numbers that look random, the same in every run.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % limit
+    }
+}
+
+/// A crowd on a map of which a tenth is obstacles, the goals a few cells away.
+fn instance(numbers: &mut Numbers) -> Instance {
+    let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(10) == 0).collect();
+    let map = Map::new(SIDE, SIDE, obstacles).unwrap();
+    let cells = (0..SIDE * SIDE).map(|index| map.cell_at(index));
+    let mut free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
+    for index in (1..free.len()).rev() {
+        free.swap(index, numbers.below(index + 1));
+    }
+    let stream = |start: &Cell| {
+        let near = Cell::new((start.row + 1).min(SIDE as u16 - 1), start.col.saturating_sub(1));
+        GoalStream::sequence(near, vec![near, *start].into())
+    };
+    let starts = free[..NUM_AGENTS].to_vec();
+    let goals = starts.iter().map(stream).collect();
+    Instance::new(map, Outside::Free, starts, goals).unwrap()
+}
+
+/// Everything there is to see after a step.
+#[derive(PartialEq)]
+struct Seen {
+    state: Snapshot,
+    rewards: Vec<f32>,
+    ended: [Vec<bool>; 2],
+    values: Vec<f32>,
+    bytes: Vec<u8>,
+    words: Vec<u64>,
+    some_bytes: Vec<u8>,
+    some_words: Vec<u64>,
+}
+
+fn step(engine: &mut Engine, actions: &[Action]) -> Seen {
+    let num_values = engine.config().num_observed();
+    let (per_agent, num_words) = (num_values / NUM_AGENTS, words_per_agent(engine.config().radius));
+    let flags = vec![true; NUM_AGENTS];
+    let mut seen = Seen {
+        state: Snapshot::default(),
+        rewards: vec![-1.0; NUM_AGENTS],
+        ended: [flags.clone(), flags],
+        values: vec![-1.0; num_values],
+        bytes: vec![9; num_values],
+        words: vec![u64::MAX; NUM_AGENTS * num_words],
+        some_bytes: vec![9; SOME.len() * per_agent],
+        some_words: vec![u64::MAX; SOME.len() * num_words],
+    };
+    let [terminated, truncated] = &mut seen.ended;
+    engine.step(actions, StepOut { rewards: &mut seen.rewards, terminated, truncated }).unwrap();
+    engine.observe(&mut seen.values).unwrap();
+    engine.observe_agents(0..NUM_AGENTS, &mut seen.bytes).unwrap();
+    engine.observe_bits(0..NUM_AGENTS, &mut seen.words).unwrap();
+    engine.observe_agents(SOME, &mut seen.some_bytes).unwrap();
+    engine.observe_bits(SOME, &mut seen.some_words).unwrap();
+    assert!(seen.some_bytes == seen.bytes[SOME.start * per_agent..SOME.end * per_agent]);
+    seen.state = engine.snapshot();
+    seen
+}
+
+fn check(config: Config, seed: u64) {
+    let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
+    let mut numbers = Numbers(seed);
+    let instance = instance(&mut numbers);
+    let mut plain = Engine::new(config).unwrap();
+    let mut shared = Engine::new(config).unwrap().with_pool(pool);
+    plain.reset(&instance).unwrap();
+    shared.reset(&instance).unwrap();
+    let (mut num_moved, mut num_reached) = (0, 0.0);
+    let mut cells = instance.starts().to_vec();
+    for number in 0..NUM_STEPS {
+        // Most go the same way, so that there are long queues.
+        let along = Action::ALL[1 + number / 3 % 4];
+        let any = |numbers: &mut Numbers| Action::ALL.get(numbers.below(12)).copied().unwrap_or(along);
+        let actions: Vec<Action> = (0..NUM_AGENTS).map(|_| any(&mut numbers)).collect();
+        let (want, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
+        assert!(want.state == got.state, "state, step {number}, {config:?}");
+        assert!(want == got, "results or observations, step {number}, {config:?}");
+        num_moved += cells.iter().zip(&want.state.cells).filter(|(before, after)| before != after).count();
+        num_reached += want.rewards.iter().sum::<f32>();
+        cells = want.state.cells;
+    }
+    assert!(num_moved > NUM_AGENTS, "only {num_moved} moves, {config:?}");
+    assert!(num_reached > 500.0, "only {num_reached} goals, {config:?}");
+}
+
+#[test]
+fn threads_change_nothing() {
+    let rules = [
+        (Collision::Priority, OnGoal::Restart, Occupancy::AsReleased),
+        (Collision::BlockBoth, OnGoal::Restart, Occupancy::AsReleased),
+        (Collision::BlockBoth, OnGoal::Finish, Occupancy::Exact),
+        (Collision::Soft, OnGoal::Restart, Occupancy::AsReleased),
+        (Collision::Soft, OnGoal::Finish, Occupancy::AsReleased),
+        (Collision::Soft, OnGoal::Restart, Occupancy::Exact),
+    ];
+    for (seed, (collision, on_goal, occupancy)) in rules.into_iter().enumerate() {
+        let (num_agents, radius) = (NUM_AGENTS, 3);
+        check(Config { num_agents, radius, collision, on_goal, occupancy, ..Config::default() }, seed as u64);
+    }
+}
