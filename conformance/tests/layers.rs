@@ -1,10 +1,12 @@
-//! Who may depend on whom.
+//! Who may depend on whom, and where unsafe code may stand.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
+use pogema_conformance::golden;
 
 /// A crate uses lower layers only, never its own.
 const LAYERS: [(&str, u8); 8] = [
@@ -34,4 +36,25 @@ fn crates_use_lower_layers_only() {
         }
     }
     assert_eq!(metadata.packages.len(), LAYERS.len());
+}
+
+/// Everywhere else the compiler refuses it.
+const MAY_BE_UNSAFE: [&str; 1] = ["fast/src/simd/mod.rs"];
+
+#[test]
+fn unsafe_code_is_allowed_in_named_modules_only() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let metadata = MetadataCommand::new().no_deps().exec().unwrap();
+    let mut allowing = BTreeSet::new();
+    for package in &metadata.packages {
+        let folder = Path::new(&package.manifest_path).parent().unwrap();
+        for path in golden::files(folder, ".rs").unwrap() {
+            let local = path.strip_prefix(root).unwrap().display().to_string();
+            let is_source = local.split('/').nth(1) == Some("src");
+            if is_source && std::fs::read_to_string(&path).unwrap().contains("allow(unsafe_code") {
+                allowing.insert(local);
+            }
+        }
+    }
+    assert_eq!(allowing, MAY_BE_UNSAFE.into_iter().map(str::to_owned).collect());
 }

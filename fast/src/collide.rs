@@ -5,31 +5,68 @@
 //! matter and the work can be shared among threads. Only `priority` is an order by definition, and is played so.
 
 use std::ops::Range;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use pogema_core::{Action, Cell, Collision, Occupancy};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::grid::{FREE, NOBODY, OBSTACLE};
+use crate::grid::{Board, FREE, NOBODY, OBSTACLE};
+use crate::simd::fetch;
 
 /// Agents that one thread takes at a time.
-const CHUNK: usize = 4096;
+pub(crate) const CHUNK: usize = 4096;
 /// A claim of two.
 const CONTESTED: u32 = NOBODY - 1;
+/// Boards of more squares do not stay near the processor.
+const MOST_NEAR: usize = 1 << 16;
+/// So many agents ahead of the present one the squares are asked for.
+const AHEAD: usize = 32;
+
+/// How the agents of a step are gone through.
+trait Way {
+    /// Whether several threads do it at the same time.
+    const SHARED: bool;
+    /// Whether squares have to be fetched from far away.
+    const FAR: bool;
+}
+
+struct Near;
+struct Far;
+struct Shared;
+
+impl Way for Near {
+    const SHARED: bool = false;
+    const FAR: bool = false;
+}
+
+impl Way for Far {
+    const SHARED: bool = false;
+    const FAR: bool = true;
+}
+
+impl Way for Shared {
+    const SHARED: bool = true;
+    const FAR: bool = true;
+}
 
 impl Engine {
     /// Moves the active agents as their actions and the collision system allow.
     ///
     /// Rule: move/actions, move/inactive
     pub(crate) fn move_agents(&mut self, actions: &[Action]) {
-        let pool = self.pool.clone().filter(|_| actions.len() > CHUNK);
-        match (self.config.collision, pool) {
-            (Collision::Priority, _) => self.move_by_priority(actions),
-            (Collision::BlockBoth, None) => self.move_blocking_both::<false>(actions),
-            (Collision::BlockBoth, Some(pool)) => pool.install(|| self.move_blocking_both::<true>(actions)),
-            (Collision::Soft, None) => self.move_softly::<false>(actions),
-            (Collision::Soft, Some(pool)) => pool.install(|| self.move_softly::<true>(actions)),
+        match self.pool.clone().filter(|_| actions.len() > CHUNK) {
+            Some(pool) => pool.install(|| self.move_in::<Shared>(actions)),
+            None if self.board.num_squares() > MOST_NEAR => self.move_in::<Far>(actions),
+            None => self.move_in::<Near>(actions),
+        }
+    }
+
+    fn move_in<W: Way>(&mut self, actions: &[Action]) {
+        match self.config.collision {
+            Collision::Priority => self.move_by_priority(actions),
+            Collision::BlockBoth => self.move_blocking_both::<W>(actions),
+            Collision::Soft => self.move_softly::<W>(actions),
         }
     }
 
@@ -47,10 +84,10 @@ impl Engine {
                 continue;
             }
             let to = moved(from, action);
-            self.vacate(place, agent);
+            self.vacate(place, agent as u32, false);
             self.board.square(target).agent.store(agent as u32, Relaxed);
             self.occupied.clear(usize::from(from.row) + radius, usize::from(from.col) + radius);
-            self.mark::<false>(to);
+            self.mark(to);
             self.cells[agent] = to;
         }
     }
@@ -58,18 +95,14 @@ impl Engine {
     /// Onto a cell that was empty before the step and that no other agent wants.
     ///
     /// Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
-    fn move_blocking_both<const SHARED: bool>(&mut self, actions: &[Action]) {
-        self.aim::<SHARED>(actions);
-        self.over_agents::<SHARED>(|agents| {
-            for agent in agents {
-                if self.ahead[agent] == FREE {
-                    self.claim_alone::<SHARED>(agent as u32, self.targets[agent]);
-                }
+    fn move_blocking_both<W: Way>(&mut self, actions: &[Action]) {
+        self.aim::<W>(actions, |crowd, agent, target, there| {
+            if there == FREE {
+                claim_alone::<W>(&crowd.board.square(target).claim, agent);
             }
         });
-        self.over_agents::<SHARED>(|agents| self.leave_squares(agents));
-        self.enter::<SHARED>(actions);
-        self.over_agents::<SHARED>(|agents| {
+        self.enter::<W>(actions);
+        self.over_agents::<W>(|agents| {
             for agent in agents {
                 if self.ahead[agent] == FREE {
                     self.board.square(self.targets[agent]).claim.store(NOBODY, Relaxed);
@@ -81,84 +114,51 @@ impl Engine {
     /// Everybody at once, except where that is impossible.
     ///
     /// Rule: collide/soft, occupancy/as-released, occupancy/exact
-    fn move_softly<const SHARED: bool>(&mut self, actions: &[Action]) {
-        self.aim::<SHARED>(actions);
-        self.over_agents::<SHARED>(|agents| self.claim_targets::<SHARED>(agents));
-        self.over_agents::<SHARED>(|agents| self.withdraw_hindered(agents));
-        self.over_agents::<SHARED>(|agents| self.leave_squares(agents));
-        self.enter::<SHARED>(actions);
+    fn move_softly<W: Way>(&mut self, actions: &[Action]) {
+        self.aim::<W>(actions, claim_unless_swapping::<W>);
+        self.over_agents::<W>(|agents| self.withdraw_hindered::<W>(agents));
+        self.enter::<W>(actions);
     }
 
-    /// Finds what each agent aims at; its own place if it waits, is gone or faces an obstacle.
+    /// Finds what each agent aims at and what is there, where an agent that is gone finds an obstacle; then claims
+    /// it, which the collision system says how.
     ///
     /// The marks of all agents are wiped on the way, since [`Engine::enter`] sets them again.
-    fn aim<const SHARED: bool>(&mut self, actions: &[Action]) {
-        let (board, occupied, radius) = (&self.board, &self.occupied, self.config.radius);
-        let offsets = board.offsets();
-        let num_agents = actions.len();
+    fn aim<W: Way>(&mut self, actions: &[Action], claim: impl Fn(&Crowd<'_>, u32, u32, u32) + Sync) {
+        let (board, cells, active) = (&self.board, &self.cells[..], &self.active[..]);
+        let crowd = Crowd { board, cells, actions, offsets: board.offsets() };
+        let (occupied, radius) = (&self.occupied, self.config.radius);
         let aim = |(first, targets, ahead): Aims<'_>| {
-            let agents = first..first + ahead.len();
-            let (actions, cells) = (&actions[agents.clone()], &self.cells[agents.clone()]);
-            let active = &self.active[agents.clone()];
-            for (index, agent) in agents.enumerate() {
-                let cell = cells[index];
-                let place = board.place(cell);
-                let target = place.wrapping_add(offsets[actions[index] as usize]);
-                let there = board.square(target).agent.load(Relaxed);
-                let stays = there == OBSTACLE || !active[index];
-                targets[index] = if stays { place } else { target };
-                ahead[index] = if stays { agent as u32 } else { there };
+            for (index, (aim, found)) in targets.iter_mut().zip(ahead).enumerate() {
+                let agent = first + index;
+                if W::FAR && agent + AHEAD < cells.len() {
+                    fetch(board.square(crowd.target(agent + AHEAD)));
+                }
+                let target = crowd.target(agent);
+                let square = board.square(target).agent.load(Relaxed);
+                let there = if active[agent] { square } else { OBSTACLE };
+                claim(&crowd, agent as u32, target, there);
+                (*aim, *found) = (target, there);
+                let cell = cells[agent];
                 occupied.blank(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
             }
         };
-        let targets = &mut self.targets[..num_agents];
-        if SHARED {
-            let chunks = targets.par_chunks_mut(CHUNK).zip(self.ahead.par_chunks_mut(CHUNK)).enumerate();
+        if W::SHARED {
+            let chunks = self.targets.par_chunks_mut(CHUNK).zip(self.ahead.par_chunks_mut(CHUNK)).enumerate();
             chunks.for_each(|(chunk, (targets, ahead))| aim((chunk * CHUNK, targets, ahead)));
         } else {
-            aim((0, targets, &mut self.ahead));
-        }
-    }
-
-    /// Every agent that does not wait or swap claims its target. A wait is a swap with oneself.
-    ///
-    /// Rule: collide/soft/stay, collide/soft/swap, collide/soft/contest
-    fn claim_targets<const SHARED: bool>(&self, agents: Range<usize>) {
-        let none = self.config.num_agents;
-        for agent in agents {
-            let place = self.board.place(self.cells[agent]);
-            let opposite = self.targets[(self.ahead[agent] as usize).min(none)];
-            // Where nothing is claimed the corner of the wall takes the number, which nobody aims at.
-            let claimed = if opposite == place { 0 } else { self.targets[agent] };
-            let claim = &self.board.square(claimed).claim;
-            if SHARED {
-                if claimed != 0 {
-                    claim.fetch_min(agent as u32, Relaxed);
-                }
-            } else {
-                claim.store(claim.load(Relaxed).min(agent as u32), Relaxed);
-            }
-        }
-    }
-
-    /// Claims an empty square, unless another agent has, and then nobody gets it.
-    fn claim_alone<const SHARED: bool>(&self, agent: u32, target: u32) {
-        let claim = &self.board.square(target).claim;
-        if SHARED {
-            if claim.compare_exchange(NOBODY, agent, Relaxed, Relaxed).is_err() {
-                claim.store(CONTESTED, Relaxed);
-            }
-        } else {
-            let is_first = claim.load(Relaxed) == NOBODY;
-            claim.store(if is_first { agent } else { CONTESTED }, Relaxed);
+            aim((0, &mut self.targets, &mut self.ahead));
         }
     }
 
     /// Takes back the claim on the cell of each agent that stays, and so on along the queue behind it.
     ///
     /// Rule: collide/soft/chain
-    fn withdraw_hindered(&self, agents: Range<usize>) {
+    fn withdraw_hindered<W: Way>(&self, agents: Range<usize>) {
         for agent in agents {
+            if W::FAR && agent + AHEAD < self.cells.len() {
+                fetch(self.board.square(self.board.place(self.cells[agent + AHEAD])));
+            }
             let mut place = self.board.place(self.cells[agent]);
             if self.board.square(place).claim.load(Relaxed) == NOBODY
                 || !self.active[agent]
@@ -181,19 +181,15 @@ impl Engine {
         self.board.square(self.targets[agent as usize]).claim.load(Relaxed) == agent
     }
 
-    fn leave_squares(&self, agents: Range<usize>) {
-        for agent in agents {
-            if self.moves(agent as u32) {
-                self.vacate(self.board.place(self.cells[agent]), agent);
-            }
-        }
-    }
-
-    /// Frees a square, unless it is an obstacle that the agent started on.
-    pub(crate) fn vacate(&self, place: u32, agent: usize) {
-        let square = self.board.square(place);
-        if square.agent.load(Relaxed) == agent as u32 {
-            square.agent.store(FREE, Relaxed);
+    /// Frees a square, unless another agent has come already or it is an obstacle that the agent started on.
+    #[inline]
+    pub(crate) fn vacate(&self, place: u32, agent: u32, is_shared: bool) {
+        let square = &self.board.square(place).agent;
+        if is_shared {
+            // Whoever comes may be there before or after this.
+            let _ = square.compare_exchange(agent, FREE, Relaxed, Relaxed);
+        } else if square.load(Relaxed) == agent {
+            square.store(FREE, Relaxed);
         }
     }
 
@@ -201,38 +197,46 @@ impl Engine {
     /// with a higher index leaves in the same step has its mark wiped by it.
     ///
     /// Rule: occupancy/as-released, occupancy/exact
-    fn enter<const SHARED: bool>(&mut self, actions: &[Action]) {
+    fn enter<W: Way>(&mut self, actions: &[Action]) {
+        let mut cells = std::mem::take(&mut self.cells);
         let (board, occupied, radius) = (&self.board, &self.occupied, self.config.radius);
         let (targets, ahead, active) = (&self.targets, &self.ahead, &self.active);
         let shows_all = self.config.occupancy == Occupancy::Exact;
         let enter = |(first, cells): (usize, &mut [Cell])| {
-            for (index, cell) in cells.iter_mut().enumerate() {
+            for index in 0..cells.len() {
                 let agent = first + index;
+                if W::FAR && index + AHEAD < cells.len() {
+                    fetch(board.square(targets[agent + AHEAD]));
+                    fetch(board.square(board.place(cells[index + AHEAD])));
+                }
+                let (number, cell) = (agent as u32, &mut cells[index]);
                 let square = board.square(targets[agent]);
                 let mut is_shown = active[agent];
-                if square.claim.load(Relaxed) == agent as u32 {
+                if square.claim.load(Relaxed) == number {
                     square.claim.store(NOBODY, Relaxed);
-                    square.agent.store(agent as u32, Relaxed);
+                    square.agent.store(number, Relaxed);
+                    self.vacate(board.place(*cell), number, W::SHARED);
                     *cell = moved(*cell, actions[agent]);
-                    is_shown &= shows_all || ahead[agent] == FREE || ahead[agent] < agent as u32;
+                    is_shown &= shows_all || ahead[agent] == FREE || ahead[agent] < number;
                 }
                 if is_shown {
-                    occupied.set::<SHARED>(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
+                    occupied.set(usize::from(cell.row) + radius, usize::from(cell.col) + radius, W::SHARED);
                 }
             }
         };
-        if SHARED {
-            let chunks = self.cells.par_chunks_mut(CHUNK).enumerate();
+        if W::SHARED {
+            let chunks = cells.par_chunks_mut(CHUNK).enumerate();
             chunks.for_each(|(chunk, cells)| enter((chunk * CHUNK, cells)));
         } else {
-            enter((0, &mut self.cells));
+            enter((0, &mut cells));
         }
+        self.cells = cells;
     }
 
-    /// Does the same for all agents, in parallel if `SHARED`.
-    fn over_agents<const SHARED: bool>(&self, work: impl Fn(Range<usize>) + Sync) {
+    /// Does the same for all agents, in parallel if the way is shared.
+    fn over_agents<W: Way>(&self, work: impl Fn(Range<usize>) + Sync) {
         let num_agents = self.config.num_agents;
-        if SHARED {
+        if W::SHARED {
             let firsts = (0..num_agents).into_par_iter().step_by(CHUNK);
             firsts.for_each(|first| work(first..num_agents.min(first + CHUNK)));
         } else {
@@ -248,6 +252,48 @@ impl Engine {
                 square.agent.store(agent as u32, Relaxed);
             }
         }
+    }
+}
+
+/// The agents of a step, and what they want.
+struct Crowd<'a> {
+    board: &'a Board,
+    cells: &'a [Cell],
+    actions: &'a [Action],
+    offsets: [u32; 5],
+}
+
+impl Crowd<'_> {
+    /// The place that an agent aims at.
+    fn target(&self, agent: usize) -> u32 {
+        self.board.place(self.cells[agent]).wrapping_add(self.offsets[self.actions[agent] as usize])
+    }
+}
+
+/// Claims a target for the lowest index that wants it, unless the agent faces an obstacle or swaps; and a wait is a
+/// swap with oneself.
+///
+/// Rule: collide/soft/stay, collide/soft/swap, collide/soft/contest
+fn claim_unless_swapping<W: Way>(crowd: &Crowd<'_>, agent: u32, target: u32, there: u32) {
+    let other = if there < FREE { there } else { agent };
+    let stays =
+        there == OBSTACLE || crowd.target(other as usize) == crowd.board.place(crowd.cells[agent as usize]);
+    // Where nothing is claimed the corner of the wall takes the number, which nobody aims at.
+    let claim = &crowd.board.square(if stays { 0 } else { target }).claim;
+    if !W::SHARED {
+        claim.store(claim.load(Relaxed).min(agent), Relaxed);
+    } else if !stays {
+        claim.fetch_min(agent, Relaxed);
+    }
+}
+
+/// Claims an empty square, unless another agent has, and then nobody gets it.
+fn claim_alone<W: Way>(claim: &AtomicU32, agent: u32) {
+    if !W::SHARED {
+        let is_first = claim.load(Relaxed) == NOBODY;
+        claim.store(if is_first { agent } else { CONTESTED }, Relaxed);
+    } else if claim.compare_exchange(NOBODY, agent, Relaxed, Relaxed).is_err() {
+        claim.store(CONTESTED, Relaxed);
     }
 }
 

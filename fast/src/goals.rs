@@ -2,7 +2,10 @@
 
 use pogema_core::{OnGoal, Reward};
 
+use rayon::prelude::*;
+
 use crate::Engine;
+use crate::collide::CHUNK;
 
 impl Engine {
     /// Which active agents stood on their goals after the last move, before goals changed.
@@ -14,13 +17,24 @@ impl Engine {
     ///
     /// Rule: goal/finish, goal/nothing, goal/restart
     pub(crate) fn mark_on_goal(&mut self) {
-        let places = self.cells.iter().zip(&self.goals).zip(&self.active);
-        let mut num_on_goal = 0;
-        for (on_goal, ((cell, goal), &active)) in self.on_goal.iter_mut().zip(places) {
-            *on_goal = active && cell == goal;
-            num_on_goal += usize::from(*on_goal);
-        }
-        self.num_on_goal = num_on_goal;
+        let (cells, goals, active) = (&self.cells, &self.goals, &self.active);
+        let mark = |(first, on_goal): (usize, &mut [bool])| {
+            let agents = first..first + on_goal.len();
+            let places = cells[agents.clone()].iter().zip(&goals[agents.clone()]).zip(&active[agents]);
+            let mut num_on_goal = 0;
+            for (on_goal, ((cell, goal), &active)) in on_goal.iter_mut().zip(places) {
+                *on_goal = active && cell == goal;
+                num_on_goal += usize::from(*on_goal);
+            }
+            num_on_goal
+        };
+        self.num_on_goal = match self.pool.as_ref().filter(|_| cells.len() > CHUNK) {
+            Some(pool) => pool.install(|| {
+                let chunks = self.on_goal.par_chunks_mut(CHUNK).enumerate();
+                chunks.map(|(chunk, on_goal)| mark((chunk * CHUNK, on_goal))).sum()
+            }),
+            None => mark((0, &mut self.on_goal)),
+        };
     }
 
     fn all_on_goal(&self) -> bool {
@@ -78,7 +92,7 @@ impl Engine {
     fn leave(&mut self, agent: usize) {
         let (cell, radius) = (self.cells[agent], self.config.radius);
         self.active[agent] = false;
-        self.vacate(self.board.place(cell), agent);
+        self.vacate(self.board.place(cell), agent as u32, false);
         self.occupied.clear(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
     }
 }

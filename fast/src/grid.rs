@@ -55,10 +55,11 @@ impl Strips {
         word.load(Relaxed) & bit != 0
     }
 
-    /// Sets a bit; `SHARED` if other threads may be setting bits too.
-    pub fn set<const SHARED: bool>(&self, row: usize, col: usize) {
+    /// Sets a bit; `is_shared` if other threads may be setting bits too.
+    #[inline]
+    pub fn set(&self, row: usize, col: usize, is_shared: bool) {
         let (word, other, bit) = self.words_of(row, col);
-        if SHARED {
+        if is_shared {
             word.fetch_or(bit, Relaxed);
             other.fetch_or(bit << STRIDE, Relaxed);
         } else {
@@ -156,8 +157,9 @@ impl Board {
         Ok(Self { squares, width: width as u32 + 2 })
     }
 
-    pub fn num_bytes(&self) -> usize {
-        size_of::<Square>() * self.squares.len()
+    /// Number of squares, the wall's among them.
+    pub fn num_squares(&self) -> usize {
+        self.squares.len()
     }
 
     /// Where the square of a cell is.

@@ -29,11 +29,11 @@ impl Engine {
         self.past.pop();
         let Some(before) = self.past.last().cloned() else { return Ok(false) };
         for agent in 0..self.cells.len() {
-            self.vacate(self.board.place(self.cells[agent]), agent);
+            self.vacate(self.board.place(self.cells[agent]), agent as u32, false);
         }
         self.occupied.clear_all();
         for &cell in &before.occupied {
-            self.mark::<false>(cell);
+            self.mark(cell);
         }
         self.step = before.step;
         self.cells = before.cells;

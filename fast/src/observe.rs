@@ -13,7 +13,7 @@ const NUM_WORDS: usize = 3200;
 /// The same where windows are small, so that less has to be cleared.
 const FEW_WORDS: usize = 400;
 /// Buffers of more bytes are written around the cache.
-const BEYOND_CACHE: usize = 16 << 20;
+const BEYOND_CACHE: usize = 8 << 20;
 /// Agents that one thread takes at a time.
 const CHUNK: usize = 1024;
 

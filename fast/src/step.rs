@@ -6,7 +6,7 @@ use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance
 use pogema_core::{MapfOut, PomapfOut, Snapshot, StepOut};
 use rayon::ThreadPool;
 
-use crate::grid::{Board, FREE, Strips};
+use crate::grid::{Board, FREE, Square, Strips};
 use crate::simd::Path;
 
 /// One environment that plays by POGEMA 1.4.0's rules, on bits.
@@ -30,7 +30,7 @@ pub struct Engine {
     pub(crate) active: Vec<bool>,
     pub(crate) on_goal: Vec<bool>,
     pub(crate) num_on_goal: usize,
-    /// While a step is played: the place each agent aims at, and one more that nobody aims at.
+    /// While a step is played: the place each agent aims at.
     pub(crate) targets: Vec<u32>,
     /// While a step is played: what stood at that place before.
     pub(crate) ahead: Vec<u32>,
@@ -114,7 +114,8 @@ impl Engine {
     pub fn num_bytes(&self) -> usize {
         let per_agent = 3 * size_of::<Cell>() + size_of::<GoalStream>() + 2 * size_of::<bool>() + 8;
         let strips = 8 * (self.obstacles.num_words() + self.occupied.num_words());
-        size_of::<Self>() + self.config.num_agents * per_agent + strips + self.board.num_bytes()
+        let squares = size_of::<Square>() * self.board.num_squares();
+        size_of::<Self>() + self.config.num_agents * per_agent + strips + squares
     }
 
     pub(crate) fn check_started(&self) -> Result<(), Error> {
@@ -136,7 +137,7 @@ impl Engine {
         (self.obstacles, self.occupied) = (obstacles, occupied);
         (self.height, self.width) = (height, width);
         let num_agents = self.config.num_agents;
-        self.targets = vec![u32::MAX; num_agents + 1];
+        self.targets = vec![0; num_agents];
         self.ahead = vec![0; num_agents];
         Ok(())
     }
@@ -159,7 +160,7 @@ impl Engine {
         self.occupied.clear_all();
         self.take_squares();
         for &start in &self.starts {
-            self.mark::<false>(start);
+            self.mark(start);
         }
         self.mark_on_goal();
         self.past.clear();
@@ -229,9 +230,9 @@ impl Environment for Engine {
 
 impl Engine {
     /// Marks a cell as occupied.
-    pub(crate) fn mark<const SHARED: bool>(&self, cell: Cell) {
+    pub(crate) fn mark(&self, cell: Cell) {
         let radius = self.config.radius;
-        self.occupied.set::<SHARED>(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
+        self.occupied.set(usize::from(cell.row) + radius, usize::from(cell.col) + radius, false);
     }
 
     fn occupied_cells(&self) -> Vec<Cell> {

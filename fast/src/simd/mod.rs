@@ -184,6 +184,20 @@ fn check_enough(words: &[u64], num_bits: usize) {
     assert!(num_bits <= 64 * words.len(), "{num_bits} bits do not fit {} words", words.len());
 }
 
+/// Asks for a value that will be needed soon.
+#[inline]
+#[allow(unsafe_code, reason = "a hint to the processor")]
+pub(crate) fn fetch<T>(what: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a hint changes nothing, and every x86-64 has it.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(what).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = what;
+}
+
 /// Values of a type from one line of memory to the next.
 pub(crate) const fn per_line<V>() -> usize {
     64 / size_of::<V>()
