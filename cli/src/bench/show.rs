@@ -23,6 +23,7 @@ fn speeds(rows: &[Row]) -> Table {
         "u8",
         "bits",
         "step + f32",
+        "step + u8",
         "zeros f32",
         "zeros u8",
         "f32 of zeros",
@@ -32,8 +33,16 @@ fn speeds(rows: &[Row]) -> Table {
     ]);
     for row in rows {
         let speed = &row.speed;
-        let millions =
-            [speed.step, speed.f32, speed.u8, speed.bits, speed.step_f32, speed.fill_f32, speed.fill_u8];
+        let millions = [
+            speed.step,
+            speed.f32,
+            speed.u8,
+            speed.bits,
+            speed.step_f32,
+            speed.step_u8,
+            speed.fill_f32,
+            speed.fill_u8,
+        ];
         let mut cells = vec![row.name.clone()];
         cells.extend(millions.map(|rate| figure(rate / 1e6)));
         cells.push(format!("{:.0} %", 100.0 * speed.f32 / speed.fill_f32));

@@ -50,6 +50,26 @@ pub struct Speed {
     pub bytes: usize,
 }
 
+impl Speed {
+    /// Takes over whatever is better in another measurement of the same work.
+    pub fn improve(&mut self, other: &Self) {
+        let Self { step, f32, u8, bits, step_f32, step_u8, fill_f32, fill_u8, reset, bytes: _ } = self;
+        for (own, other) in [
+            (step, other.step),
+            (f32, other.f32),
+            (u8, other.u8),
+            (bits, other.bits),
+            (step_f32, other.step_f32),
+            (step_u8, other.step_u8),
+            (fill_f32, other.fill_f32),
+            (fill_u8, other.fill_u8),
+            (reset, other.reset),
+        ] {
+            *own = own.max(other);
+        }
+    }
+}
+
 impl Work {
     /// The config in POGEMA's words: the paper's, with a random policy under way.
     pub fn config(&self) -> Value {
