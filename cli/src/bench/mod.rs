@@ -34,7 +34,7 @@ pub struct Bench {
     #[arg(long, value_name = "TEXT", default_value = "")]
     rows: String,
     /// Time for each figure, in seconds
-    #[arg(long, value_name = "S", default_value_t = 0.25)]
+    #[arg(long, value_name = "S", default_value_t = 0.1)]
     seconds: f64,
     /// How often everything is measured, the best counting: more on a machine that has other work
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]

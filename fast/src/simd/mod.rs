@@ -9,6 +9,9 @@ mod avx2;
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512;
 mod scalar;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "512-bit intrinsics")]
+mod windows;
 
 use std::fmt;
 use std::ops::Range;
@@ -209,7 +212,7 @@ pub(crate) fn lead_of<V>(out: &[V]) -> usize {
 }
 
 /// Words that have to follow the one in which the bits of the last agent begin.
-pub(crate) const MOST_WORDS: usize = 7;
+pub(crate) const MOST_WORDS: usize = 8;
 
 /// Writes the windows of some agents as bits, one after the other from bit `lead` on; if `apart`, each agent's
 /// begin a new word.
@@ -226,7 +229,7 @@ pub(crate) fn pack(
     #[cfg(target_arch = "x86_64")]
     if path == Path::Avx512
         && channels == Channels::All
-        && avx512::pack(scene, agents.clone(), lead, apart, words)
+        && windows::pack(scene, agents.clone(), lead, apart, words)
     {
         return;
     }
