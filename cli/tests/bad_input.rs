@@ -32,7 +32,7 @@ const FILES: [(&str, &str); 17] = [
 ];
 
 /// Arguments and the line they are answered with.
-const REFUSED: [(&str, &str); 30] = [
+const REFUSED: [(&str, &str); 34] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     ("run --sped 3", "unexpected argument '--sped' found"),
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
@@ -93,6 +93,13 @@ const REFUSED: [(&str, &str); 30] = [
     ),
     ("run --steps 9000000000 --policy stay --trace blank.yaml/x", "blank.yaml/x: `blank.yaml` is no folder"),
     ("conform --cases 9000000000 --json ./", "./: is no file"),
+    (
+        "bench --rows nothing",
+        "config: `rows` is `nothing`, expected a part of a row's name, such as `64 agents`",
+    ),
+    ("bench --seconds 0", "config: `seconds` is `0`, expected a time above 0"),
+    ("bench --rounds 0", "invalid value '0' for '--rounds <N>': 0 is not in 1..18446744073709551615"),
+    ("bench --json no/where.json", "no/where.json: `no`: No such file or directory (os error 2)"),
 ];
 
 fn folder() -> tempfile::TempDir {

@@ -53,18 +53,28 @@ impl Engine {
         let per_agent = words_per_agent(self.config.radius);
         Error::check_length("observations", agents.len() * per_agent, out.len())?;
         let scene = self.scene();
-        let write = |(first, out): (usize, &mut [u64])| {
+        self.in_parts(agents.start, per_agent, out, |first, out| {
             let agents = first..first + out.len() / per_agent;
             pack(self.path, &scene, agents, Channels::All, (0, true), out);
-        };
-        match self.pool.as_ref().filter(|_| agents.len() > CHUNK) {
+        });
+        Ok(())
+    }
+
+    /// Writes a buffer for the agents from `first` on, its parts shared among the threads if there are any.
+    fn in_parts<T: Send>(
+        &self,
+        first: usize,
+        per_agent: usize,
+        out: &mut [T],
+        write: impl Fn(usize, &mut [T]) + Sync,
+    ) {
+        match self.pool.as_ref().filter(|_| out.len() > CHUNK * per_agent) {
             Some(pool) => pool.install(|| {
                 let chunks = out.par_chunks_mut(CHUNK * per_agent).enumerate();
-                chunks.for_each(|(chunk, out)| write((agents.start + chunk * CHUNK, out)));
+                chunks.for_each(|(chunk, out)| write(first + chunk * CHUNK, out));
             }),
-            None => write((agents.start, out)),
+            None => write(first, out),
         }
-        Ok(())
     }
 
     fn check_agents(&self, agents: &Range<usize>) -> Result<(), Error> {
@@ -95,20 +105,13 @@ impl Engine {
     ) {
         let per_agent = channels.number() * self.config.side() * self.config.side();
         let scene = self.scene();
-        let write = |(first, out): (usize, &mut [V])| {
+        self.in_parts(agents.start, per_agent, out, |first, out| {
             if per_agent.div_ceil(64) < FEW_WORDS / 16 {
                 write_blocks::<V, FEW_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
             } else {
                 write_blocks::<V, NUM_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
             }
-        };
-        match self.pool.as_ref().filter(|_| agents.len() > CHUNK) {
-            Some(pool) => pool.install(|| {
-                let chunks = out.par_chunks_mut(CHUNK * per_agent).enumerate();
-                chunks.for_each(|(chunk, out)| write((agents.start + chunk * CHUNK, out)));
-            }),
-            None => write((agents.start, out)),
-        }
+        });
     }
 
     /// Rule: observe/pomapf, observe/pomapf/relative

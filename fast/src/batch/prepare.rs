@@ -12,8 +12,6 @@ use pogema_core::{Error, Instance};
 ///
 /// What it gives may depend on the lane and on the number of the episode, and on nothing else, so that a batch
 /// plays the same episodes on any number of threads. Any such function is one.
-///
-/// Rule: seed/streams
 pub trait Instances: Send + Sync {
     /// The instance of an episode of a lane, both counted from 0.
     ///

@@ -27,7 +27,7 @@ pub enum Path {
     Scalar,
     /// AVX2.
     Avx2,
-    /// AVX-512 F, BW, DQ and VL, and BMI2.
+    /// AVX-512 F and BW.
     Avx512,
 }
 
@@ -45,13 +45,7 @@ impl Path {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2"),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => {
-                is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512bw")
-                    && is_x86_feature_detected!("avx512dq")
-                    && is_x86_feature_detected!("avx512vl")
-                    && is_x86_feature_detected!("bmi2")
-            }
+            Self::Avx512 => is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw"),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx2 | Self::Avx512 => false,
         }
@@ -211,7 +205,7 @@ pub(crate) fn lead_of<V>(out: &[V]) -> usize {
     out.as_ptr().addr() / size_of::<V>() % per_line::<V>()
 }
 
-/// Words that have to follow the one in which the bits of the last agent begin.
+/// Words that a path may write from the one on in which an agent's bits begin.
 pub(crate) const MOST_WORDS: usize = 8;
 
 /// Writes the windows of some agents as bits, one after the other from bit `lead` on; if `apart`, each agent's
