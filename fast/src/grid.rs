@@ -15,6 +15,9 @@ pub struct Strips {
     num_rows: usize,
 }
 
+/// Rows that may be read of a window, its own or not; so many words are behind the last strip.
+pub const MOST_ROWS: usize = 12;
+
 /// Columns from one strip to the next.
 pub const STRIDE: usize = 32;
 
@@ -22,7 +25,8 @@ impl Strips {
     /// Strips without any bit set.
     pub fn empty(height: usize, width: usize) -> Result<Self, Error> {
         let num_strips = width.div_ceil(STRIDE) + 2;
-        let words = reserve(num_strips.checked_mul(height), || AtomicU64::new(0))?;
+        let num_words = num_strips.checked_mul(height).and_then(|words| words.checked_add(MOST_ROWS));
+        let words = reserve(num_words, || AtomicU64::new(0))?;
         Ok(Self { words, num_rows: height })
     }
 
@@ -34,6 +38,12 @@ impl Strips {
     /// Number of words in all strips.
     pub fn num_words(&self) -> usize {
         self.words.len()
+    }
+
+    /// The words of all strips.
+    #[inline]
+    pub fn words(&self) -> &[AtomicU64] {
+        &self.words
     }
 
     /// The words of a window's first strip from its first row on, and the shift that brings its first column to
@@ -170,6 +180,11 @@ impl Board {
     /// What to add to a place, wrapping, for each action in the order of their numbers.
     pub fn offsets(&self) -> [u32; 5] {
         [0, self.width.wrapping_neg(), self.width, u32::MAX, 1]
+    }
+
+    /// All squares, row after row.
+    pub fn squares(&self) -> &[Square] {
+        &self.squares
     }
 
     pub fn square(&self, place: u32) -> &Square {

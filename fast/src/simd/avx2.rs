@@ -12,9 +12,9 @@ const F32_PER_VECTOR: usize = 8;
 const U8_PER_VECTOR: usize = 32;
 
 pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32]) {
-    let value = |bit: u32| f32::from_bits(bit * 1f32.to_bits());
+    let table = &scalar::FLOATS;
     let (head, body) = split(lead, out, F32_PER_VECTOR);
-    scalar::spread(words, lead, head, value);
+    scalar::spread(words, lead, head, table);
     let first = (lead + head.len()) / F32_PER_VECTOR;
     let num_vectors = body.len() / F32_PER_VECTOR;
     let (body, tail) = body.split_at_mut(num_vectors * F32_PER_VECTOR);
@@ -22,20 +22,20 @@ pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32]) {
     // `check_enough` has seen that `words` hold a bit for each value.
     unsafe { spread_f32_vectors(words.as_ptr().cast::<u8>().add(first), num_vectors, body.as_mut_ptr()) };
     let (words, lead) = words_from(words, lead, head.len() + body.len());
-    scalar::spread(words, lead, tail, value);
+    scalar::spread(words, lead, tail, table);
 }
 
 pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8]) {
-    let value = |bit: u32| bit as u8;
+    let table = &scalar::BYTES;
     let (head, body) = split(lead, out, U8_PER_VECTOR);
-    scalar::spread(words, lead, head, value);
+    scalar::spread(words, lead, head, table);
     let first = (lead + head.len()) / U8_PER_VECTOR;
     let num_vectors = body.len() / U8_PER_VECTOR;
     let (body, tail) = body.split_at_mut(num_vectors * U8_PER_VECTOR);
     // SAFETY: as in `spread_f32`.
     unsafe { spread_u8_vectors(words.as_ptr().cast::<u32>().add(first), num_vectors, body.as_mut_ptr()) };
     let (words, lead) = words_from(words, lead, head.len() + body.len());
-    scalar::spread(words, lead, tail, value);
+    scalar::spread(words, lead, tail, table);
 }
 
 /// The values before the first whole vector of bits, and the rest.

@@ -6,12 +6,19 @@
 #[allow(unsafe_code, reason = "256-bit intrinsics")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
-#[allow(unsafe_code, reason = "512-bit intrinsics")]
-mod avx512;
-mod scalar;
+#[allow(unsafe_code, reason = "256-bit intrinsics")]
+mod avx2_windows;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
-mod windows;
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "512-bit intrinsics")]
+mod avx512_windows;
+#[cfg(target_arch = "x86_64")]
+mod layout;
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+mod sights;
 
 use std::fmt;
 use std::ops::Range;
@@ -151,7 +158,7 @@ impl sealed::Spread for f32 {
     fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
         check_enough(words, lead + out.len());
         match path {
-            Path::Scalar => scalar::spread(words, lead, out, |bit| Self::from_bits(bit * 1f32.to_bits())),
+            Path::Scalar => scalar::spread(words, lead, out, &scalar::FLOATS),
             #[cfg(target_arch = "x86_64")]
             Path::Avx2 => avx2::spread_f32(words, lead, out),
             #[cfg(target_arch = "x86_64")]
@@ -166,7 +173,7 @@ impl sealed::Spread for u8 {
     fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
         check_enough(words, lead + out.len());
         match path {
-            Path::Scalar => scalar::spread(words, lead, out, |bit| bit as u8),
+            Path::Scalar => scalar::spread(words, lead, out, &scalar::BYTES),
             #[cfg(target_arch = "x86_64")]
             Path::Avx2 => avx2::spread_u8(words, lead, out),
             #[cfg(target_arch = "x86_64")]
@@ -195,6 +202,11 @@ pub(crate) fn fetch<T>(what: &T) {
     let _ = what;
 }
 
+/// Asks for a whole list.
+pub(crate) fn fetch_all<T>(list: &[T]) {
+    list.chunks(per_line::<T>()).for_each(|line| fetch(&line[0]));
+}
+
 /// Values of a type from one line of memory to the next.
 pub(crate) const fn per_line<V>() -> usize {
     64 / size_of::<V>()
@@ -221,11 +233,15 @@ pub(crate) fn pack(
     words: &mut [u64],
 ) {
     #[cfg(target_arch = "x86_64")]
-    if path == Path::Avx512
-        && channels == Channels::All
-        && windows::pack(scene, agents.clone(), lead, apart, words)
-    {
-        return;
+    if channels == Channels::All {
+        let is_done = match path {
+            Path::Scalar => false,
+            Path::Avx2 => avx2_windows::pack(scene, agents.clone(), lead, apart, words),
+            Path::Avx512 => avx512_windows::pack(scene, agents.clone(), lead, apart, words),
+        };
+        if is_done {
+            return;
+        }
     }
     let _ = path;
     scalar::pack(scene, agents, channels, (lead, apart), words);

@@ -60,14 +60,36 @@ fn write_window(strips: &Strips, row: usize, col: usize, side: usize, writer: &m
     }
 }
 
-pub fn spread<V>(words: &[u64], lead: usize, out: &mut [V], value: impl Fn(u32) -> V) {
+/// The values of each byte of bits.
+pub type Table<V> = [[V; 8]; 256];
+
+pub static FLOATS: Table<f32> = table([0.0, 1.0]);
+pub static BYTES: Table<u8> = table([0, 1]);
+
+const fn table<V: Copy>(values: [V; 2]) -> Table<V> {
+    let mut table = [[values[0]; 8]; 256];
+    // A plain loop, since a constant knows no iterators.
+    let mut index = 0;
+    while index < 8 * 256 {
+        table[index / 8][index % 8] = values[((index / 8) >> (index % 8)) & 1];
+        index += 1;
+    }
+    table
+}
+
+pub fn spread<V: Copy>(words: &[u64], lead: usize, out: &mut [V], table: &Table<V>) {
     let mut bits = lead;
     for part in split_by_words(lead, out) {
         let word = words[bits / 64] >> (bits % 64);
-        for (index, slot) in part.iter_mut().enumerate() {
-            *slot = value((word >> index & 1) as u32);
-        }
         bits += part.len();
+        let values_of = |index: usize| &table[usize::from((word >> (8 * index)) as u8)];
+        let (whole, rest) = part.as_chunks_mut();
+        for (index, slots) in whole.iter_mut().enumerate() {
+            *slots = *values_of(index);
+        }
+        if !rest.is_empty() {
+            rest.copy_from_slice(&values_of(whole.len())[..rest.len()]);
+        }
     }
 }
 

@@ -1,0 +1,138 @@
+//! Windows of up to 11 x 11, cut out of the strips four rows at a time.
+
+use std::arch::x86_64::{
+    __m256i, _mm_cvtsi32_si128, _mm_cvtsi128_si64, _mm_extract_epi64, _mm_or_si128, _mm256_and_si256,
+    _mm256_castsi256_si128, _mm256_extracti128_si256, _mm256_loadu_si256, _mm256_or_si256,
+    _mm256_setzero_si256, _mm256_sllv_epi64, _mm256_srl_epi64, _mm256_srlv_epi64, _mm256_unpackhi_epi64,
+    _mm256_unpacklo_epi64,
+};
+use std::ops::Range;
+use std::sync::atomic::AtomicU64;
+
+use super::Scene;
+use super::sights::{GROUP, Sights};
+use crate::bits::BitWriter;
+use crate::grid::MOST_ROWS;
+
+/// Rows of a vector.
+const LANES: usize = 4;
+
+/// Writes all three channels of some agents, or says that the windows are too large for this.
+pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, words: &mut [u64]) -> bool {
+    // SAFETY: the path is only taken where its features are there (`Path::check`).
+    unsafe {
+        match scene.radius {
+            1 => pack_side::<3>(scene, agents, lead, apart, words),
+            2 => pack_side::<5>(scene, agents, lead, apart, words),
+            3 => pack_side::<7>(scene, agents, lead, apart, words),
+            4 => pack_side::<9>(scene, agents, lead, apart, words),
+            5 => pack_side::<11>(scene, agents, lead, apart, words),
+            _ => return false,
+        }
+    }
+    true
+}
+
+#[target_feature(enable = "avx2")]
+fn pack_side<const SIDE: usize>(
+    scene: &Scene<'_>,
+    agents: Range<usize>,
+    lead: usize,
+    apart: bool,
+    words: &mut [u64],
+) {
+    let num_cells = SIDE * SIDE;
+    let mut writer = BitWriter::new(words, lead);
+    for begin in agents.clone().step_by(GROUP) {
+        let end = agents.end.min(begin + GROUP);
+        let sights = Sights::of::<SIDE>(scene, begin..end);
+        for index in 0..end - begin {
+            let first = sights.first[index] as usize;
+            for strips in [scene.obstacles, scene.occupied] {
+                let rows = &strips.words()[first..first + MOST_ROWS];
+                let [low, high] = window::<SIDE>(rows, sights.shift[index]);
+                writer.push(low, num_cells.min(64) as u32);
+                if num_cells > 64 {
+                    writer.push(high, num_cells as u32 - 64);
+                }
+            }
+            writer.push_one_of(sights.goal[index] as usize - 2 * num_cells, num_cells);
+            if apart {
+                writer.end_word();
+            }
+        }
+    }
+    writer.end_word();
+}
+
+/// The cells of a window, row after row.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn window<const SIDE: usize>(rows: &[AtomicU64], shift: u32) -> [u64; 2] {
+    let layout = const { &Layout::of(SIDE) };
+    let shift = _mm_cvtsi32_si128(shift as i32);
+    let (mut low, mut high) = (_mm256_setzero_si256(), _mm256_setzero_si256());
+    for (rows, places) in rows.as_chunks::<LANES>().0.iter().zip(&layout.places[..SIDE.div_ceil(LANES)]) {
+        // SAFETY: there are as many rows as a vector takes. No thread writes them, since a step borrows the engine
+        // mutably.
+        let rows = unsafe { _mm256_loadu_si256(rows.as_ptr().cast()) };
+        let rows = _mm256_and_si256(_mm256_srl_epi64(rows, shift), vector(&places.mask));
+        low = _mm256_or_si256(low, _mm256_sllv_epi64(rows, vector(&places.low)));
+        let above = _mm256_sllv_epi64(rows, vector(&places.high));
+        let over = _mm256_srlv_epi64(rows, vector(&places.over));
+        high = _mm256_or_si256(high, _mm256_or_si256(above, over));
+    }
+    let pairs = _mm256_or_si256(_mm256_unpacklo_epi64(low, high), _mm256_unpackhi_epi64(low, high));
+    let words = _mm_or_si128(_mm256_castsi256_si128(pairs), _mm256_extracti128_si256::<1>(pairs));
+    [_mm_cvtsi128_si64(words) as u64, _mm_extract_epi64::<1>(words) as u64]
+}
+
+#[target_feature(enable = "avx2")]
+#[inline]
+fn vector(lanes: &[u64; LANES]) -> __m256i {
+    // SAFETY: the array is as large as a vector.
+    unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) }
+}
+
+/// Where the bits of each row of a window go; everything follows from its side.
+struct Layout {
+    places: [Places; MOST_ROWS / LANES],
+}
+
+/// Where the bits of four rows go.
+#[derive(Clone, Copy)]
+struct Places {
+    /// The bits of a row, where there is one.
+    mask: [u64; LANES],
+    /// How far up in the first word.
+    low: [u64; LANES],
+    /// How far up in the second word.
+    high: [u64; LANES],
+    /// How far down in the second word, where a row begins in the first.
+    over: [u64; LANES],
+}
+
+impl Layout {
+    const fn of(side: usize) -> Self {
+        // A shift by 64 leaves nothing.
+        let none = Places { mask: [0; LANES], low: [64; LANES], high: [64; LANES], over: [64; LANES] };
+        let mut places = [none; MOST_ROWS / LANES];
+        // A plain loop, since a constant knows no iterators.
+        let mut row = 0;
+        while row < side {
+            let (places, lane) = (&mut places[row / LANES], row % LANES);
+            let begin = (row * side) as u64;
+            places.mask[lane] = (1 << side) - 1;
+            if begin >= 64 {
+                places.high[lane] = begin - 64;
+            } else {
+                places.low[lane] = begin;
+                if begin > 0 {
+                    places.over[lane] = 64 - begin;
+                }
+            }
+            row += 1;
+        }
+        Self { places }
+    }
+}
