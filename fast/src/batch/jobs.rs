@@ -4,6 +4,7 @@ use pogema_core::{Action, Config, Error, StepOut};
 use rayon::ThreadPool;
 
 use crate::observe::{is_beyond_cache, words_per_agent};
+use crate::simd::fetch_all;
 
 use super::Lane;
 
@@ -122,6 +123,7 @@ impl Jobs<'_> {
     fn run_here(mut self, play: Play<'_>) -> Result<(), Error> {
         while !self.lanes.is_empty() {
             let (first, rest) = self.split_at(1);
+            rest.fetch_first();
             let lane = &mut first.lanes[0];
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
@@ -130,6 +132,24 @@ impl Jobs<'_> {
             self = rest;
         }
         Ok(())
+    }
+
+    /// Asks for what the first lane needs, so that it comes from memory while the lane before plays.
+    fn fetch_first(&self) {
+        let Some(Lane { engine, .. }) = self.lanes.first() else { return };
+        if self.steps.is_some() {
+            fetch_all(engine.board.squares());
+            fetch_all(&engine.active);
+            fetch_all(&engine.on_goal);
+            fetch_all(&engine.targets);
+            fetch_all(&engine.ahead);
+        }
+        if !matches!(self.observations, Observations::None) {
+            fetch_all(engine.obstacles.words());
+        }
+        fetch_all(engine.occupied.words());
+        fetch_all(&engine.cells);
+        fetch_all(&engine.goals);
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {

@@ -4,6 +4,7 @@ mod jobs;
 mod prepare;
 
 use pogema_core::{Action, Config, Environment, EpisodeMeter, Error, Instance, Metrics, StepOut};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{Engine, Path};
@@ -90,20 +91,14 @@ impl Batch {
     /// If a lane has no next instance, or one of another shape than the first lane's. Every lane is then as it
     /// was.
     pub fn reset(&mut self) -> Result<(), Error> {
+        let preparer = &self.preparer;
+        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| lane.look_ahead(preparer).map(|_| ()))?;
         let mut size = None;
-        for lane in &mut self.lanes {
-            let instance = lane.look_ahead(&self.preparer)?;
+        for instance in self.lanes.iter().filter_map(|lane| lane.pending.as_ref()) {
             let size = *size.get_or_insert((instance.map().height(), instance.map().width()));
             check_shape(instance, &self.config, size)?;
         }
-        for lane in &mut self.lanes {
-            if let Some(instance) = lane.pending.take() {
-                lane.engine.start(instance)?;
-                lane.meter.reset();
-                lane.failure = None;
-                lane.has_just_ended = false;
-            }
-        }
+        over_lanes(self.pool.as_ref(), &mut self.lanes, Lane::begin)?;
         self.is_started = true;
         Ok(())
     }
@@ -236,6 +231,15 @@ impl Lane {
         self.pending.as_ref().ok_or_else(|| Error::State { reason: "no instance was made".into() })
     }
 
+    /// Begins the episode whose instance is here.
+    fn begin(&mut self) -> Result<(), Error> {
+        self.pending.take().map_or(Ok(()), |instance| self.engine.start(instance))?;
+        self.meter.reset();
+        self.failure = None;
+        self.has_just_ended = false;
+        Ok(())
+    }
+
     /// Puts the ended episode aside and begins the next one, if there is one.
     fn begin_next(&mut self, preparer: &Preparer, size: (usize, usize)) {
         match self.try_begin_next(preparer, size) {
@@ -249,6 +253,20 @@ impl Lane {
         check_shape(self.look_ahead(preparer)?, &config, size)?;
         self.pending.take().map_or(Ok(()), |instance| self.ended.start(instance))
     }
+}
+
+/// Does something to all lanes, on the threads of a pool if there is one; the error is that of the first lane that
+/// has one.
+fn over_lanes(
+    pool: Option<&ThreadPool>,
+    lanes: &mut [Lane],
+    work: impl Fn(&mut Lane) -> Result<(), Error> + Sync,
+) -> Result<(), Error> {
+    let done: Vec<_> = match pool {
+        Some(pool) => pool.install(|| lanes.par_iter_mut().map(&work).collect()),
+        None => lanes.iter_mut().map(work).collect(),
+    };
+    done.into_iter().collect()
 }
 
 fn check_shape(instance: &Instance, config: &Config, (height, width): (usize, usize)) -> Result<(), Error> {
