@@ -1,5 +1,6 @@
 //! What agents see.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use pogema_core::{Cell, Error, MapfOut, PomapfOut};
@@ -8,9 +9,9 @@ use rayon::prelude::*;
 use crate::Engine;
 use crate::simd::{Channels, MOST_WORDS, Path, Scene, Value, lead_of, pack, per_line};
 
-/// Words on the stack for the bits of some agents; enough for one agent of any radius.
+/// Words for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;
-/// The same where windows are small, so that less has to be cleared.
+/// So many of them are used where windows are small, so that they stay close to the processor.
 const FEW_WORDS: usize = 400;
 /// Buffers of more bytes are written around the cache.
 const BEYOND_CACHE: usize = 8 << 20;
@@ -106,11 +107,11 @@ impl Engine {
         let per_agent = channels.number() * self.config.side() * self.config.side();
         let scene = self.scene();
         self.in_parts(agents.start, per_agent, out, |first, out| {
-            if per_agent.div_ceil(64) < FEW_WORDS / 16 {
-                write_blocks::<V, FEW_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
-            } else {
-                write_blocks::<V, NUM_WORDS>(self.path, &scene, first, channels, out, beyond_cache);
-            }
+            WORDS.with_borrow_mut(|words| {
+                let few = per_agent.div_ceil(64) < FEW_WORDS / 16;
+                let words = if few { &mut words[..FEW_WORDS] } else { &mut words[..] };
+                write_blocks(self.path, &scene, first, channels, out, beyond_cache, words);
+            });
         });
     }
 
@@ -160,28 +161,33 @@ pub fn words_per_agent(radius: usize) -> usize {
     (3 * (2 * radius + 1) * (2 * radius + 1)).div_ceil(64)
 }
 
-/// Writes the values of the agents from `first` on, as many agents at a time as have room on the stack.
-fn write_blocks<V: Value, const WORDS: usize>(
+thread_local! {
+    /// Kept from call to call, so that they need not be cleared each time.
+    static WORDS: RefCell<[u64; NUM_WORDS]> = const { RefCell::new([0; NUM_WORDS]) };
+}
+
+/// Writes the values of the agents from `first` on, by way of `words`, as many agents at a time as have room there.
+fn write_blocks<V: Value>(
     path: Path,
     scene: &Scene<'_>,
     first: usize,
     channels: Channels,
     out: &mut [V],
     beyond_cache: bool,
+    words: &mut [u64],
 ) {
     let per_agent = channels.number() * scene.side() * scene.side();
     // The first bits may be left out, and an agent may touch more words than it fills.
-    let room = (WORDS - MOST_WORDS) / per_agent.div_ceil(64);
+    let room = (words.len() - MOST_WORDS) / per_agent.div_ceil(64);
     // So many agents end where a line of memory does.
     let whole = room - room % per_line::<V>();
     let per_block = if whole > 0 { whole } else { room };
-    let mut words = [0; WORDS];
     for (block, out) in out.chunks_mut(per_block * per_agent).enumerate() {
         let first = first + block * per_block;
         let lead = lead_of(out);
         let agents = first..first + out.len() / per_agent;
-        pack(path, scene, agents, channels, (lead, false), &mut words);
-        V::spread(path, &words, lead, out, beyond_cache);
+        pack(path, scene, agents, channels, (lead, false), words);
+        V::spread(path, words, lead, out, beyond_cache);
     }
 }
 
