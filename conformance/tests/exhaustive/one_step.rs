@@ -9,22 +9,12 @@ use crate::scope::{RULES, Results, Scope, cells_of, placements, write_actions};
 /// Steps that [`check_map`] compares over all maps: each placement, with each set of active agents, each joint
 /// action and all rules.
 pub fn num_steps(scope: Scope) -> u64 {
-    num_steps_of_all(scope) << scope.num_agents
-}
-
-/// Steps that [`check_map_of_all`] compares over all maps.
-pub fn num_steps_of_all(scope: Scope) -> u64 {
-    scope.num_placements() * scope.num_actions() as u64 * RULES.len() as u64
+    (scope.num_placements() * scope.num_actions() as u64 * RULES.len() as u64) << scope.num_agents
 }
 
 /// Compares all steps on a map, any of the agents gone, and counts them.
 pub fn check_map(scope: Scope, map: &Map) -> u64 {
     (0..1 << scope.num_agents).map(|gone| check_without(gone, scope, map)).sum()
-}
-
-/// Compares all steps on a map that all agents are on, and counts them.
-pub fn check_map_of_all(scope: Scope, map: &Map) -> u64 {
-    check_without(0, scope, map)
 }
 
 /// Compares all steps on a map where some agents, as bits, are gone.
