@@ -52,7 +52,7 @@ fn every_step_of_up_to_3_agents_on_2_x_4() {
 }
 
 #[test]
-#[ignore = "half an hour: cargo test --release -p pogema-conformance --test exhaustive -- --ignored"]
+#[ignore = "minutes: cargo test --release -p pogema-conformance --test exhaustive -- --ignored"]
 fn every_step_of_4_agents_on_2_x_4() {
     check_one_step(&[Scope::new(2, 4, 4)], 1_612_800_000);
 }
