@@ -6,10 +6,11 @@ use pogema_core::{Cell, Config, Environment, GoalStream, Instance, Map, Outside}
 use pogema_fast::{Engine, Path, words_per_agent};
 use quickcheck::{Arbitrary, Gen, QuickCheck};
 
-/// Miri, which looks at every access to memory, needs minutes for a few scenes.
-const NUM_SCENES: u64 = if cfg!(miri) { 5 } else { 400 };
-const MOST_ROWS: usize = if cfg!(miri) { 4 } else { 12 };
+/// Miri, which looks at every access to memory, has time for a few small scenes.
+const NUM_SCENES: u64 = if cfg!(miri) { 50 } else { 400 };
+const MOST_ROWS: usize = if cfg!(miri) { 3 } else { 12 };
 const MOST_COLS: usize = if cfg!(miri) { 80 } else { 200 };
+const MOST_AGENTS: usize = if cfg!(miri) { 4 } else { 20 };
 
 /// A map, often wide, with some agents on it.
 #[derive(Clone, Debug)]
@@ -35,13 +36,14 @@ impl Arbitrary for Scene {
     fn arbitrary(g: &mut Gen) -> Self {
         let (height, width) = (1 + below(g, MOST_ROWS), 1 + below(g, MOST_COLS));
         let radius = match below(g, 8) {
+            _ if cfg!(miri) => 1 + below(g, 6),
             0 => 16 + below(g, 2),
-            1 if !cfg!(miri) => 1 + below(g, Config::LARGEST_RADIUS),
+            1 => 1 + below(g, Config::LARGEST_RADIUS),
             _ => 1 + below(g, 20),
         };
         let density = below(g, 101);
         let obstacles = (0..height * width).map(|_| below(g, 100) < density).collect();
-        let mut starts: Vec<Cell> = (0..=below(g, 20)).map(|_| any_cell(g, height, width)).collect();
+        let mut starts: Vec<Cell> = (0..=below(g, MOST_AGENTS)).map(|_| any_cell(g, height, width)).collect();
         starts.sort();
         starts.dedup();
         let goals = starts.iter().map(|_| any_cell(g, height, width)).collect();
