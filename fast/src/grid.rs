@@ -46,18 +46,24 @@ impl Strips {
         &self.words
     }
 
+    /// The word of a cell in its first strip, and which of its bits the cell is.
+    #[inline]
+    pub fn locate(&self, row: usize, col: usize) -> (usize, u32) {
+        ((col / STRIDE + 1) * self.num_rows + row, (col % STRIDE) as u32)
+    }
+
     /// The words of a window's first strip from its first row on, and the shift that brings its first column to
     /// bit 0. The strips to the right follow at distances of [`Strips::num_rows`].
     #[inline]
     pub fn window(&self, row: usize, col: usize) -> (&[AtomicU64], u32) {
-        let first = (col / STRIDE + 1) * self.num_rows + row;
-        (&self.words[first..], (col % STRIDE) as u32)
+        let (first, shift) = self.locate(row, col);
+        (&self.words[first..], shift)
     }
 
     /// The two words of a cell, and its bit in the first of them; in the second it is 32 bits higher.
     fn words_of(&self, row: usize, col: usize) -> (&AtomicU64, &AtomicU64, u64) {
-        let here = (col / STRIDE + 1) * self.num_rows + row;
-        (&self.words[here], &self.words[here - self.num_rows], 1 << (col % STRIDE))
+        let (here, bit) = self.locate(row, col);
+        (&self.words[here], &self.words[here - self.num_rows], 1 << bit)
     }
 
     pub fn get(&self, row: usize, col: usize) -> bool {
@@ -101,11 +107,10 @@ impl Strips {
         let mut col = first;
         let mut rest = flags;
         while !rest.is_empty() {
-            let (now, later) = rest.split_at(rest.len().min(STRIDE - col % STRIDE));
-            let bits =
-                now.iter().rev().fold(0u64, |bits, &flag| bits << 1 | u64::from(flag)) << (col % STRIDE);
-            let mask = (u64::MAX >> (64 - now.len())) << (col % STRIDE);
-            let here = (col / STRIDE + 1) * self.num_rows + row;
+            let (here, shift) = self.locate(row, col);
+            let (now, later) = rest.split_at(rest.len().min(STRIDE - shift as usize));
+            let bits = now.iter().rev().fold(0u64, |bits, &flag| bits << 1 | u64::from(flag)) << shift;
+            let mask = (u64::MAX >> (64 - now.len())) << shift;
             replace(self.words[here].get_mut(), mask, bits);
             replace(self.words[here - self.num_rows].get_mut(), mask << STRIDE, bits << STRIDE);
             col += now.len();

@@ -15,7 +15,7 @@ use std::arch::x86_64::{
 use std::ops::Range;
 use std::sync::atomic::AtomicU64;
 
-use super::layout::Layout;
+use super::avx512_layout::Layout;
 use super::sights::{GROUP, Sights};
 use super::{MOST_WORDS, Scene};
 use crate::grid::MOST_ROWS;

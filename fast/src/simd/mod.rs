@@ -12,10 +12,10 @@ mod avx2_windows;
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512;
 #[cfg(target_arch = "x86_64")]
+mod avx512_layout;
+#[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512_windows;
-#[cfg(target_arch = "x86_64")]
-mod layout;
 mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod sights;
@@ -126,15 +126,18 @@ impl Scene<'_> {
         2 * self.radius + 1
     }
 
-    /// The index of the goal, or of the rim towards it, within a window.
+    /// The index of the goal, or of the rim towards it, within a window of a side.
     ///
     /// Rule: observe/default/goal
-    #[inline]
-    pub fn goal_index(&self, agent: usize) -> usize {
-        let (cell, goal, radius) = (self.cells[agent], self.goals[agent], self.radius as i32);
-        let down = (i32::from(goal.row) - i32::from(cell.row)).clamp(-radius, radius) + radius;
-        let right = (i32::from(goal.col) - i32::from(cell.col)).clamp(-radius, radius) + radius;
-        down as usize * self.side() + right as usize
+    #[allow(clippy::inline_always, reason = "so that each path compiles it with its own features")]
+    #[inline(always)]
+    pub fn goal_index(cell: Cell, goal: Cell, side: usize) -> usize {
+        let radius = side as u16 / 2;
+        // Without a sign, since places differ by more than one of 16 bits can say.
+        let toward = |cell: u16, goal: u16| {
+            radius + goal.saturating_sub(cell).min(radius) - cell.saturating_sub(goal).min(radius)
+        };
+        usize::from(toward(cell.row, goal.row)) * side + usize::from(toward(cell.col, goal.col))
     }
 }
 

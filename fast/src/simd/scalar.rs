@@ -30,7 +30,7 @@ pub fn pack(
             write_window(scene.occupied, row, col, side, &mut writer);
         }
         if channels == Channels::All {
-            writer.push_one_of(scene.goal_index(agent), side * side);
+            writer.push_one_of(Scene::goal_index(cell, scene.goals[agent], side), side * side);
         }
         if apart {
             writer.end_word();

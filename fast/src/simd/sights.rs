@@ -5,7 +5,6 @@ use std::ops::Range;
 use pogema_core::Cell;
 
 use super::Scene;
-use crate::grid::STRIDE;
 
 /// Agents whose sights are found at a time.
 pub const GROUP: usize = 16;
@@ -21,24 +20,15 @@ pub struct Sights {
 }
 
 impl Sights {
-    /// Rule: observe/default/goal
     #[allow(clippy::inline_always, reason = "so that each path compiles it with its own features")]
     #[inline(always)]
     pub fn of<const SIDE: usize>(scene: &Scene<'_>, agents: Range<usize>) -> Self {
         let (cells, goals) = (group(&scene.cells[agents.clone()]), group(&scene.goals[agents]));
-        let num_rows = scene.obstacles.num_rows() as u32;
-        let radius = SIDE as u16 / 2;
-        // Without a sign, since places differ by more than one of 16 bits can say.
-        let toward = |cell: u16, goal: u16| {
-            radius + goal.saturating_sub(cell).min(radius) - cell.saturating_sub(goal).min(radius)
-        };
         let mut sights = Self { first: [0; GROUP], shift: [0; GROUP], goal: [0; GROUP] };
-        for index in 0..GROUP {
-            let (cell, goal) = (cells[index], goals[index]);
-            sights.first[index] = (u32::from(cell.col) / STRIDE as u32 + 1) * num_rows + u32::from(cell.row);
-            sights.shift[index] = u32::from(cell.col) % STRIDE as u32;
-            let (down, right) = (toward(cell.row, goal.row), toward(cell.col, goal.col));
-            sights.goal[index] = 2 * (SIDE * SIDE) as u32 + u32::from(down) * SIDE as u32 + u32::from(right);
+        for (index, (&cell, &goal)) in cells.iter().zip(&goals).enumerate() {
+            let (first, shift) = scene.obstacles.locate(usize::from(cell.row), usize::from(cell.col));
+            (sights.first[index], sights.shift[index]) = (first as u32, shift);
+            sights.goal[index] = (2 * SIDE * SIDE + Scene::goal_index(cell, goal, SIDE)) as u32;
         }
         sights
     }

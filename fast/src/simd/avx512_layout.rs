@@ -32,7 +32,7 @@ impl Layout {
 
     pub const fn of(side: usize) -> Self {
         let none = Term { lane: [0; LANES], turn: [0; LANES], mask: [0; LANES] };
-        let mut table = Self {
+        let mut layout = Self {
             first_rows: [0; 4 * LANES],
             last_rows: [0; 4 * LANES],
             is_wanted: [0; 4 * LANES],
@@ -43,15 +43,15 @@ impl Layout {
         // Plain loops, since a constant knows no iterators.
         let mut word = 0;
         while word < 4 * LANES {
-            table.place_row(side, word);
+            layout.place_row(side, word);
             word += 1;
         }
         let mut word = 0;
         while word < LANES {
-            table.place_parts(side, word);
+            layout.place_parts(side, word);
             word += 1;
         }
-        table
+        layout
     }
 
     const fn place_row(&mut self, side: usize, word: usize) {
