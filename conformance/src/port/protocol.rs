@@ -1,0 +1,273 @@
+//! `pogema-conform/1`: what is asked of a port and what it answers, one JSON object a line.
+//!
+//! docs/PORTING.md explains it to those who write ports.
+
+use pogema_core::{Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::request::{Derived, Registered};
+
+/// The protocol that this version speaks.
+pub const PROTOCOL: &str = "pogema-conform/1";
+
+/// One question to a port.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub enum Ask {
+    /// Who are you, and what do you claim? Always the first.
+    Hello {
+        /// The protocol that the runner speaks.
+        protocol: String,
+    },
+    /// Begin an episode.
+    Reset(Box<Beginning>),
+    /// Play one step.
+    Step {
+        /// One number for each agent.
+        actions: Vec<i64>,
+    },
+    /// Play one step with actions of your own choice.
+    Act {
+        /// Who chooses.
+        policy: Policy,
+    },
+    /// What do the agents see? Asked where an answer left it out.
+    Observe,
+    /// What are the figures of the episode? Asked where an answer left them out.
+    Metrics,
+    /// Take the last step back.
+    Back,
+    /// What have you kept of the episode?
+    History,
+    /// The end; no answer is awaited.
+    Bye,
+}
+
+/// What an episode begins from: an instance, a config, or the environment that is there already.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Beginning {
+    /// Everything but the actions, as in the first line of a trace.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instance: Option<TraceHeader>,
+    /// POGEMA's config fields, for a new environment that draws everything itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub config: Option<Value>,
+    /// A map to register under a name before the config is read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub register: Option<Registered>,
+    /// The seed handed to `reset`, which POGEMA 1.4.0 ignores.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Figures that are only measured when asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub measure: Vec<String>,
+}
+
+/// POGEMA's own policies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Policy {
+    /// Its A* policy. Rule: policy/astar
+    Astar,
+    /// What `sample_actions` draws. Rule: seed/actions
+    Sample,
+}
+
+/// A port's answer to [`Ask::Hello`]: who it is and what it claims. What is not claimed is not asked.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// Must be [`PROTOCOL`].
+    pub protocol: String,
+    /// The port's name.
+    pub name: String,
+    /// The port's version.
+    #[serde(default)]
+    pub version: String,
+    /// The named sets of rules that it claims.
+    pub profiles: Vec<Profile>,
+    /// How it can resolve conflicts.
+    pub collision: Vec<Collision>,
+    /// What reaching a goal can do.
+    pub on_goal: Vec<OnGoal>,
+    /// What its agents can see; needed for the profile `observations`.
+    #[serde(default)]
+    pub observation: Vec<Observation>,
+    /// What its occupancy grid can show.
+    #[serde(default = "as_released")]
+    pub occupancy: Vec<Occupancy>,
+    /// Who can be rewarded.
+    #[serde(default = "own")]
+    pub reward: Vec<Reward>,
+    /// Whether an instance may have noise beyond the wall.
+    #[serde(default)]
+    pub noise: bool,
+    /// The figures it measures; needed for the profile `metrics`.
+    #[serde(default)]
+    pub metrics: Vec<String>,
+    /// The further keys that its answers hold.
+    #[serde(default)]
+    pub tells: Vec<Told>,
+    /// The most agents it can play with.
+    #[serde(default = "any_number")]
+    pub max_agents: usize,
+    /// The longest side of a map it can play on.
+    #[serde(default = "any_number")]
+    pub max_side: usize,
+    /// The largest radius.
+    #[serde(default = "any_number")]
+    pub max_radius: usize,
+}
+
+fn as_released() -> Vec<Occupancy> {
+    vec![Occupancy::AsReleased]
+}
+
+fn own() -> Vec<Reward> {
+    vec![Reward::Own]
+}
+
+fn any_number() -> usize {
+    usize::MAX
+}
+
+/// A named set of rules that a port claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Profile {
+    /// Who moves, which goals come next, what is rewarded, when it ends.
+    Core,
+    /// What agents see.
+    Observations,
+    /// The figures of an episode.
+    Metrics,
+    /// Maps, starts and goals drawn from a config and its seed.
+    Seeding,
+    /// Steps taken back, and the list of changes.
+    History,
+    /// POGEMA's own policies.
+    Policies,
+}
+
+/// A key of an answer that not every port can give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Told {
+    /// Who is on the goal, before goals change. Rule: goal/finish
+    OnGoal,
+    /// The cells that the occupancy grid marks. Rule: occupancy/as-released
+    Occupied,
+    /// The map with its border. Rule: border/ring
+    Padded,
+    /// The fields that the config derives. Rule: config/size
+    Derived,
+    /// The goals foretold for each agent. Rule: goal/restart/foretold
+    Foretold,
+    /// The caller's list of actions after the step. Rule: collide/soft/rewrite
+    ActionsAfter,
+}
+
+/// A port's answer to anything else; which keys it needs depends on the question and on what the port claims.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "each is the key of its name, explained in docs/PORTING.md")]
+pub struct Reply {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<Vec<ToldCell>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goals: Option<Vec<ToldCell>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub active: Option<Vec<bool>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_goal: Option<Vec<bool>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub occupied: Option<Vec<ToldCell>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rewards: Option<Vec<f32>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub terminated: Option<Vec<bool>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truncated: Option<Vec<bool>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub observations: Option<ToldObservations>,
+    /// `null` is an answer: there are no figures yet.
+    #[serde(with = "given", skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<Option<Metrics>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub actions: Option<Vec<i64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub actions_after: Option<Vec<i64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub padded: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derived: Option<Derived>,
+    #[serde(with = "given", skip_serializing_if = "Option::is_none")]
+    pub foretold: Option<Option<Vec<Vec<Cell>>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moved: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full: Option<Vec<Vec<Change>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes: Option<Vec<Vec<Change>>>,
+}
+
+/// A row and a column, which a wrong port may count off the map.
+pub type ToldCell = [i64; 2];
+
+/// What all agents see: a list of windows for `default`, an object of lists for `POMAPF` and `MAPF`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ToldObservations {
+    /// `default`: for each agent a window over `[3, side, side]`.
+    Default(Vec<ToldWindow>),
+    /// `POMAPF` and `MAPF`.
+    Arrays(Box<ToldArrays>),
+}
+
+/// The arrays of `POMAPF`, and of `MAPF` with its three more.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "each is the array of its name")]
+pub struct ToldArrays {
+    pub obstacles: Vec<ToldWindow>,
+    pub agents: Vec<ToldWindow>,
+    pub xy: Vec<[i32; 2]>,
+    pub target_xy: Vec<[i32; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub global_obstacles: Option<Vec<String>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub global_xy: Option<Vec<[i32; 2]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub global_target_xy: Option<Vec<[i32; 2]>>,
+}
+
+/// One agent's window: a text of packed bits or a hash, or numbers nested to any depth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ToldWindow {
+    /// Hexadecimal digits as in a trace, or `sha256:…`, or `fnv1a64:…`.
+    Text(String),
+    /// The values themselves.
+    Values(Vec<Value>),
+}
+
+/// A key that is there, with `null` for nothing, against one that is not there.
+mod given {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<T: Serialize, S: Serializer>(
+        value: &Option<Option<T>>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.as_ref().and_then(Option::as_ref).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Option<T>>, D::Error> {
+        Option::deserialize(deserializer).map(Some)
+    }
+}
