@@ -3,6 +3,7 @@
 mod bench;
 mod conform;
 mod output;
+mod port;
 mod run;
 
 use std::process::ExitCode;
@@ -24,6 +25,8 @@ enum Command {
     Run(run::Run),
     /// Check that all engines follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
+    /// Answer the questions of `conform --port` on standard input, as a port of our own
+    Port(port::Port),
     /// Measure the speed of this machine, and of POGEMA 1.4.0 beside it
     Bench(bench::Bench),
 }
@@ -40,6 +43,7 @@ fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
+        Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
         Command::Bench(bench) => bench.run(),
     };
     result.unwrap_or_else(|error| {

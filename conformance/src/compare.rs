@@ -2,11 +2,12 @@
 
 use std::fmt::{Debug, Write as _};
 
-use pogema_core::{Map, Observed, Snapshot, picture};
+use pogema_core::{Map, Metrics, Observed, Snapshot, picture};
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
-use crate::request::{Back, History, Record, Request, ResetRecord, Response, StepRecord};
+use crate::port::{Scope, Told, resolve_hashes};
+use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord};
 use crate::tally::{Families, Tally, families_of};
 
 /// Two answers differ: where, in what, and which rule that breaks.
@@ -42,12 +43,24 @@ pub fn compare(
     got: &Response,
     tally: &mut Tally,
 ) -> Option<Divergence> {
+    compare_in(&Scope::ALL, request, expected, got, tally)
+}
+
+/// The same, for an answer that does not hold everything.
+pub fn compare_in(
+    scope: &Scope,
+    request: &Request,
+    expected: &Response,
+    got: &Response,
+    tally: &mut Tally,
+) -> Option<Divergence> {
     let Ok(config) = GridConfig::from_value(&request.config) else {
         let holds = expected.error.is_some() == got.error.is_some();
         tally.count("config/fields", holds);
-        return (!holds).then(|| ends_differently(0, expected, got));
+        return (!holds).then(|| ends_differently("config/fields", 0, expected, got));
     };
-    let mut comparison = Comparison { families: families_of(&config), tally, found: None };
+    let side = config.rules().side();
+    let mut comparison = Comparison { scope, side, families: families_of(&config), tally, found: None };
     let pairs = expected.records.iter().zip(&got.records);
     for (op, (expected_record, got_record)) in pairs.enumerate() {
         comparison.records(expected_record, got_record);
@@ -58,26 +71,43 @@ pub fn compare(
     let op = expected.records.len().min(got.records.len());
     let holds =
         expected.records.len() == got.records.len() && expected.error.is_some() == got.error.is_some();
-    comparison.tally.count("config/fields", holds);
-    (!holds).then(|| ends_differently(op, expected, got))
+    let rule = refusal_rule(request.ops.get(op), expected.error.is_some());
+    comparison.tally.count(rule, holds);
+    (!holds).then(|| ends_differently(rule, op, expected, got))
 }
 
-fn ends_differently(op: usize, expected: &Response, got: &Response) -> Divergence {
-    let tell = |response: &Response| match &response.error {
-        Some(error) => format!("{}: {}", error.kind, error.message),
-        None => "no error".into(),
+/// The rule that says whether an operation is to be refused.
+fn refusal_rule(op: Option<&Op>, is_refused: bool) -> &'static str {
+    match op {
+        Some(Op::Step(_)) if is_refused => "move/invalid",
+        Some(Op::Step(_)) => "move/actions",
+        Some(Op::Astar) => "policy/astar",
+        Some(Op::Sample) => "seed/actions",
+        Some(Op::Back) => "history/step-back",
+        Some(Op::History) => "history/changes",
+        Some(Op::Reset(_)) | None => "config/fields",
+    }
+}
+
+fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) -> Divergence {
+    let tell = |response: &Response| match (&response.error, response.records.get(op)) {
+        (_, Some(Record::Odd(odd))) => odd.to_string(),
+        (Some(error), _) => format!("{}: {}", error.kind, error.message),
+        (None, _) => "no error".into(),
     };
     Divergence {
         op,
         field: "error".into(),
         expected: tell(expected),
         got: tell(got),
-        rule: "config/fields".into(),
+        rule: rule.into(),
         picture: String::new(),
     }
 }
 
 struct Comparison<'a> {
+    scope: &'a Scope,
+    side: usize,
     families: Families,
     tally: &'a mut Tally,
     found: Option<Divergence>,
@@ -98,15 +128,26 @@ impl Comparison<'_> {
 
     fn resets(&mut self, expected: &ResetRecord, got: &ResetRecord) {
         let place = self.families.place;
-        self.value("config/size", "derived", &expected.derived, &got.derived);
-        self.list("place/obstacles", "map", &expected.map, &got.map);
-        self.list("border/ring", "padded", &expected.padded.rows, &got.padded.rows);
-        self.value("border/outside", "padded dtype", &expected.padded.dtype, &got.padded.dtype);
+        if self.scope.drawn {
+            if self.scope.tells(Told::Derived) {
+                self.value("config/size", "derived", &expected.derived, &got.derived);
+            }
+            self.list("place/obstacles", "map", &expected.map, &got.map);
+        }
+        if self.scope.tells(Told::Padded) {
+            self.list("border/ring", "padded", &expected.padded.rows, &got.padded.rows);
+        }
+        if self.scope.is_whole() {
+            self.value("border/outside", "padded dtype", &expected.padded.dtype, &got.padded.dtype);
+        }
         self.list(place, "start", &expected.state.cells, &got.state.cells);
         self.list(place, "goal", &expected.state.goals, &got.state.goals);
         self.state("goal/finish/start-on-goal", &expected.state, &got.state);
-        self.observations(&expected.observations, &got.observations);
-        if let (Some(expected), Some(got)) = (&expected.goal_lists, &got.goal_lists) {
+        self.seen(expected.observations.as_ref(), got.observations.as_ref());
+        if self.scope.drawn
+            && self.scope.tells(Told::Foretold)
+            && let (Some(expected), Some(got)) = (&expected.goal_lists, &got.goal_lists)
+        {
             self.list("goal/restart/foretold", "foretold goals", expected, got);
         }
     }
@@ -120,15 +161,27 @@ impl Comparison<'_> {
         self.list("reward/own", "reward", &one.rewards, &other.rewards);
         self.list("end/terminated", "terminated", &one.terminated, &other.terminated);
         self.list("end/truncated", "truncated", &one.truncated, &other.truncated);
-        self.list("goal/finish/leave", "is_active", &expected.infos_active, &got.infos_active);
-        match (&one.observations, &other.observations) {
-            (Some(one), Some(other)) => self.observations(one, other),
-            (one, other) => self.value(families.observe, "observations", one, other),
+        if self.scope.is_whole() {
+            self.list("goal/finish/leave", "is_active", &expected.infos_active, &got.infos_active);
         }
-        self.value(families.metrics, "metrics", &one.metrics, &other.metrics);
-        if families.collide == "collide/soft" {
+        self.seen(one.observations.as_ref(), other.observations.as_ref());
+        self.figures(one.metrics.as_ref(), other.metrics.as_ref());
+        if families.collide == "collide/soft" && self.scope.tells(Told::ActionsAfter) {
             self.list("collide/soft/rewrite", "caller's action", &expected.actions_after, &got.actions_after);
         }
+    }
+
+    fn figures(&mut self, expected: Option<&Metrics>, got: Option<&Metrics>) {
+        let rule = self.families.metrics;
+        let Some(names) = &self.scope.metrics else { return self.value(rule, "metrics", &expected, &got) };
+        if names.is_empty() {
+            return;
+        }
+        let claimed = |metrics: Option<&Metrics>| -> Vec<(&str, f64)> {
+            let all = metrics.map(Metrics::named).unwrap_or_default();
+            all.into_iter().filter(|(name, _)| names.iter().any(|known| known == name)).collect()
+        };
+        self.value(rule, "metrics", &claimed(expected), &claimed(got));
     }
 
     fn backs(&mut self, expected: &Back, got: &Back) {
@@ -145,9 +198,26 @@ impl Comparison<'_> {
     }
 
     fn state(&mut self, goal_rule: &str, expected: &Snapshot, got: &Snapshot) {
-        self.list(goal_rule, "on goal", &expected.on_goal, &got.on_goal);
+        if self.scope.tells(Told::OnGoal) {
+            self.list(goal_rule, "on goal", &expected.on_goal, &got.on_goal);
+        }
         self.list(goal_rule, "active", &expected.active, &got.active);
-        self.value(self.families.occupancy, "occupied cells", &expected.occupied, &got.occupied);
+        if self.scope.tells(Told::Occupied) {
+            self.value(self.families.occupancy, "occupied cells", &expected.occupied, &got.occupied);
+        }
+    }
+
+    fn seen(&mut self, expected: Option<&Observed>, got: Option<&Observed>) {
+        match (expected, got) {
+            _ if !self.scope.observations => {}
+            (Some(expected), Some(got)) if self.scope.is_whole() => self.observations(expected, got),
+            (Some(expected), Some(got)) => {
+                let mut got = got.clone();
+                resolve_hashes(expected, &mut got, self.side);
+                self.observations(expected, &got);
+            }
+            (expected, got) => self.value(self.families.observe, "observations", &expected, &got),
+        }
     }
 
     fn observations(&mut self, expected: &Observed, got: &Observed) {
@@ -177,8 +247,12 @@ impl Comparison<'_> {
     fn windows(&mut self, rule: &str, what: &str, expected: &[String], got: &[String]) {
         let differing = expected.iter().zip(got).position(|(one, other)| one != other);
         let Some(agent) = differing else { return self.list(rule, what, expected, got) };
-        let bit = first_differing_bit(&expected[agent], &got[agent]);
-        let field = format!("{what} of agent {agent}, value {bit} row by row");
+        // Of a hash that differs nothing else can be said.
+        let place = match got[agent].contains(':') {
+            true => String::new(),
+            false => format!(", value {} row by row", first_differing_bit(&expected[agent], &got[agent])),
+        };
+        let field = format!("{what} of agent {agent}{place}");
         self.value(rule, &field, &expected[agent], &got[agent]);
     }
 

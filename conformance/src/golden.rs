@@ -48,6 +48,16 @@ pub fn files(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, Error> {
     Ok(found)
 }
 
+/// The recordings of a folder.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be read.
+pub fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut found = files(folder, ".jsonl")?;
+    found.extend(files(folder, ".jsonl.zst")?);
+    Ok(found)
+}
+
 /// Reads the recordings of one file, compressed if its name ends in `.zst`.
 ///
 /// # Errors

@@ -12,6 +12,7 @@
 //! | [`compare`], [`Divergence`] | the first difference, and its rule |
 //! | [`draw_request`], [`Script`] | random configs and crowded episodes |
 //! | [`Events`] | how often the interesting things happened |
+//! | [`port`] | anyone's implementation, asked over a pipe |
 //! | [`cases`], [`golden`] | what is kept on disk |
 //! | [`Tally`] | what was checked, rule by rule |
 
@@ -27,13 +28,14 @@ mod literal;
 mod oracle;
 mod play;
 mod policies;
+pub mod port;
 mod request;
 mod runner;
 mod script;
 mod tally;
 mod windows;
 
-pub use compare::{Divergence, compare};
+pub use compare::{Divergence, compare, compare_in};
 pub use draw::draw_request;
 pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};

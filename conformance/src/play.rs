@@ -2,8 +2,8 @@
 
 use pogema_core::{
     Action, Change, CollisionMeter, Config, DensityMeter, Environment, EpisodeMeter, Error, Instance,
-    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Padded, Snapshot, StepOut,
-    TraceStep, changes, states_at_every_step,
+    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Outside, Padded, Snapshot,
+    StepOut, TraceStep, changes, states_at_every_step,
 };
 use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
@@ -68,10 +68,25 @@ fn failure(when: When, error: &Error) -> Failure {
     Failure { when, kind: "Error".into(), message: error.to_string() }
 }
 
+/// Where the instances of the episodes come from.
+enum Source {
+    Drawn(Box<InstanceSource>),
+    Given(Box<Instance>),
+}
+
+impl Source {
+    fn next(&mut self) -> Result<(Instance, Vec<String>), Error> {
+        match self {
+            Self::Drawn(source) => source.generate().map(|drawn| (drawn.instance, drawn.warnings)),
+            Self::Given(instance) => Ok((instance.as_ref().clone(), Vec::new())),
+        }
+    }
+}
+
 /// One request at work.
 pub(crate) struct Player {
     pub(crate) config: GridConfig,
-    source: InstanceSource,
+    source: Source,
     pub(crate) environment: Box<dyn Environment>,
     pub(crate) instance: Option<Instance>,
     warnings: Vec<String>,
@@ -89,21 +104,54 @@ impl Player {
         let config = GridConfig::from_value(&request.config)?;
         let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
         let registered = named.map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
+        let source = Source::Drawn(Box::new(InstanceSource::new(config.clone(), registered)?));
+        let mut player = Self::with_source(engine, config, source)?;
+        player.density = request.density.then(DensityMeter::default);
+        player.collisions = request.collisions.then(CollisionMeter::default);
+        Ok(player)
+    }
+
+    /// A player of one instance, whose episodes all begin alike.
+    pub(crate) fn of_instance(engine: Engine, rules: &Config, instance: Instance) -> Result<Self, Error> {
+        let config = GridConfig {
+            num_agents: rules.num_agents,
+            obs_radius: rules.radius,
+            max_episode_steps: rules.max_steps,
+            collision_system: rules.collision,
+            on_target: rules.on_goal,
+            observation_type: rules.observation,
+            occupancy: rules.occupancy,
+            reward: rules.reward,
+            persistent: rules.persistent,
+            empty_outside: matches!(instance.outside(), Outside::Free),
+            ..GridConfig::default()
+        };
+        Self::with_source(engine, config, Source::Given(Box::new(instance)))
+    }
+
+    fn with_source(engine: Engine, config: GridConfig, source: Source) -> Result<Self, Error> {
         let rules = config.rules();
         Ok(Self {
-            source: InstanceSource::new(config.clone(), registered)?,
+            source,
             environment: (engine.make)(rules)?,
             instance: None,
             warnings: Vec::new(),
             meter: EpisodeMeter::new(&rules),
-            density: request.density.then(DensityMeter::default),
-            collisions: request.collisions.then(CollisionMeter::default),
+            density: None,
+            collisions: None,
             past: Vec::new(),
             team: pogema_team(),
             sampler: Generator::seeded(config.seed.unwrap_or(0)),
             config,
             padded: None,
         })
+    }
+
+    /// Measures what is only measured on request.
+    pub(crate) fn measure(&mut self, figures: &[String]) {
+        let wants = |name: &str| figures.iter().any(|figure| figure == name);
+        self.density = wants("avg_agents_density").then(DensityMeter::default);
+        self.collisions = (wants("a_collisions") || wants("o_collisions")).then(CollisionMeter::default);
     }
 
     pub(crate) fn perform(&mut self, op: &Op) -> Result<Record, Error> {
@@ -135,13 +183,14 @@ impl Player {
     }
 
     fn reset(&mut self) -> Result<ResetRecord, Error> {
-        let generated = self.source.generate()?;
-        self.warnings.extend(generated.warnings);
-        self.environment.reset(&generated.instance)?;
+        let (instance, warnings) = self.source.next()?;
+        self.warnings.extend(warnings);
+        self.environment.reset(&instance)?;
         self.meter.reset();
         self.team.reset();
         self.past = vec![self.environment.snapshot()];
-        self.padded = Some(self.padded(&generated.instance)?);
+        let padded = self.padded(&instance)?;
+        self.padded = Some(padded.clone());
         let observations = self.observed(true)?;
         if let Some(density) = &mut self.density {
             density.reset();
@@ -150,7 +199,7 @@ impl Player {
         self.feed_density()?;
         let may_foretell =
             self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MOST_FORETOLD_STEPS;
-        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, &generated.instance)).flatten();
+        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, &instance)).flatten();
         let record = ResetRecord {
             derived: Derived {
                 width: self.config.width,
@@ -159,14 +208,14 @@ impl Player {
                 density: self.config.density,
                 num_agents: self.config.num_agents,
             },
-            map: generated.instance.map().rows(),
-            padded: self.padded(&generated.instance)?,
+            map: instance.map().rows(),
+            padded,
             state: self.state(),
-            observations,
+            observations: Some(observations),
             goal_lists,
             goal_lists_error: None,
         };
-        self.instance = Some(generated.instance);
+        self.instance = Some(instance);
         Ok(record)
     }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// A config and what to do with an environment of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Request {
     /// Comes back in the response.
     #[serde(default)]
@@ -119,7 +119,8 @@ pub struct ResetRecord {
     #[serde(flatten)]
     pub state: Snapshot,
     /// What agents see.
-    pub observations: Observed,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observations: Option<Observed>,
     /// In lifelong mode, the goals foretold for each agent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_lists: Option<Vec<Vec<Cell>>>,

@@ -118,7 +118,7 @@ impl Report {
     /// If a file cannot be read.
     pub fn check_recordings(&mut self, part: &str, folder: &Path, engine: Engine) -> Result<(), Error> {
         let mut results = Vec::new();
-        for path in recording_files(folder)? {
+        for path in golden::recording_files(folder)? {
             for (index, recording) in golden::read(&path)?.iter().enumerate() {
                 let name = format!("{} line {}", path.display(), index + 1);
                 let got = play_on(engine, &recording.request);
@@ -163,6 +163,7 @@ impl Report {
     ) -> Result<(), Error> {
         let Some((&first, others)) = engines.split_first() else { return Ok(()) };
         let results = on_workers(
+            None,
             num_cases,
             || Ok(()),
             |(), case| {
@@ -202,6 +203,7 @@ impl Report {
         progress: Progress<'_>,
     ) -> Result<(), Error> {
         let results = on_workers(
+            None,
             num_cases,
             || Oracle::start(python),
             |oracle, case| {
@@ -258,12 +260,6 @@ impl Report {
     }
 }
 
-fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut files = golden::files(folder, ".jsonl")?;
-    files.extend(golden::files(folder, ".jsonl.zst")?);
-    Ok(files)
-}
-
 fn check(part: &str, name: &str, request: &Request, expected: &Response, got: &Response) -> Checked {
     let mut checked = Checked::default();
     checked.events.watch(expected);
@@ -295,13 +291,15 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
     }
 }
 
-/// Runs cases on as many workers as there are processors; the results come in the order of the cases.
-fn on_workers<W, T: Send>(
+/// Runs cases on some workers, or as many as there are processors; the results come in the order of the cases.
+pub(crate) fn on_workers<W, T: Send>(
+    num_workers: Option<usize>,
     num_cases: u64,
     make_worker: impl Fn() -> Result<W, Error> + Sync,
     run: impl Fn(&mut W, u64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    let num_workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let num_workers =
+        num_workers.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let next = AtomicU64::new(0);
     let work = || -> Result<Vec<(u64, T)>, Error> {
         let mut worker = make_worker()?;

@@ -64,11 +64,25 @@ pub(crate) fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
 
 /// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
 pub(crate) fn pack(window: &[f32]) -> String {
-    let byte = |cells: &[f32]| {
-        cells.iter().enumerate().fold(0u8, |byte, (at, &value)| byte | (u8::from(value != 0.0) << (7 - at)))
-    };
-    window.chunks(8).fold(String::new(), |mut text, cells| {
+    let bits: Vec<bool> = window.iter().map(|&value| value != 0.0).collect();
+    pack_bits(&bits)
+}
+
+/// The same of flags.
+pub(crate) fn pack_bits(bits: &[bool]) -> String {
+    let byte =
+        |cells: &[bool]| cells.iter().enumerate().fold(0u8, |byte, (at, &bit)| byte | (u8::from(bit) << (7 - at)));
+    bits.chunks(8).fold(String::new(), |mut text, cells| {
         let _ = write!(text, "{:02x}", byte(cells));
         text
     })
+}
+
+/// What [`pack`] packed, and the zeros that filled the last byte.
+pub(crate) fn unpack(window: &str) -> Vec<bool> {
+    let digit = |character: char| character.to_digit(16).unwrap_or(0);
+    window
+        .chars()
+        .flat_map(|character| (0..4).rev().map(move |bit| digit(character) >> bit & 1 == 1))
+        .collect()
 }

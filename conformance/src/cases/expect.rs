@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::request::{Record, ResetRecord, StepRecord};
+use crate::windows::unpack;
 
 /// What holds after one operation. Pictures may end in blank lines.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -115,7 +116,7 @@ impl Expect {
             .or_else(|| differ("padded_dtype", self.padded_dtype.as_ref(), &reset.padded.dtype))
             .or_else(|| self.of_derived(reset))
             .or_else(|| differ("foretold", self.foretold.as_ref(), reset.goal_lists.as_ref()?))
-            .or_else(|| self.of_observations(&reset.observations))
+            .or_else(|| self.of_observations(reset.observations.as_ref()?))
     }
 
     fn of_derived(&self, reset: &ResetRecord) -> Option<String> {
@@ -188,14 +189,6 @@ impl Sees {
 fn area_of(num_flags: usize) -> Option<usize> {
     let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
     areas.last().filter(|area| num_flags < 3 * area + 8)
-}
-
-fn unpack(window: &str) -> Vec<bool> {
-    let digit = |character: char| character.to_digit(16).unwrap_or(0);
-    window
-        .chars()
-        .flat_map(|character| (0..4).rev().map(move |bit| digit(character) >> bit & 1 == 1))
-        .collect()
 }
 
 fn differ<T: PartialEq + std::fmt::Debug>(what: &str, expected: Option<&T>, got: &T) -> Option<String> {

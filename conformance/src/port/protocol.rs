@@ -191,7 +191,7 @@ pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truncated: Option<Vec<bool>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub observations: Option<ToldObservations>,
+    pub observations: Option<Value>,
     /// `null` is an answer: there are no figures yet.
     #[serde(with = "given", skip_serializing_if = "Option::is_none")]
     pub metrics: Option<Option<Metrics>>,
@@ -217,42 +217,6 @@ pub struct Reply {
 
 /// A row and a column, which a wrong port may count off the map.
 pub type ToldCell = [i64; 2];
-
-/// What all agents see: a list of windows for `default`, an object of lists for `POMAPF` and `MAPF`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum ToldObservations {
-    /// `default`: for each agent a window over `[3, side, side]`.
-    Default(Vec<ToldWindow>),
-    /// `POMAPF` and `MAPF`.
-    Arrays(Box<ToldArrays>),
-}
-
-/// The arrays of `POMAPF`, and of `MAPF` with its three more.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "each is the array of its name")]
-pub struct ToldArrays {
-    pub obstacles: Vec<ToldWindow>,
-    pub agents: Vec<ToldWindow>,
-    pub xy: Vec<[i32; 2]>,
-    pub target_xy: Vec<[i32; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub global_obstacles: Option<Vec<String>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub global_xy: Option<Vec<[i32; 2]>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub global_target_xy: Option<Vec<[i32; 2]>>,
-}
-
-/// One agent's window: a text of packed bits or a hash, or numbers nested to any depth.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum ToldWindow {
-    /// Hexadecimal digits as in a trace, or `sha256:…`, or `fnv1a64:…`.
-    Text(String),
-    /// The values themselves.
-    Values(Vec<Value>),
-}
 
 /// A key that is there, with `null` for nothing, against one that is not there.
 mod given {

@@ -1,5 +1,8 @@
 //! `pogema conform`: every engine against everything there is to check.
 
+mod port_table;
+mod ports;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,12 +38,21 @@ pub struct Conform {
     /// Where cases that diverge are kept
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
+    #[command(flatten)]
+    ports: ports::Ports,
 }
 
-const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+/// The fast engine.
+pub const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
+        if self.ports.is_asked() {
+            let bar = self.bar("cases");
+            let shared =
+                ports::Shared { cases: self.cases, seed: self.seed, json: self.json.as_ref(), bar: &bar };
+            return self.ports.run(&shared);
+        }
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let engines = [Engine::REFERENCE, FAST, Engine::LITERAL];
         let mut report = Report::default();

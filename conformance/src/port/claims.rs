@@ -1,0 +1,268 @@
+//! What follows from what a port claims: which requests it can play, and which comparisons count.
+
+use pogema_core::{Observation, OnGoal};
+use pogema_maps::{GridConfig, Targets};
+use serde_json::json;
+
+use super::protocol::{Hello, Profile, Told};
+use crate::request::{Op, Record, Request, Response};
+use crate::tally::families_of;
+
+/// How a port is given an episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// As an instance, in which everything is drawn already.
+    Instance,
+    /// As a config, from which the port draws.
+    Config,
+}
+
+/// Something that a port does not claim, and the rules that therefore stay unchecked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unclaimed {
+    /// What is not claimed, in words.
+    pub what: String,
+    /// A rule, or the first parts of one.
+    pub rule: &'static str,
+}
+
+impl Unclaimed {
+    fn new(what: impl Into<String>, rule: &'static str) -> Self {
+        Self { what: what.into(), rule }
+    }
+
+    /// Whether a rule stays unchecked.
+    pub fn covers(&self, rule: &str) -> bool {
+        rule.strip_prefix(self.rule).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    }
+}
+
+/// Which comparisons count.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Scope {
+    /// Of what a config derives and draws.
+    pub drawn: bool,
+    /// Of observations.
+    pub observations: bool,
+    /// Of the figures of an episode: those of these names, or all.
+    pub metrics: Option<Vec<String>>,
+    /// Of the key of this name; all without a list.
+    tells: Option<Vec<Told>>,
+}
+
+impl Scope {
+    /// Everything.
+    pub const ALL: Self = Self { drawn: true, observations: true, metrics: None, tells: None };
+
+    /// What a port can be held to.
+    pub fn of(hello: &Hello, mode: Mode) -> Self {
+        let claims = |profile| hello.profiles.contains(&profile);
+        Self {
+            drawn: mode == Mode::Config,
+            observations: claims(Profile::Observations),
+            metrics: Some(if claims(Profile::Metrics) { hello.metrics.clone() } else { Vec::new() }),
+            tells: Some(hello.tells.clone()),
+        }
+    }
+
+    /// Whether a further key counts.
+    pub fn tells(&self, key: Told) -> bool {
+        self.tells.as_ref().is_none_or(|keys| keys.contains(&key))
+    }
+
+    /// Whether this is our own kind of answer, which holds everything.
+    pub fn is_whole(&self) -> bool {
+        self.tells.is_none()
+    }
+}
+
+/// The profile that a rule belongs to.
+pub fn profile_of(rule: &str) -> Profile {
+    const SEEDING: [&str; 5] =
+        ["border/noise", "goal/restart/draw", "goal/restart/foretold", "goal/restart/pool", "goal/restart/unreachable"];
+    let is_any = |rules: &[&'static str]| rules.iter().any(|prefix| Unclaimed::new("", prefix).covers(rule));
+    match rule.split('/').next().unwrap_or_default() {
+        _ if is_any(&SEEDING) => Profile::Seeding,
+        _ if rule == "seed/actions" => Profile::Policies,
+        _ if rule == "occupancy/exact" => Profile::Core,
+        "config" | "grid" | "place" | "seed" => Profile::Seeding,
+        "observe" | "border" | "occupancy" => Profile::Observations,
+        "metrics" => Profile::Metrics,
+        "history" => Profile::History,
+        "policy" => Profile::Policies,
+        _ => Profile::Core,
+    }
+}
+
+/// The request as a port can play it, and what had to be left out of it; or why it cannot play it at all.
+///
+/// # Errors
+/// With the first thing that the port does not claim and that cannot be left out.
+pub fn adapt(
+    hello: &Hello,
+    mode: Mode,
+    request: &Request,
+    expected: &Response,
+) -> Result<(Request, Vec<Unclaimed>), Unclaimed> {
+    let Ok(config) = GridConfig::from_value(&request.config) else {
+        return refused(hello).map(|()| (request.clone(), Vec::new()));
+    };
+    check_rules(hello, &config)?;
+    check_sizes(hello, &config, expected)?;
+    if mode == Mode::Instance && expected.records.is_empty() {
+        return refused(hello).map(|()| (request.clone(), Vec::new()));
+    }
+    let mut request = request.clone();
+    let left_out = leave_out(hello, mode, &config, &mut request, expected);
+    Ok((request, left_out))
+}
+
+/// A config that is to be refused leaves nothing to play as an instance.
+fn refused(hello: &Hello) -> Result<(), Unclaimed> {
+    if hello.profiles.contains(&Profile::Seeding) {
+        Ok(())
+    } else {
+        Err(Unclaimed::new("profile seeding", "config"))
+    }
+}
+
+fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
+    let rules = config.rules();
+    let families = families_of(config);
+    if !hello.collision.contains(&rules.collision) {
+        return Err(Unclaimed::new(format!("collision {}", word(&rules.collision)), families.collide));
+    }
+    if !hello.on_goal.contains(&rules.on_goal) {
+        return Err(Unclaimed::new(format!("on_goal {}", word(&rules.on_goal)), families.goal));
+    }
+    if !hello.occupancy.contains(&rules.occupancy) {
+        return Err(Unclaimed::new(format!("occupancy {}", word(&rules.occupancy)), families.occupancy));
+    }
+    if !hello.reward.contains(&rules.reward) {
+        return Err(Unclaimed::new(format!("reward {}", word(&rules.reward)), "reward/shared"));
+    }
+    Ok(())
+}
+
+fn word(value: &impl serde::Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+fn check_sizes(hello: &Hello, config: &GridConfig, expected: &Response) -> Result<(), Unclaimed> {
+    let map = expected.records.iter().find_map(|record| match record {
+        Record::Reset(reset) => Some(&reset.map),
+        _ => None,
+    });
+    let side = map.map_or(0, |rows| rows.len().max(rows.first().map_or(0, String::len)));
+    let sizes = [
+        ("max_agents", config.num_agents, hello.max_agents, "config/limits"),
+        ("max_side", side, hello.max_side, "config/limits"),
+        ("max_radius", config.obs_radius, hello.max_radius, "config/limits"),
+    ];
+    match sizes.into_iter().find(|(_, size, most, _)| size > most) {
+        Some((what, _, most, rule)) => Err(Unclaimed::new(format!("more than {what} {most}"), rule)),
+        None => Ok(()),
+    }
+}
+
+/// Takes out of a request what a port does not claim and what the rest can be played without.
+fn leave_out(
+    hello: &Hello,
+    mode: Mode,
+    config: &GridConfig,
+    request: &mut Request,
+    expected: &Response,
+) -> Vec<Unclaimed> {
+    let claims = |profile| hello.profiles.contains(&profile);
+    let mut left_out = Vec::new();
+    if !claims(Profile::Observations) {
+        left_out.push(Unclaimed::new("profile observations", families_of(config).observe));
+    } else if !hello.observation.contains(&config.observation_type) {
+        let what = format!("observation {}", word(&config.observation_type));
+        left_out.push(Unclaimed::new(what, families_of(config).observe));
+        let other = hello.observation.first().copied().unwrap_or(Observation::Default);
+        request.config["observation_type"] = json!(other);
+    }
+    if mode == Mode::Instance && !config.empty_outside && !hello.noise {
+        left_out.push(Unclaimed::new("noise", "border/noise"));
+        request.config["empty_outside"] = true.into();
+    }
+    if config.persistent && !claims(Profile::History) {
+        left_out.push(Unclaimed::new("profile history", "history"));
+        request.config["persistent"] = false.into();
+        request.ops.retain(|op| !matches!(op, Op::Back | Op::History));
+    }
+    let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
+    if mode == Mode::Instance && config.on_target == OnGoal::Restart && !has_sequences {
+        // A goal that is drawn anew after a step back depends on where the agent stands; no list can hold that.
+        request.ops.retain(|op| *op != Op::Back);
+    }
+    leave_out_figures(hello, config, request, &mut left_out);
+    if mode == Mode::Instance || !claims(Profile::Policies) {
+        let was_left_out = leave_out_policies(request, expected);
+        left_out.extend(was_left_out.filter(|_| !claims(Profile::Policies)));
+    }
+    left_out
+}
+
+fn leave_out_figures(hello: &Hello, config: &GridConfig, request: &mut Request, left_out: &mut Vec<Unclaimed>) {
+    if !hello.profiles.contains(&Profile::Metrics) {
+        left_out.push(Unclaimed::new("profile metrics", "metrics"));
+    }
+    let measures = |name: &str| hello.metrics.iter().any(|known| known == name);
+    if request.density && !measures("avg_agents_density") {
+        left_out.push(Unclaimed::new("metric avg_agents_density", "metrics/density"));
+        request.density = false;
+    }
+    if request.collisions && !(measures("a_collisions") && measures("o_collisions")) {
+        left_out.push(Unclaimed::new("metrics a_collisions and o_collisions", "metrics/collisions"));
+        request.collisions = false;
+    }
+    let names = match config.on_target {
+        OnGoal::Finish => &["ISR", "CSR", "ep_length"][..],
+        OnGoal::Nothing => &["ISR", "CSR", "ep_length", "SoC", "makespan"],
+        OnGoal::Restart => &["avg_throughput"],
+    };
+    if let Some(name) = names.iter().find(|name| !measures(name)) {
+        left_out.push(Unclaimed::new(format!("metric {name}"), families_of(config).metrics));
+    }
+}
+
+/// Puts the actions that a policy chooses in its place.
+fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Unclaimed> {
+    // Records and operations go together, one to one, up to the first error.
+    let kept = expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
+    let mut records = kept.map(Record::step);
+    let mut left_out = None;
+    for op in &mut request.ops {
+        if matches!(op, Op::Back | Op::History) {
+            continue;
+        }
+        let chosen = records.next().flatten();
+        let rule = match op {
+            Op::Astar => "policy",
+            Op::Sample => "seed/actions",
+            _ => continue,
+        };
+        let Some(step) = chosen else { continue };
+        left_out = Some(Unclaimed::new("profile policies", rule));
+        *op = Op::Step(step.step.actions.iter().map(|&action| action as i64).collect());
+    }
+    left_out
+}
+
+/// What a port would have to claim for a hand-written case of a rule to show anything.
+pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
+    let profile = profile_of(rule);
+    if !hello.profiles.contains(&profile) {
+        return Some(Unclaimed::new(format!("profile {}", word(&profile)), "config"));
+    }
+    let needed = [
+        (Told::ActionsAfter, "collide/soft/rewrite"),
+        (Told::Derived, "config/size"),
+        (Told::Foretold, "goal/restart/foretold"),
+    ];
+    let lacking = needed.into_iter().find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
+    lacking.map(|(key, of)| Unclaimed::new(format!("tells {}", word(&key)), of))
+}

@@ -1,0 +1,103 @@
+//! Differences by their cause, so that one bug is one line.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::claims::Mode;
+use super::link::Misbehaviour;
+use crate::compare::Divergence;
+use crate::request::Request;
+
+/// Something wrong with a port, however often it was seen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    /// The rule that is broken; none if the port broke the protocol.
+    pub rule: Option<String>,
+    /// What differs, without its index, or what was seen.
+    pub what: String,
+    /// How often it was seen.
+    pub times: u64,
+    /// The hand-written cases that show it, by rule.
+    pub cases: BTreeMap<String, u64>,
+    /// The smallest occasion.
+    pub example: Example,
+    /// Where the smallest counterexample was kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<PathBuf>,
+    /// The command that plays it again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replay: Option<String>,
+    /// Why it is known and borne for now.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<String>,
+}
+
+/// One occasion on which something was wrong.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Example {
+    /// The case, the line of a recording, or the number of a drawn case.
+    pub name: String,
+    /// Whether the port was given an instance or a config.
+    pub mode: Mode,
+    /// What was played.
+    pub request: Request,
+    /// The difference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub divergence: Option<Divergence>,
+    /// What the port did instead of answering.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fault: Option<Misbehaviour>,
+}
+
+impl Example {
+    fn key(&self) -> (Option<String>, String) {
+        match (&self.divergence, &self.fault) {
+            (Some(found), _) => (Some(found.rule.clone()), kind_of(&found.field)),
+            (None, Some(fault)) => (None, kind_of(&fault.what)),
+            (None, None) => (None, String::new()),
+        }
+    }
+
+    /// Whether another occasion has the same cause.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+
+    /// Small is easy to understand.
+    fn size(&self) -> (usize, usize) {
+        let written = |value: &serde_json::Value| value.to_string().len();
+        (self.divergence.as_ref().map_or(self.request.ops.len(), |found| found.op), written(&self.request.config))
+    }
+}
+
+/// A field or message without its numbers and quotes.
+fn kind_of(text: &str) -> String {
+    let head = text.split(['`', ':', ',']).next().unwrap_or(text);
+    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
+    let kind: Vec<&str> = words.collect();
+    kind.join(" ").trim_end_matches(" of agent").to_owned()
+}
+
+/// Adds an occasion to the causes; `case` is the rule of the hand-written case that it is.
+pub fn add(causes: &mut Vec<Cause>, example: Example, case: Option<&str>) {
+    let cause = match causes.iter().position(|cause| cause.example.is_like(&example)) {
+        Some(at) => &mut causes[at],
+        None => {
+            let (rule, what) = example.key();
+            let example = example.clone();
+            let cases = BTreeMap::new();
+            causes.push(Cause { rule, what, times: 0, cases, example, kept: None, replay: None, known: None });
+            let last = causes.len() - 1;
+            &mut causes[last]
+        }
+    };
+    cause.times += 1;
+    if let Some(rule) = case {
+        *cause.cases.entry(rule.to_owned()).or_default() += 1;
+    }
+    if example.size() < cause.example.size() {
+        cause.example = example;
+    }
+}

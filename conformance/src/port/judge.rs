@@ -1,0 +1,65 @@
+//! What one request shows of a port.
+
+use super::claims::{Mode, Scope, Unclaimed, adapt};
+use super::link::{Link, Misbehaviour};
+use super::play::play_on_port;
+use super::protocol::Hello;
+use crate::compare::{Divergence, compare_in};
+use crate::play::play;
+use crate::request::{Request, Response};
+use crate::tally::Tally;
+
+/// What one request shows of a port.
+#[derive(Clone, Debug, Default)]
+pub struct Judged {
+    /// What was played, in the form that the port can play.
+    pub request: Request,
+    /// Comparisons by rule, up to the first difference.
+    pub tally: Tally,
+    /// The first difference.
+    pub divergence: Option<Divergence>,
+    /// Why there is no whole answer.
+    pub fault: Option<Misbehaviour>,
+    /// What could not be checked.
+    pub not_claimed: Vec<Unclaimed>,
+    /// Whether anything was played at all.
+    pub is_played: bool,
+}
+
+/// Plays a request on a port and compares.
+///
+/// `expected` is the right answer; where the port's claims ask for another form of the request, the reference is
+/// asked again.
+pub fn judge(
+    link: &mut dyn Link,
+    hello: &Hello,
+    mode: Mode,
+    request: &Request,
+    expected: &Response,
+) -> Judged {
+    let mut judged = Judged::default();
+    let adapted = match adapt(hello, mode, request, expected) {
+        Ok((adapted, left_out)) => {
+            judged.not_claimed = left_out;
+            adapted
+        }
+        Err(unclaimed) => {
+            judged.not_claimed.push(unclaimed);
+            return judged;
+        }
+    };
+    if mode == Mode::Instance && expected.records.is_empty() {
+        return judged;
+    }
+    let again = (adapted != *request).then(|| play(&adapted));
+    let expected = again.as_ref().unwrap_or(expected);
+    let answered = play_on_port(link, hello, mode, &adapted, expected);
+    judged.is_played = true;
+    judged.fault = answered.fault;
+    if judged.fault.is_none() {
+        let scope = Scope::of(hello, mode);
+        judged.divergence = compare_in(&scope, &adapted, expected, &answered.response, &mut judged.tally);
+    }
+    judged.request = adapted;
+    judged
+}

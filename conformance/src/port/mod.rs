@@ -1,0 +1,33 @@
+//! Ports: implementations of the spec in any language, asked over a pipe.
+//!
+//! | module | what it holds |
+//! | --- | --- |
+//! | [`Ask`], [`Reply`], [`Hello`] | the protocol |
+//! | [`Link`], [`Process`], [`Server`] | who answers: a child process, or an engine of this workspace |
+//! | [`Port`] | a link as an environment |
+//! | [`Scope`], [`adapt`] | what follows from what a port claims |
+//! | [`play_on_port`] | a port's answer to a whole request |
+
+mod claims;
+mod group;
+mod judge;
+mod link;
+mod observations;
+mod play;
+mod process;
+mod protocol;
+mod run;
+mod server;
+mod session;
+
+pub use claims::{Mode, Scope, Unclaimed, adapt, needed_by, profile_of};
+pub use group::{Cause, Example};
+pub use judge::{Judged, judge};
+pub use link::{Link, Misbehaviour};
+pub(crate) use observations::resolve_hashes;
+pub use play::{Answered, play_on_port};
+pub use process::{Command, Process};
+pub use protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
+pub use run::{Plan, PortReport, Subject, Verdicts, check_ports};
+pub use server::{Server, serve};
+pub use session::Port;

@@ -1,0 +1,177 @@
+//! What a port says its agents see, in the form that records keep.
+
+use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use crate::windows::{pack_bits, unpack};
+
+/// Reads what a port told; an error says in words what is wrong with its form.
+///
+/// Rule: observe/default, observe/pomapf, observe/mapf
+pub fn read(told: &Value, config: &Config, padded_dtype: &str) -> Result<Observed, String> {
+    let area = config.side() * config.side();
+    let mut odd = Vec::new();
+    if config.observation == Observation::Default {
+        let windows = windows("observations", told, config.num_agents, 3 * area, &mut odd)?;
+        return Ok(Observed::Default { dtype: "float32".into(), windows, odd });
+    }
+    let array = |name: &str| told.get(name).ok_or_else(|| format!("`observations` has no `{name}`"));
+    let places = |name: &str| pairs(name, array(name)?, config.num_agents);
+    let pomapf = ObservedPomapf {
+        dtype: "float32".into(),
+        obstacles: windows("obstacles", array("obstacles")?, config.num_agents, area, &mut odd)?,
+        agents: windows("agents", array("agents")?, config.num_agents, area, &mut odd)?,
+        xy: places("xy")?,
+        target_xy: places("target_xy")?,
+        odd,
+    };
+    if config.observation == Observation::Pomapf {
+        return Ok(Observed::Pomapf(pomapf));
+    }
+    let global_obstacles = match told.get("global_obstacles").unwrap_or(&Value::Null) {
+        Value::Null => None,
+        rows => {
+            let rows = serde_json::from_value(rows.clone())
+                .map_err(|_| "`global_obstacles` is no list of texts".to_owned())?;
+            Some(Padded { dtype: padded_dtype.into(), rows })
+        }
+    };
+    let (global_xy, global_target_xy) = (places("global_xy")?, places("global_target_xy")?);
+    Ok(Observed::Mapf(ObservedMapf { pomapf, global_obstacles, global_xy, global_target_xy }))
+}
+
+/// The same the other way.
+pub fn write(observed: &Observed) -> Value {
+    let arrays = |pomapf: &ObservedPomapf| {
+        json!({
+            "obstacles": pomapf.obstacles, "agents": pomapf.agents,
+            "xy": pomapf.xy, "target_xy": pomapf.target_xy,
+        })
+    };
+    match observed {
+        Observed::Default { windows, .. } => json!(windows),
+        Observed::Pomapf(pomapf) => arrays(pomapf),
+        Observed::Mapf(mapf) => {
+            let mut told = arrays(&mapf.pomapf);
+            told["global_xy"] = json!(mapf.global_xy);
+            told["global_target_xy"] = json!(mapf.global_target_xy);
+            told["global_obstacles"] = json!(mapf.global_obstacles.as_ref().map(|padded| &padded.rows));
+            told
+        }
+    }
+}
+
+/// Puts the expected window in the place of every hash of it, so that the two can be compared as a whole.
+pub fn resolve_hashes(expected: &Observed, told: &mut Observed, side: usize) {
+    let area = side * side;
+    match (expected, told) {
+        (Observed::Default { windows: one, .. }, Observed::Default { windows: other, .. }) => {
+            resolve(one, other, 3 * area);
+        }
+        (Observed::Pomapf(one), Observed::Pomapf(other)) => resolve_both(one, other, area),
+        (Observed::Mapf(one), Observed::Mapf(other)) => resolve_both(&one.pomapf, &mut other.pomapf, area),
+        _ => {}
+    }
+}
+
+fn resolve_both(expected: &ObservedPomapf, told: &mut ObservedPomapf, area: usize) {
+    resolve(&expected.obstacles, &mut told.obstacles, area);
+    resolve(&expected.agents, &mut told.agents, area);
+}
+
+fn resolve(expected: &[String], told: &mut [String], num_values: usize) {
+    for (expected, told) in expected.iter().zip(told) {
+        let Some((algorithm, _)) = told.split_once(':') else { continue };
+        if hash(algorithm, unpack(expected).into_iter().take(num_values)).as_deref() == Some(told) {
+            told.clone_from(expected);
+        }
+    }
+}
+
+/// The hash of one byte for each value.
+fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
+    let bytes: Vec<u8> = values.map(u8::from).collect();
+    let mut text = format!("{algorithm}:");
+    match algorithm {
+        "sha256" => text.extend(Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}"))),
+        "fnv1a64" => text.push_str(&format!("{:016x}", fnv1a64(&bytes))),
+        _ => return None,
+    }
+    Some(text)
+}
+
+fn fnv1a64(bytes: &[u8]) -> u64 {
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0100_0000_01b3;
+    bytes.iter().fold(OFFSET, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
+}
+
+fn windows(
+    name: &str,
+    told: &Value,
+    num_agents: usize,
+    num_values: usize,
+    odd: &mut Vec<String>,
+) -> Result<Vec<String>, String> {
+    let list = told.as_array().ok_or_else(|| format!("`{name}` is no list"))?;
+    if list.len() != num_agents {
+        return Err(format!("`{name}` has length {}, expected {num_agents}, one for each agent", list.len()));
+    }
+    let window = |(agent, window): (usize, &Value)| {
+        read_window(window, num_values, odd).map_err(|what| format!("`{name}` of agent {agent} {what}"))
+    };
+    list.iter().enumerate().map(window).collect()
+}
+
+fn read_window(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+    let Some(text) = told.as_str() else { return read_values(told, num_values, odd) };
+    let (digits, length) = match text.split_once(':') {
+        Some(("sha256", digits)) => (digits, 64),
+        Some(("fnv1a64", digits)) => (digits, 16),
+        Some((other, _)) => return Err(format!("is a hash of the unknown kind `{other}`")),
+        None => (text, 2 * num_values.div_ceil(8)),
+    };
+    if digits.len() != length {
+        return Err(format!("has {} digits, expected {length}", digits.len()));
+    }
+    match digits.chars().find(|digit| !digit.is_ascii_hexdigit()) {
+        Some(digit) => Err(format!("has `{digit}` where a hexadecimal digit was expected")),
+        None => Ok(text.to_ascii_lowercase()),
+    }
+}
+
+/// Numbers nested to any depth. A number other than 0 and 1 is no bad form but a wrong answer.
+fn read_values(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+    let mut bits = Vec::with_capacity(num_values);
+    let mut rest = vec![told];
+    while let Some(value) = rest.pop() {
+        match value {
+            Value::Array(values) => rest.extend(values.iter().rev()),
+            Value::Bool(flag) => bits.push(*flag),
+            Value::Number(number) => {
+                let number = number.as_f64().unwrap_or(f64::NAN);
+                if number != 0.0 && number != 1.0 {
+                    odd.push(format!("value {} is {number}", bits.len()));
+                }
+                bits.push(number != 0.0);
+            }
+            other => return Err(format!("holds {other}, expected numbers, or a text")),
+        }
+    }
+    if bits.len() == num_values {
+        Ok(pack_bits(&bits))
+    } else {
+        Err(format!("has {} values, expected {num_values}", bits.len()))
+    }
+}
+
+fn pairs(name: &str, told: &Value, num_agents: usize) -> Result<Vec<[i32; 2]>, String> {
+    let pairs: Vec<[i32; 2]> = serde_json::from_value(told.clone())
+        .map_err(|_| format!("`{name}` is no list of pairs of whole numbers"))?;
+    if pairs.len() == num_agents {
+        Ok(pairs)
+    } else {
+        Err(format!("`{name}` has length {}, expected {num_agents}, one for each agent", pairs.len()))
+    }
+}

@@ -1,0 +1,225 @@
+//! A port's answer to a whole request, in the form of every other answer.
+
+use pogema_core::{Action, Environment, Error, Map, Metrics, Padded, Snapshot, TraceStep};
+use pogema_maps::{GridConfig, InstanceSource};
+use serde_json::json;
+
+use super::claims::Mode;
+use super::link::{Link, Misbehaviour};
+use super::protocol::{Ask, Beginning, Hello, Policy, Profile};
+use super::session::Port;
+use crate::request::{
+    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
+};
+
+/// What a port answered, and what it did instead of answering.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answered {
+    /// The answers, up to the first refusal or misbehaviour.
+    pub response: Response,
+    /// Why there are no more of them.
+    pub fault: Option<Misbehaviour>,
+}
+
+/// Plays a request on a port.
+///
+/// `expected` is the right answer: a port that claims no policies is given the actions that stand there.
+pub fn play_on_port(
+    link: &mut dyn Link,
+    hello: &Hello,
+    mode: Mode,
+    request: &Request,
+    expected: &Response,
+) -> Answered {
+    let mut answered = Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
+    let mut play = match PortPlay::new(link, hello, mode, request, expected) {
+        Ok(play) => play,
+        Err(Unplayable::Config(link)) => return refuse_config(link, request),
+        Err(Unplayable::Instance(error)) => {
+            answered.response.error = Some(failure(When::Phase("instance".into()), &error));
+            return answered;
+        }
+    };
+    for (index, op) in request.ops.iter().enumerate() {
+        match play.perform(index, op) {
+            Ok(record) => answered.response.records.push(record),
+            Err(error) => {
+                answered.response.error = Some(failure(When::Op(index), &error));
+                break;
+            }
+        }
+    }
+    answered.fault = play.port.fault().cloned();
+    answered
+}
+
+/// A config that must be refused: there is nothing to play, and no form that an answer would have to keep.
+fn refuse_config(link: &mut dyn Link, request: &Request) -> Answered {
+    let beginning = Beginning {
+        config: Some(request.config.clone()),
+        register: request.register.clone(),
+        ..Beginning::default()
+    };
+    let mut answered = Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
+    match link.ask(&Ask::Reset(Box::new(beginning))) {
+        Ok(reply) => {
+            let failed = |reason| failure(When::Phase("config".into()), &Error::State { reason });
+            answered.response.error = reply.error.map(failed);
+        }
+        Err(fault) => answered.fault = Some(fault),
+    }
+    answered
+}
+
+fn failure(when: When, error: &Error) -> Failure {
+    Failure { when, kind: "Error".into(), message: error.to_string() }
+}
+
+enum Unplayable<'l> {
+    Config(&'l mut dyn Link),
+    Instance(Error),
+}
+
+/// What makes a record of a step.
+type Kind = fn(Box<StepRecord>) -> Record;
+
+/// One request at work on a port.
+struct PortPlay<'l> {
+    port: Port<'l>,
+    mode: Mode,
+    config: GridConfig,
+    source: InstanceSource,
+    request: &'l Request,
+    expected: &'l Response,
+    plays_policies: bool,
+    has_begun: bool,
+}
+
+impl<'l> PortPlay<'l> {
+    fn new(
+        link: &'l mut dyn Link,
+        hello: &'l Hello,
+        mode: Mode,
+        request: &'l Request,
+        expected: &'l Response,
+    ) -> Result<Self, Unplayable<'l>> {
+        let Ok(config) = GridConfig::from_value(&request.config) else { return Err(Unplayable::Config(link)) };
+        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
+        let registered = named.map(|map| Map::from_rows(&map.rows)).transpose().map_err(Unplayable::Instance)?;
+        let source = InstanceSource::new(config.clone(), registered).map_err(Unplayable::Instance)?;
+        let mut port = Port::new(link, hello, config.rules());
+        port.set_padded_dtype(if config.empty_outside { "float64" } else { "int64" });
+        let plays_policies = mode == Mode::Config && hello.profiles.contains(&Profile::Policies);
+        Ok(Self { port, mode, config, source, request, expected, plays_policies, has_begun: false })
+    }
+
+    fn perform(&mut self, index: usize, op: &Op) -> Result<Record, Error> {
+        match op {
+            Op::Reset(seed) => self.reset(index, *seed).map(|record| Record::Reset(Box::new(record))),
+            Op::Step(actions) => {
+                self.step(&Ask::Step { actions: actions.clone() }, Record::Step)
+            }
+            Op::Astar => self.act(Policy::Astar, index, Record::Astar),
+            Op::Sample => self.act(Policy::Sample, index, Record::Sample),
+            Op::Back => {
+                let moved = self.port.step_back()?;
+                Ok(Record::Back(Back { moved, state: self.state() }))
+            }
+            Op::History => {
+                let kept = self.port.history()?;
+                let (full, changes) = (kept.full.unwrap_or_default(), kept.changes.unwrap_or_default());
+                Ok(Record::History(History { full, changes }))
+            }
+        }
+    }
+
+    fn reset(&mut self, index: usize, seed: Option<u64>) -> Result<ResetRecord, Error> {
+        let beginning = self.beginning(index, seed)?;
+        self.port.begin(beginning)?;
+        self.has_begun = true;
+        let config = &self.config;
+        let derived = Derived {
+            width: config.width,
+            height: config.height,
+            size: config.size,
+            density: config.density,
+            num_agents: config.num_agents,
+        };
+        let reply = self.port.reply();
+        let dtype = if config.empty_outside { "float64" } else { "int64" };
+        let padded = Padded { dtype: dtype.into(), rows: reply.padded.clone().unwrap_or_default() };
+        Ok(ResetRecord {
+            derived: reply.derived.clone().unwrap_or(derived),
+            map: reply.map.clone().unwrap_or_default(),
+            padded,
+            goal_lists: reply.foretold.clone().flatten(),
+            goal_lists_error: None,
+            state: self.state(),
+            observations: self.port.observed().cloned(),
+        })
+    }
+
+    fn beginning(&mut self, index: usize, seed: Option<u64>) -> Result<Beginning, Error> {
+        let mut measure = Vec::new();
+        if self.request.density {
+            measure.push("avg_agents_density".to_owned());
+        }
+        if self.request.collisions {
+            measure.extend(["a_collisions".to_owned(), "o_collisions".to_owned()]);
+        }
+        if self.mode == Mode::Instance {
+            let ops = &self.request.ops[index + 1..];
+            self.port.set_num_goals(ops.iter().take_while(|op| !matches!(op, Op::Reset(_))).count() + 2);
+            let generated = self.source.generate()?;
+            let instance = Some(self.port.header(&generated.instance));
+            return Ok(Beginning { instance, measure, ..Beginning::default() });
+        }
+        if self.has_begun {
+            return Ok(Beginning { seed, ..Beginning::default() });
+        }
+        let (config, register) = (Some(self.request.config.clone()), self.request.register.clone());
+        Ok(Beginning { config, register, seed, measure, instance: None })
+    }
+
+    fn act(&mut self, policy: Policy, index: usize, kind: Kind) -> Result<Record, Error> {
+        if self.plays_policies {
+            return self.step(&Ask::Act { policy }, kind);
+        }
+        let chosen = self.expected.records.get(index).and_then(Record::step);
+        let missing = || Error::State { reason: "no actions are expected here".into() };
+        let actions = chosen.ok_or_else(missing)?.step.actions.iter().map(|&action| action as i64).collect();
+        self.step(&Ask::Step { actions }, kind)
+    }
+
+    fn step(&mut self, ask: &Ask, kind: Kind) -> Result<Record, Error> {
+        self.port.advance(ask)?;
+        let state = self.state();
+        let reply = self.port.reply().clone();
+        let numbers = match ask {
+            Ask::Step { actions } => actions.clone(),
+            _ => reply.actions.unwrap_or_default(),
+        };
+        let numbered = numbers.iter().enumerate();
+        let actions: Result<Vec<Action>, _> =
+            numbered.map(|(agent, &number)| Action::from_number(agent, number)).collect();
+        // No action at all, and yet it was played: there is no record of such a step.
+        let Ok(actions) = actions else { return Ok(Record::Odd(json!({ "played": numbers }))) };
+        let step = TraceStep {
+            actions,
+            rewards: reply.rewards.unwrap_or_default(),
+            terminated: reply.terminated.unwrap_or_default(),
+            truncated: reply.truncated.unwrap_or_default(),
+            observations: self.port.observed().cloned(),
+            metrics: reply.metrics.flatten().filter(|metrics| *metrics != Metrics::default()),
+            state,
+        };
+        let infos_active = step.state.active.clone();
+        let actions_after = reply.actions_after.unwrap_or_default();
+        Ok(kind(Box::new(StepRecord { step, actions_after, infos_active })))
+    }
+
+    fn state(&self) -> Snapshot {
+        // The number of the step is not among what implementations answer.
+        Snapshot { step: 0, ..self.port.snapshot() }
+    }
+}

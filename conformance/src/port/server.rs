@@ -1,0 +1,167 @@
+//! The other side: an engine that answers the protocol, in this process or behind a pipe.
+
+use std::io::{BufRead, Write};
+
+use pogema_core::{Collision, Error, Observation, Occupancy, OnGoal, Reward};
+
+use super::link::{Link, Misbehaviour};
+use super::observations;
+use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
+use crate::play::{Engine, Player};
+use crate::request::{Op, Record, Request};
+
+/// An engine as a port. It claims everything.
+pub struct Server {
+    engine: Engine,
+    player: Option<Player>,
+}
+
+impl Server {
+    /// A port that plays on an engine.
+    pub fn new(engine: Engine) -> Self {
+        Self { engine, player: None }
+    }
+
+    fn answer(&mut self, ask: &Ask) -> Result<Reply, Error> {
+        let op = match ask {
+            Ask::Hello { .. } | Ask::Observe | Ask::Metrics | Ask::Bye => return Ok(Reply::default()),
+            Ask::Reset(beginning) => return self.begin(beginning),
+            Ask::Step { actions } => Op::Step(actions.clone()),
+            Ask::Act { policy: Policy::Astar } => Op::Astar,
+            Ask::Act { policy: Policy::Sample } => Op::Sample,
+            Ask::Back => Op::Back,
+            Ask::History => Op::History,
+        };
+        let before_reset = || Error::State { reason: "reset comes first".into() };
+        self.player.as_mut().ok_or_else(before_reset)?.perform(&op).map(reply_of)
+    }
+
+    fn begin(&mut self, beginning: &Beginning) -> Result<Reply, Error> {
+        if let Some(header) = &beginning.instance {
+            let mut player = Player::of_instance(self.engine, &header.config, header.instance()?)?;
+            player.measure(&beginning.measure);
+            self.player = Some(player);
+        } else if let Some(config) = &beginning.config {
+            let measures = |name: &str| beginning.measure.iter().any(|wanted| wanted == name);
+            let request = Request {
+                id: 0,
+                config: config.clone(),
+                register: beginning.register.clone(),
+                density: measures("avg_agents_density"),
+                collisions: measures("a_collisions") || measures("o_collisions"),
+                ops: Vec::new(),
+            };
+            self.player = None;
+            self.player = Some(Player::new(self.engine, &request)?);
+        }
+        let nothing = || Error::State { reason: "there is nothing to reset".into() };
+        let op = Op::Reset(beginning.seed);
+        self.player.as_mut().ok_or_else(nothing)?.perform(&op).map(reply_of)
+    }
+}
+
+impl Link for Server {
+    fn hello(&mut self) -> Result<Hello, Misbehaviour> {
+        let figures = "ISR CSR ep_length SoC makespan avg_throughput avg_agents_density a_collisions o_collisions";
+        Ok(Hello {
+            protocol: PROTOCOL.into(),
+            name: self.engine.name.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            profiles: vec![
+                Profile::Core,
+                Profile::Observations,
+                Profile::Metrics,
+                Profile::Seeding,
+                Profile::History,
+                Profile::Policies,
+            ],
+            collision: vec![Collision::Priority, Collision::BlockBoth, Collision::Soft],
+            on_goal: vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart],
+            observation: vec![Observation::Default, Observation::Pomapf, Observation::Mapf],
+            occupancy: vec![Occupancy::AsReleased, Occupancy::Exact],
+            reward: vec![Reward::Own, Reward::Shared],
+            noise: true,
+            metrics: figures.split(' ').map(str::to_owned).collect(),
+            tells: vec![
+                Told::OnGoal,
+                Told::Occupied,
+                Told::Padded,
+                Told::Derived,
+                Told::Foretold,
+                Told::ActionsAfter,
+            ],
+            max_agents: usize::MAX,
+            max_side: usize::MAX,
+            max_radius: usize::MAX,
+        })
+    }
+
+    fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
+        let refused = |error: Error| Reply { error: Some(error.to_string()), ..Reply::default() };
+        Ok(self.answer(ask).unwrap_or_else(refused))
+    }
+}
+
+/// Serves an engine over a pair of pipes until the other side says goodbye; this is all that a port in Rust needs.
+///
+/// # Errors
+/// [`Error::Io`] if a pipe breaks.
+pub fn serve(engine: Engine, input: impl BufRead, mut output: impl Write) -> Result<(), Error> {
+    let failed = |error: std::io::Error| Error::io("pipe", error);
+    let mut server = Server::new(engine);
+    for line in input.lines() {
+        let line = line.map_err(failed)?;
+        let told = match serde_json::from_str(&line) {
+            Ok(Ask::Bye) => return Ok(()),
+            Ok(Ask::Hello { .. }) => server.hello().map(|hello| serde_json::to_string(&hello)),
+            Ok(ask) => server.ask(&ask).map(|reply| serde_json::to_string(&reply)),
+            Err(error) => {
+                let reply = Reply { error: Some(error.to_string()), ..Reply::default() };
+                Ok(serde_json::to_string(&reply))
+            }
+        };
+        let text = told.map_err(|fault| Error::io("pipe", fault))?.map_err(|error| Error::io("pipe", error))?;
+        writeln!(output, "{text}").and_then(|()| output.flush()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// A record as an answer.
+fn reply_of(record: Record) -> Reply {
+    let mut reply = Reply::default();
+    if let Some(state) = record.state() {
+        let told = |cells: &[pogema_core::Cell]| -> Vec<ToldCell> {
+            cells.iter().map(|cell| [i64::from(cell.row), i64::from(cell.col)]).collect()
+        };
+        reply.cells = Some(told(&state.cells));
+        reply.goals = Some(told(&state.goals));
+        reply.occupied = Some(told(&state.occupied));
+        reply.active = Some(state.active.clone());
+        reply.on_goal = Some(state.on_goal.clone());
+    }
+    match record {
+        Record::Reset(reset) => {
+            reply.observations = reset.observations.as_ref().map(observations::write);
+            reply.map = Some(reset.map);
+            reply.padded = Some(reset.padded.rows);
+            reply.derived = Some(reset.derived);
+            reply.foretold = Some(reset.goal_lists);
+        }
+        Record::Step(step) | Record::Astar(step) | Record::Sample(step) => {
+            reply.observations = step.step.observations.as_ref().map(observations::write);
+            reply.actions = Some(step.step.actions.iter().map(|&action| action as i64).collect());
+            reply.rewards = Some(step.step.rewards);
+            reply.terminated = Some(step.step.terminated);
+            reply.truncated = Some(step.step.truncated);
+            reply.metrics = Some(step.step.metrics);
+            reply.actions_after = Some(step.actions_after);
+        }
+        Record::Back(back) => reply.moved = Some(back.moved),
+        Record::History(history) => {
+            reply.full = Some(history.full);
+            reply.changes = Some(history.changes);
+        }
+        Record::Odd(_) => {}
+    }
+    reply
+}

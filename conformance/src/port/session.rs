@@ -1,0 +1,310 @@
+//! A port as an environment.
+
+use pogema_core::{
+    Action, Cell, Config, Environment, Error, Instance, MapfOut, Observed, PomapfOut, Snapshot, StepOut,
+    TraceHeader,
+};
+
+use super::link::{Link, Misbehaviour};
+use super::observations;
+use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
+use crate::windows::unpack;
+
+/// A port at work on one config.
+///
+/// As an [`Environment`] it plays instances; [`Port::begin`] begins an episode from a config too. Whatever keeps
+/// to no form is an error, and [`Port::fault`] then tells more.
+pub struct Port<'l> {
+    link: &'l mut dyn Link,
+    hello: &'l Hello,
+    config: Config,
+    padded_dtype: &'static str,
+    num_goals: usize,
+    reply: Reply,
+    observed: Option<Observed>,
+    elapsed: u64,
+    fault: Option<Misbehaviour>,
+}
+
+impl<'l> Port<'l> {
+    /// A port that will play episodes of this config.
+    pub fn new(link: &'l mut dyn Link, hello: &'l Hello, config: Config) -> Self {
+        // An instance lists so many goals for each agent: one is reached in a step at most.
+        let num_goals = usize::try_from(config.max_steps).unwrap_or(0) + 2;
+        let (reply, observed) = (Reply::default(), None);
+        Self { link, hello, config, padded_dtype: "float64", num_goals, reply, observed, elapsed: 0, fault: None }
+    }
+
+    /// The element type to put down for maps with their border, which the protocol does not tell.
+    pub fn set_padded_dtype(&mut self, dtype: &'static str) {
+        self.padded_dtype = dtype;
+    }
+
+    /// How many goals an instance lists for each agent.
+    pub fn set_num_goals(&mut self, num_goals: usize) {
+        self.num_goals = num_goals.max(2);
+    }
+
+    /// What the port did instead of keeping to the protocol.
+    pub fn fault(&self) -> Option<&Misbehaviour> {
+        self.fault.as_ref()
+    }
+
+    /// The last answer.
+    pub fn reply(&self) -> &Reply {
+        &self.reply
+    }
+
+    /// What the agents see, if the port claims to say so.
+    pub fn observed(&self) -> Option<&Observed> {
+        self.observed.as_ref()
+    }
+
+    /// An instance as it is told to a port.
+    pub fn header(&self, instance: &Instance) -> TraceHeader {
+        TraceHeader::new(self.config, instance, self.num_goals)
+    }
+
+    /// Begins an episode.
+    ///
+    /// # Errors
+    /// If the port refuses, or keeps to no form.
+    pub fn begin(&mut self, beginning: Beginning) -> Result<(), Error> {
+        let needs_map = beginning.instance.is_none();
+        let reply = self.ask(&Ask::Reset(Box::new(beginning)))?;
+        self.check_state(&reply)?;
+        if needs_map {
+            self.need("map", reply.map.as_ref())?;
+        }
+        self.observed = None;
+        self.take_observations(reply)?;
+        self.elapsed = 0;
+        Ok(())
+    }
+
+    /// Plays a step, or lets the port choose its actions.
+    ///
+    /// # Errors
+    /// If the port refuses, or keeps to no form.
+    pub fn advance(&mut self, ask: &Ask) -> Result<(), Error> {
+        let mut reply = self.ask(ask)?;
+        self.check_state(&reply)?;
+        self.need_list("rewards", reply.rewards.as_ref())?;
+        self.need_list("terminated", reply.terminated.as_ref())?;
+        self.need_list("truncated", reply.truncated.as_ref())?;
+        if matches!(ask, Ask::Act { .. }) {
+            self.need_list("actions", reply.actions.as_ref())?;
+        }
+        if self.tells(Told::ActionsAfter) {
+            self.need_list("actions_after", reply.actions_after.as_ref())?;
+        }
+        if self.claims(Profile::Metrics) && reply.metrics.is_none() {
+            reply.metrics = self.ask(&Ask::Metrics)?.metrics;
+            self.need("metrics", reply.metrics.as_ref())?;
+        }
+        self.take_observations(reply)?;
+        self.elapsed += 1;
+        Ok(())
+    }
+
+    /// What the port has kept of the episode.
+    ///
+    /// # Errors
+    /// If the port refuses, or keeps to no form.
+    pub fn history(&mut self) -> Result<Reply, Error> {
+        let reply = self.ask(&Ask::History)?;
+        self.need_list("full", reply.full.as_ref())?;
+        self.need_list("changes", reply.changes.as_ref())?;
+        Ok(reply)
+    }
+
+    fn claims(&self, profile: Profile) -> bool {
+        self.hello.profiles.contains(&profile)
+    }
+
+    fn tells(&self, key: Told) -> bool {
+        self.hello.tells.contains(&key)
+    }
+
+    fn ask(&mut self, ask: &Ask) -> Result<Reply, Error> {
+        let reply = self.link.ask(ask).map_err(|fault| self.misbehaved(fault))?;
+        match reply.error {
+            Some(reason) => Err(Error::State { reason }),
+            None => Ok(reply),
+        }
+    }
+
+    fn misbehaved(&mut self, fault: Misbehaviour) -> Error {
+        let reason = fault.what.clone();
+        self.fault = Some(fault);
+        Error::State { reason }
+    }
+
+    fn need<T>(&mut self, key: &str, value: Option<&T>) -> Result<(), Error> {
+        if value.is_some() {
+            return Ok(());
+        }
+        Err(self.misbehaved(Misbehaviour::new(format!("left `{key}` out of an answer that needs it"))))
+    }
+
+    fn need_list<T>(&mut self, key: &str, list: Option<&Vec<T>>) -> Result<(), Error> {
+        self.need(key, list)?;
+        let (length, want) = (list.map_or(0, Vec::len), self.config.num_agents);
+        if length == want {
+            return Ok(());
+        }
+        let what = format!("`{key}` has length {length}, expected {want}, one for each agent");
+        Err(self.misbehaved(Misbehaviour::new(what)))
+    }
+
+    fn check_state(&mut self, reply: &Reply) -> Result<(), Error> {
+        self.need_list("cells", reply.cells.as_ref())?;
+        self.need_list("goals", reply.goals.as_ref())?;
+        self.need_list("active", reply.active.as_ref())?;
+        if self.tells(Told::OnGoal) {
+            self.need_list("on_goal", reply.on_goal.as_ref())?;
+        }
+        if self.tells(Told::Occupied) {
+            self.need("occupied", reply.occupied.as_ref())?;
+        }
+        for (what, cells) in [("cell", &reply.cells), ("goal", &reply.goals), ("marked cell", &reply.occupied)] {
+            for cell in cells.iter().flatten() {
+                if as_cell(cell).is_none() {
+                    // No breach of the form, but a wrong answer.
+                    return Err(Error::State { reason: format!("{what} ({}, {}) is on no map", cell[0], cell[1]) });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take_observations(&mut self, mut reply: Reply) -> Result<(), Error> {
+        if self.claims(Profile::Observations) {
+            if reply.observations.is_none() {
+                reply.observations = self.ask(&Ask::Observe)?.observations;
+                self.need("observations", reply.observations.as_ref())?;
+            }
+            if let Some(told) = reply.observations.take() {
+                let observed = observations::read(&told, &self.config, self.padded_dtype);
+                self.observed = Some(observed.map_err(|what| self.misbehaved(Misbehaviour::new(what)))?);
+            }
+        }
+        self.reply = reply;
+        Ok(())
+    }
+
+    fn arrays(&self) -> Result<&Observed, Error> {
+        let reason = || Error::State { reason: "the port tells no observations".into() };
+        self.observed.as_ref().ok_or_else(reason)
+    }
+}
+
+/// A cell that may be on a map.
+fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
+    u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col))
+}
+
+fn as_cells(told: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {
+    told?.iter().map(as_cell).collect()
+}
+
+impl Environment for Port<'_> {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
+        instance.check_fits(&self.config)?;
+        let instance = Some(self.header(instance));
+        self.begin(Beginning { instance, ..Beginning::default() })
+    }
+
+    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
+        out.check(self.config.num_agents)?;
+        let actions = actions.iter().map(|&action| action as i64).collect();
+        self.advance(&Ask::Step { actions })?;
+        out.rewards.copy_from_slice(self.reply.rewards.as_deref().unwrap_or_default());
+        out.terminated.copy_from_slice(self.reply.terminated.as_deref().unwrap_or_default());
+        out.truncated.copy_from_slice(self.reply.truncated.as_deref().unwrap_or_default());
+        Ok(())
+    }
+
+    fn step_back(&mut self) -> Result<bool, Error> {
+        let reply = self.ask(&Ask::Back)?;
+        self.check_state(&reply)?;
+        self.need("moved", reply.moved.as_ref())?;
+        let moved = reply.moved == Some(true);
+        self.elapsed -= u64::from(moved && self.elapsed > 0);
+        self.reply = reply;
+        Ok(moved)
+    }
+
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        let Observed::Default { windows, .. } = self.arrays()? else { return Err(other_arrays()) };
+        Error::check_length("observations", self.config.num_observed(), out.len())?;
+        copy_windows(windows, out)
+    }
+
+    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+        let pomapf = match self.arrays()? {
+            Observed::Default { .. } => return Err(other_arrays()),
+            Observed::Pomapf(pomapf) => pomapf,
+            Observed::Mapf(mapf) => &mapf.pomapf,
+        };
+        copy_windows(&pomapf.obstacles, out.obstacles)?;
+        copy_windows(&pomapf.agents, out.agents)?;
+        copy_pairs(&pomapf.xy, out.cells);
+        copy_pairs(&pomapf.target_xy, out.goals);
+        Ok(())
+    }
+
+    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+        let Observed::Mapf(mapf) = self.arrays()? else { return Err(other_arrays()) };
+        let rows = mapf.global_obstacles.iter().flat_map(|padded| padded.rows.iter());
+        let flags = rows.flat_map(|row| row.bytes()).map(|letter| u8::from(letter == b'#'));
+        out.obstacles.iter_mut().zip(flags).for_each(|(value, flag)| *value = flag);
+        copy_pairs(&mapf.global_xy, out.cells);
+        copy_pairs(&mapf.global_target_xy, out.goals);
+        Ok(())
+    }
+
+    /// What the port does not tell is put down as if nobody were on a goal and every active agent had its mark.
+    fn snapshot(&self) -> Snapshot {
+        let reply = &self.reply;
+        let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();
+        let active = reply.active.clone().unwrap_or_default();
+        let occupied = as_cells(reply.occupied.as_ref()).unwrap_or_else(|| {
+            let mut marked: Vec<Cell> =
+                cells.iter().zip(&active).filter(|(_, active)| **active).map(|(cell, _)| *cell).collect();
+            marked.sort_by_key(|cell| (cell.row, cell.col));
+            marked
+        });
+        Snapshot {
+            step: self.elapsed,
+            goals: as_cells(reply.goals.as_ref()).unwrap_or_default(),
+            on_goal: reply.on_goal.clone().unwrap_or_else(|| vec![false; cells.len()]),
+            cells,
+            active,
+            occupied,
+        }
+    }
+}
+
+fn other_arrays() -> Error {
+    Error::State { reason: "the port was asked for other observations".into() }
+}
+
+fn copy_windows(windows: &[String], out: &mut [f32]) -> Result<(), Error> {
+    let size = out.len() / windows.len().max(1);
+    for (window, values) in windows.iter().zip(out.chunks_mut(size.max(1))) {
+        if window.contains(':') {
+            return Err(Error::State { reason: "the port tells hashes of observations only".into() });
+        }
+        values.iter_mut().zip(unpack(window)).for_each(|(value, bit)| *value = f32::from(u8::from(bit)));
+    }
+    Ok(())
+}
+
+fn copy_pairs(pairs: &[[i32; 2]], out: &mut [i32]) {
+    out.chunks_exact_mut(2).zip(pairs).for_each(|(values, pair)| values.copy_from_slice(pair));
+}
