@@ -50,7 +50,7 @@ impl Conform {
         if self.ports.is_asked() {
             let bar = self.bar("cases");
             let shared =
-                ports::Shared { cases: self.cases, seed: self.seed, json: self.json.as_ref(), bar: &bar };
+                ports::Shared { cases: self.cases, seed: self.seed, json: self.json.as_ref(), keep: &self.keep, bar: &bar };
             return self.ports.run(&shared);
         }
         self.json.as_deref().map_or(Ok(()), check_writable)?;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::files;
-use pogema_conformance::port::{Command, Link, Plan, PortReport, Process, Profile, Subject, check_ports};
+use pogema_conformance::port::{Command, Link, Plan, PortReport, Process, Profile, Subject, check_ports, shrink_causes};
 use pogema_core::Error;
 
 use super::port_table;
@@ -31,6 +31,9 @@ pub struct Ports {
     /// Seconds that a port may take for one answer
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     timeout: f64,
+    /// Play only this case; may be given several times
+    #[arg(long = "case", value_name = "FILE", requires = "commands")]
+    files: Vec<PathBuf>,
     /// How many cases are played side by side, each in a process of its own; one for each processor by default
     #[arg(long, value_name = "N", requires = "commands", value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: Option<u16>,
@@ -51,6 +54,7 @@ pub struct Shared<'a> {
     pub cases: u64,
     pub seed: u64,
     pub json: Option<&'a PathBuf>,
+    pub keep: &'a PathBuf,
     pub bar: &'a ProgressBar,
 }
 
@@ -72,11 +76,16 @@ impl Ports {
             rules: self.rules.clone(),
             profiles: self.profiles.clone(),
             num_workers: self.workers.map(usize::from),
-            golden: true,
+            files: self.files.clone(),
         };
-        let reports =
+        let mut reports =
             check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
         shared.bar.finish_and_clear();
+        for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
+            // Several ports fail in the same rules, and must not overwrite each other's cases.
+            let folder = if subjects.len() == 1 { shared.keep.clone() } else { shared.keep.join(format!("{}", index + 1)) };
+            shrink_causes(subject, report, &plan, &folder, &|| ())?;
+        }
         if let Some(path) = shared.json {
             let text = serde_json::to_vec_pretty(&reports).map_err(|error| Error::io(path, error))?;
             files::write(path, &text)?;

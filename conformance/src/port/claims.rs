@@ -208,7 +208,10 @@ fn leave_out(
 
 fn leave_out_figures(hello: &Hello, config: &GridConfig, request: &mut Request, left_out: &mut Vec<Unclaimed>) {
     if !hello.profiles.contains(&Profile::Metrics) {
-        left_out.push(Unclaimed::new("profile metrics", "metrics"));
+        left_out.push(Unclaimed::new("profile metrics", families_of(config).metrics));
+        request.density = false;
+        request.collisions = false;
+        return;
     }
     let measures = |name: &str| hello.metrics.iter().any(|known| known == name);
     if request.density && !measures("avg_agents_density") {

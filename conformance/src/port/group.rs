@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::claims::Mode;
 use super::link::Misbehaviour;
-use crate::compare::Divergence;
+use crate::compare::{Divergence, kind_of};
 use crate::request::Request;
 
 /// Something wrong with a port, however often it was seen.
@@ -54,7 +54,7 @@ pub struct Example {
 impl Example {
     fn key(&self) -> (Option<String>, String) {
         match (&self.divergence, &self.fault) {
-            (Some(found), _) => (Some(found.rule.clone()), kind_of(&found.field)),
+            (Some(found), _) => (Some(found.rule.clone()), found.kind()),
             (None, Some(fault)) => (None, kind_of(&fault.what)),
             (None, None) => (None, String::new()),
         }
@@ -70,14 +70,6 @@ impl Example {
         let written = |value: &serde_json::Value| value.to_string().len();
         (self.divergence.as_ref().map_or(self.request.ops.len(), |found| found.op), written(&self.request.config))
     }
-}
-
-/// A field or message without its numbers and quotes.
-fn kind_of(text: &str) -> String {
-    let head = text.split(['`', ':', ',']).next().unwrap_or(text);
-    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
-    let kind: Vec<&str> = words.collect();
-    kind.join(" ").trim_end_matches(" of agent").to_owned()
 }
 
 /// Adds an occasion to the causes; `case` is the rule of the hand-written case that it is.

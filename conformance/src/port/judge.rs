@@ -16,8 +16,8 @@ pub struct Judged {
     pub request: Request,
     /// Comparisons by rule, up to the first difference.
     pub tally: Tally,
-    /// The first difference.
-    pub divergence: Option<Divergence>,
+    /// The first difference of each kind.
+    pub divergences: Vec<Divergence>,
     /// Why there is no whole answer.
     pub fault: Option<Misbehaviour>,
     /// What could not be checked.
@@ -58,7 +58,7 @@ pub fn judge(
     judged.fault = answered.fault;
     if judged.fault.is_none() {
         let scope = Scope::of(hello, mode);
-        judged.divergence = compare_in(&scope, &adapted, expected, &answered.response, &mut judged.tally);
+        judged.divergences = compare_in(&scope, &adapted, expected, &answered.response, &mut judged.tally);
     }
     judged.request = adapted;
     judged

@@ -1,7 +1,7 @@
 //! One run of ports over everything that they claim.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pogema_core::Error;
@@ -10,9 +10,12 @@ use serde::Serialize;
 use super::claims::{Mode, Unclaimed, needed_by, profile_of};
 use super::group::{self, Cause, Example};
 use super::judge::{Judged, judge};
+use super::keep::keep;
 use super::link::{Link, Misbehaviour};
 use super::protocol::{Hello, Profile};
+use super::shrink::shrink;
 use crate::cases::{self, Case};
+use crate::compare::Divergence;
 use crate::draw::draw_request;
 use crate::golden::{self, Recording};
 use crate::play::{Engine, play};
@@ -46,8 +49,8 @@ pub struct Plan {
     pub profiles: Vec<Profile>,
     /// How many cases are played side by side; one for each processor, if none is given.
     pub num_workers: Option<usize>,
-    /// Whether to play the recordings of POGEMA 1.4.0.
-    pub golden: bool,
+    /// These cases alone, and nothing else, if there are any.
+    pub files: Vec<PathBuf>,
 }
 
 /// What a run shows of one port.
@@ -179,6 +182,34 @@ pub fn check_ports(
     Ok(reports)
 }
 
+/// Makes the example of each cause as small as it can be and keeps it as a case.
+///
+/// # Errors
+/// If a case cannot be written.
+pub fn shrink_causes(
+    subject: &Subject<'_>,
+    report: &mut PortReport,
+    plan: &Plan,
+    folder: &Path,
+    progress: Progress<'_>,
+) -> Result<(), Error> {
+    let mut slot = None;
+    let name = report.hello.as_ref().map_or_else(|| report.command.clone(), |hello| hello.name.clone());
+    for cause in report.causes.iter_mut().filter(|cause| cause.rule.is_some()) {
+        // A port that cannot be started again leaves the example as it was.
+        if let Ok(running) = running(subject, &mut slot, plan) {
+            cause.example = shrink(running.link.as_mut(), &running.hello, &cause.example);
+        }
+        cause.kept = keep(&cause.example, &name, folder)?;
+        cause.replay = cause.kept.as_ref().map(|path| {
+            let quoted = shell_words::join([subject.command.as_str(), "--case", &path.display().to_string()]);
+            format!("pogema conform --port {quoted}")
+        });
+        progress();
+    }
+    Ok(())
+}
+
 /// A started port.
 struct Running {
     link: Box<dyn Link>,
@@ -187,6 +218,12 @@ struct Running {
 
 fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
     let mut items = Vec::new();
+    if !plan.files.is_empty() {
+        for path in &plan.files {
+            items.push(Item::Case(path.display().to_string(), Box::new(cases::read(path)?)));
+        }
+        return Ok(items);
+    }
     let root = cases::folder();
     for path in golden::files(&root, ".yaml")? {
         let case = cases::read(&path)?;
@@ -196,13 +233,11 @@ fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
             items.push(Item::Case(relative(&path, &root), Box::new(case)));
         }
     }
-    if plan.golden {
-        for folder in [golden::folder(), golden::found_folder()] {
-            for path in golden::recording_files(&folder)? {
-                for (index, recording) in golden::read(&path)?.into_iter().enumerate() {
-                    let name = format!("{} line {}", relative(&path, &folder), index + 1);
-                    items.push(Item::Recorded(name, Box::new(recording)));
-                }
+    for folder in [golden::folder(), golden::found_folder()] {
+        for path in golden::recording_files(&folder)? {
+            for (index, recording) in golden::read(&path)?.into_iter().enumerate() {
+                let name = format!("{} line {}", relative(&path, &folder), index + 1);
+                items.push(Item::Recorded(name, Box::new(recording)));
             }
         }
     }
@@ -254,7 +289,7 @@ fn show(
         if let Item::Case(_, case) = item {
             // A case shows nothing of its rule without what the rule is about.
             let lacking = judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(&case.rule));
-            judged.is_played &= !lacking || judged.divergence.is_some();
+            judged.is_played &= !lacking || !judged.divergences.is_empty();
         }
         if judged.fault.is_some() {
             faults.fetch_add(1, Ordering::Relaxed);
@@ -309,39 +344,34 @@ fn take(report: &mut PortReport, shown: Shown, plan: &Plan) {
         report.num_not_run += 1;
         return;
     }
-    let mut is_played = false;
+    let is_played = shown.judged.iter().any(|(_, judged)| judged.is_played);
+    report.num_played += u64::from(is_played);
+    report.num_steps += if is_played { shown.num_steps } else { 0 };
     let mut verdict = Verdicts::default();
     for (mode, judged) in shown.judged {
-        is_played |= judged.is_played;
         for unclaimed in &judged.not_claimed {
             *report.not_claimed.entry(unclaimed.what.clone()).or_default() += 1;
             if shown.case_rule.is_none() {
                 report.row(unclaimed.rule).not_claimed += 1;
             }
         }
-        if shown.case_rule.is_none() {
-            for (rule, _) in judged.tally.rules.iter().filter(|(_, count)| count.diverged == 0) {
-                report.row(rule).passed += 1;
-            }
+        take_rows(report, shown.case_rule.as_deref(), &judged, plan);
+        let Judged { request, divergences, fault, .. } = judged;
+        let example = |divergence, fault| {
+            let (name, request) = (shown.name.clone(), request.clone());
+            Example { name, mode, request, divergence, fault }
+        };
+        let case = shown.case_rule.as_deref();
+        for found in divergences.into_iter().filter(|found| case.is_some() || is_wanted(plan, &found.rule)) {
+            let is_shown = case.filter(|rule| is_about(rule, &found));
+            verdict.failed |= u64::from(is_shown.is_some());
+            group::add(&mut report.causes, example(Some(found), None), is_shown);
         }
-        let is_wanted = |rule: &str| plan.rules.as_ref().is_none_or(|rules| rules.matches(rule));
-        let divergence = judged.divergence.filter(|found| shown.case_rule.is_some() || is_wanted(&found.rule));
-        if divergence.is_none() && judged.fault.is_none() {
-            continue;
+        if fault.is_some() {
+            verdict.errors = 1;
+            group::add(&mut report.causes, example(None, fault), case);
         }
-        verdict.failed |= u64::from(divergence.is_some());
-        verdict.errors |= u64::from(judged.fault.is_some());
-        if shown.case_rule.is_none() {
-            let row = report.row(divergence.as_ref().map_or(PROTOCOL_ROW, |found| &found.rule));
-            row.failed += u64::from(divergence.is_some());
-            row.errors += u64::from(judged.fault.is_some());
-        }
-        let fault = judged.fault;
-        let example = Example { name: shown.name.clone(), mode, request: judged.request, divergence, fault };
-        group::add(&mut report.causes, example, shown.case_rule.as_deref());
     }
-    report.num_played += u64::from(is_played);
-    report.num_steps += if is_played { shown.num_steps } else { 0 };
     if let Some(rule) = shown.case_rule {
         let row = report.row(&rule);
         match verdict {
@@ -351,4 +381,37 @@ fn take(report: &mut PortReport, shown: Shown, plan: &Plan) {
             _ => row.not_claimed += 1,
         }
     }
+}
+
+fn is_wanted(plan: &Plan, rule: &str) -> bool {
+    plan.rules.as_ref().is_none_or(|rules| rules.matches(rule))
+}
+
+/// Counts what an item shows of the rules of its comparisons.
+fn take_rows(report: &mut PortReport, case_rule: Option<&str>, judged: &Judged, plan: &Plan) {
+    for found in judged.divergences.iter().filter(|found| is_wanted(plan, &found.rule)) {
+        // A case counts for its own rule, once.
+        if case_rule.is_none_or(|rule| !is_about(rule, found)) {
+            report.row(&found.rule).failed += 1;
+        }
+    }
+    if case_rule.is_some() {
+        return;
+    }
+    report.row(PROTOCOL_ROW).errors += u64::from(judged.fault.is_some());
+    for (rule, _) in judged.tally.rules.iter().filter(|(rule, count)| count.diverged == 0 && is_wanted(plan, rule)) {
+        report.row(rule).passed += 1;
+    }
+}
+
+/// Whether a difference says something of the rule of the case that it was seen in: every case is about states, and
+/// otherwise about its own family.
+fn is_about(case_rule: &str, found: &Divergence) -> bool {
+    let family = |rule: &str| match rule.split('/').next().unwrap_or_default() {
+        // Seen through the same windows.
+        "border" | "occupancy" => "observe".to_owned(),
+        other => other.to_owned(),
+    };
+    let is_of_state = ["cell", "goal", "active", "start", "action", "error"].contains(&found.kind().as_str());
+    is_of_state || family(case_rule) == family(&found.rule)
 }

@@ -1,8 +1,8 @@
 //! The first place where two answers to one request differ.
 
-use std::fmt::{Debug, Write as _};
+mod draw;
 
-use pogema_core::{Map, Metrics, Observed, Snapshot, picture};
+use pogema_core::{Metrics, Observed, ObservedPomapf, Snapshot};
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
@@ -27,6 +27,13 @@ pub struct Divergence {
     pub picture: String,
 }
 
+impl Divergence {
+    /// What differs, without saying where.
+    pub fn kind(&self) -> String {
+        kind_of(&self.field)
+    }
+}
+
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         writeln!(f, "operation {}: {} differs (rule {})", self.op, self.field, self.rule)?;
@@ -43,29 +50,37 @@ pub fn compare(
     got: &Response,
     tally: &mut Tally,
 ) -> Option<Divergence> {
-    compare_in(&Scope::ALL, request, expected, got, tally)
+    compare_in(&Scope::ALL, request, expected, got, tally).into_iter().next()
 }
 
-/// The same, for an answer that does not hold everything.
+/// The first difference of each kind, for an answer that need not hold everything.
+///
+/// Differences in what is told of a state do not end the comparison; a state that differs does, since nothing
+/// after it can be right.
 pub fn compare_in(
     scope: &Scope,
     request: &Request,
     expected: &Response,
     got: &Response,
     tally: &mut Tally,
-) -> Option<Divergence> {
+) -> Vec<Divergence> {
     let Ok(config) = GridConfig::from_value(&request.config) else {
         let holds = expected.error.is_some() == got.error.is_some();
         tally.count("config/fields", holds);
-        return (!holds).then(|| ends_differently("config/fields", 0, expected, got));
+        let found = (!holds).then(|| ends_differently("config/fields", 0, expected, got));
+        return found.into_iter().collect();
     };
     let side = config.rules().side();
-    let mut comparison = Comparison { scope, side, families: families_of(&config), tally, found: None };
-    let pairs = expected.records.iter().zip(&got.records);
-    for (op, (expected_record, got_record)) in pairs.enumerate() {
-        comparison.records(expected_record, got_record);
-        if let Some(found) = comparison.found.take() {
-            return Some(Divergence { op, picture: draw(expected, got, op), ..found });
+    let (op, found, is_lost) = (0, Vec::new(), false);
+    let mut comparison = Comparison { scope, side, families: families_of(&config), tally, op, found, is_lost };
+    for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
+        comparison.op = op;
+        comparison.records(one, other);
+        for found in comparison.found.iter_mut().filter(|found| found.op == op) {
+            found.picture.insert_str(0, &draw::states(expected, got, op));
+        }
+        if comparison.is_lost || (scope.is_whole() && !comparison.found.is_empty()) {
+            return comparison.found;
         }
     }
     let op = expected.records.len().min(got.records.len());
@@ -73,7 +88,9 @@ pub fn compare_in(
         expected.records.len() == got.records.len() && expected.error.is_some() == got.error.is_some();
     let rule = refusal_rule(request.ops.get(op), expected.error.is_some());
     comparison.tally.count(rule, holds);
-    (!holds).then(|| ends_differently(rule, op, expected, got))
+    let mut found = comparison.found;
+    found.extend((!holds).then(|| ends_differently(rule, op, expected, got)));
+    found
 }
 
 /// The rule that says whether an operation is to be refused.
@@ -110,7 +127,10 @@ struct Comparison<'a> {
     side: usize,
     families: Families,
     tally: &'a mut Tally,
-    found: Option<Divergence>,
+    op: usize,
+    found: Vec<Divergence>,
+    /// Whether the states went apart.
+    is_lost: bool,
 }
 
 impl Comparison<'_> {
@@ -127,7 +147,8 @@ impl Comparison<'_> {
     }
 
     fn resets(&mut self, expected: &ResetRecord, got: &ResetRecord) {
-        let place = self.families.place;
+        // Where starts and goals are given, nothing is said of how they are drawn.
+        let place = if self.scope.drawn { self.families.place } else { "place/explicit" };
         if self.scope.drawn {
             if self.scope.tells(Told::Derived) {
                 self.value("config/size", "derived", &expected.derived, &got.derived);
@@ -140,8 +161,8 @@ impl Comparison<'_> {
         if self.scope.is_whole() {
             self.value("border/outside", "padded dtype", &expected.padded.dtype, &got.padded.dtype);
         }
-        self.list(place, "start", &expected.state.cells, &got.state.cells);
-        self.list(place, "goal", &expected.state.goals, &got.state.goals);
+        self.state_list(place, "start", &expected.state.cells, &got.state.cells);
+        self.state_list(place, "goal", &expected.state.goals, &got.state.goals);
         self.state("goal/finish/start-on-goal", &expected.state, &got.state);
         self.seen(expected.observations.as_ref(), got.observations.as_ref());
         if self.scope.drawn
@@ -154,9 +175,9 @@ impl Comparison<'_> {
 
     fn steps(&mut self, expected: &StepRecord, got: &StepRecord, policy: &str) {
         let (families, one, other) = (self.families, &expected.step, &got.step);
-        self.list(policy, "action", &one.actions, &other.actions);
-        self.list(families.collide, "cell", &one.state.cells, &other.state.cells);
-        self.list(families.goal, "goal", &one.state.goals, &other.state.goals);
+        self.state_list(policy, "action", &one.actions, &other.actions);
+        self.state_list(families.collide, "cell", &one.state.cells, &other.state.cells);
+        self.state_list(families.goal, "goal", &one.state.goals, &other.state.goals);
         self.state(families.goal, &one.state, &other.state);
         self.list("reward/own", "reward", &one.rewards, &other.rewards);
         self.list("end/terminated", "terminated", &one.terminated, &other.terminated);
@@ -187,8 +208,8 @@ impl Comparison<'_> {
     fn backs(&mut self, expected: &Back, got: &Back) {
         let rule = "history/step-back";
         self.value(rule, "moved", &expected.moved, &got.moved);
-        self.list(rule, "cell", &expected.state.cells, &got.state.cells);
-        self.list(rule, "goal", &expected.state.goals, &got.state.goals);
+        self.state_list(rule, "cell", &expected.state.cells, &got.state.cells);
+        self.state_list(rule, "goal", &expected.state.goals, &got.state.goals);
         self.state(rule, &expected.state, &got.state);
     }
 
@@ -201,7 +222,7 @@ impl Comparison<'_> {
         if self.scope.tells(Told::OnGoal) {
             self.list(goal_rule, "on goal", &expected.on_goal, &got.on_goal);
         }
-        self.list(goal_rule, "active", &expected.active, &got.active);
+        self.state_list(goal_rule, "active", &expected.active, &got.active);
         if self.scope.tells(Told::Occupied) {
             self.value(self.families.occupancy, "occupied cells", &expected.occupied, &got.occupied);
         }
@@ -222,56 +243,67 @@ impl Comparison<'_> {
 
     fn observations(&mut self, expected: &Observed, got: &Observed) {
         let rule = self.families.observe;
-        match (expected, got) {
+        let holds = match (expected, got) {
             (Observed::Default { windows: one, .. }, Observed::Default { windows: other, .. }) => {
-                self.windows(rule, "observation", one, other);
+                self.windows(rule, "observation", one, other)
             }
-            (Observed::Pomapf(one), Observed::Pomapf(other)) => {
-                self.windows(rule, "obstacles window", &one.obstacles, &other.obstacles);
-                self.windows(rule, "agents window", &one.agents, &other.agents);
-                self.list(rule, "xy", &one.xy, &other.xy);
-                self.list(rule, "target_xy", &one.target_xy, &other.target_xy);
-            }
+            (Observed::Pomapf(one), Observed::Pomapf(other)) => self.pomapf(one, other),
             (Observed::Mapf(one), Observed::Mapf(other)) => {
-                self.windows(rule, "obstacles window", &one.pomapf.obstacles, &other.pomapf.obstacles);
-                self.windows(rule, "agents window", &one.pomapf.agents, &other.pomapf.agents);
-                self.list(rule, "global_xy", &one.global_xy, &other.global_xy);
-                self.list(rule, "global_target_xy", &one.global_target_xy, &other.global_target_xy);
+                self.pomapf(&one.pomapf, &other.pomapf)
+                    && self.list(rule, "global_xy", &one.global_xy, &other.global_xy)
+                    && self.list(rule, "global_target_xy", &one.global_target_xy, &other.global_target_xy)
             }
-            _ => {}
+            _ => true,
+        };
+        if holds {
+            // Whatever was not named: element types, the global map, and what fits no form at all.
+            self.value(rule, "observations", expected, got);
         }
-        // Whatever no line above named: element types, the global map, and what fits no form at all.
-        self.value(rule, "observations", expected, got);
     }
 
-    fn windows(&mut self, rule: &str, what: &str, expected: &[String], got: &[String]) {
+    fn pomapf(&mut self, expected: &ObservedPomapf, got: &ObservedPomapf) -> bool {
+        let rule = self.families.observe;
+        self.windows(rule, "obstacles window", &expected.obstacles, &got.obstacles)
+            && self.windows(rule, "agents window", &expected.agents, &got.agents)
+            && self.list(rule, "xy", &expected.xy, &got.xy)
+            && self.list(rule, "target_xy", &expected.target_xy, &got.target_xy)
+    }
+
+    fn windows(&mut self, rule: &str, what: &str, expected: &[String], got: &[String]) -> bool {
         let differing = expected.iter().zip(got).position(|(one, other)| one != other);
         let Some(agent) = differing else { return self.list(rule, what, expected, got) };
+        let (one, other) = (&expected[agent], &got[agent]);
         // Of a hash that differs nothing else can be said.
-        let place = match got[agent].contains(':') {
+        let place = match other.contains(':') {
             true => String::new(),
-            false => format!(", value {} row by row", first_differing_bit(&expected[agent], &got[agent])),
+            false => format!(", value {} row by row", draw::first_differing_bit(one, other)),
         };
-        let field = format!("{what} of agent {agent}{place}");
-        self.value(rule, &field, &expected[agent], &got[agent]);
+        let num_found = self.found.len();
+        self.value(rule, &format!("{what} of agent {agent}{place}"), one, other);
+        if let Some(found) = self.found.get_mut(num_found) {
+            found.picture = draw::windows(one, other, self.side);
+        }
+        false
     }
 
-    fn list<T: PartialEq + Debug>(&mut self, rule: &str, what: &str, expected: &[T], got: &[T]) {
+    /// A part of the state, without which nothing that follows can be right.
+    fn state_list<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &[T], got: &[T]) {
+        self.list(rule, what, expected, got);
+        self.is_lost |= expected != got;
+    }
+
+    fn list<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &[T], got: &[T]) -> bool {
         let holds = expected == got;
         self.tally.count(rule, holds);
-        if holds || self.found.is_some() {
-            return;
-        }
         if expected.len() != got.len() {
-            let field = format!("number of {what} entries");
-            return self.report(rule, field, &expected.len(), &got.len());
-        }
-        if let Some(index) = expected.iter().zip(got).position(|(one, other)| one != other) {
+            self.report(rule, format!("number of {what} entries"), &expected.len(), &got.len());
+        } else if let Some(index) = expected.iter().zip(got).position(|(one, other)| one != other) {
             self.report(rule, format!("{what} {index}"), &expected[index], &got[index]);
         }
+        holds
     }
 
-    fn value<T: PartialEq + Debug>(&mut self, rule: &str, what: &str, expected: &T, got: &T) {
+    fn value<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &T, got: &T) {
         let holds = expected == got;
         self.tally.count(rule, holds);
         if !holds {
@@ -279,49 +311,26 @@ impl Comparison<'_> {
         }
     }
 
-    fn report(&mut self, rule: &str, field: String, expected: &impl Debug, got: &impl Debug) {
-        if self.found.is_none() {
-            self.found = Some(Divergence {
-                op: 0,
-                field,
-                expected: format!("{expected:?}"),
-                got: format!("{got:?}"),
-                rule: rule.into(),
-                picture: String::new(),
-            });
+    fn report(&mut self, rule: &str, field: String, expected: &impl Serialize, got: &impl Serialize) {
+        let is_told = |found: &Divergence| found.rule == rule && found.kind() == kind_of(&field);
+        if self.is_lost || self.found.iter().any(is_told) {
+            return;
         }
+        let (expected, got) = (in_json(expected), in_json(got));
+        let (op, rule, picture) = (self.op, rule.into(), String::new());
+        self.found.push(Divergence { op, field, expected, got, rule, picture });
     }
 }
 
-fn first_differing_bit(one: &str, other: &str) -> usize {
-    let digits = one.chars().zip(other.chars()).enumerate();
-    let digit = |character: char| character.to_digit(16).unwrap_or(0);
-    digits
-        .map(|(index, (one, other))| (index, digit(one) ^ digit(other)))
-        .find(|(_, difference)| *difference != 0)
-        .map_or(4 * one.len().min(other.len()), |(index, difference)| {
-            4 * index + difference.leading_zeros() as usize - 28
-        })
+/// A value as those see it who write ports in other languages.
+fn in_json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_else(|error| error.to_string())
 }
 
-/// Before, expected and got, below each other.
-fn draw(expected: &Response, got: &Response, op: usize) -> String {
-    let map = expected.records[..=op].iter().rev().find_map(|record| match record {
-        Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
-        _ => None,
-    });
-    let Some(map) = map else { return String::new() };
-    let before = expected.records[..op].iter().rev().find_map(Record::state);
-    let states =
-        [("before", before), ("expected", expected.records[op].state()), ("got", got.records[op].state())];
-    let mut text = String::new();
-    for (what, state) in states {
-        let Some(state) = state else { continue };
-        let occupancy = picture::occupancy_picture(&map, state);
-        let _ = writeln!(text, "  {what}: agents and goals, then occupancy");
-        for (agents, occupied) in picture::picture(&map, state).lines().zip(occupancy.lines()) {
-            let _ = writeln!(text, "    {agents}   {occupied}");
-        }
-    }
-    text
+/// A field or message without its numbers and quotes.
+pub fn kind_of(text: &str) -> String {
+    let head = text.split(['`', ':', ',']).next().unwrap_or(text);
+    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
+    let kind: Vec<&str> = words.collect();
+    kind.join(" ").trim_end_matches(" of agent").to_owned()
 }

@@ -1,0 +1,189 @@
+//! A counterexample as a case, so that it can be read, played again and kept for ever.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use pogema_core::{Action, Error, Map, Observed, picture};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::group::Example;
+use crate::files;
+use crate::play::play;
+use crate::request::{Op, Record, Registered};
+use crate::windows::unpack;
+
+/// The file of a case, in the order in which it is read.
+#[derive(Serialize)]
+struct CaseFile {
+    rule: String,
+    says: String,
+    config: Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    register: Option<Registered>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    density: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    collisions: bool,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    start: BTreeMap<&'static str, Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    steps: Vec<StepOfFile>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
+#[derive(Serialize)]
+struct StepOfFile {
+    #[serde(rename = "do", skip_serializing_if = "Option::is_none")]
+    actions: Option<Vec<Value>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    op: Option<&'static str>,
+    #[serde(flatten)]
+    expected: BTreeMap<&'static str, Value>,
+}
+
+/// Writes an example as a case into a folder; gives the path, or nothing if it breaks no rule.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written.
+pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathBuf>, Error> {
+    let Some(found) = &example.divergence else { return Ok(None) };
+    let text = text_of(example, port).map_err(|error| Error::io(folder, error))?;
+    let field: String = found.field.chars().take_while(|letter| !letter.is_ascii_digit() && *letter != ',').collect();
+    let words: Vec<&str> = found.rule.split('/').chain(field.split_whitespace()).collect();
+    let path = folder.join(format!("{}.yaml", words.join("-")));
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    files::write(&path, text.as_bytes())?;
+    Ok(Some(path))
+}
+
+/// An example in the format of cases.
+///
+/// # Errors
+/// If it cannot be written as YAML.
+pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
+    let request = &example.request;
+    let expected = play(request);
+    let (rule, field) = example.divergence.as_ref().map_or(("", ""), |found| (&found.rule, &found.field));
+    let last = example.divergence.as_ref().map_or(0, |found| found.op);
+    let mut start = BTreeMap::new();
+    let mut steps = Vec::new();
+    let mut map = None;
+    for (at, record) in expected.records.iter().enumerate() {
+        if let Record::Reset(reset) = record {
+            map = Map::from_rows(&reset.map).ok();
+        }
+        let facts = facts(record, map.as_ref(), field, at == last);
+        match (at, &request.ops[at]) {
+            (0, _) => start = facts,
+            (_, op) => steps.push(step_of(op, facts)),
+        }
+    }
+    if expected.error.is_some()
+        && let Some(op) = request.ops.get(expected.records.len())
+        && !expected.records.is_empty()
+    {
+        steps.push(step_of(op, BTreeMap::new()));
+    }
+    let file = CaseFile {
+        rule: rule.to_owned(),
+        says: format!("{port} differs in: {field}."),
+        config: request.config.clone(),
+        register: request.register.clone(),
+        density: request.density,
+        collisions: request.collisions,
+        start,
+        steps,
+        error: expected.error.map(|error| error.message),
+    };
+    serde_saphyr::to_string(&file).map_err(|error| error.to_string())
+}
+
+fn step_of(op: &Op, expected: BTreeMap<&'static str, Value>) -> StepOfFile {
+    let (actions, op) = match op {
+        Op::Step(actions) => (Some(actions.iter().copied().map(word).collect()), None),
+        Op::Reset(_) => (None, Some("reset")),
+        Op::Astar => (None, Some("astar")),
+        Op::Sample => (None, Some("sample")),
+        Op::Back => (None, Some("back")),
+        Op::History => (None, Some("history")),
+    };
+    StepOfFile { actions, op, expected }
+}
+
+fn word(number: i64) -> Value {
+    match Action::from_number(0, number) {
+        Ok(action) => format!("{action:?}").to_lowercase().into(),
+        Err(_) => number.into(),
+    }
+}
+
+/// What to expect of a moment: a picture of each, and of the last all that could differ.
+fn facts(record: &Record, map: Option<&Map>, field: &str, is_last: bool) -> BTreeMap<&'static str, Value> {
+    let mut facts = BTreeMap::new();
+    let (Some(state), Some(map)) = (record.state(), map) else {
+        if let Record::History(history) = record {
+            facts.insert("changes", json!(history.changes));
+        }
+        return facts;
+    };
+    facts.insert("picture", json!(picture::picture(map, state)));
+    if !is_last {
+        return facts;
+    }
+    facts.insert("cells", json!(state.cells));
+    facts.insert("goals", json!(state.goals));
+    facts.insert("active", json!(state.active));
+    facts.insert("on_goal", json!(state.on_goal));
+    facts.insert("occupied", json!(picture::occupancy_picture(map, state)));
+    match record {
+        Record::Reset(reset) => {
+            facts.insert("padded", json!(reset.padded.rows.join("\n")));
+            add_sees(&mut facts, reset.observations.as_ref(), field);
+        }
+        Record::Step(step) | Record::Astar(step) | Record::Sample(step) => {
+            facts.insert("rewards", json!(step.step.rewards));
+            facts.insert("terminated", json!(step.step.terminated));
+            facts.insert("truncated", json!(step.step.truncated));
+            facts.insert("metrics", json!(step.step.metrics.unwrap_or_default()));
+            if field.starts_with("caller's action") {
+                facts.insert("actions_after", json!(step.actions_after));
+            }
+            add_sees(&mut facts, step.step.observations.as_ref(), field);
+        }
+        Record::Back(back) => drop(facts.insert("moved", json!(back.moved))),
+        Record::History(_) | Record::Odd(_) => {}
+    }
+    facts
+}
+
+/// What the agent sees whose observation differs.
+fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: &str) {
+    let numbers = field.split(|letter: char| !letter.is_ascii_digit()).filter(|word| !word.is_empty());
+    let Some(agent) = numbers.filter_map(|word| word.parse::<usize>().ok()).next() else { return };
+    match observed {
+        Some(Observed::Default { windows, .. }) if field.starts_with("observation") => {
+            let Some(window) = windows.get(agent) else { return };
+            let bits = unpack(window);
+            let area = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= bits.len()).last();
+            let Some(area) = area else { return };
+            let [obstacles, agents, goal] = [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
+            facts.insert("sees", json!({ "agent": agent, "obstacles": obstacles, "agents": agents, "goal": goal }));
+        }
+        Some(Observed::Pomapf(pomapf)) => add_pairs(facts, &pomapf.xy, &pomapf.target_xy),
+        Some(Observed::Mapf(mapf)) => add_pairs(facts, &mapf.pomapf.xy, &mapf.pomapf.target_xy),
+        _ => {}
+    }
+}
+
+fn add_pairs(facts: &mut BTreeMap<&'static str, Value>, xy: &[[i32; 2]], target_xy: &[[i32; 2]]) {
+    facts.insert("xy", json!(xy));
+    facts.insert("target_xy", json!(target_xy));
+}
+
+fn lines(bits: &[bool]) -> String {
+    let side = bits.len().isqrt().max(1);
+    let line = |row: &[bool]| row.iter().map(|&bit| if bit { '1' } else { '.' }).collect::<String>();
+    bits.chunks(side).map(line).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,190 @@
+//! One episode with everything given, to be made smaller piece by piece.
+
+use pogema_core::{Cell, Map, OnGoal};
+use pogema_maps::{GridConfig, InstanceSource};
+use serde_json::{Map as Object, Value, json};
+
+use crate::request::{Op, Record, Request, Response};
+
+/// An episode: a map, agents, what they do, and the fields of the config that have nothing to do with those.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Row by row, whether there is an obstacle.
+    pub rows: Vec<Vec<bool>>,
+    /// Where each agent starts.
+    pub starts: Vec<Cell>,
+    /// The goals of each agent, one after the other.
+    pub goals: Vec<Vec<Cell>>,
+    /// What is done after the reset.
+    pub ops: Vec<Op>,
+    /// Whether agents get a new goal when they reach one.
+    pub restarts: bool,
+    /// The other fields.
+    pub fields: Object<String, Value>,
+    /// Whether the density of agents is measured.
+    pub density: bool,
+    /// Whether collisions are counted.
+    pub collisions: bool,
+}
+
+impl Scene {
+    /// The last episode of a request, as far as the operation at `until`.
+    ///
+    /// None if its instance cannot be written into a config.
+    pub fn of(request: &Request, expected: &Response, until: usize) -> Option<Self> {
+        let config = GridConfig::from_value(&request.config).ok()?;
+        let until = until.min(request.ops.len().checked_sub(1)?);
+        let begin = (0..=until).rev().find(|&at| matches!(request.ops[at], Op::Reset(_)))?;
+        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
+        let registered = named.and_then(|map| Map::from_rows(&map.rows).ok());
+        let mut source = InstanceSource::new(config.clone(), registered).ok()?;
+        let num_resets = request.ops[..=begin].iter().filter(|op| matches!(op, Op::Reset(_))).count();
+        let mut instance = source.generate().ok()?.instance;
+        for _ in 1..num_resets {
+            instance = source.generate().ok()?.instance;
+        }
+        let restarts = config.on_target == OnGoal::Restart;
+        let num_goals = if restarts { until - begin + 2 } else { 1 };
+        let map = instance.map();
+        let rows = map.obstacles().chunks(map.width()).map(<[bool]>::to_vec).collect();
+        let ops = request.ops[begin + 1..=until].iter().zip(begin + 1..).map(|(op, at)| plain(op, at, expected));
+        Some(Self {
+            rows,
+            starts: instance.starts().to_vec(),
+            goals: instance.goals().iter().map(|stream| stream.list(num_goals)).collect(),
+            ops: ops.collect(),
+            restarts,
+            fields: fields(&config),
+            density: request.density,
+            collisions: request.collisions,
+        })
+    }
+
+    /// The scene as a request.
+    pub fn request(&self) -> Request {
+        let mut config = Object::new();
+        let line = |row: &Vec<bool>| row.iter().map(|&flag| if flag { '#' } else { '.' }).collect::<String>();
+        let text: Vec<String> = self.rows.iter().map(line).collect();
+        config.insert("map".into(), text.join("\n").into());
+        config.insert("agents_xy".into(), json!(self.starts));
+        let first: Vec<Cell> = self.goals.iter().filter_map(|goals| goals.first().copied()).collect();
+        config.insert("targets_xy".into(), if self.restarts { json!(self.goals) } else { json!(first) });
+        config.extend(self.fields.clone());
+        let ops = std::iter::once(Op::Reset(None)).chain(self.ops.iter().cloned()).collect();
+        Request {
+            id: 0,
+            config: Value::Object(config),
+            register: None,
+            density: self.density,
+            collisions: self.collisions,
+            ops,
+        }
+    }
+
+    /// Number of agents.
+    pub fn num_agents(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// The scene as it stands after some of its operations, with the agents that still take part.
+    pub fn begun_after(&self, num_ops: usize, played: &Response) -> Option<Self> {
+        let state = played.records.get(num_ops)?.state()?;
+        let passed = &played.records[1..=num_ops];
+        if passed.iter().any(|record| record.step().is_none()) {
+            return None;
+        }
+        let kept: Vec<usize> = (0..self.num_agents()).filter(|&agent| state.active[agent]).collect();
+        let mut later = self.clone();
+        later.ops.drain(..num_ops);
+        later.starts = kept.iter().map(|&agent| state.cells[agent]).collect();
+        later.goals = kept.iter().map(|&agent| {
+            let mut goals = self.goals[agent].clone();
+            let reached = |record: &&Record| record.state().is_some_and(|state| state.on_goal[agent]);
+            let num_reached = if self.restarts { passed.iter().filter(reached).count() } else { 0 };
+            let length = goals.len();
+            goals.rotate_left(num_reached % length.max(1));
+            goals
+        }).collect();
+        later.keep_actions(&kept);
+        let max_steps = self.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
+        later.fields.insert("max_episode_steps".into(), (max_steps - num_ops as i64).max(1).into());
+        Some(later)
+    }
+
+    /// The scene without some agents.
+    pub fn without_agents(&self, gone: &[usize]) -> Self {
+        let kept: Vec<usize> = (0..self.num_agents()).filter(|agent| !gone.contains(agent)).collect();
+        let mut fewer = self.clone();
+        fewer.starts = kept.iter().map(|&agent| self.starts[agent]).collect();
+        fewer.goals = kept.iter().map(|&agent| self.goals[agent].clone()).collect();
+        fewer.keep_actions(&kept);
+        fewer
+    }
+
+    fn keep_actions(&mut self, kept: &[usize]) {
+        for op in &mut self.ops {
+            if let Op::Step(actions) = op {
+                *actions = kept.iter().filter_map(|&agent| actions.get(agent).copied()).collect();
+            }
+        }
+    }
+
+    /// The scene without one row, what stood there moved to the row that takes its place.
+    pub fn without_row(&self, row: usize) -> Self {
+        let mut smaller = self.clone();
+        smaller.rows.remove(row);
+        let last = smaller.rows.len().saturating_sub(1) as u16;
+        smaller.move_cells(|cell| Cell::new((cell.row - u16::from(usize::from(cell.row) > row)).min(last), cell.col));
+        smaller
+    }
+
+    /// The scene without one column, what stood there moved to the column that takes its place.
+    pub fn without_col(&self, col: usize) -> Self {
+        let mut smaller = self.clone();
+        for row in &mut smaller.rows {
+            row.remove(col);
+        }
+        let last = smaller.rows.first().map_or(0, |row| row.len().saturating_sub(1)) as u16;
+        smaller.move_cells(|cell| Cell::new(cell.row, (cell.col - u16::from(usize::from(cell.col) > col)).min(last)));
+        smaller
+    }
+
+    fn move_cells(&mut self, to: impl Fn(Cell) -> Cell) {
+        self.starts.iter_mut().chain(self.goals.iter_mut().flatten()).for_each(|cell| *cell = to(*cell));
+    }
+}
+
+/// An operation without a policy.
+fn plain(op: &Op, at: usize, expected: &Response) -> Op {
+    let chosen = expected.records.get(at).and_then(Record::step);
+    match (op, chosen) {
+        (Op::Astar | Op::Sample, Some(step)) => {
+            Op::Step(step.step.actions.iter().map(|&action| action as i64).collect())
+        }
+        _ => op.clone(),
+    }
+}
+
+/// The fields that say nothing of map and agents, where they differ from what they are by default.
+fn fields(config: &GridConfig) -> Object<String, Value> {
+    let default = GridConfig::default();
+    let mut fields = Object::new();
+    let mut put = |name: &str, value: Value, default: Value| {
+        if value != default {
+            fields.insert(name.into(), value);
+        }
+    };
+    put("on_target", json!(config.on_target), json!(default.on_target));
+    put("collision_system", json!(config.collision_system), json!(default.collision_system));
+    put("observation_type", json!(config.observation_type), json!(default.observation_type));
+    put("obs_radius", json!(config.obs_radius), json!(default.obs_radius));
+    put("max_episode_steps", json!(config.max_episode_steps), json!(default.max_episode_steps));
+    put("persistent", json!(config.persistent), json!(default.persistent));
+    put("empty_outside", json!(config.empty_outside), json!(default.empty_outside));
+    put("occupancy", json!(config.occupancy), json!(default.occupancy));
+    put("reward", json!(config.reward), json!(default.reward));
+    if !config.empty_outside {
+        put("seed", json!(config.seed), Value::Null);
+    }
+    fields
+}
