@@ -36,6 +36,9 @@ impl Engine {
         Self { name: "literal", make: |config| Ok(Box::new(crate::Literal::new(config)?)) };
 }
 
+/// Makes an environment for a config.
+pub type Make<'a> = dyn Fn(Config) -> Result<Box<dyn Environment>, Error> + 'a;
+
 /// Plays a request on the reference.
 pub fn play(request: &Request) -> Response {
     play_on(Engine::REFERENCE, request)
@@ -44,7 +47,7 @@ pub fn play(request: &Request) -> Response {
 /// Plays a request on an engine.
 pub fn play_on(engine: Engine, request: &Request) -> Response {
     let mut response = Response { id: Some(request.id), ..Response::default() };
-    let mut player = match Player::new(engine, request) {
+    let mut player = match Player::new(&engine.make, request) {
         Ok(player) => player,
         Err(error) => {
             response.error = Some(failure(When::Phase("config".into()), &error));
@@ -100,19 +103,19 @@ pub(crate) struct Player {
 }
 
 impl Player {
-    pub(crate) fn new(engine: Engine, request: &Request) -> Result<Self, Error> {
+    pub(crate) fn new(make: &Make<'_>, request: &Request) -> Result<Self, Error> {
         let config = GridConfig::from_value(&request.config)?;
         let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
         let registered = named.map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
         let source = Source::Drawn(Box::new(InstanceSource::new(config.clone(), registered)?));
-        let mut player = Self::with_source(engine, config, source)?;
+        let mut player = Self::with_source(make, config, source)?;
         player.density = request.density.then(DensityMeter::default);
         player.collisions = request.collisions.then(CollisionMeter::default);
         Ok(player)
     }
 
     /// A player of one instance, whose episodes all begin alike.
-    pub(crate) fn of_instance(engine: Engine, rules: &Config, instance: Instance) -> Result<Self, Error> {
+    pub(crate) fn of_instance(make: &Make<'_>, rules: &Config, instance: Instance) -> Result<Self, Error> {
         let config = GridConfig {
             num_agents: rules.num_agents,
             obs_radius: rules.radius,
@@ -126,14 +129,14 @@ impl Player {
             empty_outside: matches!(instance.outside(), Outside::Free),
             ..GridConfig::default()
         };
-        Self::with_source(engine, config, Source::Given(Box::new(instance)))
+        Self::with_source(make, config, Source::Given(Box::new(instance)))
     }
 
-    fn with_source(engine: Engine, config: GridConfig, source: Source) -> Result<Self, Error> {
+    fn with_source(make: &Make<'_>, config: GridConfig, source: Source) -> Result<Self, Error> {
         let rules = config.rules();
         Ok(Self {
             source,
-            environment: (engine.make)(rules)?,
+            environment: make(rules)?,
             instance: None,
             warnings: Vec::new(),
             meter: EpisodeMeter::new(&rules),

@@ -33,7 +33,7 @@ const MOST_STEPS: usize = 26;
 pub fn play_script(engine: Engine, mut request: Request, seed: u64) -> (Request, Response) {
     let mut dice = Dice::new(seed ^ 0x5ca1_ab1e, request.id);
     let mut response = Response { id: Some(request.id), ..Response::default() };
-    let Ok(mut player) = Player::new(engine, &request) else {
+    let Ok(mut player) = Player::new(&engine.make, &request) else {
         request.ops.push(Op::Reset(None));
         return (request.clone(), crate::play_on(engine, &request));
     };

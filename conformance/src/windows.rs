@@ -70,8 +70,9 @@ pub(crate) fn pack(window: &[f32]) -> String {
 
 /// The same of flags.
 pub(crate) fn pack_bits(bits: &[bool]) -> String {
-    let byte =
-        |cells: &[bool]| cells.iter().enumerate().fold(0u8, |byte, (at, &bit)| byte | (u8::from(bit) << (7 - at)));
+    let byte = |cells: &[bool]| {
+        cells.iter().enumerate().fold(0u8, |byte, (at, &bit)| byte | (u8::from(bit) << (7 - at)))
+    };
     bits.chunks(8).fold(String::new(), |mut text, cells| {
         let _ = write!(text, "{:02x}", byte(cells));
         text

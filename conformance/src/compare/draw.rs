@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pogema_core::{Map, picture};
+use pogema_core::{Cell, Map, picture};
 
 use crate::request::{Record, Response};
 use crate::windows::unpack;
@@ -20,6 +20,11 @@ pub fn states(expected: &Response, got: &Response, op: usize) -> String {
     let mut text = String::new();
     for (what, state) in states {
         let Some(state) = state else { continue };
+        let is_on_map = |cell: &Cell| map.contains(*cell);
+        if ![&state.cells, &state.goals, &state.occupied].into_iter().flatten().all(is_on_map) {
+            let _ = writeln!(text, "  {what}: somebody or something is off the map");
+            continue;
+        }
         let occupancy = picture::occupancy_picture(&map, state);
         let _ = writeln!(text, "  {what}: agents and goals, then occupancy");
         for (agents, occupied) in picture::picture(&map, state).lines().zip(occupancy.lines()) {

@@ -72,7 +72,8 @@ pub fn compare_in(
     };
     let side = config.rules().side();
     let (op, found, is_lost) = (0, Vec::new(), false);
-    let mut comparison = Comparison { scope, side, families: families_of(&config), tally, op, found, is_lost };
+    let mut comparison =
+        Comparison { scope, side, families: families_of(&config), tally, op, found, is_lost };
     for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
         comparison.op = op;
         comparison.records(one, other);
@@ -274,9 +275,10 @@ impl Comparison<'_> {
         let Some(agent) = differing else { return self.list(rule, what, expected, got) };
         let (one, other) = (&expected[agent], &got[agent]);
         // Of a hash that differs nothing else can be said.
-        let place = match other.contains(':') {
-            true => String::new(),
-            false => format!(", value {} row by row", draw::first_differing_bit(one, other)),
+        let place = if other.contains(':') {
+            String::new()
+        } else {
+            format!(", value {} row by row", draw::first_differing_bit(one, other))
         };
         let num_found = self.found.len();
         self.value(rule, &format!("{what} of agent {agent}{place}"), one, other);

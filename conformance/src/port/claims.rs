@@ -79,8 +79,13 @@ impl Scope {
 
 /// The profile that a rule belongs to.
 pub fn profile_of(rule: &str) -> Profile {
-    const SEEDING: [&str; 5] =
-        ["border/noise", "goal/restart/draw", "goal/restart/foretold", "goal/restart/pool", "goal/restart/unreachable"];
+    const SEEDING: [&str; 5] = [
+        "border/noise",
+        "goal/restart/draw",
+        "goal/restart/foretold",
+        "goal/restart/pool",
+        "goal/restart/unreachable",
+    ];
     let is_any = |rules: &[&'static str]| rules.iter().any(|prefix| Unclaimed::new("", prefix).covers(rule));
     match rule.split('/').next().unwrap_or_default() {
         _ if is_any(&SEEDING) => Profile::Seeding,
@@ -206,7 +211,12 @@ fn leave_out(
     left_out
 }
 
-fn leave_out_figures(hello: &Hello, config: &GridConfig, request: &mut Request, left_out: &mut Vec<Unclaimed>) {
+fn leave_out_figures(
+    hello: &Hello,
+    config: &GridConfig,
+    request: &mut Request,
+    left_out: &mut Vec<Unclaimed>,
+) {
     if !hello.profiles.contains(&Profile::Metrics) {
         left_out.push(Unclaimed::new("profile metrics", families_of(config).metrics));
         request.density = false;
@@ -235,7 +245,8 @@ fn leave_out_figures(hello: &Hello, config: &GridConfig, request: &mut Request, 
 /// Puts the actions that a policy chooses in its place.
 fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Unclaimed> {
     // Records and operations go together, one to one, up to the first error.
-    let kept = expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
+    let kept =
+        expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
     let mut records = kept.map(Record::step);
     let mut left_out = None;
     for op in &mut request.ops {
@@ -266,6 +277,8 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
         (Told::Derived, "config/size"),
         (Told::Foretold, "goal/restart/foretold"),
     ];
-    let lacking = needed.into_iter().find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
+    let lacking = needed
+        .into_iter()
+        .find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
     lacking.map(|(key, of)| Unclaimed::new(format!("tells {}", word(&key)), of))
 }

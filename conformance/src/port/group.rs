@@ -51,6 +51,13 @@ pub struct Example {
     pub fault: Option<Misbehaviour>,
 }
 
+impl Cause {
+    fn of(example: Example) -> Self {
+        let (rule, what) = example.key();
+        Self { rule, what, times: 0, cases: BTreeMap::new(), example, kept: None, replay: None, known: None }
+    }
+}
+
 impl Example {
     fn key(&self) -> (Option<String>, String) {
         match (&self.divergence, &self.fault) {
@@ -68,25 +75,23 @@ impl Example {
     /// Small is easy to understand.
     fn size(&self) -> (usize, usize) {
         let written = |value: &serde_json::Value| value.to_string().len();
-        (self.divergence.as_ref().map_or(self.request.ops.len(), |found| found.op), written(&self.request.config))
+        (
+            self.divergence.as_ref().map_or(self.request.ops.len(), |found| found.op),
+            written(&self.request.config),
+        )
     }
 }
 
-/// Adds an occasion to the causes; `case` is the rule of the hand-written case that it is.
-pub fn add(causes: &mut Vec<Cause>, example: Example, case: Option<&str>) {
-    let cause = match causes.iter().position(|cause| cause.example.is_like(&example)) {
-        Some(at) => &mut causes[at],
-        None => {
-            let (rule, what) = example.key();
-            let example = example.clone();
-            let cases = BTreeMap::new();
-            causes.push(Cause { rule, what, times: 0, cases, example, kept: None, replay: None, known: None });
-            let last = causes.len() - 1;
-            &mut causes[last]
-        }
-    };
+/// Adds an occasion to the causes; `case_rule` is the rule of the hand-written case that it is.
+pub fn add(causes: &mut Vec<Cause>, example: Example, case_rule: Option<&str>) {
+    let known = causes.iter().position(|known| known.example.is_like(&example));
+    let at = known.unwrap_or(causes.len());
+    if known.is_none() {
+        causes.push(Cause::of(example.clone()));
+    }
+    let cause = &mut causes[at];
     cause.times += 1;
-    if let Some(rule) = case {
+    if let Some(rule) = case_rule {
         *cause.cases.entry(rule.to_owned()).or_default() += 1;
     }
     if example.size() < cause.example.size() {

@@ -50,7 +50,8 @@ struct StepOfFile {
 pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathBuf>, Error> {
     let Some(found) = &example.divergence else { return Ok(None) };
     let text = text_of(example, port).map_err(|error| Error::io(folder, error))?;
-    let field: String = found.field.chars().take_while(|letter| !letter.is_ascii_digit() && *letter != ',').collect();
+    let field: String =
+        found.field.chars().take_while(|letter| !letter.is_ascii_digit() && *letter != ',').collect();
     let words: Vec<&str> = found.rule.split('/').chain(field.split_whitespace()).collect();
     let path = folder.join(format!("{}.yaml", words.join("-")));
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
@@ -161,15 +162,23 @@ fn facts(record: &Record, map: Option<&Map>, field: &str, is_last: bool) -> BTre
 /// What the agent sees whose observation differs.
 fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: &str) {
     let numbers = field.split(|letter: char| !letter.is_ascii_digit()).filter(|word| !word.is_empty());
-    let Some(agent) = numbers.filter_map(|word| word.parse::<usize>().ok()).next() else { return };
+    let Some(agent) = numbers.map(str::parse::<usize>).find_map(Result::ok) else { return };
     match observed {
         Some(Observed::Default { windows, .. }) if field.starts_with("observation") => {
             let Some(window) = windows.get(agent) else { return };
             let bits = unpack(window);
-            let area = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= bits.len()).last();
+            let area = (1..)
+                .step_by(2)
+                .map(|side: usize| side * side)
+                .take_while(|area| 3 * area <= bits.len())
+                .last();
             let Some(area) = area else { return };
-            let [obstacles, agents, goal] = [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
-            facts.insert("sees", json!({ "agent": agent, "obstacles": obstacles, "agents": agents, "goal": goal }));
+            let [obstacles, agents, goal] =
+                [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
+            facts.insert(
+                "sees",
+                json!({ "agent": agent, "obstacles": obstacles, "agents": agents, "goal": goal }),
+            );
         }
         Some(Observed::Pomapf(pomapf)) => add_pairs(facts, &pomapf.xy, &pomapf.target_xy),
         Some(Observed::Mapf(mapf)) => add_pairs(facts, &mapf.pomapf.xy, &mapf.pomapf.target_xy),

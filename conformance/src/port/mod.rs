@@ -10,6 +10,7 @@
 
 mod claims;
 mod group;
+mod items;
 mod judge;
 mod keep;
 mod link;
@@ -17,22 +18,25 @@ mod observations;
 mod play;
 mod process;
 mod protocol;
+mod report;
 mod run;
 mod scene;
 mod server;
 mod session;
 mod shrink;
+mod shrink_config;
 
 pub use claims::{Mode, Scope, Unclaimed, adapt, needed_by, profile_of};
 pub use group::{Cause, Example};
-pub use keep::{keep, text_of};
 pub use judge::{Judged, judge};
+pub use keep::{keep, text_of};
 pub use link::{Link, Misbehaviour};
 pub(crate) use observations::resolve_hashes;
 pub use play::{Answered, play_on_port};
 pub use process::{Command, Process};
-pub use protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
-pub use run::{Plan, PortReport, Subject, Verdicts, check_ports, shrink_causes};
+pub use protocol::{Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
+pub use report::{PortReport, Verdicts};
+pub use run::{Plan, Subject, check_ports, shrink_causes};
 pub use server::{Server, serve};
 pub use session::Port;
 pub use shrink::shrink;

@@ -1,5 +1,7 @@
 //! What a port says its agents see, in the form that records keep.
 
+use std::fmt::Write as _;
+
 use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -92,13 +94,18 @@ fn resolve(expected: &[String], told: &mut [String], num_values: usize) {
 /// The hash of one byte for each value.
 fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
     let bytes: Vec<u8> = values.map(u8::from).collect();
-    let mut text = format!("{algorithm}:");
     match algorithm {
-        "sha256" => text.extend(Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}"))),
-        "fnv1a64" => text.push_str(&format!("{:016x}", fnv1a64(&bytes))),
-        _ => return None,
+        "sha256" => {
+            let mut text = String::from("sha256:");
+            for byte in Sha256::digest(&bytes) {
+                // INVARIANT: writing to a text cannot fail.
+                let _ = write!(text, "{byte:02x}");
+            }
+            Some(text)
+        }
+        "fnv1a64" => Some(format!("fnv1a64:{:016x}", fnv1a64(&bytes))),
+        _ => None,
     }
-    Some(text)
 }
 
 fn fnv1a64(bytes: &[u8]) -> u64 {

@@ -31,7 +31,8 @@ pub fn play_on_port(
     request: &Request,
     expected: &Response,
 ) -> Answered {
-    let mut answered = Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
+    let mut answered =
+        Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
     let mut play = match PortPlay::new(link, hello, mode, request, expected) {
         Ok(play) => play,
         Err(Unplayable::Config(link)) => return refuse_config(link, request),
@@ -60,7 +61,8 @@ fn refuse_config(link: &mut dyn Link, request: &Request) -> Answered {
         register: request.register.clone(),
         ..Beginning::default()
     };
-    let mut answered = Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
+    let mut answered =
+        Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
     match link.ask(&Ask::Reset(Box::new(beginning))) {
         Ok(reply) => {
             let failed = |reason| failure(When::Phase("config".into()), &Error::State { reason });
@@ -103,9 +105,12 @@ impl<'l> PortPlay<'l> {
         request: &'l Request,
         expected: &'l Response,
     ) -> Result<Self, Unplayable<'l>> {
-        let Ok(config) = GridConfig::from_value(&request.config) else { return Err(Unplayable::Config(link)) };
+        let Ok(config) = GridConfig::from_value(&request.config) else {
+            return Err(Unplayable::Config(link));
+        };
         let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
-        let registered = named.map(|map| Map::from_rows(&map.rows)).transpose().map_err(Unplayable::Instance)?;
+        let registered =
+            named.map(|map| Map::from_rows(&map.rows)).transpose().map_err(Unplayable::Instance)?;
         let source = InstanceSource::new(config.clone(), registered).map_err(Unplayable::Instance)?;
         let mut port = Port::new(link, hello, config.rules());
         port.set_padded_dtype(if config.empty_outside { "float64" } else { "int64" });
@@ -116,9 +121,7 @@ impl<'l> PortPlay<'l> {
     fn perform(&mut self, index: usize, op: &Op) -> Result<Record, Error> {
         match op {
             Op::Reset(seed) => self.reset(index, *seed).map(|record| Record::Reset(Box::new(record))),
-            Op::Step(actions) => {
-                self.step(&Ask::Step { actions: actions.clone() }, Record::Step)
-            }
+            Op::Step(actions) => self.step(&Ask::Step { actions: actions.clone() }, Record::Step),
             Op::Astar => self.act(Policy::Astar, index, Record::Astar),
             Op::Sample => self.act(Policy::Sample, index, Record::Sample),
             Op::Back => {
@@ -152,7 +155,7 @@ impl<'l> PortPlay<'l> {
             derived: reply.derived.clone().unwrap_or(derived),
             map: reply.map.clone().unwrap_or_default(),
             padded,
-            goal_lists: reply.foretold.clone().flatten(),
+            goal_lists: reply.foretold.clone().given(),
             goal_lists_error: None,
             state: self.state(),
             observations: self.port.observed().cloned(),
@@ -210,7 +213,7 @@ impl<'l> PortPlay<'l> {
             terminated: reply.terminated.unwrap_or_default(),
             truncated: reply.truncated.unwrap_or_default(),
             observations: self.port.observed().cloned(),
-            metrics: reply.metrics.flatten().filter(|metrics| *metrics != Metrics::default()),
+            metrics: reply.metrics.given().filter(|metrics| *metrics != Metrics::default()),
             state,
         };
         let infos_active = step.state.active.clone();

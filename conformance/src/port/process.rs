@@ -83,7 +83,8 @@ impl Process {
         wrap.wrap(process_wrap::std::ProcessGroup::leader());
         #[cfg(windows)]
         wrap.wrap(process_wrap::std::JobObject);
-        let cannot = |error: &std::io::Error| Misbehaviour::new(format!("`{program}` cannot be started: {error}"));
+        let cannot =
+            |error: &std::io::Error| Misbehaviour::new(format!("`{program}` cannot be started: {error}"));
         let mut child = wrap.spawn().map_err(|error| cannot(&error))?;
         let pipes = (child.stdin().take(), child.stdout().take(), child.stderr().take());
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
@@ -129,7 +130,9 @@ impl Process {
             match self.output.recv_timeout(patience) {
                 Ok(Said::Line(line)) => return Ok(line),
                 Ok(Said::TooLong) => {
-                    return Err(self.saw(format!("answered `{kind}` with a line of more than {LONGEST_LINE} bytes")));
+                    return Err(
+                        self.saw(format!("answered `{kind}` with a line of more than {LONGEST_LINE} bytes"))
+                    );
                 }
                 Ok(Said::End(rest)) => return Err(self.ended(kind, &rest)),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(kind, b"")),
@@ -145,7 +148,8 @@ impl Process {
     }
 
     fn ended(&mut self, kind: &str, rest: &[u8]) -> Misbehaviour {
-        let rest = if rest.is_empty() { String::new() } else { format!(", after half a line: `{}`", quote(rest)) };
+        let rest =
+            if rest.is_empty() { String::new() } else { format!(", after half a line: `{}`", quote(rest)) };
         let until = Instant::now() + GRACE;
         let status = loop {
             match self.child.try_wait() {
@@ -230,7 +234,8 @@ fn read_lines(mut stdout: impl BufRead, said: &Sender<Said>) {
     loop {
         let mut line = Vec::new();
         let longest = LONGEST_LINE as u64 + 1;
-        let end = stdout.by_ref().take(longest).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
+        let end =
+            stdout.by_ref().take(longest).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
         let next = match end {
             true if line.len() > LONGEST_LINE => Said::TooLong,
             true => Said::End(line),

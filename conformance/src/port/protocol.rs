@@ -3,7 +3,7 @@
 //! docs/PORTING.md explains it to those who write ports.
 
 use pogema_core::{Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
 use crate::request::{Derived, Registered};
@@ -193,8 +193,8 @@ pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observations: Option<Value>,
     /// `null` is an answer: there are no figures yet.
-    #[serde(with = "given", skip_serializing_if = "Option::is_none")]
-    pub metrics: Option<Option<Metrics>>,
+    #[serde(skip_serializing_if = "Key::is_left_out")]
+    pub metrics: Key<Metrics>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub actions: Option<Vec<i64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -205,8 +205,8 @@ pub struct Reply {
     pub padded: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub derived: Option<Derived>,
-    #[serde(with = "given", skip_serializing_if = "Option::is_none")]
-    pub foretold: Option<Option<Vec<Vec<Cell>>>>,
+    #[serde(skip_serializing_if = "Key::is_left_out")]
+    pub foretold: Key<Vec<Vec<Cell>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -218,20 +218,50 @@ pub struct Reply {
 /// A row and a column, which a wrong port may count off the map.
 pub type ToldCell = [i64; 2];
 
-/// A key that is there, with `null` for nothing, against one that is not there.
-mod given {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+/// A key that may be left out, and may be `null`, which is an answer too.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Key<T> {
+    /// It is not there.
+    #[default]
+    LeftOut,
+    /// It is there, and says that there is nothing.
+    Null,
+    /// It is there.
+    Given(T),
+}
 
-    pub fn serialize<T: Serialize, S: Serializer>(
-        value: &Option<Option<T>>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        value.as_ref().and_then(Option::as_ref).serialize(serializer)
+impl<T> Key<T> {
+    /// Whether it is not there.
+    pub fn is_left_out(&self) -> bool {
+        matches!(self, Self::LeftOut)
     }
 
-    pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Option<T>>, D::Error> {
-        Option::deserialize(deserializer).map(Some)
+    /// What it gives, if anything.
+    pub fn given(self) -> Option<T> {
+        match self {
+            Self::LeftOut | Self::Null => None,
+            Self::Given(value) => Some(value),
+        }
+    }
+}
+
+impl<T> From<Option<T>> for Key<T> {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Null, Self::Given)
+    }
+}
+
+impl<T: Serialize> Serialize for Key<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::LeftOut | Self::Null => serializer.serialize_none(),
+            Self::Given(value) => value.serialize(serializer),
+        }
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Key<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Option::deserialize(deserializer).map(Self::from)
     }
 }

@@ -47,7 +47,8 @@ impl Scene {
         let num_goals = if restarts { until - begin + 2 } else { 1 };
         let map = instance.map();
         let rows = map.obstacles().chunks(map.width()).map(<[bool]>::to_vec).collect();
-        let ops = request.ops[begin + 1..=until].iter().zip(begin + 1..).map(|(op, at)| plain(op, at, expected));
+        let ops =
+            request.ops[begin + 1..=until].iter().zip(begin + 1..).map(|(op, at)| plain(op, at, expected));
         Some(Self {
             rows,
             starts: instance.starts().to_vec(),
@@ -97,14 +98,17 @@ impl Scene {
         let mut later = self.clone();
         later.ops.drain(..num_ops);
         later.starts = kept.iter().map(|&agent| state.cells[agent]).collect();
-        later.goals = kept.iter().map(|&agent| {
-            let mut goals = self.goals[agent].clone();
-            let reached = |record: &&Record| record.state().is_some_and(|state| state.on_goal[agent]);
-            let num_reached = if self.restarts { passed.iter().filter(reached).count() } else { 0 };
-            let length = goals.len();
-            goals.rotate_left(num_reached % length.max(1));
-            goals
-        }).collect();
+        later.goals = kept
+            .iter()
+            .map(|&agent| {
+                let mut goals = self.goals[agent].clone();
+                let reached = |record: &&Record| record.state().is_some_and(|state| state.on_goal[agent]);
+                let num_reached = if self.restarts { passed.iter().filter(reached).count() } else { 0 };
+                let length = goals.len();
+                goals.rotate_left(num_reached % length.max(1));
+                goals
+            })
+            .collect();
         later.keep_actions(&kept);
         let max_steps = self.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
         later.fields.insert("max_episode_steps".into(), (max_steps - num_ops as i64).max(1).into());
@@ -134,7 +138,9 @@ impl Scene {
         let mut smaller = self.clone();
         smaller.rows.remove(row);
         let last = smaller.rows.len().saturating_sub(1) as u16;
-        smaller.move_cells(|cell| Cell::new((cell.row - u16::from(usize::from(cell.row) > row)).min(last), cell.col));
+        smaller.move_cells(|cell| {
+            Cell::new((cell.row - u16::from(usize::from(cell.row) > row)).min(last), cell.col)
+        });
         smaller
     }
 
@@ -145,7 +151,9 @@ impl Scene {
             row.remove(col);
         }
         let last = smaller.rows.first().map_or(0, |row| row.len().saturating_sub(1)) as u16;
-        smaller.move_cells(|cell| Cell::new(cell.row, (cell.col - u16::from(usize::from(cell.col) > col)).min(last)));
+        smaller.move_cells(|cell| {
+            Cell::new(cell.row, (cell.col - u16::from(usize::from(cell.col) > col)).min(last))
+        });
         smaller
     }
 

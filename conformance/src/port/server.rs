@@ -2,24 +2,39 @@
 
 use std::io::{BufRead, Write};
 
-use pogema_core::{Collision, Error, Observation, Occupancy, OnGoal, Reward};
+use pogema_core::{Collision, Config, Environment, Error, Instance, Observation, Occupancy, OnGoal, Reward};
 
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
-use crate::play::{Engine, Player};
+use crate::play::{Engine, Make, Player};
 use crate::request::{Op, Record, Request};
 
 /// An engine as a port. It claims everything.
 pub struct Server {
-    engine: Engine,
+    name: String,
+    make: Box<Make<'static>>,
     player: Option<Player>,
 }
 
 impl Server {
     /// A port that plays on an engine.
     pub fn new(engine: Engine) -> Self {
-        Self { engine, player: None }
+        Self::with(engine.name, engine.make)
+    }
+
+    /// A port that plays on whatever environments are made for it.
+    pub fn with(name: &str, make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + 'static) -> Self {
+        Self { name: name.into(), make: Box::new(make), player: None }
+    }
+
+    /// Begins an episode of an instance that no list of goals could hold.
+    ///
+    /// # Errors
+    /// If the instance does not fit the rules.
+    pub fn begin_with(&mut self, rules: &Config, instance: Instance) -> Result<Reply, Error> {
+        let player = self.player.insert(Player::of_instance(&self.make, rules, instance)?);
+        player.perform(&Op::Reset(None)).map(reply_of)
     }
 
     fn answer(&mut self, ask: &Ask) -> Result<Reply, Error> {
@@ -38,7 +53,7 @@ impl Server {
 
     fn begin(&mut self, beginning: &Beginning) -> Result<Reply, Error> {
         if let Some(header) = &beginning.instance {
-            let mut player = Player::of_instance(self.engine, &header.config, header.instance()?)?;
+            let mut player = Player::of_instance(&self.make, &header.config, header.instance()?)?;
             player.measure(&beginning.measure);
             self.player = Some(player);
         } else if let Some(config) = &beginning.config {
@@ -52,7 +67,7 @@ impl Server {
                 ops: Vec::new(),
             };
             self.player = None;
-            self.player = Some(Player::new(self.engine, &request)?);
+            self.player = Some(Player::new(&self.make, &request)?);
         }
         let nothing = || Error::State { reason: "there is nothing to reset".into() };
         let op = Op::Reset(beginning.seed);
@@ -62,10 +77,11 @@ impl Server {
 
 impl Link for Server {
     fn hello(&mut self) -> Result<Hello, Misbehaviour> {
-        let figures = "ISR CSR ep_length SoC makespan avg_throughput avg_agents_density a_collisions o_collisions";
+        let figures =
+            "ISR CSR ep_length SoC makespan avg_throughput avg_agents_density a_collisions o_collisions";
         Ok(Hello {
             protocol: PROTOCOL.into(),
-            name: self.engine.name.into(),
+            name: self.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             profiles: vec![
                 Profile::Core,
@@ -120,7 +136,8 @@ pub fn serve(engine: Engine, input: impl BufRead, mut output: impl Write) -> Res
                 Ok(serde_json::to_string(&reply))
             }
         };
-        let text = told.map_err(|fault| Error::io("pipe", fault))?.map_err(|error| Error::io("pipe", error))?;
+        let text =
+            told.map_err(|fault| Error::io("pipe", fault))?.map_err(|error| Error::io("pipe", error))?;
         writeln!(output, "{text}").and_then(|()| output.flush()).map_err(failed)?;
     }
     Ok(())
@@ -145,7 +162,7 @@ fn reply_of(record: Record) -> Reply {
             reply.map = Some(reset.map);
             reply.padded = Some(reset.padded.rows);
             reply.derived = Some(reset.derived);
-            reply.foretold = Some(reset.goal_lists);
+            reply.foretold = reset.goal_lists.into();
         }
         Record::Step(step) | Record::Astar(step) | Record::Sample(step) => {
             reply.observations = step.step.observations.as_ref().map(observations::write);
@@ -153,7 +170,7 @@ fn reply_of(record: Record) -> Reply {
             reply.rewards = Some(step.step.rewards);
             reply.terminated = Some(step.step.terminated);
             reply.truncated = Some(step.step.truncated);
-            reply.metrics = Some(step.step.metrics);
+            reply.metrics = step.step.metrics.into();
             reply.actions_after = Some(step.actions_after);
         }
         Record::Back(back) => reply.moved = Some(back.moved),

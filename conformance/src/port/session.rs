@@ -32,7 +32,17 @@ impl<'l> Port<'l> {
         // An instance lists so many goals for each agent: one is reached in a step at most.
         let num_goals = usize::try_from(config.max_steps).unwrap_or(0) + 2;
         let (reply, observed) = (Reply::default(), None);
-        Self { link, hello, config, padded_dtype: "float64", num_goals, reply, observed, elapsed: 0, fault: None }
+        Self {
+            link,
+            hello,
+            config,
+            padded_dtype: "float64",
+            num_goals,
+            reply,
+            observed,
+            elapsed: 0,
+            fault: None,
+        }
     }
 
     /// The element type to put down for maps with their border, which the protocol does not tell.
@@ -98,9 +108,9 @@ impl<'l> Port<'l> {
         if self.tells(Told::ActionsAfter) {
             self.need_list("actions_after", reply.actions_after.as_ref())?;
         }
-        if self.claims(Profile::Metrics) && reply.metrics.is_none() {
+        if self.claims(Profile::Metrics) && reply.metrics.is_left_out() {
             reply.metrics = self.ask(&Ask::Metrics)?.metrics;
-            self.need("metrics", reply.metrics.as_ref())?;
+            self.need("metrics", (!reply.metrics.is_left_out()).then_some(&()))?;
         }
         self.take_observations(reply)?;
         self.elapsed += 1;
@@ -167,11 +177,15 @@ impl<'l> Port<'l> {
         if self.tells(Told::Occupied) {
             self.need("occupied", reply.occupied.as_ref())?;
         }
-        for (what, cells) in [("cell", &reply.cells), ("goal", &reply.goals), ("marked cell", &reply.occupied)] {
+        for (what, cells) in
+            [("cell", &reply.cells), ("goal", &reply.goals), ("marked cell", &reply.occupied)]
+        {
             for cell in cells.iter().flatten() {
                 if as_cell(cell).is_none() {
                     // No breach of the form, but a wrong answer.
-                    return Err(Error::State { reason: format!("{what} ({}, {}) is on no map", cell[0], cell[1]) });
+                    return Err(Error::State {
+                        reason: format!("{what} ({}, {}) is on no map", cell[0], cell[1]),
+                    });
                 }
             }
         }

@@ -13,7 +13,7 @@ use crate::play::play;
 use crate::request::{Op, Request, Response};
 
 /// So often a port is asked to play for one counterexample.
-const MOST_PLAYS: usize = 4000;
+pub const MOST_PLAYS: usize = 4000;
 
 /// Makes an example smaller as long as it shows the same cause.
 pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Example {
@@ -39,16 +39,16 @@ pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Example 
     shrinker.best
 }
 
-struct Shrinker<'a> {
+pub struct Shrinker<'a> {
     link: &'a mut dyn Link,
     hello: &'a Hello,
-    best: Example,
-    plays: usize,
+    pub best: Example,
+    pub plays: usize,
 }
 
 impl Shrinker<'_> {
     /// Takes a request as the new best if it shows the same cause.
-    fn accept(&mut self, request: &Request) -> bool {
+    pub fn accept(&mut self, request: &Request) -> bool {
         if self.plays >= MOST_PLAYS {
             return false;
         }
@@ -151,12 +151,16 @@ impl Shrinker<'_> {
     }
 
     fn simplify_fields(&mut self, scene: &mut Scene) {
-        for name in ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps", "seed"] {
+        for name in
+            ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps", "seed"]
+        {
             let mut simpler = scene.clone();
             simpler.fields.remove(name);
             self.try_scene(scene, simpler);
         }
-        for (name, value) in [("max_episode_steps", json!(scene.ops.len())), ("observation_type", json!(Observation::Pomapf))] {
+        for (name, value) in
+            [("max_episode_steps", json!(scene.ops.len())), ("observation_type", json!(Observation::Pomapf))]
+        {
             if scene.fields.contains_key(name) {
                 let mut simpler = scene.clone();
                 simpler.fields.insert(name.into(), value);
@@ -216,60 +220,5 @@ impl Shrinker<'_> {
                 }
             }
         }
-    }
-
-    /// Where map and agents are drawn by the port: fewer and smaller, with a smaller seed.
-    fn shrink_config(&mut self) {
-        loop {
-            let before = self.best.request.clone();
-            let Some(fields) = before.config.as_object() else { return };
-            let names: Vec<String> = fields.keys().cloned().collect();
-            for name in names {
-                let mut simpler = self.best.request.clone();
-                if let Some(fields) = simpler.config.as_object_mut() {
-                    fields.remove(&name);
-                }
-                self.accept(&simpler);
-            }
-            for (name, values) in [
-                ("num_agents", &[1, 2, 3, 4, 8][..]),
-                ("size", &[2, 3, 4, 5, 6]),
-                ("height", &[1, 2, 3, 4, 5]),
-                ("width", &[1, 2, 3, 4, 5]),
-                ("obs_radius", &[1, 2]),
-                ("max_episode_steps", &[1, 2, 3, 4]),
-                ("seed", &[0, 1, 2, 3, 4, 5]),
-            ] {
-                for &value in values {
-                    if self.try_number(name, value) {
-                        break;
-                    }
-                }
-            }
-            for at in (1..self.best.request.ops.len()).rev() {
-                let mut shorter = self.best.request.clone();
-                shorter.ops.remove(at);
-                self.accept(&shorter);
-            }
-            if self.best.request == before || self.plays >= MOST_PLAYS {
-                return;
-            }
-        }
-    }
-
-    fn try_number(&mut self, name: &str, value: i64) -> bool {
-        let mut simpler = self.best.request.clone();
-        if simpler.config.get(name).and_then(Value::as_i64).is_none_or(|now| now <= value) {
-            return false;
-        }
-        simpler.config[name] = value.into();
-        if name == "num_agents" {
-            for op in &mut simpler.ops {
-                if let Op::Step(actions) = op {
-                    actions.truncate(value as usize);
-                }
-            }
-        }
-        self.accept(&simpler)
     }
 }

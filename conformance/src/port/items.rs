@@ -1,0 +1,86 @@
+//! What there is to check: cases, recordings and drawn episodes.
+
+use std::path::Path;
+
+use pogema_core::Error;
+
+use super::run::Plan;
+use crate::cases::{self, Case};
+use crate::draw::draw_request;
+use crate::golden::{self, Recording};
+use crate::play::{Engine, play};
+use crate::request::{Request, Response};
+use crate::script::play_script;
+
+/// One thing to check.
+pub enum Item {
+    Case(String, Box<Case>),
+    Recorded(String, Box<Recording>),
+    Drawn(u64),
+}
+
+impl Item {
+    pub fn name(&self, seed: u64) -> String {
+        match self {
+            Self::Case(name, _) | Self::Recorded(name, _) => name.clone(),
+            Self::Drawn(number) => format!("drawn case {number} of seed {seed}"),
+        }
+    }
+
+    pub fn case_rule(&self) -> Option<&str> {
+        match self {
+            Self::Case(_, case) => Some(&case.rule),
+            Self::Recorded(..) | Self::Drawn(_) => None,
+        }
+    }
+
+    pub fn request(&self, seed: u64) -> Result<(Request, Response), Error> {
+        match self {
+            Self::Case(_, case) => {
+                let request = case.request()?;
+                let expected = play(&request);
+                Ok((request, expected))
+            }
+            Self::Recorded(_, recording) => Ok((recording.request.clone(), recording.response.clone())),
+            Self::Drawn(number) => Ok(play_script(Engine::REFERENCE, draw_request(seed, *number), seed)),
+        }
+    }
+}
+
+/// All that a plan asks for, cases first.
+pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
+    let mut items = Vec::new();
+    if !plan.files.is_empty() {
+        for path in &plan.files {
+            items.push(Item::Case(path.display().to_string(), Box::new(cases::read(path)?)));
+        }
+        return Ok(items);
+    }
+    let root = cases::folder();
+    for path in golden::files(&root, ".yaml")? {
+        let case = cases::read(&path)?;
+        // Where POGEMA does something else by decision of this project, a port may do as POGEMA does.
+        let is_asked =
+            case.pogema.is_none() && plan.rules.as_ref().is_none_or(|rules| rules.matches(&case.rule));
+        if is_asked {
+            items.push(Item::Case(relative(&path, &root), Box::new(case)));
+        }
+    }
+    if plan.only_cases {
+        return Ok(items);
+    }
+    for folder in [golden::folder(), golden::found_folder()] {
+        for path in golden::recording_files(&folder)? {
+            for (index, recording) in golden::read(&path)?.into_iter().enumerate() {
+                let name = format!("{} line {}", relative(&path, &folder), index + 1);
+                items.push(Item::Recorded(name, Box::new(recording)));
+            }
+        }
+    }
+    items.extend((0..plan.num_cases).map(Item::Drawn));
+    Ok(items)
+}
+
+fn relative(path: &Path, root: &Path) -> String {
+    path.strip_prefix(root.parent().unwrap_or(root)).unwrap_or(path).display().to_string()
+}

@@ -1,0 +1,115 @@
+//! Does the kit catch bugs? Each planted one must be caught by the cases of its rule, and shrink to a few cells.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod engine;
+mod flaw;
+mod moves;
+mod port;
+mod soft;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use pogema_conformance::port::{Cause, Link, Plan, PortReport, Subject, check_ports, shrink_causes};
+use pogema_core::Map;
+
+use flaw::{Flaw, PLANTED};
+use port::Planted;
+
+fn plan() -> Plan {
+    Plan {
+        num_cases: 0,
+        seed: 5,
+        rules: None,
+        profiles: Vec::new(),
+        num_workers: None,
+        files: Vec::new(),
+        only_cases: true,
+    }
+}
+
+fn subject(flaw: Flaw) -> Subject<'static> {
+    Subject {
+        command: format!("{flaw:?}"),
+        start: Box::new(move || Ok(Box::new(Planted::new(flaw)) as Box<dyn Link>)),
+    }
+}
+
+fn check(flaw: Flaw, plan: &Plan) -> PortReport {
+    check_ports(&[subject(flaw)], plan, |_| (), &|| ()).unwrap().remove(0)
+}
+
+#[test]
+fn the_port_without_a_bug_conforms() {
+    let plan = Plan { num_cases: 400, only_cases: false, ..plan() };
+    let report = check(Flaw::Faultless, &plan);
+    let told =
+        report.causes.iter().map(|cause| format!("{:?}", cause.example)).collect::<Vec<_>>().join("\n");
+    assert!(report.causes.is_empty(), "{told}");
+    assert!(report.num_played > 4000, "only {} cases", report.num_played);
+}
+
+/// Agents, rows, columns and steps of a counterexample.
+fn size(cause: &Cause) -> (usize, usize, usize, usize) {
+    let request = &cause.example.request;
+    let played = pogema_conformance::play(request);
+    let reset = played.records.iter().find_map(|record| match record {
+        pogema_conformance::Record::Reset(reset) => Some(reset),
+        _ => None,
+    });
+    let reset = reset.unwrap();
+    let steps = played.records.iter().filter(|record| record.step().is_some()).count();
+    let map = Map::from_rows(&reset.map).unwrap();
+    (reset.state.cells.len(), map.height(), map.width(), steps)
+}
+
+/// Bugs that need more room or time than the others, and why.
+const LARGER: [(Flaw, &str); 2] = [
+    (Flaw::SoftNoRotation, "the smallest ring on a grid has four agents"),
+    (Flaw::SoftChainStopsAfterOne, "the agent in front, two that stay behind it, and one that does not"),
+];
+
+#[test]
+fn each_bug_is_caught_by_the_cases_of_its_rule_and_shrinks() {
+    let mut table = String::new();
+    let mut wrong = String::new();
+    for (flaw, words, rule) in PLANTED {
+        let mut report = check(flaw, &plan());
+        let folder = tempfile::tempdir().unwrap();
+        shrink_causes(&subject(flaw), &mut report, &plan(), folder.path(), &|| ()).unwrap();
+        let is_of_rule = |case: &String| case == rule || case.starts_with(&format!("{rule}/"));
+        let Some(cause) = report.causes.iter().find(|cause| cause.cases.keys().any(is_of_rule)) else {
+            let seen: Vec<_> =
+                report.causes.iter().map(|cause| (&cause.rule, &cause.what, &cause.cases)).collect();
+            let _ = writeln!(wrong, "{flaw:?} is not caught by the cases of {rule}, but: {seen:?}");
+            continue;
+        };
+        let (agents, height, width, steps) = size(cause);
+        let is_small = agents <= 3 && height <= 4 && width <= 4 && steps <= 3;
+        if !is_small && LARGER.iter().all(|(larger, _)| *larger != flaw) {
+            let _ = writeln!(wrong, "{flaw:?} needs {agents} agents, {height} x {width}, {steps} steps");
+        }
+        let _ = writeln!(table, "| {words} | `{rule}` | {agents} | {height} × {width} | {steps} |");
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+    check_table(&table);
+}
+
+/// Passes if the table in the book is this one; `BLESS=1` writes it there.
+fn check_table(table: &str) {
+    const BEGIN: &str = "<!-- planted -->\n";
+    const END: &str = "<!-- /planted -->";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/trust.md");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let begin = text.find(BEGIN).unwrap() + BEGIN.len();
+    let end = text.find(END).unwrap();
+    let head =
+        "| planted bug | caught by the cases of | agents | map | steps |\n| --- | --- | --- | --- | --- |\n";
+    let wanted = format!("{head}{table}");
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(&path, format!("{}{wanted}{}", &text[..begin], &text[end..])).unwrap();
+    } else {
+        assert_eq!(&text[begin..end], wanted, "run with BLESS=1 to write docs/trust.md");
+    }
+}

@@ -1,0 +1,211 @@
+//! A planted bug as a port.
+
+use std::sync::{Arc, Mutex};
+
+use pogema_conformance::port::{Ask, Beginning, Hello, Key, Link, Misbehaviour, Reply, Server};
+use pogema_core::{Cell, GoalSource, GoalStream, Instance, Map, OnGoal};
+use pogema_maps::numpy::Generator;
+use pogema_maps::{Components, GridConfig, InstanceSource};
+
+use crate::engine::Flawed;
+use crate::flaw::Flaw;
+
+pub struct Planted {
+    flaw: Flaw,
+    server: Server,
+    num_agents: usize,
+    elapsed: u64,
+}
+
+impl Planted {
+    pub fn new(flaw: Flaw) -> Self {
+        let server = Server::with(&format!("{flaw:?}"), move |config| Flawed::make(flaw, config));
+        Self { flaw, server, num_agents: 0, elapsed: 0 }
+    }
+
+    /// Draws the instance itself where the bug is in the drawing.
+    fn begin(&mut self, beginning: &Beginning) -> Option<Reply> {
+        let config = GridConfig::from_value(beginning.config.as_ref()?).ok()?;
+        let drawn = InstanceSource::new(config.clone(), None).ok()?.generate().ok()?.instance;
+        let instance = draw(self.flaw, &config, &drawn)?;
+        let mut reply = self.server.begin_with(&config.rules(), instance.clone()).ok()?;
+        reply.map = Some(instance.map().rows());
+        reply.foretold = Key::LeftOut;
+        reply.derived = None;
+        Some(reply)
+    }
+
+    fn spoil_figures(&self, reply: &mut Reply) {
+        let Key::Given(metrics) = &mut reply.metrics else { return };
+        match self.flaw {
+            Flaw::MakespanOneShort => metrics.makespan = metrics.makespan.map(|steps| steps - 1.0),
+            Flaw::SumOfCostsCountsFromZero => {
+                metrics.soc = metrics.soc.map(|steps| steps - self.num_agents as f64);
+            }
+            Flaw::LengthIsOfEpisode => metrics.ep_length = metrics.ep_length.map(|_| self.elapsed as f64),
+            Flaw::SolvedIfAnyIs => {
+                metrics.csr = metrics.isr.map(|share| f64::from(u8::from(share > 0.0)));
+            }
+            Flaw::ThroughputOfEachAgent => {
+                metrics.avg_throughput = metrics.avg_throughput.map(|all| all / self.num_agents as f64);
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Link for Planted {
+    fn hello(&mut self) -> Result<Hello, Misbehaviour> {
+        let mut hello = self.server.hello()?;
+        let draws = Flaw::ShuffleForwards as usize..=Flaw::NextGoalMayBeHere as usize;
+        if draws.contains(&(self.flaw as usize)) {
+            hello.tells.clear();
+        }
+        Ok(hello)
+    }
+
+    fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
+        if let Ask::Reset(beginning) = ask {
+            self.elapsed = 0;
+            if let Some(reply) = self.begin(beginning) {
+                return Ok(reply);
+            }
+        }
+        let mut reply = self.server.ask(ask)?;
+        self.num_agents = reply.cells.as_ref().map_or(self.num_agents, Vec::len);
+        self.elapsed += u64::from(reply.rewards.is_some());
+        self.spoil_figures(&mut reply);
+        if let (Flaw::CallersListUntouched, Ask::Step { actions }) = (self.flaw, ask) {
+            reply.actions_after = reply.actions_after.map(|_| actions.clone());
+        }
+        Ok(reply)
+    }
+}
+
+/// The instance as a port with this bug draws it; none where the bug makes no difference.
+fn draw(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Instance> {
+    let restarts = config.on_target == OnGoal::Restart;
+    let is_seeded = config.map.is_none() && config.map_name.is_none() && config.agents_xy.is_none();
+    let has_pools = config.possible_agents_xy.is_some() || config.possible_targets_xy.is_some();
+    if has_pools || config.targets_xy.is_some() {
+        return None;
+    }
+    match flaw {
+        Flaw::ObstaclesColumnByColumn if is_seeded && !restarts => {
+            let map = columns_first(config)?;
+            let (starts, goals) = pairs(Flaw::Faultless, config, &map)?;
+            Instance::new(map, drawn.outside().clone(), starts, goals).ok()
+        }
+        Flaw::ShuffleForwards | Flaw::DrawsOf64Bits | Flaw::PairsAcrossComponents if !restarts => {
+            let (starts, goals) = pairs(flaw, config, drawn.map())?;
+            Instance::new(drawn.map().clone(), drawn.outside().clone(), starts, goals).ok()
+        }
+        Flaw::OneStreamForAllGoals | Flaw::NextGoalMayBeHere if restarts => {
+            let streams = streams(flaw, config, drawn)?;
+            let starts = drawn.starts().to_vec();
+            Instance::new(drawn.map().clone(), drawn.outside().clone(), starts, streams).ok()
+        }
+        _ => None,
+    }
+}
+
+fn columns_first(config: &GridConfig) -> Option<Map> {
+    let (height, width) = (config.height, config.width);
+    let mut drawn = Vec::new();
+    let mut generator = Generator::seeded(config.seed?);
+    generator.binomial1_array(config.density, height * width, |obstacle| drawn.push(obstacle)).ok()?;
+    let obstacles = (0..height * width).map(|at| drawn[at % width * height + at / width]).collect();
+    Map::new(height, width, obstacles).ok()
+}
+
+/// A whole number from 0 to `most`, by throwing away what is too large.
+fn interval(flaw: Flaw, generator: &mut Generator, most: usize) -> usize {
+    let mask = most.next_power_of_two().max(most + 1).next_power_of_two() - 1;
+    loop {
+        let drawn = if flaw == Flaw::DrawsOf64Bits {
+            generator.next_u64() as usize & mask
+        } else {
+            generator.next_u32() as usize & mask
+        };
+        if drawn <= most {
+            return drawn;
+        }
+    }
+}
+
+fn pairs(flaw: Flaw, config: &GridConfig, map: &Map) -> Option<(Vec<Cell>, Vec<GoalStream>)> {
+    let mut generator = Generator::seeded(config.seed?);
+    let mut order: Vec<usize> = (0..map.obstacles().len()).filter(|&at| !map.obstacles()[at]).collect();
+    if flaw == Flaw::ShuffleForwards {
+        for at in 0..order.len().saturating_sub(1) {
+            let most = order.len() - 1 - at;
+            order.swap(at, at + interval(flaw, &mut generator, most));
+        }
+    } else {
+        for at in (1..order.len()).rev() {
+            order.swap(at, interval(flaw, &mut generator, at));
+        }
+    }
+    let components = Components::of(map);
+    let label = |at: usize| match flaw {
+        Flaw::PairsAcrossComponents => 0,
+        _ => components.label_at(at).unwrap_or(0) as usize,
+    };
+    let mut left = vec![0; components.len().max(1)];
+    for &at in &order {
+        left[label(at)] += 1;
+    }
+    let mut waiting: Vec<Option<usize>> = vec![None; left.len()];
+    let (mut starts, mut goals) = (Vec::new(), vec![None; config.num_agents]);
+    for at in order {
+        let here = label(at);
+        if let Some(agent) = waiting[here].take() {
+            goals[agent] = Some(GoalStream::single(map.cell_at(at)));
+        } else if starts.len() < config.num_agents && left[here] >= 2 {
+            left[here] -= 2;
+            waiting[here] = Some(starts.len());
+            starts.push(map.cell_at(at));
+        }
+    }
+    Some((starts, goals.into_iter().collect::<Option<_>>()?))
+}
+
+fn streams(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Vec<GoalStream>> {
+    let seeds = Generator::seeded(config.seed?).integers_array(0, i64::from(i32::MAX), drawn.starts().len());
+    let common = Arc::new(Mutex::new(Generator::seeded(config.seed?)));
+    let components = Components::of(drawn.map());
+    let cells = components.cells();
+    let streams = drawn.first_goals().into_iter().zip(seeds.ok()?).map(|(goal, seed)| {
+        let generator = match flaw {
+            Flaw::OneStreamForAllGoals => Arc::clone(&common),
+            _ => Arc::new(Mutex::new(Generator::seeded(seed as u64))),
+        };
+        let pool = cells.of(components.label(goal)?).to_vec();
+        Some(GoalStream::drawn(goal, Box::new(Loose { flaw, generator, pool })))
+    });
+    streams.collect()
+}
+
+/// Draws next goals with a bug.
+#[derive(Clone, Debug)]
+struct Loose {
+    flaw: Flaw,
+    generator: Arc<Mutex<Generator>>,
+    pool: Vec<Cell>,
+}
+
+impl GoalSource for Loose {
+    fn next_goal(&mut self, at: Cell) -> Cell {
+        let mut generator = self.generator.lock().unwrap();
+        loop {
+            let goal = self.pool[generator.choice_index(self.pool.len()).unwrap()];
+            if goal != at || self.flaw == Flaw::NextGoalMayBeHere {
+                return goal;
+            }
+        }
+    }
+
+    fn boxed_clone(&self) -> Box<dyn GoalSource> {
+        Box::new(self.clone())
+    }
+}
