@@ -20,6 +20,8 @@ const LONGEST_LINE: usize = 1 << 26;
 const LONGEST_TAIL: usize = 2048;
 /// So much of a bad answer is quoted. Units: characters.
 const LONGEST_QUOTE: usize = 120;
+/// So long a port may take to start, if answers are to come sooner: imports alone can take seconds.
+const START_UP: Duration = Duration::from_secs(60);
 /// How long a port may take to end by itself when it is told goodbye.
 const GRACE: Duration = Duration::from_millis(500);
 /// How often it is looked whether a silent port is still there.
@@ -123,7 +125,8 @@ impl Process {
     }
 
     fn wait(&mut self, kind: &str) -> Result<Vec<u8>, Misbehaviour> {
-        let until = Instant::now() + self.timeout;
+        let timeout = if kind == "hello" { self.timeout.max(START_UP) } else { self.timeout };
+        let until = Instant::now() + timeout;
         let mut has_ended = false;
         loop {
             let patience = until.saturating_duration_since(Instant::now()).min(GLANCE);
@@ -139,7 +142,7 @@ impl Process {
                 // Its children may keep its output open after its own end.
                 Err(RecvTimeoutError::Timeout) if has_ended => return Err(self.ended(kind, b"")),
                 Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
-                    let seconds = self.timeout.as_secs_f64();
+                    let seconds = timeout.as_secs_f64();
                     return Err(self.saw(format!("gave no answer to `{kind}` within {seconds} s")));
                 }
                 Err(RecvTimeoutError::Timeout) => has_ended = matches!(self.child.try_wait(), Ok(Some(_))),

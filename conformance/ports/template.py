@@ -1,0 +1,145 @@
+"""A whole port to copy: a small environment, and the adapter through which the checks play on it.
+
+Put your own environment in the place of `Environment`, and claim in `CLAIMS` what it can do; the adapter may stay as
+it is. docs/PORTING.md explains questions and answers. Needs Python 3.9 or newer and the standard library.
+"""
+
+import json
+import sys
+from typing import Any, Optional
+
+# ------------------------------------ The environment. Put yours in its place. ------------------------------------
+
+MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))  # stay, up, down, left, right
+
+
+class Environment:
+    """POGEMA where agents move one after the other, each in view of what the ones before it did (`priority`)."""
+
+    def __init__(self, instance: dict[str, Any]) -> None:
+        config = instance["config"]
+        if (config["collision"], config["reward"], instance.get("outside", "free")) != ("priority", "own", "free"):
+            raise ValueError("other rules than these are not claimed")
+        self.radius, self.max_steps, self.on_goal = config["radius"], config["max_steps"], config["on_goal"]
+        self.starts, self.goal_lists = instance["starts"], instance["goals"]
+        # A wall goes around the map, one cell wide, and free cells around that, so that no window leaves the grid:
+        # the cell (row, col) of the map is at [row + radius][col + radius].
+        free, width = "0" * (self.radius - 1), len(instance["map"][0])
+        rows = [row.replace(".", "0").replace("#", "1") for row in instance["map"]]
+        walled = [free + "1" + row + "1" + free for row in ["1" * width, *rows, "1" * width]]
+        beyond = ["0" * len(walled[0])] * len(free)
+        self.obstacles = [*beyond, *walled, *beyond]
+
+    def reset(self) -> None:
+        """Begins the episode anew. It finishes nobody, not even an agent that starts on its goal."""
+        self.steps = 0
+        self.cells = [tuple(cell) for cell in self.starts]
+        self.goals = [tuple(goals[0]) for goals in self.goal_lists]
+        self.reached = [0] * len(self.cells)  # how many goals of its list each agent has behind it
+        self.active = [True] * len(self.cells)
+
+    def step(self, actions: list[int]) -> tuple[list[float], list[bool], list[bool]]:
+        """Plays one step; gives rewards, `terminated` and `truncated`."""
+        if len(actions) != len(self.cells) or any(action not in range(5) for action in actions):
+            raise ValueError(f"expected {len(self.cells)} actions from 0 to 4")  # and nothing has changed
+        taken = {cell for cell, active in zip(self.cells, self.active) if active}
+        for agent, ((row, col), action) in enumerate(zip(self.cells, actions)):
+            there = row + MOVES[action][0], col + MOVES[action][1]
+            is_free = self.obstacles[there[0] + self.radius][there[1] + self.radius] == "0"
+            if self.active[agent] and is_free and there not in taken:
+                taken.remove((row, col))
+                taken.add(there)
+                self.cells[agent] = there
+        self.steps += 1
+        on_goal = [cell == goal for cell, goal in zip(self.cells, self.goals)]
+        paid = [on and active for on, active in zip(on_goal, self.active)]
+        terminated = on_goal  # under `finish`: those that finished earlier too, though they are paid no more
+        if self.on_goal == "nothing":
+            paid = terminated = [all(on_goal)] * len(on_goal)
+        elif self.on_goal == "restart":
+            terminated = [False] * len(on_goal)
+        self.arrive([agent for agent, has_arrived in enumerate(paid) if has_arrived])
+        return [float(each) for each in paid], terminated, [self.steps >= self.max_steps] * len(on_goal)
+
+    def arrive(self, agents: list[int]) -> None:
+        """What reaching a goal does, after all moves and rewards and before anything is observed."""
+        for agent in agents:
+            if self.on_goal == "finish":
+                self.active[agent] = False
+            elif self.on_goal == "restart":
+                self.reached[agent] += 1
+                goals = self.goal_lists[agent]
+                self.goals[agent] = tuple(goals[self.reached[agent] % len(goals)])
+
+    def observe(self) -> list[str]:
+        """What each agent sees, finished or not: obstacles, agents (itself too) and goal, row by row as `0` and `1`."""
+        radius, side = self.radius, 2 * self.radius + 1
+        marks = [["0"] * len(row) for row in self.obstacles]
+        for (row, col), active in zip(self.cells, self.active):
+            if active:
+                marks[row + radius][col + radius] = "1"
+        agents, windows = ["".join(row) for row in marks], []
+        for (row, col), (goal_row, goal_col) in zip(self.cells, self.goals):
+            rows, cols = slice(row, row + side), slice(col, col + side)
+            seen = [line[cols] for grid in (self.obstacles, agents) for line in grid[rows]]
+            # A goal out of sight is shown on the rim, each axis clamped by itself.
+            down, right = (min(max(away, -radius), radius) for away in (goal_row - row, goal_col - col))
+            before = (radius + down) * side + radius + right
+            windows.append("".join(seen) + "0" * before + "1" + "0" * (side * side - before - 1))
+        return windows
+
+
+# ------------------------------- The adapter: from questions to calls, from results to answers. -------------------
+
+CLAIMS: dict[str, Any] = {
+    "protocol": "pogema-conform/1",
+    "name": "template",
+    "version": "1",
+    "profiles": ["core", "observations"],
+    "collision": ["priority"],
+    "on_goal": ["finish", "nothing", "restart"],
+    "observation": ["default"],
+}
+
+
+def packed(bits: str) -> str:
+    """Zeros and ones as hexadecimal digits, eight to a byte. Nested lists of numbers are as right, only slower."""
+    bits += "0" * (-len(bits) % 8)
+    return f"{int(bits, 2):0{len(bits) // 4}x}"
+
+
+def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
+    """Carries out a `reset` or a `step`; the answers to both have these keys in common."""
+    results: dict[str, Any] = {}
+    if question["type"] == "reset":
+        environment.reset()
+    else:
+        rewards, terminated, truncated = environment.step(question["actions"])
+        results = {"rewards": rewards, "terminated": terminated, "truncated": truncated}
+    state = {"cells": environment.cells, "goals": environment.goals, "active": environment.active}
+    return {**state, **results, "observations": [packed(bits) for bits in environment.observe()]}
+
+
+def main() -> None:
+    """One line in, one line out, until `bye`."""
+    environment: Optional[Environment] = None
+    for line in sys.stdin:
+        try:
+            question = json.loads(line)
+            if question["type"] == "bye":
+                break
+            if "instance" in question:  # without one, `reset` means the environment that is there already
+                environment = Environment(question["instance"])
+            if question["type"] == "hello":
+                reply = CLAIMS
+            elif environment and question["type"] in ("reset", "step") and "config" not in question:
+                reply = play(environment, question)
+            else:
+                raise ValueError("this is not claimed, or comes too early")
+        except (KeyError, TypeError, ValueError) as error:  # a refusal is an answer like any other
+            reply = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(reply, separators=(",", ":")), flush=True)
+
+
+if __name__ == "__main__":
+    main()

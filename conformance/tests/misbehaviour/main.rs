@@ -1,0 +1,131 @@
+//! Whatever a port does instead of answering, the run goes on, says what was seen, and leaves nothing behind.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::time::Duration;
+
+use pogema_conformance::port::{Command, Link, Plan, PortReport, Process, Subject, check_ports};
+
+const TIMEOUT: Duration = Duration::from_millis(1500);
+
+fn bad_port(way: &str, folder: &Path) -> Command {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/misbehaviour/bad_port.py");
+    let words = ["python3.11", script.to_str().unwrap(), way, folder.to_str().unwrap()];
+    Command::new(&shell_words::join(words), TIMEOUT).unwrap()
+}
+
+fn check(way: &str, folder: &Path) -> PortReport {
+    let command = bad_port(way, folder);
+    let start = || Process::start(&command).map(|process| Box::new(process) as Box<dyn Link>);
+    let subject = Subject { command: command.text.clone(), start: Box::new(start) };
+    let plan = Plan {
+        num_cases: 0,
+        seed: 0,
+        rules: Some(glob::Pattern::new("end/*").unwrap()),
+        profiles: Vec::new(),
+        num_workers: Some(2),
+        files: Vec::new(),
+        only_cases: true,
+    };
+    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
+}
+
+/// Checks that a port that goes wrong is told so, and that cases were played after that.
+fn assert_error(way: &str, what: &str) -> PortReport {
+    let folder = tempfile::tempdir().unwrap();
+    let report = check(way, folder.path());
+    let faults: Vec<String> =
+        report.causes.iter().filter_map(|cause| Some(cause.example.fault.as_ref()?.what.clone())).collect();
+    assert!(faults.iter().any(|fault| fault.contains(what)), "{way}: {faults:?}");
+    assert!(report.misbehaves(), "{way}");
+    let errors: u64 = report.rules.values().map(|row| row.errors).sum();
+    assert_eq!(errors, 1, "{way}: not one case has the verdict `error`");
+    assert!(report.num_played >= 5, "{way}: the run did not go on");
+    assert_eq!(report.num_not_run, 0, "{way}");
+    report
+}
+
+#[test]
+fn a_port_that_ends_is_told_with_its_status_and_last_words() {
+    let report = assert_error("exit", "ended (exit status: 7) instead of answering `step`");
+    let fault = report.causes.iter().find_map(|cause| cause.example.fault.clone()).unwrap();
+    assert_eq!(fault.stderr, "the reason is here");
+    assert_error("abort", "ended (signal: 6");
+}
+
+#[test]
+fn a_port_that_keeps_silent_is_given_up_in_time() {
+    assert_error("hang", "gave no answer to `step` within 1.5 s");
+    assert_error("half-line-then-hang", "gave no answer to `step` within 1.5 s");
+    assert_error("closes-stdout", "closed its output instead of answering `step`");
+}
+
+#[test]
+fn what_is_no_answer_is_quoted() {
+    assert_error(
+        "garbage",
+        "gave no readable answer to `step` (expected value at line 1 column 1): `Traceback",
+    );
+    assert_error("half-line", "instead of answering `step`, after half a line: `{\"cells\": [[`");
+    assert_error("binary", "gave no readable answer to `step`");
+    assert_error("null", "gave no readable answer to `step`");
+    assert_error("nan", "gave no readable answer to `step`");
+    assert_error("huge-line", "answered `step` with a line of more than 67108864 bytes");
+}
+
+#[test]
+fn what_lacks_its_form_is_named() {
+    assert_error("wrong-length", "`rewards` has length");
+    assert_error("left-out", "left `truncated` out of an answer that needs it");
+    assert_error("short-window", "`observations` of agent 0 has 2 values, expected ");
+    assert_error("twice", "wrote a line that nobody asked for");
+}
+
+#[test]
+fn a_flood_on_stderr_neither_blocks_nor_fills_the_memory() {
+    let report = assert_error("stderr-flood", "ended (exit status: 1)");
+    let fault = report.causes.iter().find_map(|cause| cause.example.fault.clone()).unwrap();
+    assert!(fault.stderr.ends_with("the last words"), "{}", fault.stderr);
+    assert!(fault.stderr.len() <= 2048);
+}
+
+#[test]
+fn a_port_that_answers_and_then_neither_reads_nor_ends_is_given_up() {
+    assert_error("deaf", "gave no answer to");
+}
+
+#[test]
+fn what_a_port_has_started_ends_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = check("fork", folder.path());
+    assert!(report.misbehaves());
+    let started = std::fs::read_to_string(folder.path().join("pids")).unwrap();
+    assert!(started.lines().count() >= 1, "nothing was started");
+    for pid in started.lines() {
+        // Gone, or a zombie that nobody has waited for.
+        let status = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+        let state = status.rsplit(") ").next().and_then(|rest| rest.chars().next());
+        assert!(matches!(state, None | Some('Z')), "process {pid} is still there: {status}");
+    }
+}
+
+#[test]
+fn a_port_that_cannot_begin_is_asked_nothing_more() {
+    for (way, what) in [
+        ("not-in-hello", "gave no readable answer to `hello` (missing field `protocol`"),
+        ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let report = check(way, folder.path());
+        let fault = report.causes[0].example.fault.clone().unwrap();
+        assert!(fault.what.contains(what), "{fault}");
+        assert!(report.num_not_run > 0);
+        assert_eq!(report.num_played, 0);
+    }
+    let command = Command::new("there-is-no-such-program --at-all", TIMEOUT).unwrap();
+    let fault = Process::start(&command).err().unwrap();
+    assert!(fault.what.starts_with("`there-is-no-such-program` cannot be started"), "{fault}");
+    assert!(Command::new("  ", TIMEOUT).is_err());
+    assert!(Command::new("python3 'open", TIMEOUT).is_err());
+}
