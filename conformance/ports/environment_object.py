@@ -33,7 +33,8 @@ import json
 import os
 import sys
 import traceback
-from typing import Any, Callable
+from collections.abc import Callable
+from typing import Any
 
 Record = dict[str, Any]
 
@@ -194,7 +195,8 @@ class ExampleParallelEnv:
     def step(self, actions: Record) -> tuple[Record, Record, Record, Record, Record]:
         """Plays a step; then those that are terminated or truncated drop out."""
         self.results = self.environment.step([actions.get(name, 0) for name in self.possible_agents])
-        observations, infos = self.of_agents(self.observe()), {name: {} for name in self.agents}
+        observations = self.of_agents(self.observe())
+        infos: Record = {name: {} for name in self.agents}
         rewards, terminated, truncated = (self.of_agents(values) for values in self.results)
         self.agents = [name for name in self.agents if not (terminated[name] or truncated[name])]
         return observations, rewards, terminated, truncated, infos

@@ -10,10 +10,11 @@ import sys
 import warnings
 from typing import Any
 
+from pogema import pogema_v0
+
 import pogema_release as release
 import pogema_views as views
 from environment_object import serve
-from pogema import pogema_v0
 
 Record = dict[str, Any]
 

@@ -13,12 +13,14 @@ import os
 import signal
 import sys
 import warnings
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Iterator
+from typing import Any
+
+from pogema import GridConfig
 
 import pogema_release as release
 import pogema_views as views
-from pogema import GridConfig
 from pogema_release import Refusal
 
 Record = dict[str, Any]
@@ -52,7 +54,7 @@ def calling(seconds: float) -> Iterator[None]:
     except Refusal:
         raise
     except (Exception, Timeout) as error:
-        raise Refusal(f"{type(error).__name__}: {error}") from error
+        raise Refusal(f"{type(error).__name__}: {error}".removesuffix(": ")) from error
     finally:
         set_alarm(0)
 
@@ -78,6 +80,8 @@ class Port:
             return self.claims
         if kind == "reset":
             return self.reset(question)
+        if kind is None:
+            raise Refusal("a question is an object with a `type`")
         if self.env is None:
             raise Refusal("there is no episode; reset comes first")
         if kind == "step":
@@ -198,10 +202,10 @@ class Port:
         """Plays a step that a policy of POGEMA's chooses."""
         if policy == "sample":
             return self.step(self.env.sample_actions())
-        if policy != "astar" or release.BatchAStarAgent is None:
+        if policy != "astar" or release.PLANNER is None:
             raise Refusal(f"there is no policy `{policy}`")
         with calling(self.limit):
-            self.planner = self.planner or release.BatchAStarAgent()
+            self.planner = self.planner or release.PLANNER()
             actions = self.planner.act(self.seen)
         return self.step(actions)
 

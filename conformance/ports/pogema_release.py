@@ -5,7 +5,8 @@ Nothing here goes by version numbers: each difference is looked for where it sho
 
 from __future__ import annotations
 
-from typing import Any, Callable, get_args, get_type_hints
+from collections.abc import Callable
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pogema
@@ -13,11 +14,6 @@ from pogema import GridConfig, envs, pogema_v0
 from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 from pogema.wrappers import metrics as wrappers
 from pogema.wrappers.persistence import PersistentWrapper
-
-try:
-    from pogema import BatchAStarAgent
-except ImportError:  # before 1.2
-    BatchAStarAgent = None
 
 FIGURES = {
     "ISRMetric": ["ISR"],
@@ -27,6 +23,7 @@ FIGURES = {
     "LifeLongAverageThroughputMetric": ["avg_throughput"],
     "AgentsDensityWrapper": ["avg_agents_density"],
 }
+PLANNER: Any = getattr(pogema, "BatchAStarAgent", None)  # from 1.2 on
 TELLS_SIZES = "width" in get_type_hints(GridConfig)
 TAKES_SEQUENCES = FORETELLS = hasattr(envs.PogemaLifeLong, "get_lifelong_targets_xy")
 
@@ -53,7 +50,7 @@ def claims(raw: bool) -> dict[str, Any]:
     """The answer to `hello`."""
     profiles = ["core", "observations", "seeding"]
     profiles += [] if raw else ["metrics", "history"]
-    profiles += ["policies"] if BatchAStarAgent else []
+    profiles += ["policies"] if PLANNER else []
     tells = ["on_goal", "occupied", "padded", "actions_after"]
     tells += ["derived"] if TELLS_SIZES else []
     tells += ["foretold"] if FORETELLS else []

@@ -49,7 +49,7 @@ def run(command: list[str]) -> str:
     sys.stderr.write(done.stderr)
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or done.stdout.strip().splitlines() or ["no message"]
-        raise Failure(next((line for line in lines if line.startswith("ERROR")), lines[-1]))
+        raise Failure(next((line for line in reversed(lines) if line.startswith("ERROR")), lines[-1]))
     return done.stdout.strip()
 
 

@@ -42,9 +42,10 @@ class Environment:
         """Plays one step; gives rewards, `terminated` and `truncated`."""
         if len(actions) != len(self.cells) or any(action not in range(5) for action in actions):
             raise ValueError(f"expected {len(self.cells)} actions from 0 to 4")  # and nothing has changed
+        moves = [MOVES[action] for action in actions]
         taken = {cell for cell, active in zip(self.cells, self.active) if active}
-        for agent, ((row, col), action) in enumerate(zip(self.cells, actions)):
-            there = row + MOVES[action][0], col + MOVES[action][1]
+        for agent, ((row, col), (down, right)) in enumerate(zip(self.cells, moves)):
+            there = row + down, col + right
             is_free = self.obstacles[there[0] + self.radius][there[1] + self.radius] == "0"
             if self.active[agent] and is_free and there not in taken:
                 taken.remove((row, col))

@@ -2,8 +2,8 @@
 
 mod draw;
 
-use pogema_core::{Metrics, Observed, ObservedPomapf, Snapshot};
-use pogema_maps::GridConfig;
+use pogema_core::{Metrics, Observed, ObservedPomapf, OnGoal, Snapshot};
+use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
 
 use crate::port::{Scope, Told, resolve_hashes};
@@ -72,8 +72,12 @@ pub fn compare_in(
     };
     let side = config.rules().side();
     let (op, found, is_lost) = (0, Vec::new(), false);
-    let mut comparison =
-        Comparison { scope, side, families: families_of(&config), tally, op, found, is_lost };
+    let families = families_of(&config);
+    let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
+    // What a port does with goals that are given shows itself where they are given.
+    let draws_goals =
+        scope.drawn && !scope.is_whole() && config.on_target == OnGoal::Restart && !has_sequences;
+    let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, is_lost };
     for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
         comparison.op = op;
         comparison.records(one, other);
@@ -127,6 +131,7 @@ struct Comparison<'a> {
     scope: &'a Scope,
     side: usize,
     families: Families,
+    draws_goals: bool,
     tally: &'a mut Tally,
     op: usize,
     found: Vec<Divergence>,
@@ -154,7 +159,7 @@ impl Comparison<'_> {
             if self.scope.tells(Told::Derived) {
                 self.value("config/size", "derived", &expected.derived, &got.derived);
             }
-            self.list("place/obstacles", "map", &expected.map, &got.map);
+            self.state_list("place/obstacles", "map", &expected.map, &got.map);
         }
         if self.scope.tells(Told::Padded) {
             self.list("border/ring", "padded", &expected.padded.rows, &got.padded.rows);
@@ -178,7 +183,8 @@ impl Comparison<'_> {
         let (families, one, other) = (self.families, &expected.step, &got.step);
         self.state_list(policy, "action", &one.actions, &other.actions);
         self.state_list(families.collide, "cell", &one.state.cells, &other.state.cells);
-        self.state_list(families.goal, "goal", &one.state.goals, &other.state.goals);
+        let goal_rule = if self.draws_goals { "goal/restart/draw" } else { families.goal };
+        self.state_list(goal_rule, "goal", &one.state.goals, &other.state.goals);
         self.state(families.goal, &one.state, &other.state);
         self.list("reward/own", "reward", &one.rewards, &other.rewards);
         self.list("end/terminated", "terminated", &one.terminated, &other.terminated);
@@ -330,7 +336,7 @@ fn in_json(value: &impl Serialize) -> String {
 }
 
 /// A field or message without its numbers and quotes.
-pub fn kind_of(text: &str) -> String {
+fn kind_of(text: &str) -> String {
     let head = text.split(['`', ':', ',']).next().unwrap_or(text);
     let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
     let kind: Vec<&str> = words.collect();

@@ -48,7 +48,7 @@ pub struct Scope {
     /// Of the figures of an episode: those of these names, or all.
     pub metrics: Option<Vec<String>>,
     /// Of the key of this name; all without a list.
-    tells: Option<Vec<Told>>,
+    pub(super) tells: Option<Vec<Told>>,
 }
 
 impl Scope {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::claims::Mode;
 use super::link::Misbehaviour;
-use crate::compare::{Divergence, kind_of};
+use crate::compare::Divergence;
 use crate::request::Request;
 
 /// Something wrong with a port, however often it was seen.
@@ -62,7 +62,7 @@ impl Example {
     fn key(&self) -> (Option<String>, String) {
         match (&self.divergence, &self.fault) {
             (Some(found), _) => (Some(found.rule.clone()), found.kind()),
-            (None, Some(fault)) => (None, kind_of(&fault.what)),
+            (None, Some(fault)) => (None, kind_of_fault(&fault.what)),
             (None, None) => (None, String::new()),
         }
     }
@@ -80,6 +80,13 @@ impl Example {
             written(&self.request.config),
         )
     }
+}
+
+/// What was seen of a misbehaviour, without numbers and quoted answers.
+fn kind_of_fault(what: &str) -> String {
+    let head = what.split(": `").next().unwrap_or(what);
+    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// Adds an occasion to the causes; `case_rule` is the rule of the hand-written case that it is.

@@ -25,6 +25,7 @@ mod server;
 mod session;
 mod shrink;
 mod shrink_config;
+mod trace;
 
 pub use claims::{Mode, Scope, Unclaimed, adapt, needed_by, profile_of};
 pub use group::{Cause, Example};
@@ -40,3 +41,4 @@ pub use run::{Plan, Subject, check_ports, shrink_causes};
 pub use server::{Server, serve};
 pub use session::Port;
 pub use shrink::shrink;
+pub use trace::check_traces;

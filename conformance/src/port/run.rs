@@ -27,7 +27,7 @@ pub struct Subject<'a> {
 }
 
 /// What to check.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Plan {
     /// How many cases to draw.
     pub num_cases: u64,

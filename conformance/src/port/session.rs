@@ -80,12 +80,13 @@ impl<'l> Port<'l> {
     /// # Errors
     /// If the port refuses, or keeps to no form.
     pub fn begin(&mut self, beginning: Beginning) -> Result<(), Error> {
-        let needs_map = beginning.instance.is_none();
+        let is_drawn = beginning.instance.is_none();
         let reply = self.ask(&Ask::Reset(Box::new(beginning)))?;
-        self.check_state(&reply)?;
-        if needs_map {
+        if is_drawn {
             self.need("map", reply.map.as_ref())?;
+            self.check_crowd(&reply)?;
         }
+        self.check_state(&reply)?;
         self.observed = None;
         self.take_observations(reply)?;
         self.elapsed = 0;
@@ -165,6 +166,18 @@ impl<'l> Port<'l> {
         }
         let what = format!("`{key}` has length {length}, expected {want}, one for each agent");
         Err(self.misbehaved(Misbehaviour::new(what)))
+    }
+
+    /// Passes unless the config was read as one of another number of agents, which is a wrong answer in good form.
+    fn check_crowd(&self, reply: &Reply) -> Result<(), Error> {
+        let lengths = [reply.cells.as_ref().map(Vec::len), reply.goals.as_ref().map(Vec::len)];
+        let want = self.config.num_agents;
+        match lengths {
+            [Some(cells), Some(goals)] if cells == goals && cells != want => {
+                Err(Error::State { reason: format!("there are {cells} agents, expected {want}") })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_state(&mut self, reply: &Reply) -> Result<(), Error> {

@@ -1,0 +1,95 @@
+//! Traces that a port wrote itself, for those who cannot be asked over a pipe.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use pogema_core::{Error, Snapshot, Trace, TraceStep};
+
+use super::claims::{Mode, Scope};
+use super::judge::Judged;
+use super::protocol::Told;
+use super::report::{PortReport, Shown, take};
+use super::run::Plan;
+use crate::compare::compare_in;
+use crate::files;
+use crate::play::{Engine, Player};
+use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord};
+
+/// Plays the actions of each trace on the reference and compares what it gives with what stands there.
+///
+/// # Errors
+/// [`Error::Trace`] or [`Error::Io`] for a file that is no trace.
+pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
+    let mut report = PortReport { command: format!("{} traces", paths.len()), ..PortReport::default() };
+    let plan = Plan::default();
+    for path in paths {
+        let path = path.as_ref();
+        let trace = Trace::read(files::open(path)?).map_err(|error| Error::io(path, error))?;
+        let judged = judge_trace(&trace).map_err(|error| Error::io(path, error))?;
+        let shown = Shown {
+            subject: 0,
+            name: path.display().to_string(),
+            case_rule: None,
+            num_steps: trace.steps.len() as u64,
+            judged: vec![(Mode::Instance, judged)],
+            hello: None,
+        };
+        take(&mut report, shown, &plan);
+    }
+    Ok(report)
+}
+
+fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
+    let mut player =
+        Player::of_instance(&Engine::REFERENCE.make, &trace.header.config, trace.header.instance()?)?;
+    player.measure(&figures(trace));
+    let mut request = Request { config: player.config.to_value(), ..Request::default() };
+    let (mut expected, mut got) = (Response::default(), Response::default());
+    request.ops.push(Op::Reset(None));
+    let begun = player.perform(&Op::Reset(None))?;
+    let Record::Reset(reset) = &begun else { return Ok(Judged::default()) };
+    let state = unnumbered(&trace.start.state);
+    let observations = trace.start.observations.clone();
+    got.records.push(Record::Reset(Box::new(ResetRecord { state, observations, ..reset.as_ref().clone() })));
+    expected.records.push(begun);
+    for step in &trace.steps {
+        let op = Op::Step(step.actions.iter().map(|&action| action as i64).collect());
+        expected.records.push(player.perform(&op)?);
+        got.records.push(Record::Step(Box::new(record_of(step))));
+        request.ops.push(op);
+    }
+    let mut judged = Judged { is_played: true, ..Judged::default() };
+    let scope = scope_of(trace);
+    judged.divergences = compare_in(&scope, &request, &expected, &got, &mut judged.tally);
+    judged.request = request;
+    Ok(judged)
+}
+
+fn record_of(step: &TraceStep) -> StepRecord {
+    let step = TraceStep { state: unnumbered(&step.state), ..step.clone() };
+    StepRecord { infos_active: step.state.active.clone(), actions_after: Vec::new(), step }
+}
+
+/// The number of the step is not among what is compared.
+fn unnumbered(state: &Snapshot) -> Snapshot {
+    Snapshot { step: 0, ..state.clone() }
+}
+
+/// The figures that a trace gives anywhere.
+fn figures(trace: &Trace) -> Vec<String> {
+    let told = trace.steps.iter().filter_map(|step| step.metrics).flat_map(|metrics| metrics.named());
+    let names: BTreeSet<&str> = told.map(|(name, _)| name).collect();
+    names.into_iter().map(str::to_owned).collect()
+}
+
+/// What a trace can be held to: all of what it records throughout.
+fn scope_of(trace: &Trace) -> Scope {
+    let is_seen =
+        trace.start.observations.is_some() && trace.steps.iter().all(|step| step.observations.is_some());
+    Scope {
+        drawn: false,
+        observations: is_seen,
+        metrics: Some(figures(trace)),
+        tells: Some(vec![Told::OnGoal, Told::Occupied]),
+    }
+}

@@ -1,0 +1,168 @@
+//! What ports may say and how, and what a run makes of it.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod links;
+mod schema;
+mod traces;
+
+use pogema_conformance::Engine;
+use pogema_conformance::port::{
+    Ask, Hello, Link, Plan, Port, PortReport, Profile, Reply, Server, Subject, Told as Key, check_ports,
+};
+use pogema_core::{Action, Collision, Environment, Observation, OnGoal, StepOut};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+use serde_json::json;
+
+use links::{Told, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
+
+fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
+    let subject = Subject { command: "told".into(), start: Box::new(move || Ok(Told::boxed(hello, reply))) };
+    let plan = Plan { only_cases: true, ..Plan::default() };
+    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
+}
+
+fn whats(report: &PortReport) -> Vec<String> {
+    report.causes.iter().map(|cause| format!("{:?} {}", cause.rule, cause.what)).collect()
+}
+
+#[test]
+fn answers_may_leave_out_what_can_be_asked_for() {
+    assert_eq!(whats(&check(|_| (), terse)), [""; 0]);
+}
+
+#[test]
+fn windows_may_be_numbers_or_hashes() {
+    for form in [in_numbers, in_sha256, in_fnv] {
+        let report = check(|_| (), form);
+        assert_eq!(whats(&report), [""; 0]);
+        assert!(report.rules["observe/default/goal"].passed > 0);
+    }
+}
+
+#[test]
+fn a_wrong_hash_and_a_half_are_differences() {
+    for form in [in_wrong_sha256, in_halves] {
+        let report = check(|_| (), form);
+        assert!(report.diverges() && !report.misbehaves(), "{:?}", whats(&report));
+        assert!(report.causes.iter().all(|cause| cause.rule.as_ref().unwrap().starts_with("observe/")));
+        assert!(report.rules["observe/default/goal"].failed > 0);
+    }
+}
+
+#[test]
+fn keys_that_nobody_knows_are_ignored() {
+    let hello = json!({
+        "protocol": "pogema-conform/1", "name": "n", "profiles": ["core"], "collision": ["soft"],
+        "on_goal": ["finish"], "mood": "good",
+    });
+    let hello: Hello = serde_json::from_value(hello).unwrap();
+    assert_eq!((hello.max_agents, hello.noise), (usize::MAX, false));
+    let reply: Reply = serde_json::from_value(json!({ "cells": [[1, 2]], "colour": 3 })).unwrap();
+    assert_eq!(reply.cells, Some(vec![[1, 2]]));
+}
+
+#[test]
+fn what_is_not_claimed_is_listed_and_never_asked() {
+    fn modest(hello: &mut Hello) {
+        hello.profiles = vec![Profile::Core, Profile::Observations];
+        hello.collision = vec![Collision::Priority];
+        hello.on_goal = vec![OnGoal::Finish, OnGoal::Restart];
+        hello.observation = vec![Observation::Default];
+        hello.noise = false;
+        hello.tells = Vec::new();
+    }
+    fn strict(ask: &Ask, _: &mut Reply) {
+        let Ask::Reset(beginning) = ask else {
+            assert!(matches!(ask, Ask::Step { .. }), "{ask:?} was not claimed");
+            return;
+        };
+        let config = beginning.instance.as_ref().unwrap().config;
+        assert_eq!(config.collision, Collision::Priority);
+        assert_ne!(config.on_goal, OnGoal::Nothing);
+        assert_eq!(config.observation, Observation::Default);
+        assert!(beginning.config.is_none() && beginning.measure.is_empty() && !config.persistent);
+    }
+    let report = check(modest, strict);
+    assert_eq!(whats(&report), [""; 0]);
+    for what in [
+        "collision soft",
+        "collision block_both",
+        "on_goal nothing",
+        "observation MAPF",
+        "profile metrics",
+        "profile seeding",
+        "profile history",
+        "profile policies",
+    ] {
+        assert!(report.not_claimed.contains_key(what), "{what} is missing from {:?}", report.not_claimed);
+    }
+    for rule in ["collide/soft/swap", "metrics/finish", "place/order", "history/step-back", "policy/astar"] {
+        let row = report.rules[rule];
+        assert!(row.not_claimed > 0 && row.passed + row.failed + row.errors == 0, "{rule}: {row:?}");
+    }
+    assert!(report.rules["collide/priority/swap"].passed > 0);
+}
+
+#[test]
+fn a_key_that_is_claimed_must_be_there() {
+    fn forgets(_: &Ask, reply: &mut Reply) {
+        reply.occupied = None;
+    }
+    let report = check(|_| (), forgets);
+    assert!(report.misbehaves());
+    assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
+    let report = check(|hello| hello.tells.retain(|key| *key != Key::Occupied), forgets);
+    assert_eq!(whats(&report), [""; 0]);
+}
+
+/// A port is an environment like any other.
+#[test]
+fn a_port_steps_in_lockstep_with_the_reference() {
+    for observation in ["default", "POMAPF", "MAPF"] {
+        let config = json!({
+            "size": 6, "num_agents": 5, "density": 0.2, "seed": 3, "collision_system": "soft",
+            "on_target": "restart", "observation_type": observation, "obs_radius": 2, "max_episode_steps": 30,
+        });
+        let config = GridConfig::from_value(&config).unwrap();
+        let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
+        let mut server = Server::new(Engine::LITERAL);
+        let hello = server.hello().unwrap();
+        let mut port = Port::new(&mut server, &hello, config.rules());
+        let mut reference = Reference::new(config.rules()).unwrap();
+        let mut pair: [&mut dyn Environment; 2] = [&mut port, &mut reference];
+        let mut outcomes = Vec::new();
+        for environment in &mut pair {
+            environment.reset(&instance).unwrap();
+            outcomes.push(play(&mut **environment));
+        }
+        assert_eq!(outcomes[0], outcomes[1]);
+    }
+}
+
+/// Everything that an environment says in thirty steps.
+fn play(environment: &mut dyn Environment) -> String {
+    let num_agents = environment.config().num_agents;
+    let mut told = String::new();
+    for step in 0..30 {
+        let actions: Vec<Action> =
+            (0..num_agents).map(|agent| Action::ALL[(step * 7 + agent * 3 + step / 3) % 5]).collect();
+        let (mut rewards, mut terminated, mut truncated) =
+            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&actions, out).unwrap();
+        let mut seen = vec![0.0; environment.config().num_observed()];
+        if environment.config().observation == Observation::Default {
+            environment.observe(&mut seen).unwrap();
+        } else {
+            let windows = pogema_conformance::Windows::of(environment).unwrap();
+            told.push_str(&format!("{windows:?}"));
+        }
+        told.push_str(&format!(
+            "{:?} {rewards:?} {terminated:?} {truncated:?} {seen:?}",
+            environment.snapshot()
+        ));
+    }
+    told
+}

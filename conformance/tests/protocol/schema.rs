@@ -1,0 +1,81 @@
+//! The schema in the tree fits what is really said.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use pogema_conformance::Engine;
+use pogema_conformance::port::{
+    Ask, Hello, Link, Misbehaviour, PROTOCOL, Plan, Reply, Server, Subject, check_ports,
+};
+use serde_json::{Value, json};
+
+/// Writes down what is said.
+struct Listening {
+    server: Server,
+    said: Arc<Mutex<Vec<Value>>>,
+}
+
+impl Listening {
+    fn note(&self, value: &impl serde::Serialize) {
+        self.said.lock().unwrap().push(serde_json::to_value(value).unwrap());
+    }
+}
+
+impl Link for Listening {
+    fn hello(&mut self) -> Result<Hello, Misbehaviour> {
+        self.note(&Ask::Hello { protocol: PROTOCOL.into() });
+        let hello = self.server.hello()?;
+        self.note(&hello);
+        Ok(hello)
+    }
+
+    fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
+        self.note(ask);
+        let reply = self.server.ask(ask)?;
+        self.note(&reply);
+        Ok(reply)
+    }
+}
+
+fn schema() -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("protocol/pogema-conform-1.schema.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn all_that_is_said_fits_the_schema() {
+    let said = Arc::new(Mutex::new(Vec::new()));
+    let start = || {
+        let link = Listening { server: Server::new(Engine::REFERENCE), said: Arc::clone(&said) };
+        Ok(Box::new(link) as Box<dyn Link>)
+    };
+    let subject = Subject { command: "listening".into(), start: Box::new(start) };
+    let plan = Plan { only_cases: true, ..Plan::default() };
+    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap();
+    let validator = jsonschema::validator_for(&schema()).unwrap();
+    let said = said.lock().unwrap();
+    assert!(said.len() > 1000, "only {} lines were said", said.len());
+    for line in said.iter() {
+        let wrong = validator.iter_errors(line).next();
+        assert!(wrong.is_none(), "{line}\n{}", wrong.unwrap());
+    }
+}
+
+#[test]
+fn what_is_wrong_does_not_fit_the_schema() {
+    let validator = jsonschema::validator_for(&schema()).unwrap();
+    for wrong in [
+        json!({ "type": "reset", "instance": {} }),
+        json!({ "type": "reset", "instance": {}, "config": {} }),
+        json!({ "type": "step" }),
+        json!({ "type": "dance" }),
+        json!({ "protocol": "pogema-conform/2", "name": "n" }),
+        json!({ "protocol": PROTOCOL, "name": "n", "profiles": ["all"], "collision": [], "on_goal": [] }),
+        json!({ "cells": [[1, 2, 3]] }),
+        json!({ "active": [1] }),
+        json!({ "observations": ["0g"] }),
+        json!([]),
+    ] {
+        assert!(!validator.is_valid(&wrong), "{wrong}");
+    }
+}

@@ -1,0 +1,76 @@
+//! Traces that ports write themselves.
+
+use std::path::PathBuf;
+
+use pogema_conformance::port::check_traces;
+use pogema_core::{Action, Cell, Environment, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+use serde_json::json;
+
+/// An episode as a port might write it down: without observations and figures.
+fn trace() -> Trace {
+    let config = json!({
+        "size": 5, "num_agents": 4, "density": 0.1, "seed": 1, "collision_system": "soft",
+        "on_target": "restart", "max_episode_steps": 12, "empty_outside": false,
+    });
+    let config = GridConfig::from_value(&config).unwrap();
+    let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
+    let mut environment = Reference::new(config.rules()).unwrap();
+    environment.reset(&instance).unwrap();
+    let state = environment.snapshot();
+    let header = TraceHeader::new(config.rules(), &instance, 14);
+    let mut trace = Trace { header, start: TraceStart { state, observations: None }, steps: Vec::new() };
+    for step in 0..12 {
+        let actions: Vec<Action> = (0..4).map(|agent| Action::ALL[(step * 3 + agent) % 5]).collect();
+        let (mut rewards, mut terminated, mut truncated) = (vec![0.0; 4], vec![false; 4], vec![false; 4]);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&actions, out).unwrap();
+        let state: Snapshot = environment.snapshot();
+        trace.steps.push(TraceStep {
+            actions,
+            state,
+            rewards,
+            terminated,
+            truncated,
+            observations: None,
+            metrics: None,
+        });
+    }
+    trace
+}
+
+fn written(trace: &Trace, folder: &tempfile::TempDir, name: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    let mut text = Vec::new();
+    trace.write(&mut text).unwrap();
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn a_true_trace_passes_and_an_altered_one_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let right = trace();
+    let mut wrong = right.clone();
+    wrong.steps[7].state.cells[2] = Cell::new(0, 0);
+    let paths = [written(&right, &folder, "right.jsonl"), written(&wrong, &folder, "wrong.jsonl")];
+    let report = check_traces(&paths[..1]).unwrap();
+    assert!(!report.diverges() && report.num_steps == 12);
+    assert!(report.rules["collide/soft"].passed == 1 && report.rules["reward/own"].passed == 1);
+    let report = check_traces(&paths).unwrap();
+    assert_eq!(report.causes.len(), 1);
+    let found = report.causes[0].example.divergence.as_ref().unwrap();
+    assert_eq!((found.op, found.field.as_str(), found.rule.as_str()), (8, "cell 2", "collide/soft"));
+    assert!(report.causes[0].example.name.ends_with("wrong.jsonl"));
+}
+
+#[test]
+fn what_is_no_trace_is_refused_with_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("not-a-trace");
+    std::fs::write(&path, "{}\n").unwrap();
+    let error = check_traces(&[&path]).unwrap_err().to_string();
+    assert!(error.contains("not-a-trace") && error.contains("line 1"), "{error}");
+    assert!(check_traces(&[folder.path().join("missing")]).is_err());
+}
