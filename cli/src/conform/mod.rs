@@ -1,7 +1,16 @@
 //! `pogema conform`: every engine against everything there is to check.
 
+mod badge;
+mod grid_svg;
+mod html;
+mod junit;
+mod known;
+mod outputs;
 mod port_table;
 mod ports;
+mod summary;
+mod template;
+mod text_picture;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -43,14 +52,20 @@ pub struct Conform {
 }
 
 /// The fast engine.
-pub const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+pub const FAST: Engine =
+    Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
         if self.ports.is_asked() {
             let bar = self.bar("cases");
-            let shared =
-                ports::Shared { cases: self.cases, seed: self.seed, json: self.json.as_ref(), keep: &self.keep, bar: &bar };
+            let shared = ports::Shared {
+                cases: self.cases,
+                seed: self.seed,
+                json: self.json.as_ref(),
+                keep: &self.keep,
+                bar: &bar,
+            };
             return self.ports.run(&shared);
         }
         self.json.as_deref().map_or(Ok(()), check_writable)?;

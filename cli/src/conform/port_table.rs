@@ -1,59 +1,112 @@
-//! What a run shows of a port, for the terminal.
+//! What a run shows of ports, for the terminal.
 
 use std::fmt::Write as _;
 
 use pogema_conformance::port::{Cause, PortReport};
 
+use super::known::Leftover;
+use super::summary::{self, OUTCOMES, counts, names, printable, shortened, times, title, verdict};
 use super::table;
+use super::text_picture::{Limits, cut};
 
-/// The report as tables and words.
-pub fn tell(report: &PortReport) -> String {
-    let mut text = format!("{}\n\n", title(report));
-    let mut rules = table(&["rule", "pass", "fail", "not claimed", "error"]);
-    for (rule, row) in &report.rules {
-        let counts = [row.passed, row.failed, row.not_claimed, row.errors].map(|count| match count {
-            0 => String::new(),
-            count => count.to_string(),
-        });
-        rules.add_row(std::iter::once(rule.clone()).chain(counts));
+/// What to do about a known deviation that is gone.
+const STOPPED: &str = "it stopped occurring and can be removed from the list";
+/// So much of a picture fits on a screen.
+const LIMITS: Limits = Limits { rows: 12, columns: 120 };
+
+/// The reports as tables and words: what can be laid side by side, then each port by itself.
+pub fn tell(reports: &[PortReport], leftover: &Leftover) -> String {
+    let mut text = String::new();
+    if let [report] = reports {
+        let _ = writeln!(text, "{}\n", title(report));
     }
-    let _ = writeln!(text, "{rules}\n");
-    if !report.not_claimed.is_empty() {
-        let mut unclaimed = table(&["not claimed", "cases left unchecked"]);
-        for (what, count) in &report.not_claimed {
-            unclaimed.add_row([what.clone(), count.to_string()]);
+    let _ = writeln!(text, "{}\n", rules(reports));
+    let unclaimed = unclaimed(reports);
+    let _ = write!(text, "{unclaimed}{}", if unclaimed.is_empty() { "" } else { "\n\n" });
+    for (report, name) in reports.iter().zip(names(reports)) {
+        if reports.len() > 1 {
+            let _ = writeln!(text, "=== {name}: {}\n", title(report));
         }
-        let _ = writeln!(text, "{unclaimed}\n");
+        text.push_str(&tell_port(report));
     }
-    for cause in &report.causes {
+    let stopped = leftover.stopped.iter().map(|known| format!("STOPPED {known}\n  {STOPPED}\n"));
+    let not_played = leftover.not_played.iter().map(|known| format!("not played: {known}\n"));
+    stopped.chain(not_played).for_each(|line| text.push_str(&line));
+    printable(text.trim_end())
+}
+
+/// Columns for each port; of several ports, only those that hold something.
+fn rules(reports: &[PortReport]) -> String {
+    let rows = summary::rows(reports);
+    let holds = |report: &PortReport, at: usize| rows.iter().any(|rule| !counts(report, rule)[at].is_empty());
+    let is_shown = |report: &PortReport, at: usize| reports.len() == 1 || at == 0 || holds(report, at);
+    let columns: Vec<(usize, usize)> = (0..reports.len())
+        .flat_map(|port| (0..OUTCOMES.len()).map(move |at| (port, at)))
+        .filter(|&(port, at)| is_shown(&reports[port], at))
+        .collect();
+    let names = names(reports);
+    let title = |&(port, at): &(usize, usize)| match (reports.len(), at) {
+        (1, _) => OUTCOMES[at].to_owned(),
+        (_, 0) => format!("{}\n{}", names[port], OUTCOMES[at]),
+        _ => format!("\n{}", OUTCOMES[at]),
+    };
+    let titles: Vec<String> = std::iter::once("rule".to_owned()).chain(columns.iter().map(title)).collect();
+    let mut table = table(&titles.iter().map(String::as_str).collect::<Vec<_>>());
+    for rule in rows {
+        let counts: Vec<[String; 4]> = reports.iter().map(|report| counts(report, rule)).collect();
+        let cells = columns.iter().map(|&(port, at)| counts[port][at].clone());
+        table.add_row(std::iter::once(rule.to_owned()).chain(cells));
+    }
+    table.to_string()
+}
+
+fn unclaimed(reports: &[PortReport]) -> String {
+    let all = summary::unclaimed(reports);
+    if all.is_empty() {
+        return String::new();
+    }
+    let names = names(reports);
+    let mut titles = vec!["not claimed"];
+    match reports.len() {
+        1 => titles.push("cases left unchecked"),
+        _ => titles.extend(names.iter().map(String::as_str)),
+    }
+    let mut table = table(&titles);
+    for what in all {
+        let counts =
+            reports.iter().map(|report| report.not_claimed.get(what).map_or(String::new(), u64::to_string));
+        table.add_row(std::iter::once(what.to_owned()).chain(counts));
+    }
+    table.to_string()
+}
+
+fn tell_port(report: &PortReport) -> String {
+    let mut text = String::new();
+    let (known, new): (Vec<&Cause>, Vec<&Cause>) =
+        report.causes.iter().partition(|cause| cause.known.is_some());
+    for cause in new {
         let _ = writeln!(text, "{}", tell_cause(cause));
     }
-    if report.num_not_run > 0 {
-        let _ = writeln!(text, "{} cases were not asked after that\n", report.num_not_run);
+    for cause in known {
+        let (rule, reason) =
+            (cause.rule.as_deref().unwrap_or("protocol"), cause.known.as_deref().unwrap_or_default());
+        let _ = writeln!(text, "KNOWN {rule}: {}, {}\n  {reason}", cause.what, times(cause));
+        text.push_str(&tell_replay(cause));
+        text.push('\n');
     }
-    text.push_str(&verdict(report));
+    if report.num_not_run > 0 {
+        let _ = writeln!(text, "{} cases were not asked\n", report.num_not_run);
+    }
+    let _ = writeln!(text, "{}\n", verdict(report));
     text
 }
 
-/// Who the port is.
-pub fn title(report: &PortReport) -> String {
-    match &report.hello {
-        Some(hello) => format!("{} {} ({})", hello.name, hello.version, report.command),
-        None => report.command.clone(),
-    }
-}
-
-fn tell_cause(cause: &Cause) -> String {
-    let mut text = String::new();
-    let times = if cause.times == 1 { "once".into() } else { format!("{} times", cause.times) };
-    match &cause.rule {
-        Some(rule) => {
-            let _ = writeln!(text, "FAIL {rule}: {} differs, {times}", cause.what);
-        }
-        None => {
-            let _ = writeln!(text, "ERROR {}, {times}", cause.what);
-        }
-    }
+/// One cause, with its smallest occasion.
+pub fn tell_cause(cause: &Cause) -> String {
+    let mut text = match &cause.rule {
+        Some(rule) => format!("FAIL {rule}: {} differs, {}\n", cause.what, times(cause)),
+        None => format!("ERROR {}, {}\n", cause.what, times(cause)),
+    };
     if !cause.cases.is_empty() {
         let rules: Vec<&str> = cause.cases.keys().map(String::as_str).collect();
         let _ = writeln!(text, "  shown by the cases of {}", rules.join(", "));
@@ -61,27 +114,15 @@ fn tell_cause(cause: &Cause) -> String {
     let _ = writeln!(text, "  smallest: {}", cause.example.name);
     if let Some(found) = &cause.example.divergence {
         let _ = writeln!(text, "  operation {}: {}", found.op, found.field);
-        let _ = write!(text, "  expected {}\n  got      {}\n{}", found.expected, found.got, found.picture);
+        let (expected, got) = (shortened(&found.expected), shortened(&found.got));
+        let _ = write!(text, "  expected {expected}\n  got      {got}\n{}", cut(&found.picture, LIMITS));
     }
     if let Some(fault) = &cause.example.fault {
         let _ = writeln!(text, "  {fault}");
     }
-    if let Some(replay) = &cause.replay {
-        let _ = writeln!(text, "  play it again: {replay}");
-    }
-    text
+    text + &tell_replay(cause)
 }
 
-/// One line that says it all.
-pub fn verdict(report: &PortReport) -> String {
-    let sum = |pick: fn(&Cause) -> bool| report.causes.iter().filter(|cause| pick(cause)).count();
-    let diverging = sum(|cause| cause.rule.is_some() && cause.known.is_none());
-    let misbehaving = sum(|cause| cause.rule.is_none() && cause.known.is_none());
-    let played = format!("{} cases, {} steps", report.num_played, report.num_steps);
-    match (diverging, misbehaving) {
-        (0, 0) => format!("conforms to all it claims: {played}"),
-        (1.., 0) => format!("diverges: {diverging} causes in {played}"),
-        (0, _) => format!("misbehaves: {misbehaving} causes in {played}"),
-        (..) => format!("diverges and misbehaves: {} causes in {played}", diverging + misbehaving),
-    }
+fn tell_replay(cause: &Cause) -> String {
+    cause.replay.as_ref().map_or(String::new(), |replay| format!("  play it again: {replay}\n"))
 }

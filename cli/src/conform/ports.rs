@@ -7,10 +7,15 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::files;
-use pogema_conformance::port::{Command, Link, Plan, PortReport, Process, Profile, Subject, check_ports, shrink_causes};
+use pogema_conformance::port::{
+    Command, Link, Plan, PortReport, Process, Profile, Subject, check_ports, check_traces, shrink_causes,
+};
 use pogema_core::Error;
 
+use super::known::Leftover;
+use super::outputs::Outputs;
 use super::port_table;
+use super::summary::{Verdict, score};
 use crate::output::{check_writable, say};
 
 /// The exit status for a port that breaks the protocol.
@@ -37,6 +42,11 @@ pub struct Ports {
     /// How many cases are played side by side, each in a process of its own; one for each processor by default
     #[arg(long, value_name = "N", requires = "commands", value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: Option<u16>,
+    /// Check traces that a port wrote itself, in place of asking a port
+    #[arg(long = "trace", value_name = "FILE", num_args = 1.., conflicts_with = "commands")]
+    traces: Vec<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
 }
 
 fn profile(word: &str) -> Result<Profile, String> {
@@ -59,42 +69,68 @@ pub struct Shared<'a> {
 }
 
 impl Ports {
-    /// Whether ports are to be checked.
+    /// Whether ports, or what they wrote, are to be checked.
     pub fn is_asked(&self) -> bool {
-        !self.commands.is_empty()
+        !self.commands.is_empty() || !self.traces.is_empty()
     }
 
     pub fn run(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
+        if self.traces.is_empty() { self.run_ports(shared) } else { self.run_traces(shared) }
+    }
+
+    fn run_traces(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
         shared.json.map_or(Ok(()), |path| check_writable(path))?;
+        let reports = [check_traces(&self.traces)?];
+        let leftover = Leftover::default();
+        write_json(shared, &reports)?;
+        say(&port_table::tell(&reports, &leftover))?;
+        Ok(exit_code(&reports, &leftover))
+    }
+
+    fn run_ports(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
+        let known = self.outputs.check(self.commands.len(), shared.json.map(PathBuf::as_path))?;
         let timeout = Duration::from_secs_f64(self.timeout);
         let commands =
             self.commands.iter().map(|text| Command::new(text, timeout)).collect::<Result<Vec<_>, _>>()?;
         let subjects: Vec<Subject<'_>> = commands.iter().map(subject).collect();
-        let plan = Plan {
+        let plan = self.plan(shared);
+        let mut reports =
+            check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
+        shared.bar.finish_and_clear();
+        for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
+            // Several ports fail in the same rules, and must not overwrite each other's cases.
+            let folder = if subjects.len() == 1 {
+                shared.keep.clone()
+            } else {
+                shared.keep.join(format!("{}", index + 1))
+            };
+            shrink_causes(subject, report, &plan, &folder, &|| ())?;
+        }
+        known.mark(&mut reports);
+        let leftover = known.leftover(&reports, &plan);
+        write_json(shared, &reports)?;
+        self.outputs.write(&reports, &leftover)?;
+        say(&port_table::tell(&reports, &leftover))?;
+        Ok(exit_code(&reports, &leftover))
+    }
+
+    fn plan(&self, shared: &Shared<'_>) -> Plan {
+        Plan {
             num_cases: shared.cases,
             seed: shared.seed,
             rules: self.rules.clone(),
             profiles: self.profiles.clone(),
             num_workers: self.workers.map(usize::from),
             files: self.files.clone(),
-        };
-        let mut reports =
-            check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
-        shared.bar.finish_and_clear();
-        for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
-            // Several ports fail in the same rules, and must not overwrite each other's cases.
-            let folder = if subjects.len() == 1 { shared.keep.clone() } else { shared.keep.join(format!("{}", index + 1)) };
-            shrink_causes(subject, report, &plan, &folder, &|| ())?;
+            only_cases: false,
         }
-        if let Some(path) = shared.json {
-            let text = serde_json::to_vec_pretty(&reports).map_err(|error| Error::io(path, error))?;
-            files::write(path, &text)?;
-        }
-        for report in &reports {
-            say(&port_table::tell(report))?;
-        }
-        Ok(exit_code(&reports))
     }
+}
+
+fn write_json(shared: &Shared<'_>, reports: &[PortReport]) -> Result<(), Error> {
+    let Some(path) = shared.json else { return Ok(()) };
+    let text = serde_json::to_vec_pretty(reports).map_err(|error| Error::io(path, error))?;
+    files::write(path, &text)
 }
 
 fn subject(command: &Command) -> Subject<'_> {
@@ -104,10 +140,10 @@ fn subject(command: &Command) -> Subject<'_> {
     }
 }
 
-fn exit_code(reports: &[PortReport]) -> ExitCode {
-    if reports.iter().any(PortReport::misbehaves) {
+fn exit_code(reports: &[PortReport], leftover: &Leftover) -> ExitCode {
+    if reports.iter().any(|report| score(report).verdict() == Verdict::Misbehaves) {
         ExitCode::from(MISBEHAVED)
-    } else if reports.iter().any(PortReport::diverges) {
+    } else if reports.iter().any(PortReport::diverges) || !leftover.stopped.is_empty() {
         ExitCode::FAILURE
     } else {
         ExitCode::SUCCESS

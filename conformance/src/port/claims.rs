@@ -79,13 +79,8 @@ impl Scope {
 
 /// The profile that a rule belongs to.
 pub fn profile_of(rule: &str) -> Profile {
-    const SEEDING: [&str; 5] = [
-        "border/noise",
-        "goal/restart/draw",
-        "goal/restart/foretold",
-        "goal/restart/pool",
-        "goal/restart/unreachable",
-    ];
+    const SEEDING: [&str; 4] =
+        ["border/noise", "goal/restart/draw", "goal/restart/foretold", "goal/restart/pool"];
     let is_any = |rules: &[&'static str]| rules.iter().any(|prefix| Unclaimed::new("", prefix).covers(rule));
     match rule.split('/').next().unwrap_or_default() {
         _ if is_any(&SEEDING) => Profile::Seeding,

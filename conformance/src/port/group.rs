@@ -86,7 +86,7 @@ impl Example {
 fn kind_of_fault(what: &str) -> String {
     let head = what.split(": `").next().unwrap_or(what);
     let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
-    words.collect::<Vec<_>>().join(" ")
+    words.collect::<Vec<_>>().join(" ").replace(" (exit status:", "").replace(" (signal:", "")
 }
 
 /// Adds an occasion to the causes; `case_rule` is the rule of the hand-written case that it is.

@@ -71,16 +71,15 @@ pub struct Shown {
     pub case_rule: Option<String>,
     pub num_steps: u64,
     pub judged: Vec<(Mode, Judged)>,
+    /// Whether it was not asked any more.
+    pub is_cut_off: bool,
     pub hello: Option<Hello>,
 }
 
 /// Adds what an item shows.
 pub fn take(report: &mut PortReport, shown: Shown, plan: &Plan) {
     report.hello = report.hello.take().or(shown.hello);
-    if shown.judged.is_empty() {
-        report.num_not_run += 1;
-        return;
-    }
+    report.num_not_run += u64::from(shown.is_cut_off);
     let is_played = shown.judged.iter().any(|(_, judged)| judged.is_played);
     report.num_played += u64::from(is_played);
     report.num_steps += if is_played { shown.num_steps } else { 0 };
@@ -115,6 +114,7 @@ pub fn take(report: &mut PortReport, shown: Shown, plan: &Plan) {
             Verdicts { errors: 1.., .. } => row.errors += 1,
             Verdicts { failed: 1.., .. } => row.failed += 1,
             _ if is_played => row.passed += 1,
+            _ if shown.is_cut_off => {}
             _ => row.not_claimed += 1,
         }
     }
@@ -135,7 +135,9 @@ fn take_rows(report: &mut PortReport, case_rule: Option<&str>, judged: &Judged, 
     if case_rule.is_some() {
         return;
     }
-    report.row(PROTOCOL_ROW).errors += u64::from(judged.fault.is_some());
+    if judged.fault.is_some() {
+        report.row(PROTOCOL_ROW).errors += 1;
+    }
     for (rule, _) in
         judged.tally.rules.iter().filter(|(rule, count)| count.diverged == 0 && is_wanted(plan, rule))
     {

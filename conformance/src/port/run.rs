@@ -130,10 +130,12 @@ fn show(
         case_rule: item.case_rule().map(str::to_owned),
         num_steps: expected.records.iter().filter(|record| record.step().is_some()).count() as u64,
         judged: Vec::new(),
+        is_cut_off: false,
         hello: None,
     };
     for mode in [Mode::Instance, Mode::Config] {
         if faults.load(Ordering::Relaxed) >= MOST_FAULTS {
+            shown.is_cut_off = shown.judged.is_empty();
             break;
         }
         let running = match running(subject, slot, plan) {

@@ -32,6 +32,7 @@ pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
             case_rule: None,
             num_steps: trace.steps.len() as u64,
             judged: vec![(Mode::Instance, judged)],
+            is_cut_off: false,
             hello: None,
         };
         take(&mut report, shown, &plan);

@@ -6,6 +6,8 @@ mod links;
 mod schema;
 mod traces;
 
+use std::fmt::Write as _;
+
 use pogema_conformance::Engine;
 use pogema_conformance::port::{
     Ask, Hello, Link, Plan, Port, PortReport, Profile, Reply, Server, Subject, Told as Key, check_ports,
@@ -157,12 +159,10 @@ fn play(environment: &mut dyn Environment) -> String {
             environment.observe(&mut seen).unwrap();
         } else {
             let windows = pogema_conformance::Windows::of(environment).unwrap();
-            told.push_str(&format!("{windows:?}"));
+            let _ = write!(told, "{windows:?}");
         }
-        told.push_str(&format!(
-            "{:?} {rewards:?} {terminated:?} {truncated:?} {seen:?}",
-            environment.snapshot()
-        ));
+        let state = environment.snapshot();
+        let _ = write!(told, "{state:?} {rewards:?} {terminated:?} {truncated:?} {seen:?}");
     }
     told
 }

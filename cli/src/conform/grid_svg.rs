@@ -1,0 +1,71 @@
+//! Drawings of text pictures: obstacles dark, agents as discs, goals as squares, by the same letters.
+
+use std::fmt::Write as _;
+
+/// Side of a cell. Units: pixels.
+const CELL: usize = 24;
+/// On more cells in a line nothing can be made out.
+const MOST_CELLS: usize = 64;
+
+/// A drawing of the rows of a picture, in which cells stand out that are not as in `other`; nothing for pictures that
+/// are too large.
+pub fn drawing(title: &str, rows: &[&str], other: &[&str]) -> Option<String> {
+    let (height, width) = (rows.len(), rows.first()?.len());
+    if height.max(width) > MOST_CELLS {
+        return None;
+    }
+    let [right, bottom] = [width, height].map(|cells| cells * CELL);
+    let mut svg = format!(r#"<svg viewBox="-1 -1 {} {}" width="{}" "#, right + 2, bottom + 2, right + 2);
+    let _ = write!(
+        svg,
+        r#"role="img" aria-label="{title}"><rect class="ground" width="{right}" height="{bottom}"/>"#
+    );
+    let across = (0..=height).map(|row| format!("M0 {}h{right}", row * CELL));
+    let down = (0..=width).map(|column| format!("M{} 0v{bottom}", column * CELL));
+    let lines: String = across.chain(down).collect();
+    let _ = write!(svg, r#"<path class="lines" d="{lines}"/>"#);
+    for (row, line) in rows.iter().enumerate() {
+        for (column, letter) in line.bytes().enumerate() {
+            let differs = other.get(row).is_some_and(|line| line.as_bytes().get(column) != Some(&letter));
+            svg.push_str(&cell(column * CELL, row * CELL, letter, differs));
+        }
+    }
+    svg.push_str("</svg>");
+    Some(svg)
+}
+
+fn cell(x: usize, y: usize, letter: u8, differs: bool) -> String {
+    let square = |class: &str, rim: usize, more: &str| {
+        let side = CELL - 2 * rim;
+        format!(
+            r#"<rect class="{class}" x="{}" y="{}" width="{side}" height="{side}"{more}/>"#,
+            x + rim,
+            y + rim
+        )
+    };
+    let (middle, centre) = (x + CELL / 2, y + CELL / 2);
+    let colour = colour(letter);
+    let lettered = |shape: &str, fill: &str| {
+        let letter = letter as char;
+        format!(r#"{shape}<text x="{middle}" y="{}" fill="{fill}">{letter}</text>"#, centre + 4)
+    };
+    let mut shapes = match letter {
+        b'#' => square("obstacle", 0, ""),
+        b'A'..=b'Z' => lettered(&square("goal", 4, &format!(r#" stroke="{colour}""#)), &colour),
+        b'a'..=b'z' | b'0'..=b'9' | b'?' => {
+            lettered(&format!(r#"<circle cx="{middle}" cy="{centre}" r="10" fill="{colour}"/>"#), "#fff")
+        }
+        _ => String::new(),
+    };
+    if differs {
+        shapes.push_str(&square("differs", 1, ""));
+    }
+    shapes
+}
+
+/// An agent and its goal share a colour; agents that follow each other have colours far apart.
+fn colour(letter: u8) -> String {
+    const GOLDEN_ANGLE: usize = 137;
+    let hue = letter.to_ascii_lowercase() as usize * GOLDEN_ANGLE % 360;
+    format!("hsl({hue} 65% 33%)")
+}

@@ -1,0 +1,96 @@
+//! The report as JUnit XML, for the dashboards of continuous integration.
+
+use pogema_conformance::port::{Cause, PortReport};
+use quick_junit::{NonSuccessKind, Property, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
+
+use super::known::Leftover;
+use super::port_table::tell_cause;
+use super::summary::{Standing, causes_of, names, score, standing, times, title, verdict, why_unclaimed};
+
+/// The report as JUnit XML: a suite for each port, a test case for each rule.
+pub fn xml(reports: &[PortReport], leftover: &Leftover) -> Result<String, SerializeError> {
+    let mut junit = Report::new("pogema conform");
+    for (report, name) in reports.iter().zip(names(reports)) {
+        junit.add_test_suite(suite(report, &name));
+    }
+    if !leftover.stopped.is_empty() {
+        junit.add_test_suite(stopped(leftover));
+    }
+    junit.to_string()
+}
+
+fn suite(report: &PortReport, name: &str) -> TestSuite {
+    let mut suite = TestSuite::new(name);
+    suite.add_property(Property::new("port", title(report)));
+    suite.add_property(Property::new("verdict", verdict(report)));
+    for rule in report.rules.keys() {
+        let causes: Vec<&Cause> = causes_of(report, rule).collect();
+        let standing = standing(report, rule);
+        let mut case = TestCase::new(rule.as_str(), status(report, rule, standing, &causes));
+        case.set_classname(name);
+        if standing == Standing::Known {
+            case.set_system_out(told(&causes));
+        }
+        suite.add_test_case(case);
+    }
+    if score(report).is_cut_short {
+        // The run fails for this even if each fault is known.
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+        status.set_type("misbehaviour").set_message(format!("{} cases were not asked", report.num_not_run));
+        let mut case = TestCase::new("(not asked)", status);
+        case.set_classname(name);
+        suite.add_test_case(case);
+    }
+    suite
+}
+
+fn status(report: &PortReport, rule: &str, standing: Standing, causes: &[&Cause]) -> TestCaseStatus {
+    let not_passed = |kind, ty: &str| {
+        let mut status = TestCaseStatus::non_success(kind);
+        let new: Vec<&Cause> = causes.iter().copied().filter(|cause| cause.known.is_none()).collect();
+        status.set_type(ty).set_message(in_a_line(&new)).set_description(told(causes));
+        status
+    };
+    let mut skipped = TestCaseStatus::skipped();
+    match standing {
+        Standing::Passed | Standing::Blank => TestCaseStatus::success(),
+        Standing::Failed => not_passed(NonSuccessKind::Failure, "divergence"),
+        Standing::Error => not_passed(NonSuccessKind::Error, "misbehaviour"),
+        // Skipped, not passed: dashboards count what is skipped and show its message, but leave out what a test that
+        // passed has to say; and the rule does not hold.
+        Standing::Known => {
+            let reasons: Vec<&str> = causes.iter().filter_map(|cause| cause.known.as_deref()).collect();
+            skipped.set_type("known").set_message(format!("known {}", reasons.join("; known ")));
+            skipped
+        }
+        Standing::NotClaimed => {
+            skipped.set_type("not claimed").set_message(why_unclaimed(report, rule));
+            skipped
+        }
+    }
+}
+
+fn in_a_line(causes: &[&Cause]) -> String {
+    let line = |cause: &&Cause| match &cause.rule {
+        Some(rule) => format!("{rule}: {} differs, {}", cause.what, times(cause)),
+        None => format!("{}, {}", cause.what, times(cause)),
+    };
+    causes.iter().map(line).collect::<Vec<_>>().join("; ")
+}
+
+fn told(causes: &[&Cause]) -> String {
+    causes.iter().map(|cause| tell_cause(cause)).collect::<Vec<_>>().join("\n")
+}
+
+/// What is known and stopped occurring fails the run, and must be seen to do so.
+fn stopped(leftover: &Leftover) -> TestSuite {
+    let mut suite = TestSuite::new("known deviations");
+    for deviation in &leftover.stopped {
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+        status.set_type("stopped").set_message("stopped occurring and can be removed from the list");
+        let mut case = TestCase::new(deviation.as_str(), status);
+        case.set_classname("known deviations");
+        suite.add_test_case(case);
+    }
+    suite
+}

@@ -1,0 +1,277 @@
+//! What `pogema conform --port` writes: JUnit XML, a page, a badge, and what it bears as known.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+
+/// An engine of our own as a port.
+const CONFORMING: &str = concat!("'", env!("CARGO_BIN_EXE_pogema"), "' port");
+const WRONG: &str = "python3.11 wrong.py";
+
+/// One line of the template, and what makes it wrong.
+const LATE: [&str; 2] = ["self.steps >= self.max_steps", "self.steps > self.max_steps"];
+const CROWDED: [&str; 2] = ["and there not in taken", "and (there not in taken or agent == 1)"];
+const MUTE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
+/// Mute too, but not often enough to end the run.
+const AT_TIMES_MUTE: [&str; 2] = [
+    "    return {**state, **results",
+    "    if len(environment.cells) > 20: del state[\"active\"]\n    return {**state, **results",
+];
+const NAMED: [&str; 2] = [r#""name": "template""#, r#""name": "<b>&\"'\x1b[2J""#];
+
+const KNOWN_LATE: &str =
+    "- {rule: end/truncated, what: truncated, since: 2026-11-22, reason: one step late}\n";
+
+/// A folder with `wrong.py`, a port that is wrong in some lines.
+fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/ports/template.py");
+    let mut text = std::fs::read_to_string(template).unwrap();
+    for [right, wrong] in wrong {
+        assert_eq!(text.matches(right).count(), 1, "`{right}` in the template");
+        text = text.replace(right, wrong);
+    }
+    std::fs::write(folder.path().join("wrong.py"), text).unwrap();
+    let python = Command::new("python3.11").arg("--version").output();
+    assert!(python.is_ok_and(|output| output.status.success()), "python3.11 is needed");
+    folder
+}
+
+/// A run with all reports that there are.
+fn conform(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, String) {
+    let files = ["--junit", "report.xml", "--html", "report.html", "--badge", "badge.svg"];
+    let first = ["--port", port, "--cases", "50", "--workers", "1"];
+    status_and_text(&run(folder, &[&first, &files[..], more].concat()))
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.arg("conform").args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn status_and_text(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8(output.stdout.clone()).unwrap())
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+/// The suites of the JUnit report, whose counts are checked.
+fn suites(folder: &Path) -> Vec<TestSuite> {
+    let text = read(folder, "report.xml");
+    let xml = roxmltree::Document::parse(&text).unwrap();
+    for suite in xml.descendants().filter(|node| node.has_tag_name("testsuite")) {
+        let held = |tag| suite.descendants().filter(|node| node.has_tag_name(tag)).count().to_string();
+        for (count, tag) in
+            [("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")]
+        {
+            assert_eq!(suite.attribute(count), Some(held(tag).as_str()), "{count}");
+        }
+    }
+    Report::deserialize_from_str(&text).unwrap().test_suites
+}
+
+/// The suite of the only port.
+fn suite(folder: &Path) -> TestSuite {
+    let mut suites = suites(folder);
+    assert_eq!(suites.len(), 1);
+    suites.remove(0)
+}
+
+fn case<'a>(suite: &'a TestSuite, rule: &str) -> &'a TestCase {
+    suite.test_cases.iter().find(|case| case.name.as_str() == rule).unwrap()
+}
+
+fn failures(suite: &TestSuite) -> Vec<&str> {
+    let is_bad = |case: &&TestCase| matches!(case.status, TestCaseStatus::NonSuccess { .. });
+    suite.test_cases.iter().filter(is_bad).map(|case| case.name.as_str()).collect()
+}
+
+fn skip_message(case: &TestCase) -> Option<&str> {
+    match &case.status {
+        TestCaseStatus::Skipped { message, .. } => message.as_ref().map(quick_junit::XmlString::as_str),
+        _ => None,
+    }
+}
+
+/// The page, which must be well-formed and load nothing.
+fn page(folder: &Path) -> String {
+    let text = read(folder, "report.html");
+    assert_loads_nothing(&text);
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
+    let page = roxmltree::Document::parse_with_options(&text, options).unwrap();
+    for link in page.descendants().filter_map(|node| node.attribute("href")) {
+        assert!(link.starts_with("https://pogema-rs.github.io/pogema-rs/spec/"), "{link}");
+    }
+    // Every row of a table is as wide as its head.
+    for table in page.descendants().filter(|node| node.has_tag_name("table")) {
+        let rows = table.descendants().filter(|node| node.has_tag_name("tr")).map(|row| {
+            let span =
+                |cell: roxmltree::Node| cell.attribute("colspan").map_or(1, |span| span.parse().unwrap());
+            row.children().filter(roxmltree::Node::is_element).map(span).sum()
+        });
+        assert_eq!(rows.collect::<std::collections::BTreeSet<usize>>().len(), 1);
+    }
+    text
+}
+
+fn assert_loads_nothing(text: &str) {
+    for loads in ["src=", "@import", "url(", "<link", "<script", "<iframe"] {
+        assert!(!text.contains(loads), "{loads}");
+    }
+}
+
+fn badge(folder: &Path) -> String {
+    let text = read(folder, "badge.svg");
+    assert_loads_nothing(&text);
+    let svg = roxmltree::Document::parse(&text).unwrap();
+    let title = svg.descendants().find(|node| node.has_tag_name("title")).unwrap();
+    title.text().unwrap().to_owned()
+}
+
+#[test]
+fn a_conforming_port_is_told_to_conform() {
+    let folder = folder(&[]);
+    let (status, text) = conform(folder.path(), CONFORMING, &[]);
+    assert_eq!(status, Some(0), "{text}");
+    let suite = &suite(folder.path());
+    assert_eq!(suite.name.as_str(), "reference");
+    assert_eq!(failures(suite), [""; 0]);
+    assert_eq!(case(suite, "collide/soft/swap").classname.as_ref().unwrap().as_str(), "reference");
+    let page = page(folder.path());
+    assert!(page.contains("#collidesoftswap\">collide/soft/swap</a>") && !page.contains("<article"));
+    let badge = badge(folder.path());
+    assert!(badge.starts_with("reference: POGEMA 1.4.0, conforms "), "{badge}");
+}
+
+#[test]
+fn every_report_tells_what_is_wrong() {
+    let folder = folder(&[LATE, CROWDED]);
+    let (status, text) = conform(folder.path(), WRONG, &[]);
+    assert_eq!(status, Some(1), "{text}");
+    let suite = &suite(folder.path());
+    let failures = failures(suite);
+    for (rule, what) in [("collide/priority", "cell"), ("end/truncated", "truncated")] {
+        assert!(text.contains(&format!("FAIL {rule}: {what} differs")) && failures.contains(&rule), "{text}");
+        let TestCaseStatus::NonSuccess { description: Some(told), .. } = &case(suite, rule).status else {
+            panic!("{rule} passes")
+        };
+        let told = told.as_str();
+        for part in ["  expected ", "  got  ", "agents and goals", "play it again: pogema conform --port"] {
+            assert!(told.contains(part), "{part} in {told}");
+        }
+    }
+    let told = skip_message(case(suite, "metrics/finish"));
+    assert_eq!(told, Some("not claimed: profile metrics"));
+    let page = page(folder.path());
+    for part in
+        ["#collidepriority\">collide/priority</a>: cell differs", "rule: end/truncated", "end-truncated"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    let drawings = |what: &str| page.matches(&format!("<figcaption>{what}</figcaption><svg ")).count();
+    assert_eq!(["before", "expected", "got"].map(drawings), [2, 2, 2]);
+    let badge = badge(folder.path());
+    assert!(badge.starts_with("template: POGEMA 1.4.0, diverges "), "{badge}");
+}
+
+#[test]
+fn a_misbehaving_port_is_an_error_and_its_name_is_only_text() {
+    let folder = folder(&[MUTE, NAMED]);
+    let (status, text) = conform(folder.path(), WRONG, &[]);
+    assert_eq!(status, Some(3), "{text}");
+    assert!(!text.contains('\x1b'), "{text}");
+    let suite = &suite(folder.path());
+    let is_error = |case: &TestCase| {
+        matches!(case.status, TestCaseStatus::NonSuccess { kind: NonSuccessKind::Error, .. })
+    };
+    assert!(suite.test_cases.iter().any(is_error));
+    assert!(page(folder.path()).contains("<h3>protocol: "));
+    assert!(badge(folder.path()).starts_with("<b>&\"'[2J: POGEMA 1.4.0, misbehaves "));
+}
+
+#[test]
+fn ports_stand_side_by_side() {
+    let folder = folder(&[LATE]);
+    let files = ["--junit", "report.xml", "--html", "report.html", "--rules", "end/*", "--cases", "50"];
+    let output = run(folder.path(), &[&["--port", CONFORMING, "--port", WRONG], &files[..]].concat());
+    let (status, text) = status_and_text(&output);
+    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(text.lines().filter(|line| line.starts_with("│ end/truncated")).count(), 1, "{text}");
+    let suites = suites(folder.path());
+    let failing: Vec<bool> = suites.iter().map(|suite| failures(suite).contains(&"end/truncated")).collect();
+    assert_eq!(failing, [false, true]);
+    assert!(page(folder.path()).contains(r#"<th scope="colgroup" colspan="4">template</th>"#));
+}
+
+#[test]
+fn what_is_known_is_told_apart_and_borne() {
+    let folder = folder(&[LATE]);
+    let known = "- {rule: metrics/finish, what: metrics, since: 2026-01-31, reason: not claimed any more}\n";
+    let other = "- {rule: collide/priority, what: cell, since: 2026-01-31, reason: it was so, port: other}\n";
+    std::fs::write(folder.path().join("known.yaml"), format!("{KNOWN_LATE}{known}{other}")).unwrap();
+    let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
+    assert_eq!(status, Some(0), "{text}");
+    for part in [
+        "KNOWN end/truncated: truncated, ",
+        "  since 2026-11-22: one step late\n",
+        "conforms to all it claims, but for 1 known: ",
+        "not played: metrics/finish: metrics, known since 2026-01-31: not claimed any more",
+        "not played: collide/priority: cell of other, known since 2026-01-31: it was so",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    assert!(!text.contains("FAIL") && !text.contains("STOPPED"), "{text}");
+    let suite = &suite(folder.path());
+    assert_eq!(failures(suite), [""; 0]);
+    let case = case(suite, "end/truncated");
+    assert_eq!(skip_message(case), Some("known since 2026-11-22: one step late"));
+    assert!(case.system_out.as_ref().unwrap().as_str().contains("agents and goals"));
+    assert!(page(folder.path()).contains("<dt>known</dt><dd>since 2026-11-22: one step late</dd>"));
+    let badge = badge(folder.path());
+    assert!(badge.starts_with("template: POGEMA 1.4.0, known deviations "), "{badge}");
+}
+
+#[test]
+fn what_stopped_occurring_fails_the_run() {
+    let folder = folder(&[LATE]);
+    let fixed =
+        "- {rule: reward/own, what: reward, since: 2026-01-31, reason: twice as much, port: template}\n";
+    std::fs::write(folder.path().join("known.yaml"), format!("{KNOWN_LATE}{fixed}")).unwrap();
+    let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
+    let told = "reward/own: reward of template, known since 2026-01-31: twice as much";
+    assert_eq!(status, Some(1), "{text}");
+    assert!(
+        text.ends_with(&format!("STOPPED {told}\n  it stopped occurring and can be removed from the list\n")),
+        "{text}"
+    );
+    let suites = suites(folder.path());
+    assert_eq!(suites.iter().map(failures).collect::<Vec<_>>(), [vec![], vec![told]]);
+    assert!(page(folder.path()).contains(told));
+    for left_out in [["--rules", "move/*"], ["--case", "pogema-found/end-truncated-truncated.yaml"]] {
+        let (status, text) =
+            conform(folder.path(), WRONG, &[&["--known", "known.yaml"], &left_out[..]].concat());
+        assert_eq!(status, Some(0), "{left_out:?}: {text}");
+        assert!(text.contains(&format!("not played: {told}")), "{left_out:?}: {text}");
+    }
+}
+
+#[test]
+fn faults_that_are_known_are_borne_unless_they_end_the_run() {
+    for (wrong, expected, told, not_asked) in [
+        (MUTE, 3, "misbehaves as is known, too often to be asked everything: ", vec!["(not asked)"]),
+        (AT_TIMES_MUTE, 0, "but for 1 known: ", vec![]),
+    ] {
+        let folder = folder(&[wrong]);
+        let known = "- {rule: protocol, what: left `active` out of an answer that needs it, since: 2026-11-22, reason: r}";
+        std::fs::write(folder.path().join("known.yaml"), known).unwrap();
+        let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
+        assert_eq!(status, Some(expected), "{text}");
+        assert!(text.contains("KNOWN protocol: left `active` out") && text.contains(told), "{text}");
+        assert_eq!(failures(&suite(folder.path())), not_asked);
+    }
+}

@@ -1,0 +1,84 @@
+//! What `pogema conform --port` says before a run of files that it cannot write and of lists that it cannot read.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::process::Command;
+
+/// A folder with one file.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("known.yaml"), "[]").unwrap();
+    folder
+}
+
+#[test]
+fn bad_lists_of_what_is_known_are_refused_with_one_line() {
+    let entry = |text: &str| {
+        let (at, text) = text.split_once(": ").unwrap();
+        let all = [("rule", "collide/soft"), ("what", "cell"), ("since", "2026-11-22"), ("reason", "r")];
+        let lines = all.map(|(name, value)| format!("{name}: {}", if name == at { text } else { value }));
+        let more =
+            if all.iter().any(|(name, _)| *name == at) { String::new() } else { format!(", {at}: {text}") };
+        format!("- {{{}{more}}}\n", lines.join(", "))
+    };
+    let good = entry("reason: r");
+    let date = |text: &str| format!("entry 1: `since` is `{text}`, expected a date such as 2026-11-22");
+    let refused = [
+        (
+            good.clone() + &entry("until: 2027"),
+            "entry 2: unknown field `until`, expected one of `rule`, `what`, `since`, `reason`, `port`".into(),
+        ),
+        ("- {rule: end/after, what: cell, since: 2026-11-22}".into(), "entry 1: missing field `reason`".into()),
+        (
+            entry("rule: colide/soft"),
+            "entry 1: unknown rule `colide/soft`, the nearest known one is `collide/soft`".into(),
+        ),
+        (entry("since: 2026-02-30"), date("2026-02-30")),
+        (entry("since: 20261122"), date("20261122")),
+        (entry("since: 2026-11-22T10:00"), date("2026-11-22T10:00")),
+        (entry("reason: '  '"), "entry 1: `reason` is empty".into()),
+        (good.clone() + &good, "entry 2: says the same as entry 1".into()),
+        ("rule: end/after".into(), "expected a list of entries".into()),
+        (
+            "- end/after".into(),
+            "entry 1: invalid type: string \"end/after\", expected fields and values such as `rule: collide/soft`"
+                .into(),
+        ),
+        ("- [\n".into(), "line 1 column 3: unclosed bracket '['".into()),
+    ];
+    let folder = folder();
+    for (text, expected) in refused {
+        std::fs::write(folder.path().join("known.yaml"), &text).unwrap();
+        let arguments = ["--port", "a", "--known", "known.yaml", "--html", "report.html"];
+        assert_refused(folder.path(), &arguments, &format!("known.yaml: {expected}"));
+    }
+}
+
+#[test]
+fn reports_that_cannot_be_written_are_refused_before_the_run() {
+    let folder = folder();
+    let missing = "No such file or directory (os error 2)";
+    for (arguments, expected) in [
+        ("--port a --port b --badge badge.svg", "`--badge` needs exactly one port".into()),
+        ("--port a --html no/report.html", format!("no/report.html: `no`: {missing}")),
+        ("--port a --junit known.yaml/x", "known.yaml/x: `known.yaml` is no folder".into()),
+        ("--port a --badge ./", "./: is no file".into()),
+        ("--port a --html report.html --junit ./report.html", "report.html: is to hold two reports".into()),
+        ("--port a --known no.yaml", format!("no.yaml: {missing}")),
+        ("--html report.html", "the following required arguments were not provided:".into()),
+    ] {
+        assert_refused(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), &expected);
+    }
+}
+
+/// Passes if the run is refused with one line before it began.
+fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
+    let files = || std::fs::read_dir(folder).unwrap().count();
+    let before = files();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    let output = command.arg("conform").args(arguments).current_dir(folder).output().unwrap();
+    assert_eq!(std::str::from_utf8(&output.stderr).unwrap(), format!("error: {expected}\n"), "{arguments:?}");
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{arguments:?}");
+    assert_eq!(files(), before, "{arguments:?}");
+}
