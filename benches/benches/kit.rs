@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pogema_conformance::port::{Command, Link, Mode, Process, Server, judge};
-use pogema_conformance::{Engine, Op, Request, play};
+use pogema_conformance::{Op, Request, play};
+use pogema_core::Environment;
 use serde_json::json;
 
 const NUM_STEPS: usize = 128;
@@ -36,7 +37,8 @@ fn kit(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(NUM_STEPS as u64));
     let request = request();
     group.bench_function("in this process", |bencher| {
-        bencher.iter(|| check(&mut Server::new(Engine::LITERAL), &request));
+        let make = |config| Ok(Box::new(pogema_fast::Engine::new(config)?) as Box<dyn Environment>);
+        bencher.iter(|| check(&mut Server::with("fast", make), &request));
     });
     let template = concat!(env!("CARGO_MANIFEST_DIR"), "/../conformance/ports/template.py");
     let command = Command::new(&format!("python3 {template}"), Duration::from_secs(10)).unwrap();

@@ -1,7 +1,5 @@
 //! What agents see, as policies, meters and records want it.
 
-use std::fmt::Write as _;
-
 use pogema_core::{Environment, Error, PomapfOut};
 use pogema_planners::View;
 
@@ -64,19 +62,25 @@ pub(crate) fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
 
 /// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
 pub(crate) fn pack(window: &[f32]) -> String {
-    let bits: Vec<bool> = window.iter().map(|&value| value != 0.0).collect();
-    pack_bits(&bits)
+    in_digits(window, |&value| value != 0.0)
 }
 
 /// The same of flags.
 pub(crate) fn pack_bits(bits: &[bool]) -> String {
-    let byte = |cells: &[bool]| {
-        cells.iter().enumerate().fold(0u8, |byte, (at, &bit)| byte | (u8::from(bit) << (7 - at)))
-    };
-    bits.chunks(8).fold(String::new(), |mut text, cells| {
-        let _ = write!(text, "{:02x}", byte(cells));
-        text
-    })
+    in_digits(bits, |&bit| bit)
+}
+
+fn in_digits<T>(cells: &[T], is_set: impl Fn(&T) -> bool) -> String {
+    const DIGITS: [char; 16] =
+        ['0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'a', 'b', 'c', 'd', 'e', 'f'];
+    let mut text = String::with_capacity(2 * cells.len().div_ceil(8));
+    for cells in cells.chunks(8) {
+        let bit = |byte: u8, (at, cell)| byte | u8::from(is_set(cell)) << (7 - at);
+        let byte = cells.iter().enumerate().fold(0u8, bit);
+        text.push(DIGITS[usize::from(byte >> 4)]);
+        text.push(DIGITS[usize::from(byte & 15)]);
+    }
+    text
 }
 
 /// What [`pack`] packed, and the zeros that filled the last byte.
