@@ -153,7 +153,7 @@ impl Deviation {
     /// Whether the deviation would have shown itself if it were still there: not in single cases, nor in a run that
     /// was cut short, nor where its rule was left out or is not claimed.
     fn was_played(&self, report: &PortReport, plan: &Plan) -> bool {
-        let is_whole = plan.files.is_empty() && report.num_not_run == 0;
+        let is_whole = plan.files.is_empty() && plan.parts.is_empty() && report.num_not_run == 0;
         is_whole
             && match &self.rule {
                 Some(rule) => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),

@@ -29,7 +29,7 @@ pub struct Outputs {
     /// `port: name` for one port alone. `rule` and `what` are those of the report's line `FAIL collide/soft: cell
     /// differs`; for a line `ERROR what` the rule is `protocol`. Causes so listed are reported apart and do not
     /// change the exit status. An entry that no port shows any more makes it 1, so that the list does not outlive
-    /// its reasons: but only if its rule was compared in this run, thus never under `--case`, nor where `--rules` or
+    /// its reasons: but only if its rule was compared in this run, thus never under `--case` or `--part`, nor where `--rules` or
     /// `--profile` or the port's claims leave the rule out, nor where a port broke the protocol too often to be
     /// asked everything; entries of the rule `protocol` only under neither `--rules` nor `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
 use pogema_conformance::files;
 use pogema_conformance::port::{
-    Command, Link, Plan, PortReport, Process, Profile, Subject, check_ports, check_traces, shrink_causes,
+    Command, Link, Part, Plan, PortReport, Process, Profile, Subject, check_ports, check_traces,
+    shrink_causes,
 };
 use pogema_core::Error;
 
@@ -33,6 +34,9 @@ pub struct Ports {
     /// Check only this profile; may be given several times
     #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = profile)]
     profiles: Vec<Profile>,
+    /// Play only this part; may be given several times
+    #[arg(long = "part", value_enum, value_name = "PART", requires = "commands")]
+    parts: Vec<PartWord>,
     /// Seconds that a port may take for one answer
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     timeout: f64,
@@ -47,6 +51,26 @@ pub struct Ports {
     traces: Vec<PathBuf>,
     #[command(flatten)]
     outputs: Outputs,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PartWord {
+    /// The hand-written cases
+    Cases,
+    /// The recordings of POGEMA 1.4.0
+    Recordings,
+    /// Drawn cases
+    Drawn,
+}
+
+impl From<PartWord> for Part {
+    fn from(word: PartWord) -> Self {
+        match word {
+            PartWord::Cases => Self::Cases,
+            PartWord::Recordings => Self::Recordings,
+            PartWord::Drawn => Self::Drawn,
+        }
+    }
 }
 
 fn profile(word: &str) -> Result<Profile, String> {
@@ -96,7 +120,11 @@ impl Ports {
         let plan = self.plan(shared);
         let mut reports =
             check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
-        shared.bar.finish_and_clear();
+        let num_causes =
+            reports.iter().flat_map(|report| &report.causes).filter(|cause| cause.rule.is_some()).count();
+        shared.bar.reset();
+        shared.bar.set_message("counterexamples made smaller");
+        shared.bar.set_length(num_causes as u64);
         for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
             // Several ports fail in the same rules, and must not overwrite each other's cases.
             let folder = if subjects.len() == 1 {
@@ -104,8 +132,9 @@ impl Ports {
             } else {
                 shared.keep.join(format!("{}", index + 1))
             };
-            shrink_causes(subject, report, &plan, &folder, &|| ())?;
+            shrink_causes(subject, report, &plan, &folder, &|| shared.bar.inc(1))?;
         }
+        shared.bar.finish_and_clear();
         known.mark(&mut reports);
         let leftover = known.leftover(&reports, &plan);
         write_json(shared, &reports)?;
@@ -122,7 +151,7 @@ impl Ports {
             profiles: self.profiles.clone(),
             num_workers: self.workers.map(usize::from),
             files: self.files.clone(),
-            only_cases: false,
+            parts: self.parts.iter().map(|&part| part.into()).collect(),
         }
     }
 }

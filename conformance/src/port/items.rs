@@ -4,7 +4,7 @@ use std::path::Path;
 
 use pogema_core::Error;
 
-use super::run::Plan;
+use super::run::{Part, Plan};
 use crate::cases::{self, Case};
 use crate::draw::draw_request;
 use crate::golden::{self, Recording};
@@ -56,19 +56,33 @@ pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
         }
         return Ok(items);
     }
+    let has = |part: Part| plan.parts.is_empty() || plan.parts.contains(&part);
+    if has(Part::Cases) {
+        add_cases(&mut items, plan)?;
+    }
+    if has(Part::Recordings) {
+        add_recordings(&mut items)?;
+    }
+    if has(Part::Drawn) {
+        items.extend((0..plan.num_cases).map(Item::Drawn));
+    }
+    Ok(items)
+}
+
+fn add_cases(items: &mut Vec<Item>, plan: &Plan) -> Result<(), Error> {
     let root = cases::folder();
     for path in golden::files(&root, ".yaml")? {
         let case = cases::read(&path)?;
         // Where POGEMA does something else by decision of this project, a port may do as POGEMA does.
-        let is_asked =
-            case.pogema.is_none() && plan.rules.as_ref().is_none_or(|rules| rules.matches(&case.rule));
-        if is_asked {
+        let is_wanted = plan.rules.as_ref().is_none_or(|rules| rules.matches(&case.rule));
+        if case.pogema.is_none() && is_wanted {
             items.push(Item::Case(relative(&path, &root), Box::new(case)));
         }
     }
-    if plan.only_cases {
-        return Ok(items);
-    }
+    Ok(())
+}
+
+fn add_recordings(items: &mut Vec<Item>) -> Result<(), Error> {
     for folder in [golden::folder(), golden::found_folder()] {
         for path in golden::recording_files(&folder)? {
             for (index, recording) in golden::read(&path)?.into_iter().enumerate() {
@@ -77,8 +91,7 @@ pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
             }
         }
     }
-    items.extend((0..plan.num_cases).map(Item::Drawn));
-    Ok(items)
+    Ok(())
 }
 
 fn relative(path: &Path, root: &Path) -> String {

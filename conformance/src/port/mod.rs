@@ -37,7 +37,7 @@ pub use play::{Answered, play_on_port};
 pub use process::{Command, Process};
 pub use protocol::{Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
 pub use report::{PortReport, Verdicts};
-pub use run::{Plan, Subject, check_ports, shrink_causes};
+pub use run::{Part, Plan, Subject, check_ports, shrink_causes};
 pub use server::{Server, serve};
 pub use session::Port;
 pub use shrink::shrink;

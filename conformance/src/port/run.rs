@@ -41,8 +41,19 @@ pub struct Plan {
     pub num_workers: Option<usize>,
     /// These cases alone, and nothing else, if there are any.
     pub files: Vec<PathBuf>,
-    /// The hand-written cases alone.
-    pub only_cases: bool,
+    /// These parts alone; all, if there are none.
+    pub parts: Vec<Part>,
+}
+
+/// A part of what there is to check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The hand-written cases.
+    Cases,
+    /// The recordings of POGEMA 1.4.0.
+    Recordings,
+    /// Drawn cases.
+    Drawn,
 }
 
 /// Checks ports, side by side.

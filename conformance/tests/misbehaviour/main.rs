@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use pogema_conformance::port::{Command, Link, Plan, PortReport, Process, Subject, check_ports};
+use pogema_conformance::port::{Command, Link, Part, Plan, PortReport, Process, Subject, check_ports};
 
 const TIMEOUT: Duration = Duration::from_millis(1500);
 
@@ -26,7 +26,7 @@ fn check(way: &str, folder: &Path) -> PortReport {
         profiles: Vec::new(),
         num_workers: Some(2),
         files: Vec::new(),
-        only_cases: true,
+        parts: vec![Part::Cases],
     };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }

@@ -11,7 +11,7 @@ mod soft;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pogema_conformance::port::{Cause, Link, Plan, PortReport, Subject, check_ports, shrink_causes};
+use pogema_conformance::port::{Cause, Link, Part, Plan, PortReport, Subject, check_ports, shrink_causes};
 use pogema_core::Map;
 
 use flaw::{Flaw, PLANTED};
@@ -25,7 +25,7 @@ fn plan() -> Plan {
         profiles: Vec::new(),
         num_workers: None,
         files: Vec::new(),
-        only_cases: true,
+        parts: vec![Part::Cases],
     }
 }
 
@@ -42,7 +42,7 @@ fn check(flaw: Flaw, plan: &Plan) -> PortReport {
 
 #[test]
 fn the_port_without_a_bug_conforms() {
-    let plan = Plan { num_cases: 400, only_cases: false, ..plan() };
+    let plan = Plan { num_cases: 400, parts: Vec::new(), ..plan() };
     let report = check(Flaw::Faultless, &plan);
     let told =
         report.causes.iter().map(|cause| format!("{:?}", cause.example)).collect::<Vec<_>>().join("\n");

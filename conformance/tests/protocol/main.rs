@@ -5,12 +5,13 @@
 mod links;
 mod schema;
 mod traces;
+mod validate;
 
 use std::fmt::Write as _;
 
 use pogema_conformance::Engine;
 use pogema_conformance::port::{
-    Ask, Hello, Link, Plan, Port, PortReport, Profile, Reply, Server, Subject, Told as Key, check_ports,
+    Ask, Hello, Link, Part, Plan, Port, PortReport, Profile, Reply, Server, Subject, Told as Key, check_ports,
 };
 use pogema_core::{Action, Collision, Environment, Observation, OnGoal, StepOut};
 use pogema_maps::{GridConfig, InstanceSource};
@@ -21,7 +22,7 @@ use links::{Told, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, ter
 
 fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
     let subject = Subject { command: "told".into(), start: Box::new(move || Ok(Told::boxed(hello, reply))) };
-    let plan = Plan { only_cases: true, ..Plan::default() };
+    let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }
 
