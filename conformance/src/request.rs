@@ -1,6 +1,6 @@
 //! What is asked of an implementation, and what it answers: the same JSON for every implementation.
 
-use pogema_core::{Cell, Change, Observed, Padded, Snapshot, TraceStep};
+use pogema_core::{Action, Cell, Change, Observed, Padded, Snapshot, TraceStep};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -189,6 +189,11 @@ impl Record {
             Self::History(_) | Self::Odd(_) => None,
         }
     }
+}
+
+/// Actions as a request writes them.
+pub fn numbers(actions: &[Action]) -> Vec<i64> {
+    actions.iter().map(|&action| action as i64).collect()
 }
 
 impl TryFrom<Vec<Value>> for Op {

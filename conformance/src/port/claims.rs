@@ -5,7 +5,7 @@ use pogema_maps::{GridConfig, Targets};
 use serde_json::json;
 
 use super::protocol::{Hello, Profile, Told};
-use crate::request::{Op, Record, Request, Response};
+use crate::request::{Op, Record, Request, Response, numbers};
 use crate::tally::families_of;
 
 /// How a port is given an episode.
@@ -156,12 +156,12 @@ fn check_sizes(hello: &Hello, config: &GridConfig, expected: &Response) -> Resul
     });
     let side = map.map_or(0, |rows| rows.len().max(rows.first().map_or(0, String::len)));
     let sizes = [
-        ("max_agents", config.num_agents, hello.max_agents, "config/limits"),
-        ("max_side", side, hello.max_side, "config/limits"),
-        ("max_radius", config.obs_radius, hello.max_radius, "config/limits"),
+        ("max_agents", config.num_agents, hello.max_agents),
+        ("max_side", side, hello.max_side),
+        ("max_radius", config.obs_radius, hello.max_radius),
     ];
-    match sizes.into_iter().find(|(_, size, most, _)| size > most) {
-        Some((what, _, most, rule)) => Err(Unclaimed::new(format!("more than {what} {most}"), rule)),
+    match sizes.into_iter().find(|(_, size, most)| size > most) {
+        Some((what, _, most)) => Err(Unclaimed::new(format!("more than {what} {most}"), "config/limits")),
         None => Ok(()),
     }
 }
@@ -256,7 +256,7 @@ fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Uncl
         };
         let Some(step) = chosen else { continue };
         left_out = Some(Unclaimed::new("profile policies", rule));
-        *op = Op::Step(step.step.actions.iter().map(|&action| action as i64).collect());
+        *op = Op::Step(numbers(&step.step.actions));
     }
     left_out
 }

@@ -9,7 +9,7 @@ use super::link::{Link, Misbehaviour};
 use super::protocol::{Ask, Beginning, Hello, Policy, Profile};
 use super::session::Port;
 use crate::request::{
-    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
+    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When, numbers,
 };
 
 /// What a port answered, and what it did instead of answering.
@@ -190,7 +190,7 @@ impl<'l> PortPlay<'l> {
         }
         let chosen = self.expected.records.get(index).and_then(Record::step);
         let missing = || Error::State { reason: "no actions are expected here".into() };
-        let actions = chosen.ok_or_else(missing)?.step.actions.iter().map(|&action| action as i64).collect();
+        let actions = numbers(&chosen.ok_or_else(missing)?.step.actions);
         self.step(&Ask::Step { actions }, kind)
     }
 

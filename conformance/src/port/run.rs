@@ -108,7 +108,11 @@ pub fn shrink_causes(
     for cause in report.causes.iter_mut().filter(|cause| cause.rule.is_some()) {
         // A port that cannot be started again leaves the example as it was.
         if let Ok(running) = running(subject, &mut slot, plan) {
-            cause.example = shrink(running.link.as_mut(), &running.hello, &cause.example);
+            let shrunk = shrink(running.link.as_mut(), &running.hello, &cause.example);
+            cause.example = shrunk.example;
+            if shrunk.has_faulted {
+                slot = None;
+            }
         }
         cause.kept = keep(&cause.example, &name, folder)?;
         cause.replay = cause.kept.as_ref().map(|path| {

@@ -4,7 +4,7 @@ use pogema_core::{Cell, Map, OnGoal};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};
 
-use crate::request::{Op, Record, Request, Response};
+use crate::request::{Op, Record, Request, Response, numbers};
 
 /// An episode: a map, agents, what they do, and the fields of the config that have nothing to do with those.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,9 +166,7 @@ impl Scene {
 fn plain(op: &Op, at: usize, expected: &Response) -> Op {
     let chosen = expected.records.get(at).and_then(Record::step);
     match (op, chosen) {
-        (Op::Astar | Op::Sample, Some(step)) => {
-            Op::Step(step.step.actions.iter().map(|&action| action as i64).collect())
-        }
+        (Op::Astar | Op::Sample, Some(step)) => Op::Step(numbers(&step.step.actions)),
         _ => op.clone(),
     }
 }

@@ -8,7 +8,7 @@ use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
 use crate::play::{Engine, Make, Player};
-use crate::request::{Op, Record, Request};
+use crate::request::{Op, Record, Request, numbers};
 
 /// An engine as a port. It claims everything.
 pub struct Server {
@@ -166,7 +166,7 @@ fn reply_of(record: Record) -> Reply {
         }
         Record::Step(step) | Record::Astar(step) | Record::Sample(step) => {
             reply.observations = step.step.observations.as_ref().map(observations::write);
-            reply.actions = Some(step.step.actions.iter().map(|&action| action as i64).collect());
+            reply.actions = Some(numbers(&step.step.actions));
             reply.rewards = Some(step.step.rewards);
             reply.terminated = Some(step.step.terminated);
             reply.truncated = Some(step.step.truncated);

@@ -8,6 +8,7 @@ use pogema_core::{
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
+use crate::request::numbers;
 use crate::windows::unpack;
 
 /// A port at work on one config.
@@ -248,7 +249,7 @@ impl Environment for Port<'_> {
 
     fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
         out.check(self.config.num_agents)?;
-        let actions = actions.iter().map(|&action| action as i64).collect();
+        let actions = numbers(actions);
         self.advance(&Ask::Step { actions })?;
         out.rewards.copy_from_slice(self.reply.rewards.as_deref().unwrap_or_default());
         out.terminated.copy_from_slice(self.reply.terminated.as_deref().unwrap_or_default());

@@ -13,43 +13,60 @@ use crate::play::play;
 use crate::request::{Op, Request, Response};
 
 /// So often a port is asked to play for one counterexample.
-pub const MOST_PLAYS: usize = 4000;
+const MOST_PLAYS: usize = 4000;
+
+/// An example made smaller, and whether the port misbehaved meanwhile and has to be started again.
+pub struct Shrunk {
+    pub example: Example,
+    pub has_faulted: bool,
+}
 
 /// Makes an example smaller as long as it shows the same cause.
-pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Example {
-    let mut shrinker = Shrinker { link, hello, best: example.clone(), plays: 0 };
-    let Some(until) = example.divergence.as_ref().map(|found| found.op) else { return shrinker.best };
-    let request = shrinker.best.request.clone();
-    let expected = play(&request);
-    let mut cut = request.clone();
-    cut.ops.truncate(until + 1);
-    shrinker.accept(&cut);
-    if let Some(scene) = Scene::of(&request, &expected, until) {
-        for mode in [Mode::Instance, Mode::Config] {
-            let before = shrinker.best.mode;
-            shrinker.best.mode = mode;
-            if shrinker.accept(&scene.request()) {
-                shrinker.shrink_scene(scene);
-                return shrinker.best;
-            }
-            shrinker.best.mode = before;
-        }
+pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Shrunk {
+    let mut shrinker = Shrinker { link, hello, best: example.clone(), plays: 0, has_faulted: false };
+    if let Some(divergence) = &example.divergence {
+        shrinker.shrink_until(divergence.op);
     }
-    shrinker.shrink_config();
-    shrinker.best
+    Shrunk { example: shrinker.best, has_faulted: shrinker.has_faulted }
 }
 
 pub struct Shrinker<'a> {
     link: &'a mut dyn Link,
     hello: &'a Hello,
     pub best: Example,
-    pub plays: usize,
+    plays: usize,
+    has_faulted: bool,
 }
 
 impl Shrinker<'_> {
+    /// Leaves out what comes after an operation, and then whatever else it can.
+    fn shrink_until(&mut self, until: usize) {
+        let request = self.best.request.clone();
+        let expected = play(&request);
+        let mut cut = request.clone();
+        cut.ops.truncate(until + 1);
+        self.accept(&cut);
+        if let Some(scene) = Scene::of(&request, &expected, until) {
+            for mode in [Mode::Instance, Mode::Config] {
+                let before = self.best.mode;
+                self.best.mode = mode;
+                if self.accept(&scene.request()) {
+                    return self.shrink_scene(scene);
+                }
+                self.best.mode = before;
+            }
+        }
+        self.shrink_config();
+    }
+
+    /// Whether nothing more can be learned.
+    pub fn is_done(&self) -> bool {
+        self.has_faulted || self.plays >= MOST_PLAYS
+    }
+
     /// Takes a request as the new best if it shows the same cause.
     pub fn accept(&mut self, request: &Request) -> bool {
-        if self.plays >= MOST_PLAYS {
+        if self.is_done() {
             return false;
         }
         let expected = play(request);
@@ -59,6 +76,7 @@ impl Shrinker<'_> {
         }
         self.plays += 1;
         let judged = judge(self.link, self.hello, self.best.mode, request, &expected);
+        self.has_faulted = judged.fault.is_some();
         let examples = judged.divergences.into_iter().map(|found| Example {
             request: request.clone(),
             divergence: Some(found),
@@ -80,8 +98,8 @@ impl Shrinker<'_> {
             self.simplify_fields(&mut scene);
             self.clear_obstacles(&mut scene);
             self.simplify_actions(&mut scene);
-            self.simplify_goals(&mut scene);
-            if scene == before || self.plays >= MOST_PLAYS {
+            self.shorten_sequences(&mut scene);
+            if scene == before || self.is_done() {
                 return;
             }
         }
@@ -151,11 +169,13 @@ impl Shrinker<'_> {
     }
 
     fn simplify_fields(&mut self, scene: &mut Scene) {
-        for name in
-            ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps", "seed"]
-        {
+        for name in ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps"] {
             let mut simpler = scene.clone();
             simpler.fields.remove(name);
+            if name == "empty_outside" {
+                // Nothing else is drawn.
+                simpler.fields.remove("seed");
+            }
             self.try_scene(scene, simpler);
         }
         for (name, value) in
@@ -209,8 +229,7 @@ impl Shrinker<'_> {
         }
     }
 
-    /// Shortens sequences, and puts goals on the cell that they are least surprising on.
-    fn simplify_goals(&mut self, scene: &mut Scene) {
+    fn shorten_sequences(&mut self, scene: &mut Scene) {
         for agent in 0..scene.num_agents() {
             while scene.goals[agent].len() > 2 {
                 let mut simpler = scene.clone();

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::shrink::{MOST_PLAYS, Shrinker};
+use super::shrink::Shrinker;
 use crate::request::Op;
 
 impl Shrinker<'_> {
@@ -42,7 +42,7 @@ impl Shrinker<'_> {
                 shorter.ops.remove(at);
                 self.accept(&shorter);
             }
-            if self.best.request == before || self.plays >= MOST_PLAYS {
+            if self.best.request == before || self.is_done() {
                 return;
             }
         }

@@ -13,7 +13,7 @@ use super::run::Plan;
 use crate::compare::compare_in;
 use crate::files;
 use crate::play::{Engine, Player};
-use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord};
+use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
 
 /// Plays the actions of each trace on the reference and compares what it gives with what stands there.
 ///
@@ -54,7 +54,7 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     got.records.push(Record::Reset(Box::new(ResetRecord { state, observations, ..reset.as_ref().clone() })));
     expected.records.push(begun);
     for step in &trace.steps {
-        let op = Op::Step(step.actions.iter().map(|&action| action as i64).collect());
+        let op = Op::Step(numbers(&step.actions));
         expected.records.push(player.perform(&op)?);
         got.records.push(Record::Step(Box::new(record_of(step))));
         request.ops.push(op);
