@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use pogema_conformance::{cases, golden, play};
 
 /// Crates whose sources may state rules.
-const SOURCES: [&str; 7] = ["core", "maps", "reference", "fast", "planners", "conformance", "cli"];
+const SOURCES: [&str; 8] = ["core", "maps", "reference", "fast", "planners", "render", "conformance", "cli"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
