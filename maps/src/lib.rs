@@ -17,6 +17,8 @@ mod catalogue;
 mod components;
 mod config;
 mod foretell;
+pub mod formats;
+pub mod generators;
 pub mod numpy;
 mod place;
 mod source;

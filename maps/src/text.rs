@@ -17,6 +17,75 @@ pub struct MapText {
     pub pools: Option<(Vec<Cell>, Vec<Cell>)>,
 }
 
+/// Letters for so many agents.
+const MOST_LETTERS: usize = 26;
+
+impl From<Map> for MapText {
+    fn from(map: Map) -> Self {
+        Self { map, starts: Vec::new(), goals: Vec::new(), pools: None }
+    }
+}
+
+impl MapText {
+    /// The rows of the text that says the same.
+    ///
+    /// # Errors
+    /// [`Error::Instance`] if there are no letters for it: more than 26 agents, two of them on one cell, or agents
+    /// beside pools.
+    ///
+    /// Rule: grid/text, grid/letters, grid/pools
+    pub fn rows(&self) -> Result<Vec<String>, Error> {
+        let width = self.map.width();
+        let mut letters: Vec<char> = self.map.rows().concat().chars().collect();
+        if let Some((starts, goals)) = &self.pools {
+            let mut kinds = vec![0; letters.len()];
+            for (cells, kind) in [(starts, 1), (goals, 2)] {
+                for &cell in cells {
+                    kinds[self.map.index(cell)] |= kind;
+                }
+            }
+            for (letter, kind) in letters.iter_mut().zip(kinds).filter(|(letter, _)| **letter == '.') {
+                *letter = ['!', '@', '$', '.'][kind];
+            }
+        }
+        if self.starts.len() > MOST_LETTERS {
+            let reason =
+                format!("a map text has letters for {MOST_LETTERS} agents, not for {}", self.starts.len());
+            return Err(Error::instance(reason));
+        }
+        for (first, cells) in [(b'a', &self.starts), (b'A', &self.goals)] {
+            for (letter, &cell) in (first..).zip(cells) {
+                let place = &mut letters[self.map.index(cell)];
+                if *place != '.' {
+                    let reason =
+                        format!("a map text has one character for cell {cell}, which is `{place}` already");
+                    return Err(Error::instance(reason));
+                }
+                *place = letter as char;
+            }
+        }
+        Ok(letters.chunks(width).map(|row| row.iter().collect()).collect())
+    }
+
+    /// The text.
+    ///
+    /// # Errors
+    /// As [`MapText::rows`].
+    pub fn to_text(&self) -> Result<String, Error> {
+        self.rows().map(|rows| rows.join("\n"))
+    }
+}
+
+/// A side of a map as a file's header gives it.
+pub(crate) fn check_side(line: usize, text: &str) -> Result<usize, Error> {
+    let side = text.parse::<usize>().ok().filter(|side| (1..=Map::LONGEST_SIDE).contains(side));
+    side.ok_or_else(|| {
+        let found = pogema_core::shorten(text, Error::LONGEST_QUOTE);
+        let reason = format!("found `{found}`, expected a whole number from 1 to {}", Map::LONGEST_SIDE);
+        Error::Map { line, column: 1, reason }
+    })
+}
+
 /// Reads a map text: `.` free, `#` obstacle, `a` a start, `A` a goal, `@` a possible start, `$` a possible
 /// goal, `!` neither. White space separates rows.
 ///

@@ -153,7 +153,7 @@ fn choice<T: Copy>(field: &str, value: &Value, words: &[(&str, T)]) -> Result<T,
 }
 
 /// A list of `[row, col]` pairs.
-pub(super) fn cells(field: &str, value: &Value) -> Result<Vec<Cell>, Error> {
+pub(crate) fn cells(field: &str, value: &Value) -> Result<Vec<Cell>, Error> {
     let list = value.as_array().ok_or_else(|| Error::config(field, value, "a list of [row, col] pairs"))?;
     list.iter().map(|pair| cell(field, pair)).collect()
 }

@@ -19,9 +19,12 @@ pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
     if text.trim().is_empty() {
         return Ok(Value::Null);
     }
-    let document: Document =
-        serde_saphyr::from_str_with_options(text, options(text)).map_err(|error| yaml_error(&error))?;
-    Ok(document.0)
+    yaml_document::<Document>(text).map(|document| document.0)
+}
+
+/// Reads one YAML document that holds something.
+pub(crate) fn yaml_document<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
+    serde_saphyr::from_str_with_options(text, options(text)).map_err(|error| yaml_error(&error))
 }
 
 /// Parses JSON.

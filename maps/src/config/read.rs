@@ -197,7 +197,7 @@ fn check_constants(fields: &Fields<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-fn read_targets(value: &Value) -> Result<Targets, Error> {
+pub(crate) fn read_targets(value: &Value) -> Result<Targets, Error> {
     let expected = "a list of [row, col] goals, or of lists of at least two such goals";
     let list = value.as_array().filter(|list| !list.is_empty());
     let list = list.ok_or_else(|| Error::config("targets_xy", value, expected))?;

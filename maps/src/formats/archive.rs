@@ -1,0 +1,77 @@
+//! Zip archives of MovingAI maps, as they are downloaded.
+
+use std::collections::BTreeMap;
+use std::io::{Cursor, Read, Seek, Write};
+
+use pogema_core::{Error, Map, shorten};
+use zip::write::SimpleFileOptions;
+use zip::{ZipArchive, ZipWriter};
+
+use super::movingai::{Water, read_movingai, write_movingai};
+use super::set::NamedMap;
+use crate::text::MapText;
+
+/// More entries than this are refused, whatever they hold.
+const MOST_ENTRIES: usize = 100_000;
+/// More than this is not unpacked, of all entries together. Units: bytes.
+const MOST_UNPACKED: u64 = 1 << 30;
+
+/// Reads every `.map` file of a zip archive, by the file's name without folder and ending, in order of their names.
+///
+/// # Errors
+/// [`Error::Io`] with the entry's name for what is no archive, cannot be unpacked, unpacks to more than 1 GiB, lies
+/// outside the archive's own folder, has the name of another, or is no map.
+///
+/// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
+pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<NamedMap>, Error> {
+    let mut archive = ZipArchive::new(archive).map_err(|error| Error::io("archive", error))?;
+    if archive.len() > MOST_ENTRIES {
+        let reason = format!("{} entries, expected at most {MOST_ENTRIES}", archive.len());
+        return Err(Error::io("archive", reason));
+    }
+    let mut room = MOST_UNPACKED;
+    let mut maps: BTreeMap<String, MapText> = BTreeMap::new();
+    for index in 0..archive.len() {
+        let mut entry =
+            archive.by_index(index).map_err(|error| Error::io(format!("entry {index}"), error))?;
+        let path = entry.name().to_owned();
+        let failed = |reason: &dyn std::fmt::Display| Error::io(shorten(&path, Error::LONGEST_QUOTE), reason);
+        let inside =
+            entry.enclosed_name().ok_or_else(|| failed(&"lies outside the folder of the archive"))?;
+        if entry.is_dir() || inside.extension().is_none_or(|ending| ending != "map") {
+            continue;
+        }
+        let mut bytes = Vec::new();
+        entry.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| failed(&error))?;
+        room = room.checked_sub(bytes.len() as u64).ok_or_else(|| {
+            failed(&format!("with this entry the maps unpack to more than {} MiB", MOST_UNPACKED >> 20))
+        })?;
+        let text = String::from_utf8(bytes).map_err(|error| failed(&error.utf8_error()))?;
+        let map = read_movingai(&text, water).map_err(|error| failed(&error))?;
+        let name = inside.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if maps.insert(name.clone(), MapText::from(map)).is_some() {
+            return Err(failed(&format!("a second map named `{name}`")));
+        }
+    }
+    Ok(maps.into_iter().map(|(name, text)| NamedMap { name, text }).collect())
+}
+
+/// Packs maps into a zip archive of `.map` files.
+///
+/// # Errors
+/// [`Error::Io`] if a name is no file name, or stands twice.
+pub fn write_archive<'a>(maps: impl IntoIterator<Item = (&'a str, &'a Map)>) -> Result<Vec<u8>, Error> {
+    let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+    // Nothing of when and where it was made, so that the same maps give the same bytes.
+    let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
+    for (name, map) in maps {
+        let failed = |reason: &dyn std::fmt::Display| Error::io(name, reason);
+        if name.is_empty() || name.contains(['/', '\\', '\0']) || name == "." || name == ".." {
+            return Err(failed(&"is no name of a file"));
+        }
+        writer.start_file(format!("{name}.map"), options).map_err(|error| failed(&error))?;
+        writer.write_all(write_movingai(map).as_bytes()).map_err(|error| failed(&error))?;
+    }
+    let written = writer.finish().map_err(|error| Error::io("archive", error))?;
+    Ok(written.into_inner())
+}

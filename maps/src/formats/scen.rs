@@ -1,0 +1,108 @@
+//! Scenarios of the MovingAI benchmarks: a start and a goal on each line.
+
+use std::fmt::Write;
+
+use pogema_core::{Cell, Error, shorten};
+
+use crate::text::check_side;
+
+/// One line of a `.scen` file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// MovingAI sorts by length: paths of 4 · bucket up to 4 · bucket + 4.
+    pub bucket: u64,
+    /// The file of the map.
+    pub map: String,
+    /// Rows of the map.
+    pub height: usize,
+    /// Columns of the map.
+    pub width: usize,
+    /// Where the agent starts.
+    pub start: Cell,
+    /// Where it wants to go.
+    pub goal: Cell,
+    /// Length of a shortest path, diagonal steps included. Units: cells.
+    pub length: f64,
+}
+
+/// Reads a `.scen` file. There, `x` is the column and `y` the row, and `x` comes first.
+///
+/// # Errors
+/// [`Error::Map`] with line and column for a line that is no task, and a start or goal off the map.
+pub fn read_scen(text: &str) -> Result<Vec<Task>, Error> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = (1..).zip(text.lines());
+    let (_, first) = lines.next().unwrap_or((1, ""));
+    let version = first.strip_prefix("version ").map(str::trim);
+    if !matches!(version, Some("1" | "1.0")) {
+        let found = shorten(first, Error::LONGEST_QUOTE);
+        let reason = format!("found `{found}`, expected `version 1`");
+        return Err(Error::Map { line: 1, column: 1, reason });
+    }
+    lines.filter(|(_, text)| !text.trim().is_empty()).map(|(line, text)| read_task(line, text)).collect()
+}
+
+const COLUMNS: [&str; 9] =
+    ["bucket", "map", "map width", "map height", "start x", "start y", "goal x", "goal y", "optimal length"];
+
+fn read_task(line: usize, text: &str) -> Result<Task, Error> {
+    // Names of maps may hold blanks, so tabs are what counts where there are any.
+    let fields: Vec<&str> = if text.contains('\t') {
+        text.trim_end().split('\t').collect()
+    } else {
+        text.split_whitespace().collect()
+    };
+    let fields: [&str; 9] = fields.try_into().map_err(|fields: Vec<&str>| {
+        let reason = format!(
+            "the line has {} columns, expected {}: {}",
+            fields.len(),
+            COLUMNS.len(),
+            COLUMNS.join(", ")
+        );
+        Error::Map { line, column: 1, reason }
+    })?;
+    let wrong = |at: usize, expected: &str| {
+        let begin = fields[at].as_ptr() as usize - text.as_ptr() as usize;
+        let column = text[..begin].chars().count() + 1;
+        let found = shorten(fields[at], Error::LONGEST_QUOTE);
+        let reason = format!("{} is `{found}`, expected {expected}", COLUMNS[at]);
+        Error::Map { line, column, reason }
+    };
+    let (width, height) = (check_side(line, fields[2])?, check_side(line, fields[3])?);
+    let coordinate = |at: usize, side: usize| {
+        let number = fields[at].parse::<u16>().ok().filter(|&number| usize::from(number) < side);
+        number.ok_or_else(|| wrong(at, &format!("a whole number from 0 to {}", side - 1)))
+    };
+    let length = fields[8].parse::<f64>().ok().filter(|length| length.is_finite() && *length >= 0.0);
+    Ok(Task {
+        bucket: fields[0].parse().map_err(|_| wrong(0, "a whole number"))?,
+        map: fields[1].to_owned(),
+        height,
+        width,
+        start: Cell::new(coordinate(5, height)?, coordinate(4, width)?),
+        goal: Cell::new(coordinate(7, height)?, coordinate(6, width)?),
+        length: length.ok_or_else(|| wrong(8, "a length"))?,
+    })
+}
+
+/// Writes a `.scen` file.
+///
+/// # Errors
+/// [`Error::Instance`] for a name of a map that holds a tab or a line break.
+pub fn write_scen(tasks: &[Task]) -> Result<String, Error> {
+    let mut text = String::from("version 1\n");
+    for task in tasks {
+        if task.map.is_empty() || task.map.contains(['\t', '\n', '\r']) || task.map.trim() != task.map {
+            let name = shorten(&task.map, Error::LONGEST_QUOTE);
+            return Err(Error::instance(format!("`{name}` cannot be the name of a map in a .scen file")));
+        }
+        let Task { bucket, map, height, width, start, goal, length } = task;
+        // INVARIANT: writing to a string never fails.
+        let _ = writeln!(
+            text,
+            "{bucket}\t{map}\t{width}\t{height}\t{}\t{}\t{}\t{}\t{length}",
+            start.col, start.row, goal.col, goal.row
+        );
+    }
+    Ok(text)
+}

@@ -1,0 +1,49 @@
+//! The map generators of pogema-toolbox 0.1.1: the same map for every seed and setting.
+//!
+//! | Here | What the toolbox has there |
+//! | --- | --- |
+//! | [`RandomRanges`], [`RandomMap`] | `MapRangeSettings`, `generate_map` |
+//! | [`MazeRanges`], [`Maze`] | `MazeRangeSettings`, `MazeGenerator.generate_maze` |
+//! | [`Warehouse`] | `WarehouseConfig`, `generate_warehouse`, `generate_wfi_warehouse` |
+//! | [`Preset`] | `main` of each: the sets of the paper, by the names they were published under |
+
+mod maze;
+mod preset;
+mod random;
+mod warehouse;
+
+pub use maze::{Maze, MazeRanges};
+pub use preset::{Preset, of_seeds, seed_name};
+pub use random::{RandomMap, RandomRanges};
+pub use warehouse::{Bays, Warehouse};
+
+use pogema_core::{Error, Map};
+
+use crate::numpy::Generator;
+
+/// Passes if `width` and `height` are those of a map.
+fn check_sides(width: i64, height: i64) -> Result<(), Error> {
+    let longest = Map::LONGEST_SIDE as i64;
+    for (field, side) in [("width", width), ("height", height)] {
+        if !(1..=longest).contains(&side) {
+            return Err(Error::config(field, side, format!("a whole number from 1 to {longest}")));
+        }
+    }
+    Ok(())
+}
+
+/// A whole number from `lowest` to `highest`, both ends included.
+fn draw_between(generator: &mut Generator, field: &str, (lowest, highest): (i64, i64)) -> Result<i64, Error> {
+    let end = highest.checked_add(1).filter(|_| lowest <= highest);
+    let drawn = end.and_then(|end| generator.integers(lowest, end).ok());
+    drawn.ok_or_else(|| {
+        Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
+    })
+}
+
+/// A number from `lowest` to `highest`.
+fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f64)) -> Result<f64, Error> {
+    generator.uniform(lowest, highest).map_err(|_| {
+        Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
+    })
+}

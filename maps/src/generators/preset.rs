@@ -1,0 +1,116 @@
+//! The map sets of the paper, by the names they were published under.
+
+use std::ops::Range;
+
+use pogema_core::Error;
+
+use super::{Bays, MazeRanges, RandomRanges, Warehouse};
+use crate::config::nearest;
+use crate::formats::NamedMap;
+use crate::text::MapText;
+
+/// A map set of the paper.
+///
+/// Source: pogema-toolbox 0.1.1, `random_generator.py`, `maze_generator.py` and `warehouse_generator.py`, `main`;
+/// the published sets, whose mazes have sides from 17 to 21 in place of the generator's 5 to 9
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each is the set of its name")]
+pub enum Preset {
+    ValidationRandom,
+    TrainingRandom,
+    ValidationMazes,
+    TrainingMazes,
+    Warehouse,
+}
+
+/// What map names begin with: those of validation come first.
+const SEEDS_OF_VALIDATION: Range<u64> = 0..128;
+const SEEDS_OF_RANDOM_TRAINING: Range<u64> = 128..128 + 512;
+const SEEDS_OF_MAZE_TRAINING: Range<u64> = 128..128 + 2048;
+
+impl Preset {
+    /// Each of them.
+    pub const ALL: [Self; 5] = [
+        Self::ValidationRandom,
+        Self::TrainingRandom,
+        Self::ValidationMazes,
+        Self::TrainingMazes,
+        Self::Warehouse,
+    ];
+
+    /// Its name, which the names of its maps begin with.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ValidationRandom => "validation-random",
+            Self::TrainingRandom => "training-random",
+            Self::ValidationMazes => "validation-mazes",
+            Self::TrainingMazes => "training-mazes",
+            Self::Warehouse => "warehouse",
+        }
+    }
+
+    /// The preset of a name.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the nearest name.
+    pub fn by_name(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
+            let hint = nearest(name, Self::ALL.into_iter().map(Self::name)).unwrap_or_default();
+            Error::config("preset", name, format!("a known one; the nearest is `{hint}`"))
+        })
+    }
+
+    /// The settings that the mazes of the paper are drawn from.
+    pub const MAZES: MazeRanges = MazeRanges {
+        width_min: 17,
+        width_max: 21,
+        height_min: 17,
+        height_max: 21,
+        obstacle_density_min: 0.0,
+        obstacle_density_max: 1.0,
+        wall_components_min: 1,
+        wall_components_max: 8,
+        go_straight_min: 0.75,
+        go_straight_max: 0.85,
+    };
+
+    /// The maps, in the order they were published in.
+    ///
+    /// # Errors
+    /// None: all settings are those of maps.
+    pub fn maps(self) -> Result<Vec<NamedMap>, Error> {
+        let random = |seed| RandomRanges::default().sample(seed)?.generate().map(MapText::from);
+        let maze = |seed| Self::MAZES.sample(seed)?.generate().map(MapText::from);
+        match self {
+            Self::ValidationRandom => of_seeds(self.name(), SEEDS_OF_VALIDATION, random),
+            Self::TrainingRandom => of_seeds(self.name(), SEEDS_OF_RANDOM_TRAINING, random),
+            Self::ValidationMazes => of_seeds(self.name(), SEEDS_OF_VALIDATION, maze),
+            Self::TrainingMazes => of_seeds(self.name(), SEEDS_OF_MAZE_TRAINING, maze),
+            Self::Warehouse => {
+                let text = Warehouse::PUBLISHED.generate(Bays::Published)?;
+                Ok(vec![NamedMap { name: "wfi_warehouse".into(), text }])
+            }
+        }
+    }
+}
+
+/// The name of a seed's map: the seed has as many digits as the largest of all.
+///
+/// Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_and_save_maps`
+pub fn seed_name(prefix: &str, seed: u64, seeds: &Range<u64>) -> String {
+    let num_digits = seeds.end.saturating_sub(1).to_string().len();
+    format!("{prefix}-seed-{seed:0num_digits$}")
+}
+
+/// The maps of some seeds.
+///
+/// # Errors
+/// Those of `generate`.
+pub fn of_seeds(
+    prefix: &str,
+    seeds: Range<u64>,
+    generate: impl Fn(u64) -> Result<MapText, Error>,
+) -> Result<Vec<NamedMap>, Error> {
+    let named = |seed| Ok(NamedMap { name: seed_name(prefix, seed, &seeds), text: generate(seed)? });
+    seeds.clone().map(named).collect()
+}

@@ -1,0 +1,166 @@
+//! Warehouses: shelves in rows, aisles between them, and bays at both ends.
+
+use pogema_core::{Cell, Error, Map};
+
+use crate::text::MapText;
+
+/// The settings of a warehouse.
+///
+/// Units: cells.
+///
+/// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `WarehouseConfig`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Warehouse {
+    /// Columns of a shelf.
+    pub wall_width: usize,
+    /// Rows of a shelf.
+    pub wall_height: usize,
+    /// Shelves side by side.
+    pub walls_in_row: usize,
+    /// Shelves one below the other.
+    pub walls_rows: usize,
+    /// Columns to the left and to the right of all shelves.
+    pub bottom_gap: usize,
+    /// Columns between shelves.
+    pub horizontal_gap: usize,
+    /// Rows between shelves, above and below them.
+    pub vertical_gap: usize,
+}
+
+/// Where agents may start and have their goals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bays {
+    /// Nothing is said of it.
+    None,
+    /// As the toolbox lays them: starts in the gaps at both ends, in two rows of three; goals along the shelves.
+    Toolbox,
+    /// As in the published map: without the first and last row; starts in columns 1, 2, 4 and 5 and the mirrored
+    /// four, beside each shelf and the rows next to it.
+    Published,
+}
+
+impl Default for Warehouse {
+    fn default() -> Self {
+        Self {
+            wall_width: 5,
+            wall_height: 2,
+            walls_in_row: 5,
+            walls_rows: 5,
+            bottom_gap: 5,
+            horizontal_gap: 1,
+            vertical_gap: 3,
+        }
+    }
+}
+
+impl Warehouse {
+    /// The settings of the published map `wfi_warehouse`, which goes with [`Bays::Published`].
+    pub const PUBLISHED: Self = Self {
+        wall_width: 10,
+        wall_height: 1,
+        walls_in_row: 3,
+        walls_rows: 8,
+        bottom_gap: 7,
+        horizontal_gap: 1,
+        vertical_gap: 3,
+    };
+
+    /// The map, and where agents may start and have their goals.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for settings without a map, or, with bays, without room between the shelves.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse` and `generate_wfi_warehouse`
+    pub fn generate(&self, bays: Bays) -> Result<MapText, Error> {
+        let map = self.shelves(usize::from(bays == Bays::Published))?;
+        if bays == Bays::None {
+            return Ok(MapText { map, starts: Vec::new(), goals: Vec::new(), pools: None });
+        }
+        if self.vertical_gap < 2 {
+            return Err(Error::config("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
+        }
+        let is_start = |cell: Cell| match bays {
+            Bays::Published => self.is_published_start(&map, cell),
+            Bays::None | Bays::Toolbox => self.is_toolbox_start(&map, cell),
+        };
+        let cells = || (0..map.obstacles().len()).map(|index| map.cell_at(index));
+        let free = |cell: &Cell| !map.is_obstacle(*cell);
+        let starts: Vec<Cell> = cells().filter(free).filter(|&cell| is_start(cell)).collect();
+        let goals: Vec<Cell> = cells()
+            .filter(free)
+            // A cell marked as both is written as a goal.
+            .filter(|&cell| self.is_goal(&map, cell))
+            .collect();
+        let starts = starts.into_iter().filter(|start| goals.binary_search(start).is_err()).collect();
+        Ok(MapText { map, starts: Vec::new(), goals: Vec::new(), pools: Some((starts, goals)) })
+    }
+
+    /// The shelves, without so many rows at the top and at the bottom.
+    fn shelves(&self, num_cut: usize) -> Result<Map, Error> {
+        let (height, width) = self.sides()?;
+        let height = height.saturating_sub(2 * num_cut);
+        let is_row_of_shelf = |row: usize| {
+            let (period, row) = (self.vertical_gap + self.wall_height, row + num_cut);
+            period > 0 && row / period < self.walls_rows && row % period >= self.vertical_gap
+        };
+        let is_col_of_shelf = |col: usize| {
+            let period = self.wall_width + self.horizontal_gap;
+            let is_col = |col: usize| col / period < self.walls_in_row && col % period < self.wall_width;
+            period > 0 && col.checked_sub(self.bottom_gap).is_some_and(is_col)
+        };
+        let cells = (0..height).flat_map(|row| (0..width).map(move |col| (row, col)));
+        let obstacles = cells.map(|(row, col)| is_row_of_shelf(row) && is_col_of_shelf(col)).collect();
+        Map::new(height, width, obstacles)
+    }
+
+    /// Height and width of the whole.
+    fn sides(&self) -> Result<(usize, usize), Error> {
+        let settings = [
+            ("wall_width", self.wall_width),
+            ("wall_height", self.wall_height),
+            ("walls_in_row", self.walls_in_row),
+            ("walls_rows", self.walls_rows),
+            ("bottom_gap", self.bottom_gap),
+            ("horizontal_gap", self.horizontal_gap),
+            ("vertical_gap", self.vertical_gap),
+        ];
+        if let Some((field, value)) = settings.into_iter().find(|(_, value)| *value > Map::LONGEST_SIDE) {
+            return Err(Error::config(field, value, format!("at most {}", Map::LONGEST_SIDE)));
+        }
+        let height = self.vertical_gap * (self.walls_rows + 1) + self.wall_height * self.walls_rows;
+        let walls = 2 * self.bottom_gap + self.wall_width * self.walls_in_row;
+        // No wall has one gap less than none.
+        let width = (walls + self.horizontal_gap * self.walls_in_row).saturating_sub(self.horizontal_gap);
+        super::check_sides(width as i64, height as i64)?;
+        Ok((height, width))
+    }
+
+    fn is_toolbox_start(&self, map: &Map, cell: Cell) -> bool {
+        let (row, col) = (usize::from(cell.row), usize::from(cell.col));
+        let is_inner = row > 0 && row + 1 < map.height();
+        // Every third row is left out, however far the shelves are apart.
+        let is_left = col + 1 < self.bottom_gap;
+        let is_right = col + self.bottom_gap > map.width();
+        is_inner && row % 3 != 0 && (is_left || is_right)
+    }
+
+    fn is_published_start(&self, map: &Map, cell: Cell) -> bool {
+        let col = usize::from(cell.col).min(map.width() - 1 - usize::from(cell.col));
+        let period = self.vertical_gap + self.wall_height;
+        // The rows of a shelf and the one on either side.
+        let row = usize::from(cell.row) % period;
+        let is_beside_shelf =
+            (self.vertical_gap - 2..=self.vertical_gap - 1 + self.wall_height).contains(&row);
+        [1, 2, 4, 5].contains(&col) && is_beside_shelf
+    }
+
+    fn is_goal(&self, map: &Map, cell: Cell) -> bool {
+        let is_shelf = |row: Option<u16>| {
+            row.map(|row| Cell::new(row, cell.col))
+                .is_some_and(|other| map.contains(other) && map.is_obstacle(other))
+        };
+        // Where shelves are two rows apart, agents come from one side alone.
+        let has_below = self.vertical_gap != 2 && is_shelf(cell.row.checked_add(1));
+        is_shelf(cell.row.checked_sub(1)) || has_below
+    }
+}
