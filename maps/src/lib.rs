@@ -16,21 +16,31 @@
 mod catalogue;
 mod components;
 mod config;
+mod distance;
+mod exhaustive;
 mod foretell;
 pub mod formats;
 pub mod generators;
+mod library;
 pub mod numpy;
 mod place;
 mod source;
+mod stats;
 mod streams;
 mod text;
+mod tiles;
 
-pub use catalogue::{map_names, named_map};
+pub use catalogue::{PUZZLES, Puzzle, map_names, named_map};
 pub use components::{ComponentCells, Components};
 pub use config::{
     FIELDS, GridConfig, Integration, Limits, Targets, nearest, value_from_json, value_from_yaml,
 };
+pub use distance::{distances_to, free_neighbours};
+pub use exhaustive::{Verdict, search};
 pub use foretell::foretold_goals;
+pub use library::Library;
 pub use place::{capacity, place_at_random};
 pub use source::{Generated, InstanceSource};
+pub use stats::{Doubt, MapStats, ScenarioStats};
 pub use text::{MapText, parse_map_text};
+pub use tiles::{PUBLISHED_TILE, tiles};

@@ -1,0 +1,36 @@
+//! How far it is from cell to cell.
+
+use std::collections::VecDeque;
+
+use pogema_core::{Action, Cell, Map};
+
+/// The steps from each cell to a goal, row by row; [`u32::MAX`] where there is no way.
+pub fn distances_to(map: &Map, goal: Cell) -> Vec<u32> {
+    let mut distances = vec![u32::MAX; map.obstacles().len()];
+    if map.is_obstacle(goal) {
+        return distances;
+    }
+    distances[map.index(goal)] = 0;
+    let mut frontier = VecDeque::from([goal]);
+    while let Some(cell) = frontier.pop_front() {
+        let distance = distances[map.index(cell)] + 1;
+        for next in free_neighbours(map, cell) {
+            let known = &mut distances[map.index(next)];
+            if *known == u32::MAX {
+                *known = distance;
+                frontier.push_back(next);
+            }
+        }
+    }
+    distances
+}
+
+/// The free cells above, below, left and right of a cell.
+pub fn free_neighbours(map: &Map, cell: Cell) -> impl Iterator<Item = Cell> + '_ {
+    let moves = Action::ALL.into_iter().filter(|&action| action != Action::Stay);
+    let targets = moves.filter_map(move |action| {
+        let (row, col) = cell.toward(action);
+        Some(Cell::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
+    });
+    targets.filter(|&target| !map.is_obstacle(target))
+}

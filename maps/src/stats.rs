@@ -1,0 +1,222 @@
+//! What can be said of a map, and of a scenario on it, before anybody has moved.
+
+use std::collections::BTreeMap;
+
+use pogema_core::{Cell, Map, OnGoal};
+
+use crate::components::Components;
+use crate::distance::{distances_to, free_neighbours};
+use crate::exhaustive::{Verdict, search};
+
+/// Figures of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapStats {
+    /// Number of rows.
+    pub height: usize,
+    /// Number of columns.
+    pub width: usize,
+    /// Number of free cells.
+    pub num_free: usize,
+    /// Share of obstacles among all cells.
+    pub density: f64,
+    /// The sizes of all components, the largest first. Units: cells.
+    pub components: Vec<u32>,
+    /// Free cells with one free neighbour.
+    pub dead_ends: usize,
+    /// Free cells with two.
+    pub corridor: usize,
+    /// Pairs of free cells without a way from one to the other.
+    pub unreachable_pairs: u64,
+}
+
+impl MapStats {
+    /// The figures of a map.
+    pub fn of(map: &Map) -> Self {
+        let num_cells = map.obstacles().len();
+        let num_free = map.num_free();
+        let mut components = Components::of(map).sizes().to_vec();
+        components.sort_unstable_by(|one, other| other.cmp(one));
+        let (mut dead_ends, mut corridor) = (0, 0);
+        for cell in (0..num_cells).map(|index| map.cell_at(index)).filter(|&cell| !map.is_obstacle(cell)) {
+            match free_neighbours(map, cell).count() {
+                1 => dead_ends += 1,
+                2 => corridor += 1,
+                _ => {}
+            }
+        }
+        let same: u64 = components.iter().map(|&size| u64::from(size) * u64::from(size)).sum();
+        Self {
+            height: map.height(),
+            width: map.width(),
+            num_free,
+            density: (num_cells - num_free) as f64 / num_cells as f64,
+            components,
+            dead_ends,
+            corridor,
+            unreachable_pairs: (num_free as u64 * num_free as u64 - same) / 2,
+        }
+    }
+
+    /// Share of the free cells that are corridor.
+    pub fn corridor_share(&self) -> f64 {
+        if self.num_free == 0 { 0.0 } else { self.corridor as f64 / self.num_free as f64 }
+    }
+}
+
+/// Why a scenario cannot be solved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// There is no way from this agent's start to its goal.
+    NoWay(usize),
+    /// These agents want to stay on one cell.
+    SameGoal(Vec<usize>, Cell),
+    /// These agents share a part of the map, and a search through all that they can do finds no solution.
+    Locked(Vec<usize>),
+    /// These agents share a corridor that none can leave, and their goals stand in another order than they do.
+    WrongOrder(Vec<usize>),
+}
+
+/// Figures of a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScenarioStats {
+    /// Number of agents.
+    pub num_agents: usize,
+    /// Why it cannot be solved; nothing is proven if there is nothing here.
+    pub doubts: Vec<Doubt>,
+    /// Whether every part of it was proven to have a solution.
+    pub is_proven_solvable: bool,
+    /// The sum over all agents that can reach their goals of the way there; no solution costs less. Units: steps.
+    pub sum_of_distances: u64,
+    /// The longest of those ways. Units: steps.
+    pub longest_distance: u32,
+}
+
+/// So many states are looked at for each component.
+const MOST_STATES: usize = 200_000;
+
+impl ScenarioStats {
+    /// The figures of starts and goals on a map, and the proofs that cost little.
+    pub fn of(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> Self {
+        let components = Components::of(map);
+        let mut figures = Self {
+            num_agents: starts.len(),
+            doubts: Vec::new(),
+            is_proven_solvable: true,
+            sum_of_distances: 0,
+            longest_distance: 0,
+        };
+        let mut crowds: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        let mut by_goal: BTreeMap<Cell, Vec<usize>> = BTreeMap::new();
+        for (agent, (&start, &goal)) in starts.iter().zip(goals).enumerate() {
+            by_goal.entry(goal).or_default().push(agent);
+            match (components.label(start), components.label(goal)) {
+                (Some(one), Some(other)) if one == other => {
+                    let distance = distances_to(map, goal)[map.index(start)];
+                    figures.sum_of_distances += u64::from(distance);
+                    figures.longest_distance = figures.longest_distance.max(distance);
+                    crowds.entry(one).or_default().push(agent);
+                }
+                _ => figures.doubts.push(Doubt::NoWay(agent)),
+            }
+        }
+        if on_goal == OnGoal::Nothing {
+            let shared = by_goal.into_iter().filter(|(_, agents)| agents.len() > 1);
+            figures.doubts.extend(shared.map(|(goal, agents)| Doubt::SameGoal(agents, goal)));
+        }
+        for (label, agents) in crowds {
+            let part = part_of(map, &components, label, (starts, goals), &agents);
+            figures.judge_part(&part, agents, on_goal);
+        }
+        figures.is_proven_solvable &= figures.doubts.is_empty();
+        figures
+    }
+
+    fn judge_part(&mut self, part: &Part, agents: Vec<usize>, on_goal: OnGoal) {
+        if on_goal == OnGoal::Nothing && part.is_in_wrong_order() {
+            self.doubts.push(Doubt::WrongOrder(agents));
+            return;
+        }
+        if agents.len() == 1 {
+            return;
+        }
+        if !part.is_small() {
+            self.is_proven_solvable = false;
+            return;
+        }
+        match search(&part.map, &part.starts, &part.goals, on_goal, MOST_STATES) {
+            Verdict::Solvable { .. } => {}
+            Verdict::Unsolvable => self.doubts.push(Doubt::Locked(agents)),
+            Verdict::Unknown => self.is_proven_solvable = false,
+        }
+    }
+}
+
+/// One component and the agents in it, on a map no larger than need be.
+struct Part {
+    map: Map,
+    starts: Vec<Cell>,
+    goals: Vec<Cell>,
+}
+
+fn part_of(
+    map: &Map,
+    components: &Components,
+    label: u32,
+    (starts, goals): (&[Cell], &[Cell]),
+    agents: &[usize],
+) -> Part {
+    let inside: Vec<Cell> = (0..map.obstacles().len())
+        .filter(|&index| components.label_at(index) == Some(label))
+        .map(|index| map.cell_at(index))
+        .collect();
+    let span = |of: fn(&Cell) -> u16| {
+        let (least, most) = (inside.iter().map(of).min(), inside.iter().map(of).max());
+        (least.unwrap_or(0), most.unwrap_or(0))
+    };
+    let ((top, bottom), (left, right)) = (span(|cell| cell.row), span(|cell| cell.col));
+    let (height, width) = (usize::from(bottom - top) + 1, usize::from(right - left) + 1);
+    let moved = |cell: &Cell| Cell::new(cell.row - top, cell.col - left);
+    let mut obstacles = vec![true; height * width];
+    for cell in inside.iter().map(moved) {
+        obstacles[usize::from(cell.row) * width + usize::from(cell.col)] = false;
+    }
+    // INVARIANT: no larger than the whole map, and with at least one cell.
+    let part = Map::new(height, width, obstacles).unwrap_or_else(|_| map.clone());
+    let of = |cells: &[Cell]| agents.iter().map(|&agent| moved(&cells[agent])).collect();
+    Part { map: part, starts: of(starts), goals: of(goals) }
+}
+
+impl Part {
+    /// Whether its joint states are few.
+    fn is_small(&self) -> bool {
+        let num_free = self.map.num_free();
+        let orders = (0..self.starts.len()).map(|agent| num_free.saturating_sub(agent));
+        // Each agent is done or not.
+        let states = orders.fold(1_usize, |states, choices| states.saturating_mul(2 * choices));
+        states <= MOST_STATES
+    }
+
+    /// Whether it is one corridor along which starts and goals stand in different orders.
+    fn is_in_wrong_order(&self) -> bool {
+        let Some(path) = self.corridor() else { return false };
+        let place = |cell: &Cell| path.iter().position(|other| other == cell);
+        let mut agents: Vec<usize> = (0..self.starts.len()).collect();
+        agents.sort_by_key(|&agent| place(&self.starts[agent]));
+        !agents.is_sorted_by_key(|&agent| place(&self.goals[agent]))
+    }
+
+    /// All cells from one end to the other, if there is a single row of them.
+    fn corridor(&self) -> Option<Vec<Cell>> {
+        let cells = (0..self.map.obstacles().len()).map(|index| self.map.cell_at(index));
+        let free: Vec<Cell> = cells.filter(|&cell| !self.map.is_obstacle(cell)).collect();
+        let num_neighbours = |cell: Cell| free_neighbours(&self.map, cell).count();
+        let first = *free.iter().find(|&&cell| num_neighbours(cell) <= 1)?;
+        if free.iter().any(|&cell| num_neighbours(cell) > 2) {
+            return None;
+        }
+        let distances = distances_to(&self.map, first);
+        let mut path = free;
+        path.sort_by_key(|&cell| distances[self.map.index(cell)]);
+        Some(path)
+    }
+}
