@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn an_agent_may_have_to_leave_its_goal_for_another() {
-        // The second starts on its goal, in the way of the first.
+        // The second starts on its goal, lets the first one pass and comes right back.
         let blocked = [[(0, 0), (0, 2)], [(0, 1), (0, 1)]];
         assert_eq!(
             verdict(&["...", "#.#"], &blocked, OnGoal::Nothing),

@@ -1,0 +1,210 @@
+//! `pogema maps import`, `export` and `tiles`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use pogema_core::{Error, Map};
+use pogema_maps::formats::{NamedMap, Scenario, Task, Water, write_archive, write_movingai, write_scen, write_set};
+use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
+use serde_json::{Value, json};
+
+use super::read::{Reading, read_maps, read_scenario};
+use super::{Sources, write_out};
+use crate::output::check_writable;
+
+#[derive(Args, Debug)]
+pub struct Import {
+    /// Maps (.map), archives of maps (.zip), map texts (.txt), sets and configs (.yaml), or folders of those
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Whether agents may enter MovingAI's water
+    #[arg(long, value_enum, default_value_t = WaterName::Free)]
+    water: WaterName,
+    /// Take off the outermost rows and columns of MovingAI maps, as the toolbox does
+    #[arg(long)]
+    strip_border: bool,
+    /// Write to this file in place of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum WaterName {
+    /// They may, as in the toolbox and the published sets
+    Free,
+    /// They may not, as MovingAI has it
+    Obstacle,
+}
+
+impl Import {
+    pub fn run(&self) -> Result<(), Error> {
+        let water = match self.water {
+            WaterName::Free => Water::Free,
+            WaterName::Obstacle => Water::Obstacle,
+        };
+        let reading = Reading { water, strips_border: self.strip_border };
+        let mut maps: Vec<NamedMap> = Vec::new();
+        for path in &self.paths {
+            for map in read_maps(path, reading)? {
+                if maps.iter().any(|other| other.name == map.name) {
+                    return Err(Error::io(path, format!("a second map named `{}`", map.name)));
+                }
+                maps.push(map);
+            }
+        }
+        write_out(self.out.as_deref(), write_set(&maps)?.as_bytes())
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct Export {
+    /// A name, a pattern of names, a file or a folder
+    map: String,
+    #[command(flatten)]
+    sources: Sources,
+    /// The format
+    #[arg(long, value_enum)]
+    to: Format,
+    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// The first agents of the scenario alone
+    #[arg(long, value_name = "N", requires = "scenario")]
+    num_agents: Option<usize>,
+    /// Write to this file in place of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// A map set
+    Set,
+    /// A map text
+    Text,
+    /// A MovingAI .map file; starts and goals go into `scen`
+    Map,
+    /// A MovingAI .scen file: starts and goals alone
+    Scen,
+    /// A config of `pogema run` and POGEMA
+    Config,
+    /// A zip archive of .map files
+    Zip,
+}
+
+impl Export {
+    pub fn run(&self) -> Result<(), Error> {
+        let mut maps = self.sources.meant_by(&self.map)?;
+        if let Some(path) = &self.scenario {
+            let [map] = maps.as_mut_slice() else { return Err(self.one_map(maps.len(), "a scenario is of")) };
+            let scenario = read_scenario(path, &map.text.map)?;
+            let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
+            let scenario = scenario.truncated(num_agents)?;
+            if matches!(scenario.goals, Targets::Sequences(_)) && self.to != Format::Config {
+                let reason = "the scenario has sequences of goals, which only `--to config` can hold";
+                return Err(Error::State { reason: reason.into() });
+            }
+            if self.to == Format::Config {
+                return write_out(self.out.as_deref(), config(&map.text, Some(&scenario)).as_bytes());
+            }
+            map.text.starts.clone_from(&scenario.starts);
+            map.text.goals = scenario.goals.first();
+        }
+        let bytes = self.bytes(&maps)?;
+        write_out(self.out.as_deref(), &bytes)
+    }
+
+    fn bytes(&self, maps: &[NamedMap]) -> Result<Vec<u8>, Error> {
+        match self.to {
+            Format::Set => return write_set(maps).map(String::into_bytes),
+            Format::Zip => {
+                return write_archive(maps.iter().map(|map| (map.name.as_str(), &map.text.map)));
+            }
+            Format::Text | Format::Map | Format::Scen | Format::Config => {}
+        }
+        let [NamedMap { name, text }] = maps else { return Err(self.one_map(maps.len(), "this format holds")) };
+        let written = match self.to {
+            Format::Text => text.to_text()? + "\n",
+            Format::Map => write_movingai(&text.map),
+            Format::Scen => write_scen(&tasks(name, text))?,
+            _ => config(text, None),
+        };
+        Ok(written.into_bytes())
+    }
+
+    fn one_map(&self, found: usize, what: &str) -> Error {
+        Error::State { reason: format!("`{}` means {found} maps, {what} one", self.map) }
+    }
+}
+
+/// The tasks of a map with starts and goals.
+fn tasks(name: &str, text: &MapText) -> Vec<Task> {
+    let task = |(&start, &goal)| {
+        let steps = distances_to(&text.map, goal)[text.map.index(start)];
+        Task {
+            bucket: u64::from(steps) / 4,
+            map: format!("{name}.map"),
+            height: text.map.height(),
+            width: text.map.width(),
+            start,
+            goal,
+            length: f64::from(steps),
+        }
+    };
+    text.starts.iter().zip(&text.goals).map(task).collect()
+}
+
+/// A config as YAML, the map as people draw it.
+fn config(text: &MapText, scenario: Option<&Scenario>) -> String {
+    let mut lines = vec!["map: |-".to_owned()];
+    let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
+    // Pools always have characters; without starts and goals nothing can be missing.
+    let rows = plain.rows().unwrap_or_else(|_| plain.map.rows());
+    lines.extend(rows.iter().map(|row| format!("  {row}")));
+    let own = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };
+    let scenario = scenario.or((!text.starts.is_empty()).then_some(&own));
+    for (field, value) in scenario.map(Scenario::fields).unwrap_or_default() {
+        lines.push(format!("{field}: {}", one_line(&value)));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// A value as JSON, which is YAML, with a blank after each comma.
+fn one_line(value: &Value) -> String {
+    match value {
+        Value::Array(items) => format!("[{}]", items.iter().map(one_line).collect::<Vec<_>>().join(", ")),
+        other => json!(other).to_string(),
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct Tiles {
+    /// A name, a pattern of names, a file or a folder
+    map: String,
+    #[command(flatten)]
+    sources: Sources,
+    /// Side of the tiles
+    #[arg(long, value_name = "N", default_value_t = PUBLISHED_TILE)]
+    side: usize,
+    /// Write to this file in place of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Tiles {
+    pub fn run(&self) -> Result<(), Error> {
+        self.out.as_deref().map_or(Ok(()), check_writable)?;
+        let cut = |map: NamedMap| -> Result<Vec<NamedMap>, Error> {
+            if !map.text.starts.is_empty() || map.text.pools.is_some() {
+                let reason = format!("`{}` has starts and goals, which would be lost in tiles", map.name);
+                return Err(Error::State { reason });
+            }
+            tiles(&map.name, &map.text.map, self.side)
+        };
+        let mut all = Vec::new();
+        for map in self.sources.meant_by(&self.map)? {
+            all.extend(cut(map)?);
+        }
+        write_out(self.out.as_deref().map(Path::new), write_set(&all)?.as_bytes())
+    }
+}

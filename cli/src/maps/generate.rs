@@ -1,0 +1,178 @@
+//! `pogema maps generate`.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use pogema_core::Error;
+use pogema_maps::MapText;
+use pogema_maps::formats::{NamedMap, write_set};
+use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, of_seeds};
+
+use super::write_out;
+
+#[derive(Args, Debug)]
+pub struct Generate {
+    /// A set of the paper (validation-random, training-random, validation-mazes, training-mazes, warehouse) or a
+    /// generator (random, mazes, shelves)
+    what: String,
+    /// The seeds of `random` and `mazes`, the last one not included
+    #[arg(long, value_name = "A..B", value_parser = seeds, default_value = "0..1")]
+    seeds: Range<u64>,
+    /// What the names begin with
+    #[arg(long)]
+    name: Option<String>,
+    #[command(flatten)]
+    ranges: Ranges,
+    #[command(flatten)]
+    shelves: Shelves,
+    /// Write to this file in place of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// The settings of random maps and mazes, by the toolbox's names.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Random maps and mazes")]
+struct Ranges {
+    #[arg(long, value_name = "N")]
+    width_min: Option<i64>,
+    #[arg(long, value_name = "N")]
+    width_max: Option<i64>,
+    #[arg(long, value_name = "N")]
+    height_min: Option<i64>,
+    #[arg(long, value_name = "N")]
+    height_max: Option<i64>,
+    #[arg(long, value_name = "P")]
+    obstacle_density_min: Option<f64>,
+    #[arg(long, value_name = "P")]
+    obstacle_density_max: Option<f64>,
+    /// Mazes alone
+    #[arg(long, value_name = "N")]
+    wall_components_min: Option<i64>,
+    /// Mazes alone
+    #[arg(long, value_name = "N")]
+    wall_components_max: Option<i64>,
+    /// Mazes alone
+    #[arg(long, value_name = "P")]
+    go_straight_min: Option<f64>,
+    /// Mazes alone
+    #[arg(long, value_name = "P")]
+    go_straight_max: Option<f64>,
+}
+
+/// The settings of warehouses, by the toolbox's names.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Shelves")]
+struct Shelves {
+    #[arg(long, value_name = "N")]
+    wall_width: Option<usize>,
+    #[arg(long, value_name = "N")]
+    wall_height: Option<usize>,
+    #[arg(long, value_name = "N")]
+    walls_in_row: Option<usize>,
+    #[arg(long, value_name = "N")]
+    walls_rows: Option<usize>,
+    #[arg(long, value_name = "N")]
+    bottom_gap: Option<usize>,
+    #[arg(long, value_name = "N")]
+    horizontal_gap: Option<usize>,
+    #[arg(long, value_name = "N")]
+    vertical_gap: Option<usize>,
+    /// Where agents may start and have their goals
+    #[arg(long, value_enum, default_value_t = BaysName::None)]
+    bays: BaysName,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BaysName {
+    /// Nothing is said of it
+    None,
+    /// As the toolbox lays them
+    Toolbox,
+    /// As in the published warehouse
+    Published,
+}
+
+fn seeds(text: &str) -> Result<Range<u64>, String> {
+    let wrong = || "expected two whole numbers such as 0..128, the first one smaller".to_owned();
+    let (first, end) = text.split_once("..").ok_or_else(wrong)?;
+    let seeds = first.parse().map_err(|_| wrong())?..end.parse().map_err(|_| wrong())?;
+    if seeds.is_empty() { Err(wrong()) } else { Ok(seeds) }
+}
+
+impl Generate {
+    pub fn run(&self) -> Result<(), Error> {
+        let maps = match self.what.as_str() {
+            "random" => {
+                let ranges = self.ranges.random();
+                let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
+                of_seeds(self.name.as_deref().unwrap_or("random"), self.seeds.clone(), make)?
+            }
+            "mazes" => {
+                let ranges = self.ranges.mazes();
+                let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
+                of_seeds(self.name.as_deref().unwrap_or("mazes"), self.seeds.clone(), make)?
+            }
+            "shelves" => {
+                let name = self.name.clone().unwrap_or_else(|| "shelves".into());
+                vec![NamedMap { name, text: self.shelves.warehouse().generate(self.shelves.bays())? }]
+            }
+            preset => Preset::by_name(preset)?.maps()?,
+        };
+        write_out(self.out.as_deref(), write_set(&maps)?.as_bytes())
+    }
+}
+
+impl Ranges {
+    fn random(&self) -> RandomRanges {
+        let default = RandomRanges::default();
+        RandomRanges {
+            width_min: self.width_min.unwrap_or(default.width_min),
+            width_max: self.width_max.unwrap_or(default.width_max),
+            height_min: self.height_min.unwrap_or(default.height_min),
+            height_max: self.height_max.unwrap_or(default.height_max),
+            obstacle_density_min: self.obstacle_density_min.unwrap_or(default.obstacle_density_min),
+            obstacle_density_max: self.obstacle_density_max.unwrap_or(default.obstacle_density_max),
+        }
+    }
+
+    fn mazes(&self) -> MazeRanges {
+        let default = MazeRanges::default();
+        MazeRanges {
+            width_min: self.width_min.unwrap_or(default.width_min),
+            width_max: self.width_max.unwrap_or(default.width_max),
+            height_min: self.height_min.unwrap_or(default.height_min),
+            height_max: self.height_max.unwrap_or(default.height_max),
+            obstacle_density_min: self.obstacle_density_min.unwrap_or(default.obstacle_density_min),
+            obstacle_density_max: self.obstacle_density_max.unwrap_or(default.obstacle_density_max),
+            wall_components_min: self.wall_components_min.unwrap_or(default.wall_components_min),
+            wall_components_max: self.wall_components_max.unwrap_or(default.wall_components_max),
+            go_straight_min: self.go_straight_min.unwrap_or(default.go_straight_min),
+            go_straight_max: self.go_straight_max.unwrap_or(default.go_straight_max),
+        }
+    }
+}
+
+impl Shelves {
+    fn warehouse(&self) -> Warehouse {
+        let default = Warehouse::default();
+        Warehouse {
+            wall_width: self.wall_width.unwrap_or(default.wall_width),
+            wall_height: self.wall_height.unwrap_or(default.wall_height),
+            walls_in_row: self.walls_in_row.unwrap_or(default.walls_in_row),
+            walls_rows: self.walls_rows.unwrap_or(default.walls_rows),
+            bottom_gap: self.bottom_gap.unwrap_or(default.bottom_gap),
+            horizontal_gap: self.horizontal_gap.unwrap_or(default.horizontal_gap),
+            vertical_gap: self.vertical_gap.unwrap_or(default.vertical_gap),
+        }
+    }
+
+    fn bays(&self) -> Bays {
+        match self.bays {
+            BaysName::None => Bays::None,
+            BaysName::Toolbox => Bays::Toolbox,
+            BaysName::Published => Bays::Published,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Maps from files.
+
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use pogema_core::Error;
+use pogema_maps::formats::{NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring};
+use pogema_maps::{FIELDS, GridConfig, MapText, parse_map_text, value_from_yaml};
+
+/// A larger file is not read. Units: bytes.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// What MovingAI maps are taken for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reading {
+    pub water: Water,
+    /// Whether their outermost cells are taken off.
+    pub strips_border: bool,
+}
+
+/// All maps of a file, or of the files of a folder in the order of their names.
+pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
+    if !path.is_dir() {
+        return read_file(path, reading);
+    }
+    let failed = |error: std::io::Error| Error::io(path, error);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(failed)? {
+        let file = entry.map_err(failed)?.path();
+        if file.is_file() && matches!(ending(&file), "yaml" | "yml" | "map" | "txt" | "zip") {
+            files.push(file);
+        }
+    }
+    files.sort();
+    let mut maps = Vec::new();
+    for file in files {
+        maps.extend(read_file(&file, reading)?);
+    }
+    if maps.is_empty() {
+        return Err(Error::io(path, "no map in this folder, expected files ending in yaml, yml, map, txt or zip"));
+    }
+    Ok(maps)
+}
+
+fn read_file(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
+    let in_file = |error: Error| Error::io(path, error);
+    let named = |text: MapText| vec![NamedMap { name: stem(path), text }];
+    let stripped = |maps: Vec<NamedMap>| -> Result<Vec<NamedMap>, Error> {
+        if !reading.strips_border {
+            return Ok(maps);
+        }
+        let strip = |map: NamedMap| {
+            let text = MapText::from(without_ring(&map.text.map)?);
+            Ok(NamedMap { text, ..map })
+        };
+        maps.into_iter().map(strip).collect()
+    };
+    match ending(path) {
+        "zip" => read_archive(Cursor::new(read_bytes(path)?), reading.water).and_then(stripped).map_err(in_file),
+        "map" => {
+            let map = read_movingai(&read_text(path)?, reading.water).map_err(in_file)?;
+            stripped(named(MapText::from(map))).map_err(in_file)
+        }
+        "yaml" | "yml" => read_yaml(path),
+        _ => parse_map_text(&read_text(path)?).map(named).map_err(in_file),
+    }
+}
+
+/// A map set, or a config with a map.
+fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
+    let in_file = |error: Error| Error::io(path, error);
+    let text = read_text(path)?;
+    let value = value_from_yaml(&text).map_err(in_file)?;
+    let is_config = value.as_object().is_some_and(|fields| {
+        fields.contains_key("map") && fields.keys().all(|key| FIELDS.contains(&key.as_str()))
+    });
+    if !is_config {
+        return read_set(&text).map_err(in_file);
+    }
+    let config = GridConfig::from_value(&value).map_err(in_file)?;
+    let Some(map) = config.map else { return Err(Error::io(path, "the config has no map")) };
+    let pools = config.possible_agents_xy.zip(config.possible_targets_xy);
+    let goals = config.targets_xy.map(|goals| goals.first()).unwrap_or_default();
+    let text = MapText { map, starts: config.agents_xy.unwrap_or_default(), goals, pools };
+    Ok(vec![NamedMap { name: stem(path), text }])
+}
+
+/// The starts and goals of a scenario file: MovingAI's, or a YAML file with `agents_xy` and `targets_xy`.
+pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Error> {
+    let text = read_text(path)?;
+    let scenario = if ending(path) == "scen" {
+        read_scen(&text).and_then(|tasks| Scenario::from_tasks(&tasks, map))
+    } else {
+        Scenario::from_yaml(&text)
+    };
+    scenario.map_err(|error| Error::io(path, error))
+}
+
+/// A file as text, without the mark that some programs put first.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    let text = String::from_utf8(read_bytes(path)?).map_err(|error| {
+        let place = error.utf8_error().valid_up_to();
+        Error::io(path, format!("byte {} is not UTF-8 text", place + 1))
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    let failed = |error: std::io::Error| Error::io(path, error);
+    let mut bytes = Vec::new();
+    File::open(path).map_err(failed)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(Error::io(path, format!("more than {} MiB, which is more than any map needs", MOST_BYTES >> 20)));
+    }
+    Ok(bytes)
+}
+
+pub fn ending(path: &Path) -> &str {
+    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
