@@ -2,6 +2,7 @@
 
 mod bench;
 mod conform;
+mod maps;
 mod output;
 mod port;
 mod run;
@@ -23,6 +24,8 @@ struct Arguments {
 enum Command {
     /// Play one episode and print its metrics
     Run(run::Run),
+    /// Look at maps, make, convert and judge them
+    Maps(maps::Maps),
     /// Check that all engines follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
     /// Answer the questions of `conform --port` on standard input, as a port of our own
@@ -42,6 +45,7 @@ fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
+        Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
         Command::Bench(bench) => bench.run(),

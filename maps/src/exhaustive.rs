@@ -219,7 +219,7 @@ mod tests {
         let blocked = [[(0, 0), (0, 2)], [(0, 1), (0, 1)]];
         assert_eq!(
             verdict(&["...", "#.#"], &blocked, OnGoal::Nothing),
-            Verdict::Solvable { sum_of_costs: 5 }
+            Verdict::Solvable { sum_of_costs: 4 }
         );
     }
 

@@ -126,7 +126,7 @@ impl Export {
         let written = match self.to {
             Format::Text => text.to_text()? + "\n",
             Format::Map => write_movingai(&text.map),
-            Format::Scen => write_scen(&tasks(name, text))?,
+            Format::Scen => write_scen(&tasks(name, text)?)?,
             _ => config(text, None),
         };
         Ok(written.into_bytes())
@@ -138,10 +138,13 @@ impl Export {
 }
 
 /// The tasks of a map with starts and goals.
-fn tasks(name: &str, text: &MapText) -> Vec<Task> {
-    let task = |(&start, &goal)| {
+fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
+    let task = |(agent, (&start, &goal))| {
         let steps = distances_to(&text.map, goal)[text.map.index(start)];
-        Task {
+        if steps == u32::MAX {
+            return Err(Error::agent(agent, "has no way to its goal, and a .scen file holds the length of one"));
+        }
+        Ok(Task {
             bucket: u64::from(steps) / 4,
             map: format!("{name}.map"),
             height: text.map.height(),
@@ -149,9 +152,9 @@ fn tasks(name: &str, text: &MapText) -> Vec<Task> {
             start,
             goal,
             length: f64::from(steps),
-        }
+        })
     };
-    text.starts.iter().zip(&text.goals).map(task).collect()
+    text.starts.iter().zip(&text.goals).enumerate().map(task).collect()
 }
 
 /// A config as YAML, the map as people draw it.
