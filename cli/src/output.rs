@@ -3,6 +3,7 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+use comfy_table::{CellAlignment, Table, presets};
 use pogema_core::Error;
 
 /// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
@@ -39,4 +40,14 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     }
     // A file without a name: nothing is left of it, however the run ends.
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
+}
+
+/// A table that is Markdown too, its numbers to the right of a first column of names.
+pub fn markdown_table(head: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN).set_header(head.to_vec());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
 }

@@ -1,6 +1,8 @@
 //! The tables of a run.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
+
+use crate::output::markdown_table;
 
 use super::{Bar, Row};
 
@@ -16,7 +18,7 @@ pub fn tell(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
 }
 
 fn speeds(rows: &[Row]) -> Table {
-    let mut table = table(&[
+    let mut table = markdown_table(&[
         "work",
         "step",
         "f32",
@@ -56,7 +58,7 @@ fn speeds(rows: &[Row]) -> Table {
 }
 
 fn bar_table(bars: &[Bar]) -> Table {
-    let mut table = table(&["bar", "wanted", "measured", "met"]);
+    let mut table = markdown_table(&["bar", "wanted", "measured", "met"]);
     for bar in bars {
         let sign = if bar.is_limit { "at most" } else { "at least" };
         let met = match bar.is_met() {
@@ -80,13 +82,4 @@ fn seconds(time: f64) -> String {
         _ if time >= 1e-3 => format!("{:.2} ms", time * 1e3),
         _ => format!("{:.1} us", time * 1e6),
     }
-}
-
-fn table(head: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_header(head.to_vec());
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }

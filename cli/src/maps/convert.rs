@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use pogema_core::{Error, Map};
-use pogema_maps::formats::{NamedMap, Scenario, Task, Water, write_archive, write_movingai, write_scen, write_set};
+use pogema_core::Error;
+use pogema_maps::formats::{
+    NamedMap, Scenario, Task, Water, write_archive, write_movingai, write_scen, write_set,
+};
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
@@ -122,7 +124,9 @@ impl Export {
             }
             Format::Text | Format::Map | Format::Scen | Format::Config => {}
         }
-        let [NamedMap { name, text }] = maps else { return Err(self.one_map(maps.len(), "this format holds")) };
+        let [NamedMap { name, text }] = maps else {
+            return Err(self.one_map(maps.len(), "this format holds"));
+        };
         let written = match self.to {
             Format::Text => text.to_text()? + "\n",
             Format::Map => write_movingai(&text.map),
@@ -142,7 +146,10 @@ fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
     let task = |(agent, (&start, &goal))| {
         let steps = distances_to(&text.map, goal)[text.map.index(start)];
         if steps == u32::MAX {
-            return Err(Error::agent(agent, "has no way to its goal, and a .scen file holds the length of one"));
+            return Err(Error::agent(
+                agent,
+                "has no way to its goal, and a .scen file holds the length of one",
+            ));
         }
         Ok(Task {
             bucket: u64::from(steps) / 4,

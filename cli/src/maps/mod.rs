@@ -28,7 +28,7 @@ enum Command {
     /// A picture of a map
     Show(show::Show),
     /// Maps as the paper's generators make them
-    Generate(generate::Generate),
+    Generate(Box<generate::Generate>),
     /// Maps of other formats as a map set
     Import(convert::Import),
     /// Maps in other formats
@@ -67,7 +67,10 @@ impl Sources {
         let mut library = Library::built_in();
         for path in &self.paths {
             for name in library.register(read::read_maps(path, read::Reading::default())?) {
-                eprintln!("warning: {}: a second map named `{name}` takes the place of the first", path.display());
+                eprintln!(
+                    "warning: {}: a second map named `{name}` takes the place of the first",
+                    path.display()
+                );
             }
         }
         Ok(library)
@@ -83,21 +86,20 @@ impl Sources {
             return read::read_maps(Path::new(word), read::Reading::default());
         }
         let names = library.matching(word)?;
-        names.into_iter().map(|name| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() })).collect()
+        names
+            .into_iter()
+            .map(|name| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() }))
+            .collect()
     }
 }
 
 /// Writes what was asked for, to a file or to standard output.
 fn write_out(path: Option<&Path>, bytes: &[u8]) -> Result<(), Error> {
     use std::io::Write;
-    match path {
-        Some(path) => {
-            check_writable(path)?;
-            pogema_conformance::files::write(path, bytes)
-        }
-        None => {
-            let mut output = std::io::stdout().lock();
-            said(output.write_all(bytes).and_then(|()| output.flush()))
-        }
+    if let Some(path) = path {
+        check_writable(path)?;
+        return pogema_conformance::files::write(path, bytes);
     }
+    let mut output = std::io::stdout().lock();
+    said(output.write_all(bytes).and_then(|()| output.flush()))
 }

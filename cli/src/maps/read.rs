@@ -5,7 +5,9 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 
 use pogema_core::Error;
-use pogema_maps::formats::{NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring};
+use pogema_maps::formats::{
+    NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
+};
 use pogema_maps::{FIELDS, GridConfig, MapText, parse_map_text, value_from_yaml};
 
 /// A larger file is not read. Units: bytes.
@@ -38,7 +40,10 @@ pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> 
         maps.extend(read_file(&file, reading)?);
     }
     if maps.is_empty() {
-        return Err(Error::io(path, "no map in this folder, expected files ending in yaml, yml, map, txt or zip"));
+        return Err(Error::io(
+            path,
+            "no map in this folder, expected files ending in yaml, yml, map, txt or zip",
+        ));
     }
     Ok(maps)
 }
@@ -57,7 +62,9 @@ fn read_file(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
         maps.into_iter().map(strip).collect()
     };
     match ending(path) {
-        "zip" => read_archive(Cursor::new(read_bytes(path)?), reading.water).and_then(stripped).map_err(in_file),
+        "zip" => {
+            read_archive(Cursor::new(read_bytes(path)?), reading.water).and_then(stripped).map_err(in_file)
+        }
         "map" => {
             let map = read_movingai(&read_text(path)?, reading.water).map_err(in_file)?;
             stripped(named(MapText::from(map))).map_err(in_file)
@@ -111,7 +118,10 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     File::open(path).map_err(failed)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::io(path, format!("more than {} MiB, which is more than any map needs", MOST_BYTES >> 20)));
+        return Err(Error::io(
+            path,
+            format!("more than {} MiB, which is more than any map needs", MOST_BYTES >> 20),
+        ));
     }
     Ok(bytes)
 }

@@ -5,7 +5,7 @@ use pogema_core::{
     Action, CollisionMeter, DensityMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot,
     StepOut, Trace, TraceHeader, TraceStart, TraceStep,
 };
-use pogema_maps::{GridConfig, InstanceSource, named_map};
+use pogema_maps::{GridConfig, InstanceSource};
 use pogema_planners::AStarTeam;
 use pogema_reference::Reference;
 
@@ -27,8 +27,7 @@ pub struct Episode {
 impl Episode {
     /// Makes the instance and resets the engine; `is_recorded` keeps every step for [`Episode::trace`].
     pub fn start(config: GridConfig, is_recorded: bool) -> Result<Self, Error> {
-        let registered = config.map_name.as_deref().map(named_map).transpose()?;
-        let generated = InstanceSource::new(config.clone(), registered)?.generate()?;
+        let generated = InstanceSource::new(config.clone(), None)?.generate()?;
         let mut environment = Reference::new(config.rules())?;
         environment.reset(&generated.instance)?;
         let mut episode = Self {

@@ -4,16 +4,26 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
-use pogema_maps::{GridConfig, map_names, named_map, nearest, parse_map_text};
+use pogema_maps::formats::{NamedMap, Scenario};
+use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_maps::{GridConfig, Library, MapText, Targets};
 use serde_json::{Map as Object, Number, Value};
+
+use crate::maps::Sources;
+use crate::maps::read::{Reading, read_maps, read_scenario, read_text};
 
 #[derive(Args, Debug)]
 pub struct Settings {
     /// A config file with POGEMA's fields, YAML or JSON
     config: Option<PathBuf>,
-    /// A named map, or a file with a map text
-    #[arg(long, value_name = "NAME|FILE")]
+    /// A named map, a pattern of names among which the seed chooses, or a file with a map
+    #[arg(long, value_name = "NAME|PATTERN|FILE")]
     map: Option<String>,
+    #[command(flatten)]
+    sources: Sources,
+    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
     /// Seed of everything that is drawn
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
@@ -78,7 +88,6 @@ impl Settings {
         set("max_episode_steps", self.steps.map(Into::into));
         set("on_target", word(self.on_target).map(Into::into));
         set("collision_system", word(self.collision_system).map(Into::into));
-        set("map", self.map.as_deref().map(map_text).transpose()?.map(Into::into));
         for other in &self.others {
             let (field, value) = other
                 .split_once('=')
@@ -89,8 +98,78 @@ impl Settings {
             fields.remove("width");
             fields.remove("height");
         }
+        self.choose_map(&mut fields)?;
+        self.take_scenario(&mut fields)?;
         GridConfig::from_value(&Value::Object(fields))
     }
+
+    /// Puts the map that is named in the place of its name.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
+    fn choose_map(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
+        let named = fields.remove("map_name").and_then(|name| name.as_str().map(str::to_owned));
+        let Some(word) = self.map.clone().or(named) else { return Ok(()) };
+        let library = self.sources.library()?;
+        let text = if let Ok(text) = library.map(&word) {
+            text.clone()
+        } else if self.map.is_some() && Path::new(&word).exists() {
+            the_one(&word, read_maps(Path::new(&word), Reading::default())?)?
+        } else {
+            chosen(&library, &word, fields.get("seed").and_then(Value::as_u64))?
+        };
+        put_map(&text, fields)
+    }
+
+    /// Puts starts and goals of a file in their place: those of the first agents, where their number is given.
+    fn take_scenario(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
+        let Some(path) = &self.scenario else { return Ok(()) };
+        let map = GridConfig::from_value(&Value::Object(fields.clone()))?.map;
+        let map = map.ok_or_else(|| Error::State { reason: "`--scenario` needs a map".into() })?;
+        put_scenario(&read_scenario(path, &map)?, fields)
+    }
+}
+
+/// The only map of a file.
+fn the_one(word: &str, maps: Vec<NamedMap>) -> Result<MapText, Error> {
+    let found = maps.len();
+    let mut maps = maps.into_iter();
+    match (maps.next(), maps.next()) {
+        (Some(map), None) => Ok(map.text),
+        _ => Err(Error::io(word, format!("{found} maps, expected one; `--maps {word} --map NAME` chooses"))),
+    }
+}
+
+/// The map that a seed, or chance, chooses among those that match.
+fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText, Error> {
+    if let Some(seed) = seed {
+        return library.choose(pattern, seed).map(|(_, text)| text.clone());
+    }
+    let names = library.matching(pattern)?;
+    let chance = SeedSequence::from_os().map_err(|error| Error::State { reason: error.to_string() })?;
+    let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
+    library.map(names[index as usize]).cloned()
+}
+
+fn put_map(text: &MapText, fields: &mut Object<String, Value>) -> Result<(), Error> {
+    for derived in ["width", "height", "size"] {
+        fields.remove(derived);
+    }
+    let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
+    fields.insert("map".into(), plain.to_text()?.into());
+    if text.starts.is_empty() || fields.contains_key("agents_xy") {
+        return Ok(());
+    }
+    put_scenario(
+        &Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) },
+        fields,
+    )
+}
+
+fn put_scenario(scenario: &Scenario, fields: &mut Object<String, Value>) -> Result<(), Error> {
+    let num_agents = fields.get("num_agents").and_then(Value::as_u64);
+    let num_agents = num_agents.map_or(scenario.starts.len(), |number| number as usize);
+    fields.extend(scenario.truncated(num_agents)?.fields());
+    Ok(())
 }
 
 fn word(choice: Option<impl ValueEnum>) -> Option<String> {
@@ -107,7 +186,7 @@ fn value_of(text: &str) -> Value {
 }
 
 fn fields_of(path: &Path) -> Result<Object<String, Value>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let text = read_text(path)?;
     let is_json = path.extension().is_some_and(|ending| ending == "json");
     let value =
         if is_json { pogema_maps::value_from_json(&text) } else { pogema_maps::value_from_yaml(&text) };
@@ -116,18 +195,4 @@ fn fields_of(path: &Path) -> Result<Object<String, Value>, Error> {
         Value::Null => Ok(Object::new()),
         _ => Err(Error::io(path, "expected fields and values such as `size: 8`")),
     }
-}
-
-/// The text of a map, by name or from a file.
-fn map_text(name: &str) -> Result<String, Error> {
-    if let Ok(map) = named_map(name) {
-        return Ok(map.rows().join("\n"));
-    }
-    let text = std::fs::read_to_string(name).map_err(|error| {
-        let hint = nearest(name, map_names()).unwrap_or_default();
-        Error::io(name, format!("{error}; it is no known map either, the nearest of those is `{hint}`"))
-    })?;
-    // Read here for the sake of the file's name in the error.
-    parse_map_text(&text).map_err(|error| Error::io(name, error))?;
-    Ok(text)
 }

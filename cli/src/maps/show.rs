@@ -1,0 +1,124 @@
+//! `pogema maps list` and `show`.
+
+use clap::Args;
+use comfy_table::CellAlignment;
+use pogema_core::{Error, Map};
+use pogema_maps::formats::NamedMap;
+use pogema_maps::{MapStats, MapText, PUZZLES};
+
+use super::Sources;
+use crate::output::{markdown_table, say};
+
+#[derive(Args, Debug)]
+pub struct List {
+    /// A pattern that the names have to match, as the toolbox matches `map_name`
+    pattern: Option<String>,
+    #[command(flatten)]
+    sources: Sources,
+}
+
+impl List {
+    pub fn run(&self) -> Result<(), Error> {
+        let library = self.sources.library()?;
+        let names: Vec<&str> = match &self.pattern {
+            Some(pattern) => library.matching(pattern)?,
+            None => library.names().collect(),
+        };
+        let mut table = markdown_table(&[
+            "map",
+            "rows",
+            "columns",
+            "free",
+            "agents",
+            "least cost",
+            "what has to be done",
+        ]);
+        for name in names {
+            let text = library.map(name)?;
+            let puzzle = PUZZLES.iter().find(|puzzle| puzzle.name == name);
+            let agents = if text.starts.is_empty() { String::new() } else { text.starts.len().to_string() };
+            table.add_row([
+                name.to_owned(),
+                text.map.height().to_string(),
+                text.map.width().to_string(),
+                text.map.num_free().to_string(),
+                agents,
+                puzzle.map_or_else(String::new, |puzzle| puzzle.sum_of_costs.to_string()),
+                puzzle.map_or_else(String::new, |puzzle| puzzle.says.to_owned()),
+            ]);
+        }
+        if let Some(says) = table.column_mut(6) {
+            says.set_cell_alignment(CellAlignment::Left);
+        }
+        say(&table.to_string())
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct Show {
+    /// A name, a pattern of names, a file or a folder
+    map: String,
+    #[command(flatten)]
+    sources: Sources,
+    /// Widest picture; a map of more columns is drawn smaller
+    #[arg(long, value_name = "COLUMNS")]
+    width: Option<usize>,
+}
+
+impl Show {
+    pub fn run(&self) -> Result<(), Error> {
+        let room = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
+        for NamedMap { name, text } in self.sources.meant_by(&self.map)? {
+            let figures = MapStats::of(&text.map);
+            say(&format!(
+                "{name}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
+                figures.height,
+                figures.width,
+                figures.num_free,
+                figures.density,
+                figures.components.len(),
+                if figures.components.len() == 1 { "" } else { "s" },
+            ))?;
+            say(&picture(&text, room))?;
+        }
+        Ok(())
+    }
+}
+
+/// The map text, or, where that is too wide or has no letters for it, dots of two by four cells or more.
+fn picture(text: &MapText, room: usize) -> String {
+    match text.to_text() {
+        Ok(rows) if text.map.width() <= room => rows,
+        _ => braille(&text.map, room),
+    }
+}
+
+/// Each character stands for two columns and four rows of dots, each dot for a square of cells; a dot is set where
+/// at least half of them are obstacles.
+fn braille(map: &Map, room: usize) -> String {
+    const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+    let scale = map.width().div_ceil(2 * room).max(1);
+    let is_dark = |top: usize, left: usize| {
+        let (bottom, right) = ((top + scale).min(map.height()), (left + scale).min(map.width()));
+        if top >= bottom || left >= right {
+            return false;
+        }
+        let rows = map.obstacles().chunks(map.width()).take(bottom).skip(top);
+        let dark: usize = rows.map(|row| row[left..right].iter().filter(|&&obstacle| obstacle).count()).sum();
+        2 * dark >= (bottom - top) * (right - left)
+    };
+    let character = |row: usize, col: usize| {
+        let mut code = 0x2800;
+        for (down, dots) in DOTS.iter().enumerate() {
+            for (across, dot) in dots.iter().enumerate() {
+                if is_dark((row * 4 + down) * scale, (col * 2 + across) * scale) {
+                    code |= dot;
+                }
+            }
+        }
+        char::from_u32(code).unwrap_or(' ')
+    };
+    let (height, width) = (map.height().div_ceil(4 * scale), map.width().div_ceil(2 * scale));
+    let line = |row: usize| (0..width).map(|col| character(row, col)).collect::<String>();
+    (0..height).map(line).collect::<Vec<_>>().join("\n")
+}

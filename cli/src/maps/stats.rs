@@ -1,0 +1,197 @@
+//! `pogema maps stats`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use comfy_table::Table;
+use pogema_core::{Error, OnGoal};
+use pogema_maps::formats::NamedMap;
+use pogema_maps::{Doubt, GridConfig, InstanceSource, MapStats, ScenarioStats};
+use serde_json::{Value, json};
+
+use super::Sources;
+use super::read::read_scenario;
+use crate::output::{markdown_table, say};
+
+#[derive(Args, Debug)]
+pub struct Stats {
+    /// A name, a pattern of names, a file or a folder
+    map: String,
+    #[command(flatten)]
+    sources: Sources,
+    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    scenario: Option<PathBuf>,
+    /// So many agents: the first ones of the scenario, or, with `--seed`, as POGEMA places them
+    #[arg(long, value_name = "N")]
+    num_agents: Option<usize>,
+    /// Place agents as POGEMA does with this seed
+    #[arg(long, value_name = "S", requires = "num_agents")]
+    seed: Option<u64>,
+    /// Whether agents leave the map on their goals or have to be there all at once
+    #[arg(long, value_enum, default_value_t = OnTarget::Nothing)]
+    on_target: OnTarget,
+    /// Print everything as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OnTarget {
+    Finish,
+    Nothing,
+}
+
+impl Stats {
+    pub fn run(&self) -> Result<(), Error> {
+        let maps = self.sources.meant_by(&self.map)?;
+        if self.scenario.is_some() && maps.len() != 1 {
+            let reason = format!("`{}` means {} maps, a scenario is of one", self.map, maps.len());
+            return Err(Error::State { reason });
+        }
+        let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
+        let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
+            judged.collect::<Result<_, Error>>()?;
+        if self.json {
+            let all: Vec<Value> =
+                judged.iter().map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref())).collect();
+            return say(&json!(all).to_string());
+        }
+        say(&table(&judged).to_string())?;
+        for (map, _, scenario) in &judged {
+            if let Some(scenario) = scenario {
+                say(&format!("{}: {}", map.name, in_words(scenario)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The scenario that was asked for, or that the map brings itself.
+    fn scenario_of(&self, map: &NamedMap) -> Result<Option<ScenarioStats>, Error> {
+        let on_goal = match self.on_target {
+            OnTarget::Finish => OnGoal::Finish,
+            OnTarget::Nothing => OnGoal::Nothing,
+        };
+        let ground = &map.text.map;
+        if let Some(path) = &self.scenario {
+            let scenario = read_scenario(path, ground)?;
+            let scenario = scenario.truncated(self.num_agents.unwrap_or(scenario.starts.len()))?;
+            let cells =
+                scenario.starts.iter().chain(scenario.goals.first().iter()).copied().collect::<Vec<_>>();
+            if let Some(cell) = cells.into_iter().find(|&cell| !ground.contains(cell)) {
+                let (height, width) = (ground.height(), ground.width());
+                let reason = format!("cell {cell} is outside the map of {height} rows and {width} columns");
+                return Err(Error::io(path, reason));
+            }
+            return Ok(Some(ScenarioStats::of(ground, &scenario.starts, &scenario.goals.first(), on_goal)));
+        }
+        if let (Some(seed), Some(num_agents)) = (self.seed, self.num_agents) {
+            let pools = map.text.pools.clone().unzip();
+            let config = GridConfig {
+                map: Some(ground.clone()),
+                seed: Some(seed),
+                num_agents,
+                possible_agents_xy: pools.0,
+                possible_targets_xy: pools.1,
+                ..GridConfig::default()
+            };
+            let instance = InstanceSource::new(config, None)?.generate()?.instance;
+            let goals = instance.first_goals();
+            return Ok(Some(ScenarioStats::of(ground, instance.starts(), &goals, on_goal)));
+        }
+        let own = (!map.text.starts.is_empty())
+            .then(|| ScenarioStats::of(ground, &map.text.starts, &map.text.goals, on_goal));
+        Ok(own)
+    }
+}
+
+fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
+    let mut table = markdown_table(&[
+        "map",
+        "rows",
+        "columns",
+        "free",
+        "density",
+        "components",
+        "largest",
+        "dead ends",
+        "corridor",
+        "unreachable pairs",
+    ]);
+    for (map, stats, _) in judged {
+        table.add_row([
+            map.name.clone(),
+            stats.height.to_string(),
+            stats.width.to_string(),
+            stats.num_free.to_string(),
+            format!("{:.3}", stats.density),
+            stats.components.len().to_string(),
+            stats.components.first().copied().unwrap_or(0).to_string(),
+            stats.dead_ends.to_string(),
+            format!("{:.3}", stats.corridor_share()),
+            stats.unreachable_pairs.to_string(),
+        ]);
+    }
+    table
+}
+
+fn in_words(scenario: &ScenarioStats) -> String {
+    let ScenarioStats { num_agents, sum_of_distances, longest_distance, .. } = scenario;
+    let bounds = format!(
+        "{num_agents} agents, no sum of costs below {sum_of_distances}, no makespan below {longest_distance}"
+    );
+    let verdict = match scenario.doubts.as_slice() {
+        [] if scenario.is_proven_solvable => "solvable".to_owned(),
+        [] => "nothing proves it unsolvable".to_owned(),
+        doubts => {
+            let told: Vec<String> = doubts.iter().map(doubt).collect();
+            format!("unsolvable: {}", told.join("; "))
+        }
+    };
+    format!("{bounds}; {verdict}")
+}
+
+fn doubt(doubt: &Doubt) -> String {
+    let listed = |agents: &[usize]| agents.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    match doubt {
+        Doubt::NoWay(agent) => format!("agent {agent} has no way to its goal"),
+        Doubt::SameGoal(agents, cell) => format!("agents {} all want to stay on cell {cell}", listed(agents)),
+        Doubt::Locked(agents) => {
+            format!(
+                "agents {} share a component in which nothing they can do brings them all home",
+                listed(agents)
+            )
+        }
+        Doubt::WrongOrder(agents) => {
+            format!(
+                "agents {} share a corridor along which their goals stand in another order",
+                listed(agents)
+            )
+        }
+    }
+}
+
+fn as_json(map: &NamedMap, stats: &MapStats, scenario: Option<&ScenarioStats>) -> Value {
+    json!({
+        "map": map.name,
+        "height": stats.height,
+        "width": stats.width,
+        "free": stats.num_free,
+        "density": stats.density,
+        "components": stats.components,
+        "dead_ends": stats.dead_ends,
+        "corridor_share": stats.corridor_share(),
+        "unreachable_pairs": stats.unreachable_pairs,
+        "scenario": scenario.map(|scenario| json!({
+            "num_agents": scenario.num_agents,
+            "least_sum_of_costs": scenario.sum_of_distances,
+            "least_makespan": scenario.longest_distance,
+            "solvable": match (scenario.doubts.is_empty(), scenario.is_proven_solvable) {
+                (true, true) => Some(true),
+                (true, false) => None,
+                (false, _) => Some(false),
+            },
+            "proofs": scenario.doubts.iter().map(doubt).collect::<Vec<_>>(),
+        })),
+    })
+}
