@@ -71,7 +71,7 @@ def build(directory: Path) -> None:
     clear(directory)
     run([sys.executable, "-m", "venv", str(directory)], "cannot make a virtual environment; is `venv` installed?")
     pip = [str(directory / "bin" / "python"), "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
-    run([*pip, "--retries", "2", "-r", str(REQUIREMENTS)], "pip cannot install requirements.txt; is there a network?")
+    run([*pip, "--retries", "2", "--no-deps", "-r", str(REQUIREMENTS)], "pip cannot install requirements.txt; is there a network?")
     write_stamp(directory, wanted_stamp())
 
 

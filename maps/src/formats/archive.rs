@@ -14,12 +14,12 @@ use crate::text::MapText;
 /// More entries than this are refused, whatever they hold.
 const MOST_ENTRIES: usize = 100_000;
 /// More than this is not unpacked, of all entries together. Units: bytes.
-const MOST_UNPACKED: u64 = 1 << 30;
+const MOST_UNPACKED: u64 = 1 << 28;
 
 /// Reads every `.map` file of a zip archive, by the file's name without folder and ending, in order of their names.
 ///
 /// # Errors
-/// [`Error::Io`] with the entry's name for what is no archive, cannot be unpacked, unpacks to more than 1 GiB, lies
+/// [`Error::Io`] with the entry's name for what is no archive, cannot be unpacked, unpacks to more than 256 MiB, lies
 /// outside the archive's own folder, has the name of another, or is no map.
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
@@ -36,8 +36,8 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
             archive.by_index(index).map_err(|error| Error::io(format!("entry {index}"), error))?;
         let path = entry.name().to_owned();
         let failed = |reason: &dyn std::fmt::Display| Error::io(shorten(&path, Error::LONGEST_QUOTE), reason);
-        let inside =
-            entry.enclosed_name().ok_or_else(|| failed(&"lies outside the folder of the archive"))?;
+        let inside = entry.enclosed_name().filter(|_| !path.starts_with(['/', '\\']));
+        let inside = inside.ok_or_else(|| failed(&"lies outside the folder of the archive"))?;
         if entry.is_dir() || inside.extension().is_none_or(|ending| ending != "map") {
             continue;
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use pogema_core::{Error, shorten};
-use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
 use crate::config::yaml_document;
@@ -22,24 +22,27 @@ pub struct NamedMap {
 /// Reads a map set, in the order of the file.
 ///
 /// # Errors
-/// [`Error::Syntax`] with line and column for what is no YAML, a name that stands twice, or a map that
-/// [`parse_map_text`] refuses.
+/// [`Error::Map`] with line and column for a name that stands twice or a map that [`parse_map_text`] refuses, and
+/// an error with the place for what is no YAML.
 ///
 /// Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry._initialize_maps`
 pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    let entries: Entries = yaml_document(text)?;
+    let entries: Entries = yaml_document(text).map_err(|error| match error {
+        Error::Syntax { reason } => Error::State { reason: format!("map set: {reason}") },
+        other => other,
+    })?;
     let mut names = BTreeSet::new();
     let read = |(name, block): (String, Spanned<String>)| {
-        let place = Place::of(text, &block);
+        let place = Place { source: text, block: &block, name: &name };
         if !names.insert(name.clone()) {
-            return Err(place.error(1, 1, &name, "the name stands twice"));
+            return Err(place.error(1, 1, "the name stands twice"));
         }
         let map = parse_map_text(&block.value).map_err(|error| match error {
-            Error::Map { line, column, reason } => place.error(line, column, &name, &reason),
-            Error::Instance { reason } => place.error(1, 1, &name, &reason),
+            Error::Map { line, column, reason } => place.error(line, column, &reason),
+            Error::Instance { reason } => place.error(1, 1, &reason),
             other => other,
         })?;
         Ok(NamedMap { name, text: map })
@@ -61,37 +64,34 @@ pub fn write_set(maps: &[NamedMap]) -> Result<String, Error> {
     Ok(lines.concat())
 }
 
-/// Where a block stands in the file.
+/// Where a map stands in the file.
 struct Place<'a> {
     source: &'a str,
-    /// Line of the block's first row, counted from 1.
-    first_line: usize,
-    /// Whether rows of the block are lines of the file.
-    is_block: bool,
-    column: usize,
+    block: &'a Spanned<String>,
+    name: &'a str,
 }
 
-impl<'a> Place<'a> {
-    fn of(source: &'a str, block: &Spanned<String>) -> Self {
-        let line = block.defined.line() as usize;
-        let column = block.defined.column() as usize;
-        let line_text = source.lines().nth(line.saturating_sub(1)).unwrap_or_default();
-        let begins = line_text.chars().nth(column.saturating_sub(1));
-        let is_block = begins == Some('|');
-        Self { source, first_line: line + usize::from(is_block), is_block, column }
+impl Place<'_> {
+    /// What is wrong with a row of the map, counted from 1, told by its place in the file.
+    fn error(&self, row: usize, column: usize, reason: &str) -> Error {
+        let (line, column) = self.find(row, column);
+        let quoted = shorten(self.name, Error::LONGEST_QUOTE);
+        Error::Map { line, column, reason: format!("in `{quoted}`: {reason}") }
     }
 
-    fn error(&self, line: usize, column: usize, name: &str, reason: &str) -> Error {
-        let quoted = shorten(name, Error::LONGEST_QUOTE);
-        let (line, column) = if self.is_block {
-            let line = self.first_line + line - 1;
-            let text = self.source.lines().nth(line - 1).unwrap_or_default();
-            let indent = text.chars().take_while(|letter| *letter == ' ').count();
-            (line, indent + column)
-        } else {
-            (self.first_line, self.column)
-        };
-        Error::Syntax { reason: format!("line {line}, column {column}: map `{quoted}`: {reason}") }
+    fn find(&self, row: usize, column: usize) -> (usize, usize) {
+        let (first, begin) = (self.block.defined.line() as usize, self.block.defined.column() as usize);
+        let text = self.block.value.as_str();
+        // The parser tells where the first line stands that is not empty.
+        let num_blank = text.lines().take_while(|line| line.is_empty()).count();
+        let line = (first + row).saturating_sub(1 + num_blank);
+        let wanted = text.lines().nth(row - 1).unwrap_or_default();
+        let found = self.source.lines().nth(line.saturating_sub(1)).and_then(|there| {
+            let offset = there.find(wanted).filter(|_| !wanted.is_empty())?;
+            Some(there[..offset].chars().count())
+        });
+        // Rows of a text in quotes need not be lines of the file.
+        found.map_or((first, begin), |offset| (line, offset + column))
     }
 }
 
@@ -111,10 +111,7 @@ impl<'de> Deserialize<'de> for Entries {
             fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Entries, A::Error> {
                 let mut list = Vec::new();
                 while let Some(name) = entries.next_key::<String>()? {
-                    let block = entries.next_value().map_err(|error| {
-                        let quoted = shorten(&name, Error::LONGEST_QUOTE);
-                        A::Error::custom(format!("map `{quoted}`: {error}"))
-                    })?;
+                    let block = entries.next_value()?;
                     list.push((name, block));
                 }
                 Ok(Entries(list))
