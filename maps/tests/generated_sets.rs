@@ -60,9 +60,9 @@ fn training_sets_have_the_published_names() {
         let maps = preset.maps().unwrap();
         (maps.len(), maps[0].name.clone(), maps[maps.len() - 1].name.clone())
     };
-    let named = |number, first: &str, last: &str| (number, first.to_owned(), last.to_owned());
-    let random = named(512, "training-random-seed-128", "training-random-seed-639");
+    let expected = |number, first: &str, last: &str| (number, first.to_owned(), last.to_owned());
+    let random = expected(512, "training-random-seed-128", "training-random-seed-639");
     assert_eq!(names(Preset::TrainingRandom), random);
-    let mazes = named(2048, "training-mazes-seed-0128", "training-mazes-seed-2175");
+    let mazes = expected(2048, "training-mazes-seed-0128", "training-mazes-seed-2175");
     assert_eq!(names(Preset::TrainingMazes), mazes);
 }
