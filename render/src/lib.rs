@@ -3,5 +3,7 @@
 //! [`Film`] is what every picture is made from: a map, and the state after the reset and after each step.
 
 mod film;
+pub mod html;
+pub mod stays;
 
 pub use film::Film;

@@ -1,0 +1,94 @@
+//! Plays an episode to make a page of, or to test with.
+
+use std::collections::{HashMap, VecDeque};
+
+use pogema_core::{
+    Action, Cell, Environment, Error, Map, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
+};
+use pogema_maps::numpy::{Generator, NumpyError};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+
+/// The episode of a config, up to its end; each agent walks to its goal, or at random with the chance `stray`.
+pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
+    let config = GridConfig::from_yaml(yaml)?;
+    let (seed, rules) = (config.seed.unwrap_or_default(), config.rules());
+    let instance = InstanceSource::new(config, None)?.generate()?.instance;
+    // The instance may bring the number of agents.
+    let num_agents = rules.num_agents;
+    let mut environment = Reference::new(rules)?;
+    environment.reset(&instance)?;
+    let start = TraceStart { state: environment.snapshot(), observations: None };
+    let mut trace = Trace { header: TraceHeader::new(rules, &instance, 1), start, steps: Vec::new() };
+    let mut walkers = Walkers { generator: Generator::seeded(seed), stray, ways: HashMap::new() };
+    for _ in 0..rules.max_steps.max(1) {
+        let actions = walkers
+            .act(instance.map(), &environment.snapshot())
+            .map_err(|error| Error::State { reason: error.to_string() })?;
+        let mut step = TraceStep {
+            actions,
+            state: Snapshot::default(),
+            rewards: vec![0.0; num_agents],
+            terminated: vec![false; num_agents],
+            truncated: vec![false; num_agents],
+            observations: None,
+            metrics: None,
+        };
+        let TraceStep { actions, rewards, terminated, truncated, .. } = &mut step;
+        environment.step(actions, StepOut { rewards, terminated, truncated })?;
+        step.state = environment.snapshot();
+        let is_over = step.terminated.iter().all(|&flag| flag);
+        trace.steps.push(step);
+        if is_over {
+            break;
+        }
+    }
+    Ok(trace)
+}
+
+/// Agents that know the way.
+struct Walkers {
+    generator: Generator,
+    stray: f64,
+    /// For each goal, how far every cell is from it.
+    ways: HashMap<Cell, Vec<u32>>,
+}
+
+impl Walkers {
+    fn act(&mut self, map: &Map, state: &Snapshot) -> Result<Vec<Action>, NumpyError> {
+        let mut actions = Vec::with_capacity(state.cells.len());
+        for (&cell, &goal) in state.cells.iter().zip(&state.goals) {
+            let strays = self.generator.random() < self.stray;
+            let first = self.generator.integers(0, 5)? as usize;
+            let way = self.ways.entry(goal).or_insert_with(|| distances(map, goal));
+            let length =
+                |action: &Action| neighbour(map, cell, *action).map_or(u32::MAX, |at| way[map.index(at)]);
+            // Begun anywhere, so that of two ways of one length either can be taken.
+            let choices = (0..5).map(|add| Action::ALL[(first + add) % 5]);
+            let best = choices.min_by_key(length).unwrap_or_default();
+            actions.push(if strays { Action::ALL[first] } else { best });
+        }
+        Ok(actions)
+    }
+}
+
+fn neighbour(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
+    let (row, col) = cell.toward(action);
+    let cell = Cell::new(row.try_into().ok()?, col.try_into().ok()?);
+    (map.contains(cell) && !map.obstacles()[map.index(cell)]).then_some(cell)
+}
+
+fn distances(map: &Map, goal: Cell) -> Vec<u32> {
+    let mut lengths = vec![u32::MAX; map.height() * map.width()];
+    let mut queue = VecDeque::from([goal]);
+    lengths[map.index(goal)] = 0;
+    while let Some(cell) = queue.pop_front() {
+        for next in Action::ALL.into_iter().filter_map(|action| neighbour(map, cell, action)) {
+            if lengths[map.index(next)] == u32::MAX {
+                lengths[map.index(next)] = lengths[map.index(cell)] + 1;
+                queue.push_back(next);
+            }
+        }
+    }
+    lengths
+}

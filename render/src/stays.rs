@@ -1,0 +1,173 @@
+//! Why agents stay: for each reverted move, the rule that reverted it.
+
+use std::collections::HashMap;
+
+use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
+
+/// A move that an active agent wanted and did not get.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stay {
+    /// Whose move it is.
+    pub agent: usize,
+    /// The id of the rule that reverted it.
+    pub rule: &'static str,
+    /// What stood in the way.
+    pub cause: Cause,
+}
+
+/// What a reverted move ran into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The wall around the map.
+    Wall,
+    /// The obstacle on a cell.
+    Obstacle(Cell),
+    /// Another agent, by index: the one that holds the cell, or that gets it instead.
+    Agent(usize),
+    /// Nothing that the rules know: whoever recorded the step played by other rules.
+    Unknown,
+}
+
+/// The reverted moves of one step, by ascending agent: active agents that did not stay of their own will and are
+/// where they were. Each has one reason; where several hold, the first of these counts: obstacle or wall, swap,
+/// occupied cell, lost contest.
+///
+/// The four lists of agents are as long as each other; what goes beyond the shortest is left out.
+///
+/// Rule: move/actions, collide/priority, collide/block-both, collide/soft
+pub fn stays(
+    config: &Config,
+    map: &Map,
+    before: &Snapshot,
+    actions: &[Action],
+    after: &Snapshot,
+) -> Vec<Stay> {
+    let step = Step::new(map, before, actions, after);
+    let reason = |agent| {
+        let (rule, cause) = step.reason(config.collision, agent);
+        Stay { agent, rule, cause }
+    };
+    (0..step.num_agents).filter(|&agent| step.is_reverted(agent)).map(reason).collect()
+}
+
+type Reason = (&'static str, Cause);
+
+/// One step, with the agents that took part sorted by cell.
+struct Step<'a> {
+    num_agents: usize,
+    map: &'a Map,
+    before: &'a Snapshot,
+    actions: &'a [Action],
+    after: &'a Snapshot,
+    /// Who was where.
+    occupants: HashMap<Cell, usize>,
+    /// Who came where.
+    arrivals: HashMap<Cell, usize>,
+    /// The two lowest indices that aim at a cell.
+    aiming: HashMap<Cell, (usize, Option<usize>)>,
+}
+
+impl<'a> Step<'a> {
+    fn new(map: &'a Map, before: &'a Snapshot, actions: &'a [Action], after: &'a Snapshot) -> Self {
+        let lengths = [before.cells.len(), before.active.len(), actions.len(), after.cells.len()];
+        let num_agents = lengths.into_iter().min().unwrap_or(0);
+        let [occupants, arrivals] = [HashMap::new(), HashMap::new()];
+        let aiming = HashMap::new();
+        let mut step = Self { num_agents, map, before, actions, after, occupants, arrivals, aiming };
+        for agent in (0..num_agents).filter(|&agent| before.active[agent]) {
+            step.occupants.insert(before.cells[agent], agent);
+            if step.has_moved(agent) {
+                step.arrivals.insert(after.cells[agent], agent);
+            }
+            if let Some(target) = step.target(agent) {
+                let (lowest, second) = step.aiming.entry(target).or_insert((agent, None));
+                if *lowest != agent {
+                    second.get_or_insert(agent);
+                }
+            }
+        }
+        step
+    }
+
+    fn has_moved(&self, agent: usize) -> bool {
+        self.before.cells[agent] != self.after.cells[agent]
+    }
+
+    fn is_reverted(&self, agent: usize) -> bool {
+        self.before.active[agent] && self.actions[agent] != Action::Stay && !self.has_moved(agent)
+    }
+
+    /// The cell an agent aims at, if it is on the map.
+    fn target(&self, agent: usize) -> Option<Cell> {
+        let (row, col) = self.before.cells[agent].toward(self.actions[agent]);
+        let cell = Cell::new(row.try_into().ok()?, col.try_into().ok()?);
+        self.map.contains(cell).then_some(cell)
+    }
+
+    fn reason(&self, collision: Collision, agent: usize) -> Reason {
+        let blocked = if collision == Collision::Soft { "collide/soft/stay" } else { "move/actions" };
+        let Some(target) = self.target(agent) else { return (blocked, Cause::Wall) };
+        if self.map.obstacles()[self.map.index(target)] {
+            return (blocked, Cause::Obstacle(target));
+        }
+        match collision {
+            Collision::Priority => self.reason_by_priority(agent, target),
+            Collision::BlockBoth => self.reason_blocking_both(agent, target),
+            Collision::Soft => self.reason_softly(agent, target),
+        }
+    }
+
+    /// Who holds the cell when the agent's turn comes: a lower index that has come, or one that has not left yet.
+    ///
+    /// Rule: collide/priority/contest, collide/priority/follow, collide/priority/swap
+    fn reason_by_priority(&self, agent: usize, target: Cell) -> Reason {
+        if let Some(&winner) = self.arrivals.get(&target).filter(|&&other| other < agent) {
+            return ("collide/priority/contest", Cause::Agent(winner));
+        }
+        match self.occupants.get(&target) {
+            Some(&other) if self.is_in_ring(agent) => ("collide/priority/swap", Cause::Agent(other)),
+            Some(&other) if !self.has_moved(other) => ("collide/priority", Cause::Agent(other)),
+            Some(&other) if other > agent => ("collide/priority/follow", Cause::Agent(other)),
+            _ => ("collide/priority", Cause::Unknown),
+        }
+    }
+
+    /// Rule: collide/block-both/occupied, collide/block-both/contest
+    fn reason_blocking_both(&self, agent: usize, target: Cell) -> Reason {
+        if let Some(&other) = self.occupants.get(&target) {
+            return ("collide/block-both/occupied", Cause::Agent(other));
+        }
+        match self.aiming.get(&target) {
+            Some(&(other, _)) if other != agent => ("collide/block-both/contest", Cause::Agent(other)),
+            Some(&(_, Some(other))) => ("collide/block-both/contest", Cause::Agent(other)),
+            _ => ("collide/block-both", Cause::Unknown),
+        }
+    }
+
+    /// Rule: collide/soft/swap, collide/soft/chain, collide/soft/contest
+    fn reason_softly(&self, agent: usize, target: Cell) -> Reason {
+        match (self.occupants.get(&target), self.arrivals.get(&target)) {
+            (Some(&other), _) if self.target(other) == Some(self.before.cells[agent]) => {
+                ("collide/soft/swap", Cause::Agent(other))
+            }
+            (Some(&other), _) if !self.has_moved(other) => ("collide/soft/chain", Cause::Agent(other)),
+            (_, Some(&winner)) => ("collide/soft/contest", Cause::Agent(winner)),
+            _ => ("collide/soft", Cause::Unknown),
+        }
+    }
+
+    /// Whether each from this agent on aims at the cell of the next, up to one that aims at the agent's own.
+    fn is_in_ring(&self, agent: usize) -> bool {
+        let next = |other: &usize| self.target(*other).and_then(|cell| self.occupants.get(&cell)).copied();
+        // Behind a ring that the agent is not part of, the walk would go on for ever.
+        let mut ahead = std::iter::successors(next(&agent), next).take(self.num_agents);
+        ahead.any(|other| other == agent)
+    }
+}
+
+#[cfg(test)]
+#[path = "../examples/pages/play.rs"]
+pub(crate) mod play;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,135 @@
+//! Every reverted move of drawn episodes has a reason, and the states bear it out.
+
+use std::collections::BTreeMap;
+
+use pogema_core::{Trace, TraceStep};
+
+use super::play::play;
+use super::*;
+
+const SYSTEMS: [&str; 3] = ["priority", "block_both", "soft"];
+const MODES: [&str; 3] = ["finish", "nothing", "restart"];
+
+/// Small and crowded, so that every rule has its say.
+fn drawn(collision: &str, mode: &str, seed: u64) -> Trace {
+    let (size, num_agents) = (5 + seed % 4, 5 + seed % 4);
+    let yaml = format!(
+        "{{size: {size}, num_agents: {num_agents}, density: 0.1, seed: {seed}, max_episode_steps: 40, \
+         collision_system: {collision}, on_target: {mode}}}"
+    );
+    play(&yaml, 0.6).unwrap()
+}
+
+/// What must be true of the states if `stay` is the reason.
+fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, stay: Stay) -> bool {
+    let (map, after, agent) = (&trace.header.map, &step.state, stay.agent);
+    let own = before.cells[agent];
+    let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
+    let at = |cell: Cell| (i32::from(cell.row), i32::from(cell.col));
+    let other = match stay.cause {
+        Cause::Wall => {
+            let (row, col) = aim(agent);
+            return row < 0 || col < 0 || row as usize >= map.height() || col as usize >= map.width();
+        }
+        Cause::Obstacle(cell) => return map.obstacles()[map.index(cell)] && at(cell) == aim(agent),
+        Cause::Unknown => return false,
+        Cause::Agent(other) => other,
+    };
+    let was_there = at(before.cells[other]) == aim(agent);
+    let stayed = before.cells[other] == after.cells[other];
+    let came = !stayed && at(after.cells[other]) == aim(agent);
+    let nobody_was_there =
+        (0..before.cells.len()).all(|third| !before.active[third] || at(before.cells[third]) != aim(agent));
+    let wants_mine = aim(other) == at(own);
+    let fits = match stay.rule {
+        "collide/priority/contest" | "collide/soft/contest" => came && other < agent,
+        "collide/priority/follow" => was_there && !stayed && other > agent,
+        "collide/priority" => was_there && stayed && !wants_mine,
+        "collide/priority/swap" => was_there && stayed && turns(before, &step.actions, agent),
+        "collide/block-both/occupied" => was_there,
+        "collide/block-both/contest" => nobody_was_there && stayed && aim(other) == aim(agent),
+        "collide/soft/swap" => was_there && stayed && wants_mine,
+        "collide/soft/chain" => was_there && stayed && !wants_mine,
+        _ => false,
+    };
+    fits && other != agent && before.active[other]
+}
+
+/// Whether the agents from this one on form a ring, found by looking at all of them in turn.
+fn turns(before: &Snapshot, actions: &[Action], agent: usize) -> bool {
+    let mut place = before.cells[agent];
+    for _ in 0..before.cells.len() {
+        let here = (0..before.cells.len()).find(|&at| before.active[at] && before.cells[at] == place);
+        let Some(here) = here else { return false };
+        let (row, col) = place.toward(actions[here]);
+        if actions[here] == Action::Stay || row < 0 || col < 0 {
+            return false;
+        }
+        place = Cell::new(row as u16, col as u16);
+        if place == before.cells[agent] {
+            return true;
+        }
+    }
+    false
+}
+
+#[test]
+fn every_reverted_move_has_one_true_reason() {
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    for (collision, mode, seed) in SYSTEMS
+        .into_iter()
+        .flat_map(|system| MODES.map(|mode| (system, mode)))
+        .flat_map(|(system, mode)| (0..40).map(move |seed| (system, mode, seed)))
+    {
+        let trace = drawn(collision, mode, seed);
+        let mut before = &trace.start.state;
+        for step in &trace.steps {
+            let got = stays(&trace.header.config, &trace.header.map, before, &step.actions, &step.state);
+            let reverted: Vec<usize> = (0..step.actions.len())
+                .filter(|&agent| before.active[agent] && step.actions[agent] != Action::Stay)
+                .filter(|&agent| before.cells[agent] == step.state.cells[agent])
+                .collect();
+            assert_eq!(got.iter().map(|stay| stay.agent).collect::<Vec<_>>(), reverted);
+            for stay in got {
+                assert!(holds(&trace, before, step, stay), "{collision} {mode} {seed}: {stay:?} {step:?}");
+                *seen.entry(stay.rule).or_default() += 1;
+            }
+            before = &step.state;
+        }
+    }
+    let rules = [
+        "collide/block-both/contest",
+        "collide/block-both/occupied",
+        "collide/priority",
+        "collide/priority/contest",
+        "collide/priority/follow",
+        "collide/priority/swap",
+        "collide/soft/chain",
+        "collide/soft/contest",
+        "collide/soft/stay",
+        "collide/soft/swap",
+        "move/actions",
+    ];
+    assert_eq!(seen.keys().copied().collect::<Vec<_>>(), rules);
+    assert!(seen.values().all(|&times| times > 20), "{seen:?}");
+}
+
+#[test]
+fn a_ring_under_priority_is_a_swap() {
+    let yaml = "{map: \"abAB\\ndcDC\", collision_system: priority}";
+    let trace = play(yaml, 0.0).unwrap();
+    let actions = [Action::Right, Action::Down, Action::Left, Action::Up];
+    let state = &trace.start.state;
+    let got = stays(&trace.header.config, &trace.header.map, state, &actions, state);
+    let reasons: Vec<_> = got.iter().map(|stay| (stay.rule, stay.cause)).collect();
+    let swap = |other| ("collide/priority/swap", Cause::Agent(other));
+    assert_eq!(reasons, [swap(1), swap(2), swap(3), swap(0)]);
+}
+
+#[test]
+fn steps_of_other_rules_have_no_known_reason() {
+    let trace = play("{map: \"a.A\"}", 0.0).unwrap();
+    let state = &trace.start.state;
+    let got = stays(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
+    assert_eq!(got, [Stay { agent: 0, rule: "collide/priority", cause: Cause::Unknown }]);
+}
