@@ -1,1 +1,76 @@
-fn main() {}
+//! Makes the pages that the browser tests drive, and tells how saved maps are read.
+//!
+//! `pages DIR` writes replay pages, what each must show, and the editor; `pages check FILE...` prints what the
+//! map text (`.txt`, `.map`) or config (else) says, as one line of JSON each.
+
+mod play;
+
+use std::path::Path;
+
+use pogema_core::{Error, Trace};
+use pogema_render::{Film, html};
+use serde_json::json;
+
+fn main() -> Result<(), Error> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.as_slice() {
+        [folder] => write_all(Path::new(folder)),
+        _ => Err(Error::State { reason: "expected `pages DIR` or `pages check FILE...`".into() }),
+    }
+}
+
+/// Name, title, config, and the share of moves made at random.
+const EPISODES: [(&str, &str, &str, f64); 5] = [
+    (
+        "finish",
+        "Four agents </title><script>alert(1)</script> & goals",
+        "{size: 8, num_agents: 4, seed: 3, density: 0.2}",
+        0.1,
+    ),
+    (
+        "restart",
+        "Eight agents, one goal after the other",
+        "{size: 12, num_agents: 8, seed: 1, density: 0.25, on_target: restart, collision_system: block_both}",
+        0.15,
+    ),
+    (
+        "soft",
+        "A crowd under soft",
+        "{size: 7, num_agents: 12, seed: 5, density: 0.1, on_target: restart, collision_system: soft, obs_radius: 2}",
+        0.2,
+    ),
+    (
+        "nothing",
+        "All on their goals at once",
+        "{size: 6, num_agents: 5, seed: 2, density: 0.1, on_target: nothing, reward: shared}",
+        0.1,
+    ),
+    (
+        "large",
+        "A thousand agents",
+        "{size: 256, num_agents: 1000, seed: 7, density: 0.2, on_target: restart, max_episode_steps: 256, collision_system: soft}",
+        0.1,
+    ),
+];
+
+fn write_all(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    for (name, title, yaml, stray) in EPISODES {
+        let trace = play::play(yaml, stray)?;
+        write(&folder.join(format!("{name}.html")), &html::replay(&Film::of(&trace), title)?)?;
+        write(&folder.join(format!("{name}.json")), &expected(&trace, title))?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Error> {
+    std::fs::write(path, text).map_err(|error| Error::io(path, error))
+}
+
+/// What the page of a trace must show.
+fn expected(trace: &Trace, title: &str) -> String {
+    let states: Vec<_> =
+        std::iter::once(json!(trace.start)).chain(trace.steps.iter().map(|step| json!(step))).collect();
+    json!({"title": title, "config": trace.header.config, "map": trace.header.map, "states": states})
+        .to_string()
+}

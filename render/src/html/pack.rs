@@ -1,0 +1,221 @@
+//! An episode as JSON for a page: a header one can read, and everything that is long as packed bytes.
+//!
+//! The bytes are the parts of [`Parts`] one after the other, integers in little endian, deflated, in base64;
+//! `film.js` reads them.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use pogema_core::{Action, Cell, Config, Error, Metrics, Snapshot, TraceStep};
+use serde::Serialize;
+
+use crate::Film;
+use crate::stays::{Cause, Stay, stays};
+
+/// Levels above this take longer and save nearly nothing.
+const LEVEL: u8 = 7;
+
+#[derive(Serialize)]
+struct Header<'a> {
+    height: usize,
+    width: usize,
+    num_agents: usize,
+    num_steps: usize,
+    config: Config,
+    metrics: Option<&'a Metrics>,
+    /// Why moves were reverted, as far as it happened; the packed reasons are places in this list.
+    reasons: Vec<Reason>,
+    num_goals: usize,
+    num_reverted: usize,
+    num_others: usize,
+    num_marks: usize,
+    data: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Serialize)]
+struct Reason {
+    rule: &'static str,
+    cause: &'static str,
+}
+
+/// What is packed, each part by step, then by agent.
+#[derive(Default)]
+struct Parts {
+    /// For each agent: start row and col, first goal's row and col (u16).
+    starts: Vec<u8>,
+    /// For each agent: 1 active, 2 on goal, after the reset.
+    flags: Vec<u8>,
+    /// For each step and agent: action, 8 · move, 64 active, 128 on goal.
+    moves: Vec<u8>,
+    /// For each step and agent, f32.
+    rewards: Vec<u8>,
+    /// For each step and agent: 1 terminated, 2 truncated.
+    ended: Vec<u8>,
+    /// Goals that changed: step, agent (u32), row, col (u16).
+    goals: Vec<u8>,
+    /// For each reverted move, its place among the reasons.
+    reverted: Vec<u8>,
+    /// For each reverted move that an agent caused, that agent (u32).
+    others: Vec<u8>,
+    /// Cells where the occupancy grid is not what the active agents' cells say: step (u32), row, col (u16).
+    marks: Vec<u8>,
+    reasons: Vec<Reason>,
+}
+
+/// The episode as JSON without any `<`.
+///
+/// # Errors
+/// As [`super::replay`].
+pub fn pack(film: &Film) -> Result<String, Error> {
+    let num_agents = film.config.num_agents;
+    check_state(film, &film.start, 0)?;
+    let mut parts = Parts::default();
+    parts.add_start(film);
+    let mut before = &film.start;
+    for (step, after) in (1..).zip(&film.steps) {
+        check_step(after, num_agents)?;
+        check_state(film, &after.state, step)?;
+        parts.add_step(film, before, after, step)?;
+        before = &after.state;
+    }
+    let mut bytes = bits(film.map.obstacles());
+    let Parts { starts, flags, moves, rewards, ended, goals, reverted, others, marks, reasons } = parts;
+    for part in [&starts, &flags, &moves, &rewards, &ended, &goals, &reverted, &others, &marks] {
+        bytes.extend_from_slice(part);
+    }
+    let header = Header {
+        height: film.map.height(),
+        width: film.map.width(),
+        num_agents,
+        num_steps: film.steps.len(),
+        config: film.config,
+        metrics: film.steps.iter().rev().find_map(|step| step.metrics.as_ref()),
+        reasons,
+        num_goals: goals.len() / 12,
+        num_reverted: reverted.len(),
+        num_others: others.len() / 4,
+        num_marks: marks.len() / 8,
+        data: STANDARD.encode(compress_to_vec_zlib(&bytes, LEVEL)),
+    };
+    let text = serde_json::to_string(&header).map_err(|error| Error::State { reason: error.to_string() })?;
+    Ok(text.replace('<', "\\u003c"))
+}
+
+impl Parts {
+    fn add_start(&mut self, film: &Film) {
+        let start = &film.start;
+        for (cell, goal) in start.cells.iter().zip(&start.goals) {
+            put_cell(&mut self.starts, *cell);
+            put_cell(&mut self.starts, *goal);
+        }
+        let flags = start.active.iter().zip(&start.on_goal);
+        self.flags = flags.map(|(&active, &on_goal)| u8::from(active) | u8::from(on_goal) << 1).collect();
+        self.add_marks(film, start, 0);
+    }
+
+    fn add_step(&mut self, film: &Film, before: &Snapshot, step: &TraceStep, at: u32) -> Result<(), Error> {
+        let after = &step.state;
+        for (agent, &action) in step.actions.iter().enumerate() {
+            let moved = direction(before.cells[agent], after.cells[agent]).ok_or_else(|| {
+                let (from, to) = (before.cells[agent], after.cells[agent]);
+                wrong(at, format!("agent {agent} is on {to}, expected {from} or a cell next to it"))
+            })?;
+            let flags = u8::from(after.active[agent]) << 6 | u8::from(after.on_goal[agent]) << 7;
+            self.moves.push(action as u8 | (moved as u8) << 3 | flags);
+            self.ended.push(u8::from(step.terminated[agent]) | u8::from(step.truncated[agent]) << 1);
+            self.rewards.extend(step.rewards[agent].to_le_bytes());
+            if before.goals[agent] != after.goals[agent] {
+                self.goals.extend(at.to_le_bytes());
+                self.goals.extend((agent as u32).to_le_bytes());
+                put_cell(&mut self.goals, after.goals[agent]);
+            }
+        }
+        for stay in stays(&film.config, &film.map, before, &step.actions, after) {
+            self.add_stay(stay);
+        }
+        self.add_marks(film, after, at);
+        Ok(())
+    }
+
+    fn add_stay(&mut self, stay: Stay) {
+        let cause = match stay.cause {
+            Cause::Wall => "wall",
+            Cause::Obstacle(_) => "obstacle",
+            Cause::Agent(_) => "agent",
+            Cause::Unknown => "unknown",
+        };
+        let reason = Reason { rule: stay.rule, cause };
+        let place = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
+            self.reasons.push(reason);
+            self.reasons.len() - 1
+        });
+        self.reverted.push(place as u8);
+        if let Cause::Agent(other) = stay.cause {
+            self.others.extend((other as u32).to_le_bytes());
+        }
+    }
+
+    /// Rule: occupancy/as-released
+    fn add_marks(&mut self, film: &Film, state: &Snapshot, at: u32) {
+        let mut differs = vec![false; film.map.obstacles().len()];
+        let active = state.cells.iter().zip(&state.active).filter(|&(_, &active)| active);
+        for (&cell, _) in active {
+            differs[film.map.index(cell)] = true;
+        }
+        for &cell in state.occupied.iter().filter(|&&cell| film.map.contains(cell)) {
+            differs[film.map.index(cell)] ^= true;
+        }
+        for (index, _) in differs.iter().enumerate().filter(|&(_, &differs)| differs) {
+            self.marks.extend(at.to_le_bytes());
+            put_cell(&mut self.marks, film.map.cell_at(index));
+        }
+    }
+}
+
+/// The action that leads from one cell to another.
+fn direction(from: Cell, to: Cell) -> Option<Action> {
+    let to = (i32::from(to.row), i32::from(to.col));
+    Action::ALL.into_iter().find(|&action| from.toward(action) == to)
+}
+
+fn put_cell(bytes: &mut Vec<u8>, cell: Cell) {
+    bytes.extend(cell.row.to_le_bytes());
+    bytes.extend(cell.col.to_le_bytes());
+}
+
+/// Eight flags to a byte, the first one in the lowest bit.
+fn bits(flags: &[bool]) -> Vec<u8> {
+    let byte = |flags: &[bool]| flags.iter().rev().fold(0, |byte, &flag| byte << 1 | u8::from(flag));
+    flags.chunks(8).map(byte).collect()
+}
+
+/// An error at a step, by the line of the trace it stands on.
+fn wrong(step: u32, reason: String) -> Error {
+    Error::Trace { line: step as usize + 2, reason }
+}
+
+fn check_step(step: &TraceStep, num_agents: usize) -> Result<(), Error> {
+    Error::check_length("actions", num_agents, step.actions.len())?;
+    Error::check_length("rewards", num_agents, step.rewards.len())?;
+    Error::check_length("terminated", num_agents, step.terminated.len())?;
+    Error::check_length("truncated", num_agents, step.truncated.len())
+}
+
+fn check_state(film: &Film, state: &Snapshot, step: u32) -> Result<(), Error> {
+    let num_agents = film.config.num_agents;
+    Error::check_length("cells", num_agents, state.cells.len())?;
+    Error::check_length("goals", num_agents, state.goals.len())?;
+    Error::check_length("active", num_agents, state.active.len())?;
+    Error::check_length("on_goal", num_agents, state.on_goal.len())?;
+    for (what, cells) in [("cell", &state.cells), ("goal", &state.goals)] {
+        if let Some(agent) = cells.iter().position(|&cell| !film.map.contains(cell)) {
+            let (height, width) = (film.map.height(), film.map.width());
+            let cell = cells[agent];
+            let reason = format!(
+                "the {what} {cell} of agent {agent} is outside the map of {height} rows and {width} columns"
+            );
+            return Err(wrong(step, reason));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+// Puts the page together.
+
+async function start() {
+  const header = JSON.parse(byId("data").textContent);
+  if (typeof DecompressionStream === "undefined") {
+    throw new Error("this browser is too old: it has no DecompressionStream");
+  }
+  new Page(await unpack(header));
+}
+
+class Page {
+  constructor(film) {
+    this.film = film;
+    this.chosen = null;
+    this.isGroundOld = true;
+    watchTheme(() => this.redraw());
+    const stage = byId("stage");
+    const canvases = [byId("ground"), byId("actors")];
+    this.player = new Player(film.numSteps, (time) => this.draw(time), () => this.stopped());
+    this.view = new View(stage, canvases, film.height, film.width, () => this.redraw());
+    this.scene = new Scene(film, this.view, ...canvases);
+    this.panel = new Panel(film, (agent) => this.select(agent), (step) => this.jump(step));
+    this.timeline = new Timeline(film, byId("scrub"), byId("strip"));
+    this.view.listen({ click: (x, y) => this.select(this.scene.agentAt(x, y)) });
+    this.help = wireHelp();
+    this.tellFilm();
+    this.wire();
+    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("hashchange", () => this.follow());
+    this.follow();
+    this.expose();
+    this.redraw();
+    document.body.classList.add("ready");
+  }
+
+  tellFilm() {
+    const { film } = this;
+    const { collision, on_goal, radius } = film.config;
+    const size = `${film.height} × ${film.width}`;
+    const facts = [size, count(film.numAgents, "agent"), count(film.numSteps, "step"), collision, on_goal, `radius ${radius}`];
+    tell(byId("facts"), facts.join(" · "));
+    const figures = Object.entries(film.metrics).map(([name, value]) => `${name} ${number(value)}`);
+    tell(byId("metrics"), figures.join(" · "));
+  }
+
+  wire() {
+    const { player, view } = this;
+    const press = (id, action) => byId(id).addEventListener("click", action);
+    press("play", () => this.toggle());
+    press("first", () => this.jump(0));
+    press("back", () => player.move(-1));
+    press("next", () => player.move(1));
+    press("last", () => this.jump(this.film.numSteps));
+    press("zoom-in", () => view.zoom(1.5));
+    press("zoom-out", () => view.zoom(1 / 1.5));
+    press("fit", () => view.fit());
+    byId("scrub").addEventListener("input", () => this.jump(Number(byId("scrub").value)));
+    byId("speed").addEventListener("change", () => (player.speed = Number(byId("speed").value)));
+    player.speed = Number(byId("speed").value);
+    for (const id of ["goals", "numbers", "smooth"]) {
+      byId(id).addEventListener("change", () => {
+        player.isSmooth = byId("smooth").checked;
+        this.redraw();
+      });
+    }
+  }
+
+  key(event) {
+    if (isTyping(event) || isPressing(event)) return;
+    const { player, view, film } = this;
+    if (this.help.isOpen() && event.key !== "?") return;
+    const tick = (id) => byId(id).click();
+    const actions = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => player.move(event.shiftKey ? -10 : -1),
+      ArrowRight: () => player.move(event.shiftKey ? 10 : 1),
+      Home: () => this.jump(0),
+      End: () => this.jump(film.numSteps),
+      "+": () => view.zoom(1.5),
+      "=": () => view.zoom(1.5),
+      "-": () => view.zoom(1 / 1.5),
+      f: () => view.fit(),
+      g: () => tick("goals"),
+      n: () => tick("numbers"),
+      "[": () => this.turn(-1),
+      "]": () => this.turn(1),
+      ",": () => this.turnSpeed(-1),
+      ".": () => this.turnSpeed(1),
+      "/": () => byId("search").focus(),
+      "?": () => this.help.toggle(),
+      Escape: () => this.select(null),
+    };
+    if (!Object.hasOwn(actions, event.key)) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+
+  toggle() {
+    this.player.toggle();
+    this.tellPlaying();
+  }
+
+  tellPlaying() {
+    const { isPlaying } = this.player;
+    byId("play").setAttribute("aria-label", isPlaying ? "pause" : "play");
+    byId("play").classList.toggle("playing", isPlaying);
+  }
+
+  jump(step) {
+    this.player.jump(step);
+  }
+
+  turn(by) {
+    const { numAgents } = this.film;
+    const from = this.chosen ?? (by > 0 ? -1 : 0);
+    this.select((from + by + numAgents) % numAgents);
+  }
+
+  turnSpeed(by) {
+    const speed = byId("speed");
+    speed.selectedIndex = clamp(speed.selectedIndex + by, 0, speed.options.length - 1);
+    this.player.speed = Number(speed.value);
+  }
+
+  select(agent) {
+    this.chosen = agent;
+    this.panel.select(agent);
+    if (agent !== null) this.view.show(...this.film.agent(this.player.step, agent).cell);
+    this.player.ask();
+    this.note();
+  }
+
+  stopped() {
+    this.tellPlaying();
+    this.note();
+    tell(byId("spoken"), `step ${this.player.step} of ${this.film.numSteps}`);
+  }
+
+  // Writes the moment into the address, so that it can be sent to somebody.
+  note() {
+    const agent = this.chosen === null ? "" : `&agent=${this.chosen}`;
+    const hash = `#step=${this.player.step}${agent}`;
+    if (hash !== location.hash) history.replaceState(null, "", hash);
+  }
+
+  // Goes where the address says; what is no number of a step or an agent is left as it is.
+  follow() {
+    const wanted = new URLSearchParams(location.hash.slice(1));
+    const read = (name, most) => {
+      const text = wanted.get(name) ?? "";
+      return /^\d{1,9}$/.test(text) && Number(text) <= most ? Number(text) : null;
+    };
+    const step = read("step", this.film.numSteps);
+    const agent = read("agent", this.film.numAgents - 1);
+    if (step !== null) this.player.time = step;
+    if (step !== null || agent !== null) this.select(agent);
+  }
+
+  redraw() {
+    this.isGroundOld = true;
+    this.timeline?.drawStrip();
+    this.player.ask();
+  }
+
+  draw(time) {
+    if (this.isGroundOld) this.scene.drawGround();
+    this.isGroundOld = false;
+    const options = { goals: byId("goals").checked, numbers: byId("numbers").checked };
+    this.scene.drawActors(time, this.chosen, options);
+    this.panel.draw(this.player.step);
+    this.timeline.draw(this.player.step, time);
+  }
+
+  // For tests and scripts: everything can be read, nothing changed.
+  expose() {
+    const { film, player, view } = this;
+    const page = this;
+    window.replay = Object.freeze({
+      get step() { return player.step; },
+      get isPlaying() { return player.isPlaying; },
+      get agent() { return page.chosen; },
+      get scale() { return view.scale; },
+      get numDraws() { return player.numDraws; },
+      get medianDraw() { return player.medianDraw(); },
+      numSteps: film.numSteps,
+      numAgents: film.numAgents,
+      state: (step, agent) => film.agent(step, agent),
+      observe: (step, agent) => film.observe(step, agent),
+      marks: (step) => film.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
+      // Where a cell is on the stage. Units: pixels.
+      center: (row, col) => view.center(row, col),
+    });
+  }
+}
+
+start().catch((error) => {
+  const reason = error instanceof Error ? error.message : String(error);
+  byId("broken").hidden = false;
+  tell(byId("broken"), `This episode cannot be shown: ${reason}`);
+});

@@ -1,0 +1,137 @@
+// The list of agents, and all there is to tell about the chosen one.
+
+const WHY = {
+  "move/actions": "an agent that aims at an obstacle or the wall stays",
+  "collide/priority": "the cell was occupied",
+  "collide/priority/contest": "a lower index got the cell",
+  "collide/priority/follow": "a higher index had not left the cell yet",
+  "collide/priority/swap": "a swap, or a ring of agents",
+  "collide/block-both": "the cell was occupied or wanted by two",
+  "collide/block-both/contest": "another agent wanted the cell too",
+  "collide/block-both/occupied": "the cell held an agent before the step",
+  "collide/soft": "the move was not possible",
+  "collide/soft/stay": "an agent that aims at an obstacle or the wall stays",
+  "collide/soft/swap": "the two wanted each other's cells",
+  "collide/soft/contest": "a lower index got the cell",
+  "collide/soft/chain": "the agent ahead stayed",
+};
+
+const place = ([row, col]) => `(${row}, ${col})`;
+const number = (value) => String(Math.round(value * 1000) / 1000);
+
+function inTheWay({ cause, cell, other }) {
+  if (cause === "agent") return `agent ${other}`;
+  if (cause === "unknown") return "no known reason";
+  return cause === "wall" ? "the wall" : `obstacle ${place(cell)}`;
+}
+
+class Panel {
+  // `choose(agent)` and `jump(step)` are called when something is picked.
+  constructor(film, choose, jump) {
+    Object.assign(this, { film, jump, choose, chosen: null, reverted: [], shown: "" });
+    this.order = Array.from({ length: film.numAgents }, (_, agent) => agent);
+    this.agents = new LongList(
+      byId("agents"), "agents", (row, index) => this.fillAgent(row, index), (index) => choose(this.order[index]),
+    );
+    this.moves = new LongList(
+      byId("moves"), "reverted moves", (row, index) => this.fillMove(row, index),
+      (index) => jump(this.reverted[index].step),
+    );
+    byId("search").addEventListener("input", () => this.search());
+    byId("search").addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && this.order.length > 0) choose(this.order[0]);
+    });
+    byId("order").addEventListener("change", () => this.search());
+    byId("deselect").addEventListener("click", () => choose(null));
+    this.search();
+  }
+
+  // Agents whose number begins with what is asked for, the number itself first.
+  search() {
+    const { film } = this;
+    const wanted = byId("search").value.trim();
+    const totals = { reverted: film.agentReverted, rewards: film.agentRewards }[byId("order").value];
+    this.order = [];
+    for (let agent = 0; agent < film.numAgents; agent += 1) {
+      if (String(agent).startsWith(wanted)) this.order.push(agent);
+    }
+    if (totals) this.order.sort((one, other) => totals[other] - totals[one] || one - other);
+    tell(byId("found"), this.order.length > 0 ? "" : `no agent ${wanted}; they are 0 to ${film.numAgents - 1}`);
+    this.agents.set(this.order.length, this.order.indexOf(this.chosen));
+  }
+
+  fillAgent(row, index) {
+    const agent = this.order[index];
+    const dot = make("span", { className: "dot" });
+    dot.style.background = colorOf(agent);
+    const numbers = `${number(this.film.agentRewards[agent])} rewarded, ${this.film.agentReverted[agent]} reverted`;
+    row.append(dot, make("b", {}, `agent ${agent}`), make("span", { className: "soft" }, numbers));
+  }
+
+  fillMove(row, index) {
+    const move = this.reverted[index];
+    row.title = WHY[move.rule] ?? "";
+    row.append(
+      make("b", {}, String(move.step)), make("span", {}, move.action), make("code", {}, move.rule),
+      make("span", { className: "soft" }, inTheWay(move)),
+    );
+  }
+
+  select(agent) {
+    this.chosen = agent;
+    this.shown = "";
+    this.agents.pick(this.order.indexOf(agent));
+    byId("nobody").hidden = agent !== null;
+    byId("agent").hidden = agent === null;
+    if (agent === null) return;
+    byId("agent-dot").style.background = colorOf(agent);
+    tell(byId("agent-name"), `Agent ${agent}`);
+    this.reverted = this.film.revertedOf(agent);
+    tell(byId("moves-title"), count(this.reverted.length, "reverted move"));
+    byId("moves").hidden = this.reverted.length === 0;
+    this.moves.set(this.reverted.length, -1);
+  }
+
+  // Called at every frame, and does something only for another step or agent.
+  draw(step) {
+    const shown = `${step} ${this.chosen} ${theme.ground}`;
+    if (this.chosen === null || shown === this.shown) return;
+    this.shown = shown;
+    const state = this.film.agent(step, this.chosen);
+    const standing = !state.isActive ? "finished" : state.isOnGoal ? "on its goal" : "on its way";
+    tell(byId("agent-standing"), state.isActive && !state.isMarked ? `${standing}, vanished` : standing);
+    tell(byId("agent-cell"), place(state.cell));
+    tell(byId("agent-goal"), place(state.goal));
+    tell(byId("agent-action"), state.action ?? "none yet");
+    tell(byId("agent-reward"), `${number(state.reward)} now, ${number(state.total)} so far`);
+    const ends = [state.isTerminated && "terminated", state.isTruncated && "truncated"].filter(Boolean);
+    tell(byId("agent-end"), ends.join(", ") || "no");
+    const { reverted } = state;
+    byId("why").hidden = !reverted;
+    if (reverted) {
+      tell(byId("why-rule"), reverted.rule);
+      tell(byId("why-text"), `${WHY[reverted.rule] ?? ""}: ${inTheWay(reverted)}`);
+    }
+    this.moves.pick(this.reverted.findIndex((move) => move.step === step));
+    this.drawWindows(step);
+  }
+
+  drawWindows(step) {
+    for (const [name, rows] of Object.entries(this.film.observe(step, this.chosen))) {
+      const canvas = byId(`channel-${name}`);
+      const side = rows.length;
+      // A line between cells, as long as there is room for one.
+      const size = Math.max(1, Math.floor(220 / side));
+      const gap = size > 5 ? 1 : 0;
+      canvas.width = canvas.height = side * size;
+      const context = canvas.getContext("2d");
+      const colors = { obstacles: theme.obstacle, agents: theme.text, goal: colorOf(this.chosen) };
+      context.fillStyle = theme.line;
+      context.fillRect(0, 0, canvas.width, canvas.height);
+      rows.forEach((row, down) => row.forEach((value, right) => {
+        context.fillStyle = value ? colors[name] : theme.floor;
+        context.fillRect(right * size, down * size, size - gap, size - gap);
+      }));
+    }
+  }
+}

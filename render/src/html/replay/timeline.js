@@ -1,0 +1,51 @@
+// The strip of steps: how many agents came to their goals, how many moves were reverted, and where we are.
+
+class Timeline {
+  constructor(film, scrub, strip) {
+    Object.assign(this, { film, scrub, strip });
+    scrub.max = film.numSteps;
+    new ResizeObserver(() => this.drawStrip()).observe(strip);
+  }
+
+  // Steps share bars where there are more of them than pixels.
+  drawStrip() {
+    const { film, strip } = this;
+    const ratio = devicePixelRatio || 1;
+    const [width, height] = [strip.clientWidth, strip.clientHeight];
+    strip.width = Math.max(1, Math.round(width * ratio));
+    strip.height = Math.max(1, Math.round(height * ratio));
+    if (film.numSteps === 0) return;
+    const bars = Math.min(film.numSteps, Math.floor(width / 2) || 1);
+    const context = strip.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const half = height / 2;
+    this.drawBars(context, film.stepOnGoal, bars, width / bars, theme.good, (size) => [half - size * (half - 1), size * (half - 1)]);
+    this.drawBars(context, film.stepReverted, bars, width / bars, theme.bad, (size) => [half, size * (half - 1)]);
+    context.fillStyle = theme.line;
+    context.fillRect(0, half - 0.5, width, 1);
+  }
+
+  drawBars(context, counts, bars, width, color, box) {
+    const sums = new Float64Array(bars);
+    for (let step = 1; step <= this.film.numSteps; step += 1) {
+      const bar = Math.min(bars - 1, Math.floor(((step - 1) * bars) / this.film.numSteps));
+      sums[bar] += counts[step];
+    }
+    const most = sums.reduce((one, other) => Math.max(one, other), 0);
+    context.fillStyle = color;
+    sums.forEach((sum, bar) => {
+      if (sum === 0) return;
+      const [top, height] = box(sum / most);
+      context.fillRect(bar * width, top, Math.max(1, width - 0.5), Math.max(1, height));
+    });
+  }
+
+  draw(step, time) {
+    const { film, scrub } = this;
+    if (Number(scrub.value) !== step) scrub.value = step;
+    scrub.setAttribute("aria-valuetext", `step ${step} of ${film.numSteps}`);
+    tell(byId("step"), `step ${step} / ${film.numSteps}`);
+    const part = film.numSteps > 0 ? time / film.numSteps : 0;
+    byId("cursor").style.left = `${100 * part}%`;
+  }
+}

@@ -1,0 +1,65 @@
+// A list of any length, of which only the rows in sight are in the document.
+
+class LongList {
+  // `fill(button, index)` writes one row; `choose(index)` is called when one is picked.
+  constructor(box, label, fill, choose) {
+    Object.assign(this, { box, fill, choose, length: 0, chosen: -1 });
+    this.rowHeight = 30;
+    this.spacer = make("div", { className: "spacer" });
+    box.setAttribute("role", "listbox");
+    box.setAttribute("aria-label", label);
+    box.tabIndex = 0;
+    box.append(this.spacer);
+    box.addEventListener("scroll", () => this.draw());
+    box.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.draw()).observe(box);
+  }
+
+  set(length, chosen) {
+    this.length = length;
+    this.spacer.style.height = `${length * this.rowHeight}px`;
+    this.pick(chosen);
+  }
+
+  // Marks a row and brings it into sight.
+  pick(chosen) {
+    this.chosen = chosen;
+    const { box, rowHeight } = this;
+    const top = chosen * rowHeight;
+    if (chosen >= 0 && (top < box.scrollTop || top + rowHeight > box.scrollTop + box.clientHeight)) {
+      box.scrollTop = top - box.clientHeight / 2 + rowHeight / 2;
+    }
+    this.draw();
+  }
+
+  draw() {
+    const { box, rowHeight, length } = this;
+    const first = Math.max(0, Math.floor(box.scrollTop / rowHeight) - 1);
+    const last = Math.min(length, Math.ceil((box.scrollTop + box.clientHeight) / rowHeight) + 1);
+    const rows = [];
+    for (let index = first; index < last; index += 1) rows.push(this.row(index));
+    this.spacer.replaceChildren(...rows);
+    const chosen = this.chosen >= first && this.chosen < last ? `${box.id}-${this.chosen}` : "";
+    box.setAttribute("aria-activedescendant", chosen);
+  }
+
+  row(index) {
+    const row = make("div", { className: "row", id: `${this.box.id}-${index}`, role: "option" });
+    row.setAttribute("aria-selected", String(index === this.chosen));
+    row.setAttribute("aria-setsize", String(this.length));
+    row.setAttribute("aria-posinset", String(index + 1));
+    row.style.top = `${index * this.rowHeight}px`;
+    row.addEventListener("click", () => this.choose(index));
+    this.fill(row, index);
+    return row;
+  }
+
+  key(event) {
+    const page = Math.max(1, Math.floor(this.box.clientHeight / this.rowHeight) - 1);
+    const ways = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page };
+    if (!(event.key in ways) || this.length === 0) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.choose(clamp(this.chosen + ways[event.key], 0, this.length - 1));
+  }
+}

@@ -1,0 +1,101 @@
+// Colours, and the map itself.
+
+// POGEMA's seven, then the ones furthest from all before.
+const PALETTE = [
+  "#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72d5c8", "#0ea08c", "#8f7b66",
+  "#ff00ff", "#7800ff", "#ffa500", "#00e100", "#ff78a5", "#a50096",
+  "#007800", "#b478ff", "#96a500", "#0069ff", "#f00096", "#ff5a00",
+  "#b4b4ff", "#784b78", "#b45aa5", "#785a00", "#b41ef0",
+];
+const colorOf = (agent) => PALETTE[agent % PALETTE.length];
+// Whether dark or light letters are read better on each colour.
+const INK = PALETTE.map((color) => {
+  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16));
+  return 0.3 * red + 0.59 * green + 0.11 * blue > 150 ? "#14171a" : "#ffffff";
+});
+
+// POGEMA's proportions: of a cell 100 wide, circles have radius 35 and lines are 10 wide.
+const RADIUS = 0.35;
+const LINE = 0.1;
+// Below this, circles and round corners cannot be seen. Units: pixels per cell.
+const COARSE = 6;
+
+// The colours of the style sheet, read again when light turns dark.
+const theme = {};
+function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["ground", "floor", "obstacle", "text", "soft", "line", "accent", "bad", "good"]) {
+    theme[name] = style.getPropertyValue(`--${name}`).trim();
+  }
+}
+function watchTheme(onChange) {
+  readTheme();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    readTheme();
+    onChange();
+  });
+}
+
+// The map one pixel a cell, for when it is seen from afar.
+function bitmapOf(isObstacle, height, width) {
+  const canvas = make("canvas", { width, height });
+  const context = canvas.getContext("2d");
+  const image = context.createImageData(width, height);
+  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(theme.obstacle.slice(at, at + 2), 16));
+  for (let index = 0; index < height * width; index += 1) {
+    if (isObstacle[index]) image.data.set([red, green, blue, 255], 4 * index);
+  }
+  context.putImageData(image, 0, 0);
+  return canvas;
+}
+
+function paintMap(context, view, isObstacle, bitmap) {
+  const { height, width, scale } = view;
+  const wall = Math.max(0.12, 1.5 / scale);
+  context.fillStyle = theme.floor;
+  context.fillRect(0, 0, width, height);
+  context.strokeStyle = theme.obstacle;
+  context.lineWidth = wall;
+  context.strokeRect(-wall / 2, -wall / 2, width + wall, height + wall);
+  if (scale < 2 * COARSE) {
+    context.imageSmoothingEnabled = scale < 1;
+    context.drawImage(bitmap(), 0, 0);
+    return;
+  }
+  const [top, bottom, left, right] = view.seen();
+  paintGrid(context, view);
+  context.fillStyle = theme.obstacle;
+  context.beginPath();
+  for (let row = top; row <= bottom; row += 1) {
+    for (let col = left; col <= right; col += 1) {
+      if (isObstacle[row * width + col]) context.roundRect(col + 0.05, row + 0.05, 0.9, 0.9, 0.15);
+    }
+  }
+  context.fill();
+}
+
+function paintGrid(context, view) {
+  const [top, bottom, left, right] = view.seen();
+  context.strokeStyle = theme.line;
+  context.lineWidth = 1 / view.scale;
+  context.beginPath();
+  for (let row = Math.max(1, top); row <= bottom; row += 1) {
+    context.moveTo(left, row);
+    context.lineTo(right + 1, row);
+  }
+  for (let col = Math.max(1, left); col <= right; col += 1) {
+    context.moveTo(col, top);
+    context.lineTo(col, bottom + 1);
+  }
+  context.stroke();
+}
+
+// A disc, or from afar a square, which is drawn much faster.
+function addDisc(context, x, y, radius, isCoarse) {
+  if (isCoarse) {
+    context.rect(x - radius, y - radius, 2 * radius, 2 * radius);
+  } else {
+    context.moveTo(x + radius, y);
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+  }
+}
