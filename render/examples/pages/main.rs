@@ -8,12 +8,14 @@ mod play;
 use std::path::Path;
 
 use pogema_core::{Error, Trace};
+use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
 use pogema_render::{Film, html};
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn main() -> Result<(), Error> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.as_slice() {
+        [check, files @ ..] if check == "check" => files.iter().try_for_each(|file| check_file(file)),
         [folder] => write_all(Path::new(folder)),
         _ => Err(Error::State { reason: "expected `pages DIR` or `pages check FILE...`".into() }),
     }
@@ -60,7 +62,7 @@ fn write_all(folder: &Path) -> Result<(), Error> {
         write(&folder.join(format!("{name}.html")), &html::replay(&Film::of(&trace), title)?)?;
         write(&folder.join(format!("{name}.json")), &expected(&trace, title))?;
     }
-    Ok(())
+    write(&folder.join("editor.html"), &html::editor())
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Error> {
@@ -73,4 +75,34 @@ fn expected(trace: &Trace, title: &str) -> String {
         std::iter::once(json!(trace.start)).chain(trace.steps.iter().map(|step| json!(step))).collect();
     json!({"title": title, "config": trace.header.config, "map": trace.header.map, "states": states})
         .to_string()
+}
+
+/// Prints what a saved map says, or what is wrong with it.
+fn check_file(path: &str) -> Result<(), Error> {
+    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let is_text = [".txt", ".map"].iter().any(|end| path.ends_with(end));
+    let said = if is_text { said_by_text(&text) } else { said_by_config(&text) };
+    println!("{}", said.unwrap_or_else(|error| json!({"error": error.to_string()})));
+    Ok(())
+}
+
+fn said_by_text(text: &str) -> Result<Value, Error> {
+    let MapText { map, starts, goals, pools } = parse_map_text(text)?;
+    Ok(json!({"rows": map.rows(), "agents": starts, "goals": goals, "pools": pools}))
+}
+
+/// The config is played from, too, since not all that can be read can be played.
+fn said_by_config(text: &str) -> Result<Value, Error> {
+    let config = GridConfig::from_yaml(text)?;
+    let value = config.to_value();
+    let rows = config.map.as_ref().map(pogema_core::Map::rows);
+    InstanceSource::new(config.clone(), None)?.generate()?;
+    let pools = config.possible_agents_xy.as_ref().zip(config.possible_targets_xy.as_ref());
+    Ok(json!({
+        "rows": rows,
+        "agents": config.agents_xy,
+        "goals": value["targets_xy"],
+        "pools": pools,
+        "fields": value,
+    }))
 }

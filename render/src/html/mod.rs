@@ -10,32 +10,60 @@ use pogema_core::Error;
 use crate::Film;
 use page::Page;
 
+const SHARED: [&str; 4] = [
+    include_str!("shared/dom.js"),
+    include_str!("shared/view.js"),
+    include_str!("shared/list.js"),
+    include_str!("shared/paint.js"),
+];
+const REPLAY: [&str; 6] = [
+    include_str!("replay/film.js"),
+    include_str!("replay/scene.js"),
+    include_str!("replay/panel.js"),
+    include_str!("replay/timeline.js"),
+    include_str!("replay/player.js"),
+    include_str!("replay/main.js"),
+];
+const EDITOR: [&str; 8] = [
+    include_str!("editor/text.js"),
+    include_str!("editor/yaml.js"),
+    include_str!("editor/grid.js"),
+    include_str!("editor/check.js"),
+    include_str!("editor/canvas.js"),
+    include_str!("editor/tools.js"),
+    include_str!("editor/files.js"),
+    include_str!("editor/main.js"),
+];
+
 /// The page that replays an episode.
 ///
 /// # Errors
 /// If the lists of a step are not as long as there are agents, if an agent is off the map, or if it is not next
 /// to where it was a step before.
 pub fn replay(film: &Film, title: &str) -> Result<String, Error> {
-    let data = pack::pack(film)?;
     let page = Page {
         title,
         style: concat!(include_str!("shared/base.css"), include_str!("replay/replay.css")),
         body: include_str!("replay/replay.html"),
-        data: &data,
-        script: concat!(
-            "(() => {\n\"use strict\";\n",
-            include_str!("shared/dom.js"),
-            include_str!("shared/view.js"),
-            include_str!("shared/list.js"),
-            include_str!("shared/paint.js"),
-            include_str!("replay/film.js"),
-            include_str!("replay/scene.js"),
-            include_str!("replay/panel.js"),
-            include_str!("replay/timeline.js"),
-            include_str!("replay/player.js"),
-            include_str!("replay/main.js"),
-            "})();\n",
-        ),
+        data: &pack::pack(film)?,
+        script: &script(&[&SHARED, &REPLAY]),
     };
     Ok(page.text())
+}
+
+/// The page that edits maps, as text and as POGEMA's config.
+pub fn editor() -> String {
+    let page = Page {
+        title: "Map editor",
+        style: concat!(include_str!("shared/base.css"), include_str!("editor/editor.css")),
+        body: include_str!("editor/editor.html"),
+        data: "null",
+        script: &script(&[&SHARED, &EDITOR]),
+    };
+    page.text()
+}
+
+/// One script, none of whose names can be seen from outside.
+fn script(parts: &[&[&str]]) -> String {
+    format!("(() => {{\n\"use strict\";\n{}}})();\n", parts.concat().concat())
 }

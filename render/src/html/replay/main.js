@@ -168,7 +168,7 @@ class Page {
     const options = { goals: byId("goals").checked, numbers: byId("numbers").checked };
     this.scene.drawActors(time, this.chosen, options);
     this.panel.draw(this.player.step);
-    this.timeline.draw(this.player.step, time);
+    this.timeline.draw(this.player.step);
   }
 
   // For tests and scripts: everything can be read, nothing changed.

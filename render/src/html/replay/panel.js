@@ -16,7 +16,6 @@ const WHY = {
   "collide/soft/chain": "the agent ahead stayed",
 };
 
-const place = ([row, col]) => `(${row}, ${col})`;
 const number = (value) => String(Math.round(value * 1000) / 1000);
 
 function inTheWay({ cause, cell, other }) {
@@ -120,17 +119,19 @@ class Panel {
     for (const [name, rows] of Object.entries(this.film.observe(step, this.chosen))) {
       const canvas = byId(`channel-${name}`);
       const side = rows.length;
-      // A line between cells, as long as there is room for one.
-      const size = Math.max(1, Math.floor(220 / side));
-      const gap = size > 5 ? 1 : 0;
-      canvas.width = canvas.height = side * size;
+      // As many pixels as the screen has, so that all lines between cells are equally sharp.
+      const across = Math.round((canvas.clientWidth || 96) * (devicePixelRatio || 1));
+      canvas.width = canvas.height = across;
+      const edge = (index) => Math.round((index * across) / side);
+      const gap = across / side > 5 ? 1 : 0;
       const context = canvas.getContext("2d");
       const colors = { obstacles: theme.obstacle, agents: theme.text, goal: colorOf(this.chosen) };
       context.fillStyle = theme.line;
-      context.fillRect(0, 0, canvas.width, canvas.height);
+      context.fillRect(0, 0, across, across);
       rows.forEach((row, down) => row.forEach((value, right) => {
         context.fillStyle = value ? colors[name] : theme.floor;
-        context.fillRect(right * size, down * size, size - gap, size - gap);
+        const [x, y] = [edge(right), edge(down)];
+        context.fillRect(x, y, Math.max(1, edge(right + 1) - x - gap), Math.max(1, edge(down + 1) - y - gap));
       }));
     }
   }

@@ -14,9 +14,9 @@ class Scene {
 
   drawGround() {
     const { film, view } = this;
-    this.bitmapColor !== theme.obstacle && (this.bitmap = null);
+    if (this.bitmapColor !== theme.obstacle) this.bitmap = null;
+    this.bitmapColor = theme.obstacle;
     const bitmap = () => {
-      this.bitmapColor = theme.obstacle;
       return (this.bitmap ??= bitmapOf(film.isObstacle, film.height, film.width));
     };
     paintMap(view.begin(this.ground), view, film.isObstacle, bitmap);
@@ -62,7 +62,8 @@ class Scene {
   }
 
   drawAgents(context, isCoarse) {
-    const least = 1.2 / this.view.scale;
+    // From afar agents are drawn larger than they are, so that none is lost.
+    const least = 1.6 / this.view.scale;
     this.teams.forEach((team, color) => {
       context.fillStyle = PALETTE[color];
       context.beginPath();
@@ -78,6 +79,7 @@ class Scene {
     const { film, view } = this;
     const [top, bottom, left, right] = view.seen();
     context.lineWidth = isCoarse ? Math.max(LINE, 0.6 / view.scale) : LINE;
+    if (isCoarse) context.globalAlpha = 0.5;
     this.teams.forEach((team, color) => {
       context.strokeStyle = PALETTE[color];
       context.beginPath();
@@ -90,6 +92,7 @@ class Scene {
       }
       context.stroke();
     });
+    context.globalAlpha = 1;
   }
 
   drawNumbers(context) {

@@ -40,12 +40,10 @@ class Timeline {
     });
   }
 
-  draw(step, time) {
+  draw(step) {
     const { film, scrub } = this;
     if (Number(scrub.value) !== step) scrub.value = step;
     scrub.setAttribute("aria-valuetext", `step ${step} of ${film.numSteps}`);
     tell(byId("step"), `step ${step} / ${film.numSteps}`);
-    const part = film.numSteps > 0 ? time / film.numSteps : 0;
-    byId("cursor").style.left = `${100 * part}%`;
   }
 }

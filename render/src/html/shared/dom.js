@@ -22,6 +22,9 @@ const clamp = (number, least, most) => Math.min(Math.max(number, least), most);
 
 const count = (number, one, many = `${one}s`) => `${number.toLocaleString("en")} ${number === 1 ? one : many}`;
 
+// A cell as it is written everywhere, row first.
+const place = ([row, col]) => `(${row}, ${col})`;
+
 // Whether a key belongs to the element that has the focus, and is no command to the page.
 function isTyping(event) {
   const target = event.target;

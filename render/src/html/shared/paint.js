@@ -3,9 +3,9 @@
 // POGEMA's seven, then the ones furthest from all before.
 const PALETTE = [
   "#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72d5c8", "#0ea08c", "#8f7b66",
-  "#ff00ff", "#7800ff", "#ffa500", "#00e100", "#ff78a5", "#a50096",
-  "#007800", "#b478ff", "#96a500", "#0069ff", "#f00096", "#ff5a00",
-  "#b4b4ff", "#784b78", "#b45aa5", "#785a00", "#b41ef0",
+  "#fca800", "#fc90f0", "#903090", "#007800", "#90b40c", "#fc7878",
+  "#cc60b4", "#a890fc", "#249cfc", "#845400", "#cc8418", "#6c9024",
+  "#6c54c0", "#e4a8b4", "#90c0fc", "#00cc84", "#84546c",
 ];
 const colorOf = (agent) => PALETTE[agent % PALETTE.length];
 // Whether dark or light letters are read better on each colour.
