@@ -9,6 +9,7 @@ use std::path::Path;
 
 use pogema_core::{Error, Trace};
 use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
+use pogema_render::stays::{Cause, Stay, stays};
 use pogema_render::{Film, html};
 use serde_json::{Value, json};
 
@@ -60,7 +61,7 @@ fn write_all(folder: &Path) -> Result<(), Error> {
     for (name, title, yaml, stray) in EPISODES {
         let trace = play::play(yaml, stray)?;
         write(&folder.join(format!("{name}.html")), &html::replay(&Film::of(&trace), title)?)?;
-        write(&folder.join(format!("{name}.json")), &expected(&trace, title))?;
+        write(&folder.join(format!("{name}.json")), &expected(&trace, title)?)?;
     }
     write(&folder.join("editor.html"), &html::editor())
 }
@@ -69,12 +70,34 @@ fn write(path: &Path, text: &str) -> Result<(), Error> {
     std::fs::write(path, text).map_err(|error| Error::io(path, error))
 }
 
-/// What the page of a trace must show.
-fn expected(trace: &Trace, title: &str) -> String {
-    let states: Vec<_> =
+/// What the page of a trace must show: its states, and for each step why moves were reverted and what was seen.
+fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
+    let states: Vec<Value> =
         std::iter::once(json!(trace.start)).chain(trace.steps.iter().map(|step| json!(step))).collect();
-    json!({"title": title, "config": trace.header.config, "map": trace.header.map, "states": states})
-        .to_string()
+    let (config, map) = (&trace.header.config, &trace.header.map);
+    let mut before = &trace.start.state;
+    let mut reasons = Vec::new();
+    for step in &trace.steps {
+        reasons.push(
+            stays(config, map, before, &step.actions, &step.state).into_iter().map(told).collect::<Value>(),
+        );
+        before = &step.state;
+    }
+    let observations = if config.num_agents > 100 { Vec::new() } else { play::observe(trace)? };
+    let all = json!({
+        "title": title, "config": config, "map": map, "states": states, "stays": reasons, "observations": observations,
+    });
+    Ok(all.to_string())
+}
+
+fn told(stay: Stay) -> Value {
+    let (cause, other) = match stay.cause {
+        Cause::Wall => ("wall", None),
+        Cause::Obstacle(_) => ("obstacle", None),
+        Cause::Agent(other) => ("agent", Some(other)),
+        Cause::Unknown => ("unknown", None),
+    };
+    json!({"agent": stay.agent, "rule": stay.rule, "cause": cause, "other": other})
 }
 
 /// Prints what a saved map says, or what is wrong with it.

@@ -19,7 +19,11 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
     let mut environment = Reference::new(rules)?;
     environment.reset(&instance)?;
     let start = TraceStart { state: environment.snapshot(), observations: None };
-    let mut trace = Trace { header: TraceHeader::new(rules, &instance, 1), start, steps: Vec::new() };
+    let mut trace = Trace {
+        header: TraceHeader::new(rules, &instance, rules.max_steps.max(1) as usize),
+        start,
+        steps: Vec::new(),
+    };
     let mut walkers = Walkers { generator: Generator::seeded(seed), stray, ways: HashMap::new() };
     for _ in 0..rules.max_steps.max(1) {
         let actions = walkers
@@ -44,6 +48,30 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
         }
     }
     Ok(trace)
+}
+
+/// What the reference observes after the reset and each step of an episode: for each agent its three windows, one
+/// after the other, as zeros and ones.
+#[allow(dead_code, reason = "the unit tests, which share this file, observe nothing")]
+pub fn observe(trace: &Trace) -> Result<Vec<Vec<String>>, Error> {
+    let config = trace.header.config;
+    let mut environment = Reference::new(config)?;
+    environment.reset(&trace.header.instance()?)?;
+    let (mut rewards, mut flags, mut others) =
+        (vec![0.0; config.num_agents], vec![false; config.num_agents], vec![false; config.num_agents]);
+    let mut values = vec![0.0; config.num_observed()];
+    let mut all = Vec::new();
+    for actions in std::iter::once(None).chain(trace.steps.iter().map(|step| Some(&step.actions))) {
+        if let Some(actions) = actions {
+            let out = StepOut { rewards: &mut rewards, terminated: &mut flags, truncated: &mut others };
+            environment.step(actions, out)?;
+        }
+        environment.observe(&mut values)?;
+        let window =
+            |values: &[f32]| values.iter().map(|&value| if value == 0.0 { '0' } else { '1' }).collect();
+        all.push(values.chunks(values.len() / config.num_agents).map(window).collect());
+    }
+    Ok(all)
 }
 
 /// Agents that know the way.

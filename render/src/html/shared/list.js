@@ -11,6 +11,11 @@ class LongList {
     box.tabIndex = 0;
     box.append(this.spacer);
     box.addEventListener("scroll", () => this.draw());
+    // By place and not by row, since a row may be made anew between press and release.
+    box.addEventListener("click", (event) => {
+      const index = Math.floor((event.clientY - this.spacer.getBoundingClientRect().top) / this.rowHeight);
+      if (index >= 0 && index < this.length) choose(index);
+    });
     box.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.draw()).observe(box);
   }
@@ -49,7 +54,6 @@ class LongList {
     row.setAttribute("aria-setsize", String(this.length));
     row.setAttribute("aria-posinset", String(index + 1));
     row.style.top = `${index * this.rowHeight}px`;
-    row.addEventListener("click", () => this.choose(index));
     this.fill(row, index);
     return row;
   }

@@ -59,7 +59,10 @@ function paintMap(context, view, isObstacle, bitmap) {
   context.strokeRect(-wall / 2, -wall / 2, width + wall, height + wall);
   if (scale < 2 * COARSE) {
     context.imageSmoothingEnabled = scale < 1;
+    // From afar obstacles are so many that they would drown the agents.
+    context.globalAlpha = scale < COARSE ? 0.6 : 1;
     context.drawImage(bitmap(), 0, 0);
+    context.globalAlpha = 1;
     return;
   }
   const [top, bottom, left, right] = view.seen();

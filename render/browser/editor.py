@@ -1,0 +1,418 @@
+"""The map editor draws, saves what the Rust side reads unchanged, and tells what is wrong with a file."""
+
+import random
+
+from support import equal, on_screen, pixel, settle, text
+
+SETTINGS = """# a comment of somebody
+seed: 7
+collision_system: soft   # kept, with what stands behind it
+on_target: finish
+
+map: |
+  ..#.
+  .#..
+  ....
+obs_radius: 3
+agents_xy: [[0, 0],
+  [2, 3]] # two of them
+targets_xy:
+  - [2, 0]
+  - [0, 3]
+num_agents: 2
+# the end
+"""
+
+
+def at(page, row, col):
+    return on_screen(page, "editor", row, col)
+
+
+def drag(page, *cells):
+    page.mouse.move(*at(page, *cells[0]))
+    page.mouse.down()
+    for cell in cells[1:]:
+        page.mouse.move(*at(page, *cell), steps=3)
+    page.mouse.up()
+    settle(page)
+
+
+def press(page, *cell):
+    drag(page, cell)
+
+
+def rows(page):
+    return page.evaluate("editor.rows")
+
+
+def pairs(page):
+    return [[agent["start"], agent["goal"]] for agent in page.evaluate("editor.agents")]
+
+
+def resize(page, height, width, how="resize"):
+    page.fill("#height", str(height))
+    page.fill("#width", str(width))
+    page.click(f"#{how}")
+    settle(page)
+
+
+def save(world, page, kind):
+    with page.expect_download() as download:
+        page.click("#save-text" if kind == "txt" else "#save-yaml")
+    path = world.scratch / f"saved-{random.getrandbits(40):x}.{kind}"
+    download.value.save_as(path)
+    return path
+
+
+def load(world, page, name, content):
+    path = world.scratch / name
+    path.write_text(content)
+    page.set_input_files("#picker", path)
+    settle(page)
+    return path
+
+
+def paste(page, content):
+    page.evaluate(
+        """(content) => {
+          const data = new DataTransfer();
+          data.setData("text/plain", content);
+          document.body.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true }));
+        }""",
+        content,
+    )
+    settle(page)
+
+
+def drop(page, name, content):
+    page.evaluate(
+        """([name, content]) => {
+          const data = new DataTransfer();
+          data.items.add(new File([content], name));
+          for (const kind of ["dragover", "drop"]) {
+            document.body.dispatchEvent(new DragEvent(kind, { dataTransfer: data, bubbles: true, cancelable: true }));
+          }
+        }""",
+        [name, content],
+    )
+    page.wait_for_timeout(50)
+    settle(page)
+
+
+def test_draw_erase_undo_redo(world):
+    with world.open("editor") as page:
+        resize(page, 4, 6, "new")
+        equal(rows(page), ["......"] * 4)
+        drag(page, (1, 1), (1, 4))
+        drawn = ["......", ".####.", "......", "......"]
+        equal(rows(page), drawn)
+        place = page.evaluate("editor.center(1, 2)")
+        equal(pixel(page, "ground", *place)[:3], [0x84, 0xA1, 0xAE], "an obstacle is drawn")
+        page.keyboard.down("Shift")
+        press(page, 1, 2)
+        page.keyboard.up("Shift")
+        equal(rows(page)[1], ".#.##.")
+        equal(pixel(page, "ground", *place)[:3], [255, 255, 255], "and taken away")
+        page.click("#undo")
+        equal(rows(page), drawn)
+        page.keyboard.press("Control+z")
+        equal(rows(page), ["......"] * 4)
+        page.keyboard.press("Control+y")
+        page.keyboard.press("Control+Shift+Z")
+        equal(rows(page)[1], ".#.##.")
+        assert page.is_disabled("#redo")
+        # A fast stroke has no holes.
+        page.mouse.move(*at(page, 3, 0))
+        page.mouse.down()
+        page.mouse.move(*at(page, 3, 5))
+        page.mouse.up()
+        equal(rows(page)[3], "######")
+
+
+def test_rectangle_fill_and_pools(world):
+    with world.open("editor") as page:
+        resize(page, 5, 5, "new")
+        page.click("[data-tool=rectangle]")
+        drag(page, (3, 3), (1, 1))
+        page.click("[data-kind='0']")
+        press(page, 2, 2)
+        page.click("[data-tool=fill]")
+        page.click("[data-kind='2']")
+        equal(page.get_attribute("[data-tool=fill]", "aria-pressed"), "true")
+        press(page, 2, 2)
+        equal(rows(page), [".....", ".###.", ".#@#.", ".###.", "....."])
+        page.click("[data-kind='3']")
+        press(page, 0, 0)
+        equal(rows(page), ["$$$$$", "$###$", "$#@#$", "$###$", "$$$$$"])
+        equal(text(page, "components"), "2")
+        equal(text(page, "free"), "17 of 25")
+        equal(text(page, "density"), "0.320")
+        [read] = world.check(save(world, page, "txt"))
+        equal(read["rows"], [".....", ".###.", ".#.#.", ".###.", "....."])
+        equal([len(pool) for pool in read["pools"]], [1, 16])
+
+
+def test_agents(world):
+    with world.open("editor") as page:
+        resize(page, 4, 4, "new")
+        press(page, 1, 1)
+        page.click("[data-tool=agents]")
+        drag(page, (0, 0), (3, 3))
+        press(page, 0, 2)
+        assert "agent 1 has no goal yet" in text(page, "issues")
+        page.click("#save-yaml")
+        equal(text(page, "message"), "not saved: agent 1 has no goal yet")
+        press(page, 1, 1)
+        equal(pairs(page), [[[0, 0], [3, 3]], [[0, 2], [1, 1]]])
+        equal(rows(page), ["...."] * 4, "a goal takes the obstacle away")
+        drag(page, (3, 3), (2, 0))
+        drag(page, (0, 0), (0, 2))
+        equal(pairs(page)[0][1], [2, 0])
+        assert pairs(page)[0][0] != [0, 2], "two agents do not share a start"
+        page.click("[data-tool=brush]")
+        page.click("[data-kind='1']")
+        drag(page, (2, 0), (2, 3))
+        equal(rows(page)[2], ".###", "no obstacle on a goal")
+        page.click("[data-tool=remove]")
+        press(page, 1, 1)
+        equal(len(pairs(page)), 1)
+        page.click("#undo")
+        equal(len(pairs(page)), 2)
+
+
+def test_unreachable_goals_are_flagged(world):
+    with world.open("editor") as page:
+        paste(page, "a.#.A\nb.#..\nB.#..\n")
+        equal(page.evaluate("editor.issues"), ["agent 0 cannot reach its goal: it is in another component"])
+        equal(text(page, "components"), "2")
+        page.check("#tint")
+        settle(page)
+        one, other = (pixel(page, "ground", *page.evaluate("(col) => editor.center(1, col)", col))[:3] for col in (1, 3))
+        assert one != other and [255, 255, 255] not in (one, other), (one, other)
+        page.click("#issues button")
+        page.keyboard.press(".")
+        press(page, 1, 2)
+        equal(page.evaluate("editor.issues"), [])
+
+
+def test_text_comes_back_unchanged(world):
+    content = "a.#b\nB..A\n.#.."
+    with world.open("editor") as page:
+        source = load(world, page, "small.txt", content)
+        equal(text(page, "message"), "small.txt: 3 × 4, 2 agents")
+        saved = save(world, page, "txt")
+        equal(saved.read_text(), content + "\n")
+        equal(*world.check(source, saved))
+        page.set_input_files("#picker", saved)
+        settle(page)
+        equal(save(world, page, "txt").read_bytes(), saved.read_bytes(), "saved again")
+        [read] = world.check(save(world, page, "yaml"))
+        equal([read["agents"], read["goals"]], [[[0, 0], [0, 3]], [[1, 3], [1, 0]]])
+
+
+def test_yaml_keeps_what_it_does_not_edit(world):
+    with world.open("editor") as page:
+        source = load(world, page, "settings.yaml", SETTINGS)
+        equal(pairs(page), [[[0, 0], [2, 0]], [[2, 3], [0, 3]]])
+        saved = save(world, page, "yaml")
+        before, after = world.check(source, saved)
+        equal(after, before)
+        for line in SETTINGS.splitlines():
+            if line.startswith(("#", "seed", "coll", "on_", "obs", "num")):
+                assert line in saved.read_text().splitlines(), line
+        page.keyboard.press("b")
+        press(page, 2, 1)
+        page.click("[data-tool=agents]")
+        drag(page, (1, 3), (1, 2))
+        changed = save(world, page, "yaml")
+        [read] = world.check(changed)
+        equal(read["rows"], ["..#.", ".#..", ".#.."])
+        equal([read["agents"], read["goals"]], [[[0, 0], [2, 3], [1, 3]], [[2, 0], [0, 3], [1, 2]]])
+        equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [7, 3, "soft", 3])
+        page.set_input_files("#picker", changed)
+        settle(page)
+        equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
+
+
+def test_other_ways_to_write_a_config(world):
+    same = [
+        'map: "a.#\\n..A"\nseed: 1\n',
+        "seed: 1\nmap: a.# ..A\n",
+        "seed: 1\nmap: >-\n  a.#\n\n  ..A\n",
+        "seed: 1\nmap: [[0, 0, 1], [0, 0, 0]]\nagents_xy: [[0,0]]\ntargets_xy: [[1,2]]\n",
+        "---\nmap:\n  - [0, 0, 1]\n  - [0, 0, 0]\nagents_xy:\n- [0,0] # here\ntargets_xy:\n- [1,2]\nseed: 1",
+        '{"map": "a.#\\n..A", "seed": 1}',
+        '{\n "seed": 1, "map": [[0,0,1],[0,0,0]], "agents_xy": [[0,0]], "targets_xy": [[1,2]]}',
+    ]
+    with world.open("editor") as page:
+        for number, content in enumerate(same):
+            source = load(world, page, f"way-{number}.yaml", content)
+            before, after = world.check(source, save(world, page, "yaml"))
+            equal(after, before, content)
+            equal(after["fields"]["seed"], 1)
+
+
+def test_goal_sequences_are_kept(world):
+    content = "on_target: restart\nmap: |-\n  ...\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\n"
+    with world.open("editor") as page:
+        source = load(world, page, "restart.yaml", content)
+        saved = save(world, page, "yaml")
+        equal(saved.read_text(), content)
+        equal(*world.check(source, saved))
+        page.click("#save-text")
+        equal(text(page, "message"), "not saved: text has one goal for each agent; save it as YAML")
+        page.click("[data-tool=agents]")
+        paste(page, "on_target: restart\nmap: |\n  a.A\n")
+        equal(page.evaluate("editor.issues"), ["on_target is restart, which needs two goals or more for each agent"])
+
+
+def test_what_text_cannot_say(world):
+    shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
+    many = "map: |\n" + "  ....\n" * 14 + f"agents_xy: {[[row, 0] for row in range(14)] + [[row, 1] for row in range(13)]}\n"
+    many += f"targets_xy: {[[row, 2] for row in range(14)] + [[row, 3] for row in range(13)]}\n"
+    with world.open("editor") as page:
+        for content, reason in [
+            (shared, "two letters would stand on (0, 3) (agent 1); save it as YAML"),
+            (many, "text has letters for 26 agents, the map has 27; save it as YAML"),
+        ]:
+            paste(page, content)
+            page.click("#save-text")
+            equal(text(page, "message"), f"not saved: {reason}")
+            [read] = world.check(save(world, page, "yaml"))
+            equal([list(pair) for pair in zip(read["agents"], read["goals"])], pairs(page))
+
+
+def test_errors_are_told_with_line_and_column(world):
+    wrong = [
+        ("bad.txt", "..\n.x.\n.%", 'bad.txt: line 2, column 3'),
+        ("bad.txt", "...\n.?.", 'bad.txt: line 2, column 2: unknown character "?", expected one of .#@$!, a-z or A-Z'),
+        ("bad.txt", "...\n..", "bad.txt: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
+        ("bad.txt", "a..\n.A.\n..b", "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected as many"),
+        ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected exact starts and goals or possible ones"),
+        ("bad.txt", " \n\n", "bad.txt: line 1, column 1: the map has no cell, expected some of .#@$!, a-z and A-Z"),
+        ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, and this page edits maps"),
+        ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
+        ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: "map" stands twice'),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: agents_xy stands without targets_xy, and this page edits pairs"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 12: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 12: targets_xy cannot be read, expected a list of [row, col]"),
+        ("bad.yaml", "map: |\n  ..\nwhat is this\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
+        ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: a config in braces has to be JSON, and this is none"),
+    ]
+    with world.open("editor") as page:
+        load(world, page, "good.txt", "a.A\n")
+        for name, content, want in wrong:
+            load(world, page, name, content)
+            got = text(page, "message")
+            assert got == want or (want.endswith("column 3") and got.startswith(want)), (content, got, want)
+            equal(page.get_attribute("#message", "class"), "bad")
+            equal(rows(page), ["..."], "the map stays as it was")
+        page.click("#edit-source")
+        page.fill("#source-text", "..\n.?")
+        page.click("#source-load")
+        assert "line 2, column 2" in text(page, "source-error")
+        equal(page.evaluate("[document.activeElement.selectionStart, document.activeElement.selectionEnd]"), [4, 5])
+        page.fill("#source-text", "..\n.#")
+        page.click("#source-load")
+        assert page.locator("#source").is_hidden()
+        equal(rows(page), ["..", ".#"])
+
+
+def test_drop_and_paste(world):
+    with world.open("editor") as page:
+        drop(page, "dropped.txt", "a#\n.A\n")
+        equal((rows(page), pairs(page)), ([".#", ".."], [[[0, 0], [1, 1]]]))
+        drop(page, "dropped.yaml", "map: |\n  ...\nseed: 3\n")
+        equal(rows(page), ["..."])
+        assert "seed: 3" in save(world, page, "yaml").read_text()
+        paste(page, "##\n..\n")
+        equal(rows(page), ["##", ".."])
+
+
+def test_keyboard_alone(world):
+    with world.open("editor") as page:
+        resize(page, 4, 4, "new")
+        page.focus("#stage")
+        for key in ["ArrowUp", *["ArrowUp"] * 4, *["ArrowLeft"] * 4, "Space", "ArrowRight", "Enter"]:
+            page.keyboard.press(key)
+        equal(rows(page), ["##..", "....", "....", "...."])
+        for key in ["Delete", "r", "ArrowDown", "Space", "ArrowDown", "ArrowRight", "Space"]:
+            page.keyboard.press(key)
+        equal(rows(page), ["#...", ".##.", ".##.", "...."])
+        for key in ["a", "ArrowDown", "Space", "ArrowRight", "Space"]:
+            page.keyboard.press(key)
+        equal(pairs(page), [[[3, 2], [3, 3]]])
+        page.keyboard.press("Delete")
+        equal(pairs(page), [])
+        assert "(3, 3)" in text(page, "where")
+        page.keyboard.press("?")
+        assert page.locator("#help").is_visible()
+        page.keyboard.press("Escape")
+        unnamed = page.evaluate("[...document.querySelectorAll('button')].filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length")
+        equal(unnamed, 0, "buttons without a name")
+
+
+def test_resize(world):
+    with world.open("editor") as page:
+        paste(page, "a.A\nb#B\n")
+        resize(page, 1, 4)
+        equal((rows(page), pairs(page)), (["...."], [[[0, 0], [0, 2]]]))
+        assert "1 agent outside it went" in text(page, "message")
+        page.click("#undo")
+        equal((rows(page), len(pairs(page))), (["...", ".#."], 2))
+        resize(page, 0, 4)
+        equal(text(page, "message"), "rows and columns are whole numbers from 1 to 4096")
+        equal(rows(page), ["...", ".#."])
+
+
+def test_drawn_maps_are_read_back_unchanged(world):
+    draw = random.Random(2)
+    files = []
+    with world.open("editor") as page:
+        for number in range(12):
+            height, width = draw.randint(1, 12), draw.randint(2, 12)
+            has_pools = number % 3 == 0
+            letters = ".#@$!" if has_pools else "..#"
+            lines = [[draw.choice(letters) for _ in range(width)] for _ in range(height)]
+            if has_pools:
+                lines[0][:2] = "@$"
+            else:
+                cells = draw.sample([(row, col) for row in range(height) for col in range(width)], 2 * draw.randint(1, min(26, height * width // 2)))
+                for index, (row, col) in enumerate(cells):
+                    lines[row][col] = chr((65 if index % 2 else 97) + index // 2)
+            content = "\n".join("".join(line) for line in lines) + "\n"
+            source = load(world, page, f"drawn-{number}.txt", content)
+            text_file, yaml_file = save(world, page, "txt"), save(world, page, "yaml")
+            equal(text_file.read_text(), content)
+            files.append((source, text_file, yaml_file))
+    told = iter(world.check(*(path for three in files for path in three)))
+    for source, text_file, yaml_file in zip(told, told, told):
+        equal(text_file, source)
+        for key in ("rows", "pools"):
+            equal(yaml_file[key], source[key], key)
+        if source["agents"]:
+            equal([yaml_file["agents"], yaml_file["goals"]], [source["agents"], source["goals"]])
+
+
+
+def test_phone(world):
+    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
+    with world.open("editor", **phone) as page:
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
+        page.touchscreen.tap(*at(page, 2, 3))
+        settle(page)
+        equal(rows(page)[2], "...#............")
+        session = page.context.new_cdp_session(page)
+        (x, y), before = at(page, 8, 8), page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]")
+
+        def touch(kind, *columns):
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": column, "y": y, "id": id} for id, column in columns]})
+
+        touch("touchStart", (0, x - 30))
+        touch("touchStart", (0, x - 30), (1, x + 30))
+        for spread in (40, 50, 60):
+            touch("touchMove", (0, x - spread), (1, x + spread))
+        touch("touchEnd")
+        settle(page)
+        assert page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]") > 1.5 * before
+        equal("".join(rows(page)).count("#"), 1, "a pinch draws nothing")

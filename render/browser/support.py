@@ -1,0 +1,113 @@
+"""Opens pages, and fails a test whose page logs an error or asks the network for anything."""
+
+import json
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+FLAGS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync"
+).split()
+
+
+class World:
+    """A browser, the pages, and the program that made them."""
+
+    def __init__(self, browser, folder, program, scratch):
+        self.browser, self.folder, self.program, self.scratch = browser, Path(folder), program, Path(scratch)
+        self.films = {}
+
+    def film(self, name):
+        if name not in self.films:
+            self.films[name] = json.loads((self.folder / f"{name}.json").read_text())
+        return self.films[name]
+
+    @contextmanager
+    def open(self, name, fragment="", path=None, **options):
+        """A page in a context of its own; what it did wrong is told at the end."""
+        wrong = []
+        options = {"viewport": {"width": 1200, "height": 800}, **options}
+        context = self.browser.new_context(accept_downloads=True, **options)
+        context.set_default_timeout(10_000)
+        page = context.new_page()
+        address = (path or self.folder / f"{name}.html").resolve().as_uri()
+        page.wrong = wrong
+        page.on("console", lambda message: is_bad(message) and wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: is_foreign(request.url, address) and wrong.append(request.url))
+        # A map that was changed is asked about before it is left.
+        page.on("dialog", lambda dialog: dialog.accept() if dialog.type == "beforeunload" else wrong.append("dialog"))
+        page.goto(address + fragment)
+        page.wait_for_selector("body.ready")
+        settle(page)
+        try:
+            yield page
+        finally:
+            context.close()
+        assert not wrong, wrong
+
+    def check(self, *paths):
+        """What the Rust side reads in saved maps."""
+        command = [self.program, "check", *map(str, paths)]
+        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return [json.loads(line) for line in told.splitlines()]
+
+
+def is_bad(message):
+    # The tests read pixels back, the pages do not.
+    return message.type in ("error", "warning") and "willReadFrequently" not in message.text
+
+
+def is_foreign(url, address):
+    return url.split("#")[0] != address and not url.startswith(("data:", "blob:"))
+
+
+def settle(page):
+    """Waits until what was asked for has been drawn."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def wait(page, expression, seconds=10):
+    """Waits until an expression holds; Playwright's own way needs what the pages' policy forbids."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, f"`{expression}` never came true"
+        page.wait_for_timeout(20)
+
+
+def text(page, name):
+    return page.text_content(f"#{name}").strip()
+
+
+def place(cell):
+    return f"({cell[0]}, {cell[1]})"
+
+
+def stage(page):
+    return page.locator("#stage").bounding_box()
+
+
+def on_screen(page, tool, row, col):
+    """The middle of a cell, in pixels of the page."""
+    box = stage(page)
+    x, y = page.evaluate(f"([row, col]) => window.{tool}.center(row, col)", [row, col])
+    # The stage has a border, which is not part of its inside.
+    return box["x"] + 1 + x, box["y"] + 1 + y
+
+
+def pixel(page, canvas, x, y):
+    """Red, green, blue and alpha of a canvas at a place of the stage."""
+    return page.evaluate(
+        """([id, x, y]) => {
+          const canvas = document.getElementById(id);
+          const ratio = canvas.width / canvas.clientWidth;
+          return [...canvas.getContext("2d").getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data];
+        }""",
+        [canvas, x, y],
+    )
+
+
+def equal(got, want, what=""):
+    assert got == want, f"{what}: got {got!r}, expected {want!r}"
