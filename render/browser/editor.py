@@ -2,6 +2,8 @@
 
 import random
 
+from playwright.sync_api import TimeoutError
+
 from support import equal, on_screen, pixel, settle, text
 
 SETTINGS = """# a comment of somebody
@@ -57,8 +59,11 @@ def resize(page, height, width, how="resize"):
 
 
 def save(world, page, kind):
-    with page.expect_download() as download:
-        page.click("#save-text" if kind == "txt" else "#save-yaml")
+    try:
+        with page.expect_download(timeout=3000) as download:
+            page.click("#save-text" if kind == "txt" else "#save-yaml")
+    except TimeoutError as error:
+        raise AssertionError(f"nothing was saved: {text(page, 'message')}") from error
     path = world.scratch / f"saved-{random.getrandbits(40):x}.{kind}"
     download.value.save_as(path)
     return path
@@ -119,6 +124,7 @@ def test_draw_erase_undo_redo(world):
         equal(rows(page), ["......"] * 4)
         page.keyboard.press("Control+y")
         page.keyboard.press("Control+Shift+Z")
+        settle(page)
         equal(rows(page)[1], ".#.##.")
         assert page.is_disabled("#redo")
         # A fast stroke has no holes.
@@ -294,8 +300,8 @@ def test_errors_are_told_with_line_and_column(world):
         ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
         ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: "map" stands twice'),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: agents_xy stands without targets_xy, and this page edits pairs"),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 12: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 12: targets_xy cannot be read, expected a list of [row, col]"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
         ("bad.yaml", "map: |\n  ..\nwhat is this\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
         ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: a config in braces has to be JSON, and this is none"),
     ]
@@ -365,34 +371,36 @@ def test_resize(world):
         equal(rows(page), ["...", ".#."])
 
 
+def drawn_map(draw, has_pools):
+    height, width = draw.randint(1, 12), draw.randint(2, 12)
+    lines = [[draw.choice(".#@$!" if has_pools else "..#") for _ in range(width)] for _ in range(height)]
+    if has_pools:
+        lines[0][:2] = "@$"
+    else:
+        places = [(row, col) for row in range(height) for col in range(width)]
+        for index, (row, col) in enumerate(draw.sample(places, 2 * draw.randint(1, min(26, len(places) // 2)))):
+            lines[row][col] = chr((65 if index % 2 else 97) + index // 2)
+    return "".join("".join(line) + "\n" for line in lines)
+
+
 def test_drawn_maps_are_read_back_unchanged(world):
     draw = random.Random(2)
     files = []
-    with world.open("editor") as page:
-        for number in range(12):
-            height, width = draw.randint(1, 12), draw.randint(2, 12)
-            has_pools = number % 3 == 0
-            letters = ".#@$!" if has_pools else "..#"
-            lines = [[draw.choice(letters) for _ in range(width)] for _ in range(height)]
-            if has_pools:
-                lines[0][:2] = "@$"
-            else:
-                cells = draw.sample([(row, col) for row in range(height) for col in range(width)], 2 * draw.randint(1, min(26, height * width // 2)))
-                for index, (row, col) in enumerate(cells):
-                    lines[row][col] = chr((65 if index % 2 else 97) + index // 2)
-            content = "\n".join("".join(line) for line in lines) + "\n"
-            source = load(world, page, f"drawn-{number}.txt", content)
-            text_file, yaml_file = save(world, page, "txt"), save(world, page, "yaml")
-            equal(text_file.read_text(), content)
-            files.append((source, text_file, yaml_file))
+    # The browser stops a page that saves more than ten files in a row.
+    for begin in range(0, 12, 4):
+        with world.open("editor") as page:
+            for number in range(begin, begin + 4):
+                content = drawn_map(draw, number % 3 == 0)
+                source = load(world, page, f"drawn-{number}.txt", content)
+                text_file, yaml_file = save(world, page, "txt"), save(world, page, "yaml")
+                equal(text_file.read_text(), content)
+                files.append((source, text_file, yaml_file))
     told = iter(world.check(*(path for three in files for path in three)))
     for source, text_file, yaml_file in zip(told, told, told):
         equal(text_file, source)
-        for key in ("rows", "pools"):
-            equal(yaml_file[key], source[key], key)
+        equal([yaml_file["rows"], yaml_file["pools"]], [source["rows"], source["pools"]])
         if source["agents"]:
             equal([yaml_file["agents"], yaml_file["goals"]], [source["agents"], source["goals"]])
-
 
 
 def test_phone(world):

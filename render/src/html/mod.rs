@@ -67,3 +67,6 @@ pub fn editor() -> String {
 fn script(parts: &[&[&str]]) -> String {
     format!("(() => {{\n\"use strict\";\n{}}})();\n", parts.concat().concat())
 }
+
+#[cfg(test)]
+mod tests;

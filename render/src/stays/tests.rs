@@ -44,12 +44,11 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, stay: Stay) -> bool
     let fits = match stay.rule {
         "collide/priority/contest" | "collide/soft/contest" => came && other < agent,
         "collide/priority/follow" => was_there && !stayed && other > agent,
-        "collide/priority" => was_there && stayed && !wants_mine,
         "collide/priority/swap" => was_there && stayed && turns(before, &step.actions, agent),
         "collide/block-both/occupied" => was_there,
         "collide/block-both/contest" => nobody_was_there && stayed && aim(other) == aim(agent),
         "collide/soft/swap" => was_there && stayed && wants_mine,
-        "collide/soft/chain" => was_there && stayed && !wants_mine,
+        "collide/priority" | "collide/soft/chain" => was_there && stayed && !wants_mine,
         _ => false,
     };
     fits && other != agent && before.active[other]

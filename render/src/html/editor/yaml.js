@@ -27,15 +27,21 @@ function splitConfig(text) {
   return blocks;
 }
 
+// Browsers tell the place in words, each in its own.
+function whereInJson(text, message) {
+  const told = /line (\d+) column (\d+)/.exec(message);
+  if (told) return [Number(told[1]), Number(told[2])];
+  const lines = text.slice(0, Number(/position (\d+)/.exec(message)?.[1] ?? 0)).split("\n");
+  return [lines.length, lines.at(-1).length + 1];
+}
+
 // JSON is read too; its other fields become lines of YAML, which allows JSON as values.
 function blocksOfJson(text) {
   let object;
   try {
     object = JSON.parse(text);
   } catch (error) {
-    const offset = Number(/position (\d+)/.exec(error.message)?.[1] ?? 0);
-    const lines = text.slice(0, offset).split("\n");
-    throw new Wrong(lines.length, lines.at(-1).length + 1, "a config in braces has to be JSON, and this is none");
+    throw new Wrong(...whereInJson(text, error.message), "a config in braces has to be JSON, and this is none");
   }
   return Object.entries(object).map(([name, value]) => {
     const isText = name === "map" && typeof value === "string";

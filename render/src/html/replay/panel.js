@@ -39,6 +39,7 @@ class Panel {
     byId("search").addEventListener("input", () => this.search());
     byId("search").addEventListener("keydown", (event) => {
       if (event.key === "Enter" && this.order.length > 0) choose(this.order[0]);
+      if (event.key === "Escape") byId("stage").focus();
     });
     byId("order").addEventListener("change", () => this.search());
     byId("deselect").addEventListener("click", () => choose(null));

@@ -1,0 +1,72 @@
+//! What can be told of the pages without a browser.
+
+use pogema_core::{Cell, Error, Trace};
+
+use super::{editor, replay};
+use crate::Film;
+use crate::stays::play::play;
+
+fn trace() -> Trace {
+    play("{size: 6, num_agents: 3, density: 0.1, seed: 1, on_target: restart, max_episode_steps: 5}", 0.3)
+        .unwrap()
+}
+
+fn reason(trace: &Trace) -> String {
+    replay(&Film::of(trace), "wrong").unwrap_err().to_string()
+}
+
+#[test]
+fn titles_stay_text() {
+    let page = replay(&Film::of(&trace()), "</title><script>alert(1)</script>&\"").unwrap();
+    let title = "&lt;&#x2f;title&gt;&lt;script&gt;alert(1)&lt;&#x2f;script&gt;&amp;&quot;";
+    assert!(page.contains(&format!("<title>{title}</title>")), "{}", &page[..600]);
+    assert!(page.contains(&format!("<h1 id=\"title\">{title}</h1>")));
+    assert_eq!(page.matches("<script").count(), 2, "the data and the page's own");
+}
+
+#[test]
+fn pages_name_no_other_place() {
+    for page in [editor(), replay(&Film::of(&trace()), "t").unwrap()] {
+        for place in ["http:", "https:", "//www", "@import", "url("] {
+            assert!(!page.contains(place), "{place}");
+        }
+        assert!(page.contains("default-src 'none'"));
+        assert!(!page.contains("unsafe-"));
+    }
+}
+
+#[test]
+fn a_film_without_steps_is_shown() {
+    let mut trace = trace();
+    trace.steps.clear();
+    let page = replay(&Film::of(&trace), "start").unwrap();
+    assert!(page.contains("\"num_steps\":0,"));
+}
+
+#[test]
+fn lists_of_another_length_are_refused() {
+    let mut short = trace();
+    short.steps[2].rewards.pop();
+    assert_eq!(replay(&Film::of(&short), "t"), Err(Error::Length { what: "rewards", want: 3, got: 2 }));
+    let mut short = trace();
+    short.start.state.goals.pop();
+    assert_eq!(replay(&Film::of(&short), "t"), Err(Error::Length { what: "goals", want: 3, got: 2 }));
+}
+
+#[test]
+fn cells_off_the_map_are_refused() {
+    let mut off = trace();
+    off.steps[1].state.goals[2] = Cell::new(6, 0);
+    assert_eq!(
+        reason(&off),
+        "trace: line 4: the goal (6, 0) of agent 2 is outside the map of 6 rows and 6 columns"
+    );
+}
+
+#[test]
+fn jumps_are_refused() {
+    let mut jump = trace();
+    jump.start.state.cells[1] = Cell::new(0, 0);
+    jump.steps[0].state.cells[1] = Cell::new(5, 5);
+    assert_eq!(reason(&jump), "trace: line 3: agent 1 is on (5, 5), expected (0, 0) or a cell next to it");
+}
