@@ -9,7 +9,9 @@ import traceback
 from playwright.sync_api import sync_playwright
 
 import editor
+import editor_files
 import replay
+import replay_film
 from support import FLAGS, World
 
 
@@ -24,7 +26,7 @@ def main(folder, *wanted):
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in (replay, editor)
+            for module in (replay_film, replay, editor, editor_files)
             for name, test in tests_of(module)
             if not wanted or any(part in f"{module.__name__}.{name}" for part in wanted)
         ]

@@ -1,110 +1,8 @@
-"""The replay page shows what the film holds, and does what it is told."""
+"""The replay page does what it is told, in time, and nothing else."""
 
-import random
 import time
 
-from support import equal, on_screen, pixel, place, settle, stage, text, wait
-
-SMALL = ["finish", "restart", "soft", "nothing"]
-MOVES = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)]
-NAMES = ["stay", "up", "down", "left", "right"]
-# The first agents have POGEMA's colours.
-POGEMA = ["#c1433c", "#2e6f9e", "#6e81af", "#00b9c8"]
-
-
-def rgb(color):
-    return [int(color[at : at + 2], 16) for at in (1, 3, 5)]
-
-
-def step(page):
-    """The step by what the page says."""
-    return int(text(page, "step").split()[1])
-
-
-def is_reverted(film, at, agent):
-    """Whether an agent wanted to move in a step and did not."""
-    if at == 0:
-        return False
-    before, after = film["states"][at - 1], film["states"][at]
-    return before["active"][agent] and after["actions"][agent] != 0 and before["cells"][agent] == after["cells"][agent]
-
-
-def reverted(film, agent):
-    return [at for at in range(len(film["states"])) if is_reverted(film, at, agent)]
-
-
-def test_names_come_from_the_film_and_stay_text(world):
-    with world.open("finish") as page:
-        title = world.film("finish")["title"]
-        assert "<script>" in title
-        equal(text(page, "title"), title)
-        equal(page.title(), title)
-        equal(text(page, "facts"), f"8 × 8 · 4 agents · {len(world.film('finish')['states']) - 1} steps · priority · finish · radius 5")
-
-
-def test_states_are_those_of_the_film(world):
-    draw = random.Random(1)
-    for name in [*SMALL, "large"]:
-        film = world.film(name)
-        with world.open(name) as page:
-            num_steps, num_agents = len(film["states"]) - 1, film["config"]["num_agents"]
-            equal(page.evaluate("[replay.numSteps, replay.numAgents]"), [num_steps, num_agents])
-            asked = [[draw.randrange(num_steps + 1), draw.randrange(num_agents)] for _ in range(60)]
-            shown = page.evaluate("(asked) => asked.map(([at, agent]) => replay.state(at, agent))", asked)
-            for (at, agent), got in zip(asked, shown):
-                equal(got, told(film, at, agent), f"{name} {at} {agent}")
-
-
-def told(film, at, agent):
-    """What the page should know of an agent, but for why its move was reverted."""
-    state, states = film["states"][at], film["states"]
-    paid = [one["rewards"][agent] for one in states[1 : at + 1]]
-    why = reason(film, at, agent) if is_reverted(film, at, agent) else None
-    return {
-        "cell": state["cells"][agent], "goal": state["goals"][agent], "isActive": state["active"][agent],
-        "isOnGoal": state["on_goal"][agent], "isMarked": state["cells"][agent] in state["occupied"],
-        "action": NAMES[state["actions"][agent]] if at else None, "reward": paid[-1] if paid else 0, "total": sum(paid),
-        "isTerminated": bool(at) and state["terminated"][agent], "isTruncated": bool(at) and state["truncated"][agent],
-        "reverted": why,
-    }
-
-
-def reason(film, at, agent):
-    """Why a move was reverted, as the program that made the film says."""
-    step_told = next(one for one in film["stays"][at - 1] if one["agent"] == agent)
-    state = film["states"][at]
-    action = state["actions"][agent]
-    cell = [here + there for here, there in zip(state["cells"][agent], MOVES[action])]
-    return {"step": at, "action": NAMES[action], "rule": step_told["rule"], "cause": step_told["cause"], "cell": cell, "other": step_told["other"]}
-
-
-def test_marks_are_the_occupancy_grid(world):
-    for name in SMALL:
-        film = world.film(name)
-        width = len(film["map"][0])
-        with world.open(name) as page:
-            shown = page.evaluate("Array.from({ length: replay.numSteps + 1 }, (_, at) => replay.marks(at))")
-            want = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
-            equal(shown, want, name)
-    soft = world.film("soft")["states"]
-    assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), "nobody vanished, so nothing was tested"
-
-
-def test_windows_are_observations(world):
-    for name in SMALL:
-        film = world.film(name)
-        with world.open(name) as page:
-            num_agents = film["config"]["num_agents"]
-            asked = [[at, agent] for at in range(0, len(film["states"]), 5) for agent in range(num_agents)]
-            shown = page.evaluate(
-                """(asked) => asked.map(([at, agent]) => {
-                  const { obstacles, agents, goal } = replay.observe(at, agent);
-                  return [obstacles, agents, goal].flat().map((row) => row.join("")).join("");
-                })""",
-                asked,
-            )
-            for (at, agent), got in zip(asked, shown):
-                equal(got, film["observations"][at][agent], f"{name} {at} {agent}")
+from support import equal, on_screen, pixel, settle, stage, step, text, wait
 
 
 def test_play_and_pause(world):
@@ -159,60 +57,6 @@ def test_scrub(world):
         equal(step(page), 64)
 
 
-def test_choose_an_agent(world):
-    film = world.film("restart")
-    with world.open("restart", "#step=5") as page:
-        page.mouse.click(*on_screen(page, "replay", *film["states"][5]["cells"][3]))
-        settle(page)
-        equal(text(page, "agent-name"), "Agent 3")
-        equal(text(page, "agent-cell"), place(film["states"][5]["cells"][3]))
-        equal(text(page, "agent-goal"), place(film["states"][5]["goals"][3]))
-        equal(text(page, "agent-action"), NAMES[film["states"][5]["actions"][3]])
-        for key, want in [("]", "Agent 4"), ("[", "Agent 3"), ("[", "Agent 2")]:
-            page.keyboard.press(key)
-            equal(text(page, "agent-name"), want)
-        page.keyboard.press("Escape")
-        assert page.locator("#agent").is_hidden()
-        page.fill("#search", "6")
-        equal(page.locator("#agents .row").count(), 1)
-        page.keyboard.press("Enter")
-        equal(text(page, "agent-name"), "Agent 6")
-        page.fill("#search", "99")
-        equal(text(page, "found"), "no agent 99; they are 0 to 7")
-        page.fill("#search", "")
-        page.click("#agents-1")
-        equal(text(page, "agent-name"), "Agent 1")
-        page.focus("#agents")
-        page.keyboard.press("ArrowDown")
-        equal(text(page, "agent-name"), "Agent 2")
-        page.select_option("#order", "reverted")
-        most = max(range(8), key=lambda agent: len(reverted(film, agent)))
-        assert text(page, "agents").startswith(f"agent {most}"), text(page, "agents")
-
-
-def test_reverted_moves_are_listed_and_lead_to_their_steps(world):
-    for name in ("restart", "soft"):
-        film = world.film(name)
-        agent = max(range(film["config"]["num_agents"]), key=lambda one: len(reverted(film, one)))
-        steps = reverted(film, agent)
-        with world.open(name, f"#agent={agent}") as page:
-            equal(text(page, "moves-title"), f"{len(steps)} reverted moves")
-            for index in (0, 2):
-                row = page.locator(f"#moves-{index}")
-                want = reason(film, steps[index], agent)
-                shown = row.inner_text()
-                assert want["rule"] in shown and str(steps[index]) in shown and want["action"] in shown, (shown, want)
-                row.click()
-                settle(page)
-                equal(step(page), steps[index])
-                equal(text(page, "why-rule"), want["rule"])
-                named = {"agent": f"agent {want['other']}", "wall": "the wall", "obstacle": "obstacle"}[want["cause"]]
-                assert named in text(page, "why-text"), text(page, "why-text")
-            page.keyboard.press("Home")
-            settle(page)
-            assert page.locator("#why").is_hidden()
-
-
 def test_deep_links(world):
     with world.open("restart", "#step=12&agent=3") as page:
         equal((step(page), text(page, "agent-name")), (12, "Agent 3"))
@@ -225,31 +69,6 @@ def test_deep_links(world):
     for bad in ("#step=999&agent=8", "#step=-1&agent=<b>", "#step=1e1&%"):
         with world.open("restart", bad) as page:
             equal((step(page), page.evaluate("replay.agent")), (0, None), bad)
-
-
-def test_canvas_shows_agents_goals_and_obstacles(world):
-    film = world.film("restart")
-    with world.open("restart", "#step=20") as page:
-        page.uncheck("#numbers")
-        page.uncheck("#goals")
-        settle(page)
-        state = film["states"][20]
-        for agent, color in enumerate(POGEMA):
-            at = page.evaluate("([row, col]) => replay.center(row, col)", state["cells"][agent])
-            equal(pixel(page, "actors", *at), [*rgb(color), 255], f"agent {agent}")
-        cells = [(row, col, film["map"][row][col]) for row in range(12) for col in range(12)]
-        for row, col, kind in cells:
-            at = page.evaluate("([row, col]) => replay.center(row, col)", [row, col])
-            equal(pixel(page, "ground", *at), [*rgb("#84a1ae" if kind == "#" else "#ffffff"), 255], f"{row} {col}")
-            if [row, col] not in state["cells"]:
-                equal(pixel(page, "actors", *at)[3], 0, f"nobody on {row} {col}")
-        page.check("#goals")
-        settle(page)
-        free = next(agent for agent in range(4) if state["goals"][agent] not in state["cells"] and state["goals"].count(state["goals"][agent]) == 1)
-        x, y = page.evaluate("([row, col]) => replay.center(row, col)", state["goals"][free])
-        scale = page.evaluate("replay.scale")
-        equal(pixel(page, "actors", x + 0.35 * scale, y)[:3], rgb(POGEMA[free]), "the ring of a goal")
-        equal(pixel(page, "actors", x, y)[3], 0, "inside a goal")
 
 
 def test_agents_glide_between_steps(world):
@@ -402,3 +221,12 @@ def test_thousand_agents_in_time(world):
         )
         assert median + forced <= 33, (median, forced)
         return f"{size} bytes, draws take {median:.1f} ms and {forced:.1f} ms of painting, {rate:.0f} frames/s"
+
+
+def test_an_episode_without_steps(world):
+    with world.open("empty") as page:
+        for key in ("Space", "End", "ArrowRight", "]"):
+            page.keyboard.press(key)
+        settle(page)
+        equal(text(page, "step"), "step 0 / 0")
+        equal(text(page, "agent-name"), "Agent 0")

@@ -111,3 +111,8 @@ def pixel(page, canvas, x, y):
 
 def equal(got, want, what=""):
     assert got == want, f"{what}: got {got!r}, expected {want!r}"
+
+
+def step(page):
+    """The step by what the page says."""
+    return int(text(page, "step").split()[1])

@@ -63,6 +63,9 @@ fn write_all(folder: &Path) -> Result<(), Error> {
         write(&folder.join(format!("{name}.html")), &html::replay(&Film::of(&trace), title)?)?;
         write(&folder.join(format!("{name}.json")), &expected(&trace, title)?)?;
     }
+    let mut empty = play::play("{size: 4, density: 0, seed: 1}", 0.0)?;
+    empty.steps.clear();
+    write(&folder.join("empty.html"), &html::replay(&Film::of(&empty), "Before the first step")?)?;
     write(&folder.join("editor.html"), &html::editor())
 }
 

@@ -1,0 +1,191 @@
+"""The map editor saves what the Rust side reads unchanged, and tells what is wrong with a file."""
+
+import random
+
+from maps import drag, drop, load, pairs, paste, press, rows, save
+from support import equal, settle, text
+
+SETTINGS = """# a comment of somebody
+seed: 7
+collision_system: soft   # kept, with what stands behind it
+on_target: finish
+
+map: |
+  ..#.
+  .#..
+  ....
+obs_radius: 3
+agents_xy: [[0, 0],
+  [2, 3]] # two of them
+targets_xy:
+  - [2, 0]
+  - [0, 3]
+num_agents: 2
+# the end
+"""
+
+
+def test_text_comes_back_unchanged(world):
+    content = "a.#b\nB..A\n.#.."
+    with world.open("editor") as page:
+        source = load(world, page, "small.txt", content)
+        equal(text(page, "message"), "small.txt: 3 × 4, 2 agents")
+        saved = save(world, page, "txt")
+        equal(saved.read_text(), content + "\n")
+        equal(*world.check(source, saved))
+        page.set_input_files("#picker", saved)
+        settle(page)
+        equal(save(world, page, "txt").read_bytes(), saved.read_bytes(), "saved again")
+        [read] = world.check(save(world, page, "yaml"))
+        equal([read["agents"], read["goals"]], [[[0, 0], [0, 3]], [[1, 3], [1, 0]]])
+
+
+def test_yaml_keeps_what_it_does_not_edit(world):
+    with world.open("editor") as page:
+        source = load(world, page, "settings.yaml", SETTINGS)
+        equal(pairs(page), [[[0, 0], [2, 0]], [[2, 3], [0, 3]]])
+        saved = save(world, page, "yaml")
+        before, after = world.check(source, saved)
+        equal(after, before)
+        for line in SETTINGS.splitlines():
+            if line.startswith(("#", "seed", "coll", "on_", "obs", "num")):
+                assert line in saved.read_text().splitlines(), line
+        page.keyboard.press("b")
+        press(page, 2, 1)
+        page.click("[data-tool=agents]")
+        drag(page, (1, 3), (1, 2))
+        changed = save(world, page, "yaml")
+        [read] = world.check(changed)
+        equal(read["rows"], ["..#.", ".#..", ".#.."])
+        equal([read["agents"], read["goals"]], [[[0, 0], [2, 3], [1, 3]], [[2, 0], [0, 3], [1, 2]]])
+        equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [7, 3, "soft", 3])
+        page.set_input_files("#picker", changed)
+        settle(page)
+        equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
+
+
+def test_other_ways_to_write_a_config(world):
+    same = [
+        'map: "a.#\\n..A"\nseed: 1\n',
+        "seed: 1\nmap: a.# ..A\n",
+        "seed: 1\nmap: >-\n  a.#\n\n  ..A\n",
+        "seed: 1\nmap: [[0, 0, 1], [0, 0, 0]]\nagents_xy: [[0,0]]\ntargets_xy: [[1,2]]\n",
+        "---\nmap:\n  - [0, 0, 1]\n  - [0, 0, 0]\nagents_xy:\n- [0,0] # here\ntargets_xy:\n- [1,2]\nseed: 1",
+        '{"map": "a.#\\n..A", "seed": 1}',
+        '{\n "seed": 1, "map": [[0,0,1],[0,0,0]], "agents_xy": [[0,0]], "targets_xy": [[1,2]]}',
+    ]
+    with world.open("editor") as page:
+        for number, content in enumerate(same):
+            source = load(world, page, f"way-{number}.yaml", content)
+            before, after = world.check(source, save(world, page, "yaml"))
+            equal(after, before, content)
+            equal(after["fields"]["seed"], 1)
+
+
+def test_goal_sequences_are_kept(world):
+    content = "on_target: restart\nmap: |-\n  ...\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\n"
+    with world.open("editor") as page:
+        source = load(world, page, "restart.yaml", content)
+        saved = save(world, page, "yaml")
+        equal(saved.read_text(), content)
+        equal(*world.check(source, saved))
+        page.click("#save-text")
+        equal(text(page, "message"), "not saved: text has one goal for each agent; save it as YAML")
+        page.click("[data-tool=agents]")
+        paste(page, "on_target: restart\nmap: |\n  a.A\n")
+        equal(page.evaluate("editor.issues"), ["on_target is restart, which needs two goals or more for each agent"])
+
+
+def test_what_text_cannot_say(world):
+    shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
+    many = "map: |\n" + "  ....\n" * 14 + f"agents_xy: {[[row, 0] for row in range(14)] + [[row, 1] for row in range(13)]}\n"
+    many += f"targets_xy: {[[row, 2] for row in range(14)] + [[row, 3] for row in range(13)]}\n"
+    with world.open("editor") as page:
+        for content, reason in [
+            (shared, "two letters would stand on (0, 3) (agent 1); save it as YAML"),
+            (many, "text has letters for 26 agents, the map has 27; save it as YAML"),
+        ]:
+            paste(page, content)
+            page.click("#save-text")
+            equal(text(page, "message"), f"not saved: {reason}")
+            [read] = world.check(save(world, page, "yaml"))
+            equal([list(pair) for pair in zip(read["agents"], read["goals"])], pairs(page))
+
+
+def test_errors_are_told_with_line_and_column(world):
+    wrong = [
+        ("bad.txt", "..\n.x.\n.%", 'bad.txt: line 2, column 3'),
+        ("bad.txt", "...\n.?.", 'bad.txt: line 2, column 2: unknown character "?", expected one of .#@$!, a-z or A-Z'),
+        ("bad.txt", "...\n..", "bad.txt: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
+        ("bad.txt", "a..\n.A.\n..b", "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected as many"),
+        ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected exact starts and goals or possible ones"),
+        ("bad.txt", " \n\n", "bad.txt: line 1, column 1: the map has no cell, expected some of .#@$!, a-z and A-Z"),
+        ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, and this page edits maps"),
+        ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
+        ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: "map" stands twice'),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: agents_xy stands without targets_xy, and this page edits pairs"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
+        ("bad.yaml", "map: |\n  ..\nwhat is this\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
+        ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: a config in braces has to be JSON, and this is none"),
+    ]
+    with world.open("editor") as page:
+        load(world, page, "good.txt", "a.A\n")
+        for name, content, want in wrong:
+            load(world, page, name, content)
+            got = text(page, "message")
+            assert got == want or (want.endswith("column 3") and got.startswith(want)), (content, got, want)
+            equal(page.get_attribute("#message", "class"), "bad")
+            equal(rows(page), ["..."], "the map stays as it was")
+        page.click("#edit-source")
+        page.fill("#source-text", "..\n.?")
+        page.click("#source-load")
+        assert "line 2, column 2" in text(page, "source-error")
+        equal(page.evaluate("[document.activeElement.selectionStart, document.activeElement.selectionEnd]"), [4, 5])
+        page.fill("#source-text", "..\n.#")
+        page.click("#source-load")
+        assert page.locator("#source").is_hidden()
+        equal(rows(page), ["..", ".#"])
+
+
+def test_drop_and_paste(world):
+    with world.open("editor") as page:
+        drop(page, "dropped.txt", "a#\n.A\n")
+        equal((rows(page), pairs(page)), ([".#", ".."], [[[0, 0], [1, 1]]]))
+        drop(page, "dropped.yaml", "map: |\n  ...\nseed: 3\n")
+        equal(rows(page), ["..."])
+        assert "seed: 3" in save(world, page, "yaml").read_text()
+        paste(page, "##\n..\n")
+        equal(rows(page), ["##", ".."])
+
+
+def drawn_map(draw, has_pools):
+    height, width = draw.randint(1, 12), draw.randint(2, 12)
+    lines = [[draw.choice(".#@$!" if has_pools else "..#") for _ in range(width)] for _ in range(height)]
+    if has_pools:
+        lines[0][:2] = "@$"
+    else:
+        places = [(row, col) for row in range(height) for col in range(width)]
+        for index, (row, col) in enumerate(draw.sample(places, 2 * draw.randint(1, min(26, len(places) // 2)))):
+            lines[row][col] = chr((65 if index % 2 else 97) + index // 2)
+    return "".join("".join(line) + "\n" for line in lines)
+
+
+def test_drawn_maps_are_read_back_unchanged(world):
+    draw = random.Random(2)
+    files = []
+    # The browser stops a page that saves more than ten files in a row.
+    for begin in range(0, 12, 4):
+        with world.open("editor") as page:
+            for number in range(begin, begin + 4):
+                content = drawn_map(draw, number % 3 == 0)
+                source = load(world, page, f"drawn-{number}.txt", content)
+                text_file, yaml_file = save(world, page, "txt"), save(world, page, "yaml")
+                equal(text_file.read_text(), content)
+                files.append((source, text_file, yaml_file))
+    told = iter(world.check(*(path for three in files for path in three)))
+    for source, text_file, yaml_file in zip(told, told, told):
+        equal(text_file, source)
+        equal([yaml_file["rows"], yaml_file["pools"]], [source["rows"], source["pools"]])
+        if source["agents"]:
+            equal([yaml_file["agents"], yaml_file["goals"]], [source["agents"], source["goals"]])

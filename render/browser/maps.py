@@ -1,0 +1,85 @@
+"""What the tests of the editor do again and again."""
+
+import random
+
+from playwright.sync_api import TimeoutError
+
+from support import on_screen, settle, text
+
+
+def at(page, row, col):
+    return on_screen(page, "editor", row, col)
+
+
+def drag(page, *cells):
+    page.mouse.move(*at(page, *cells[0]))
+    page.mouse.down()
+    for cell in cells[1:]:
+        page.mouse.move(*at(page, *cell), steps=3)
+    page.mouse.up()
+    settle(page)
+
+
+def press(page, *cell):
+    drag(page, cell)
+
+
+def rows(page):
+    return page.evaluate("editor.rows")
+
+
+def pairs(page):
+    return [[agent["start"], agent["goal"]] for agent in page.evaluate("editor.agents")]
+
+
+def resize(page, height, width, how="resize"):
+    page.fill("#height", str(height))
+    page.fill("#width", str(width))
+    page.click(f"#{how}")
+    settle(page)
+
+
+def save(world, page, kind):
+    try:
+        with page.expect_download(timeout=3000) as download:
+            page.click("#save-text" if kind == "txt" else "#save-yaml")
+    except TimeoutError as error:
+        raise AssertionError(f"nothing was saved: {text(page, 'message')}") from error
+    path = world.scratch / f"saved-{random.getrandbits(40):x}.{kind}"
+    download.value.save_as(path)
+    return path
+
+
+def load(world, page, name, content):
+    path = world.scratch / name
+    path.write_text(content)
+    page.set_input_files("#picker", path)
+    settle(page)
+    return path
+
+
+def paste(page, content):
+    page.evaluate(
+        """(content) => {
+          const data = new DataTransfer();
+          data.setData("text/plain", content);
+          document.body.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true }));
+        }""",
+        content,
+    )
+    settle(page)
+
+
+def drop(page, name, content):
+    page.evaluate(
+        """([name, content]) => {
+          const data = new DataTransfer();
+          data.items.add(new File([content], name));
+          for (const kind of ["dragover", "drop"]) {
+            document.body.dispatchEvent(new DragEvent(kind, { dataTransfer: data, bubbles: true, cancelable: true }));
+          }
+        }""",
+        [name, content],
+    )
+    page.wait_for_timeout(50)
+    settle(page)
