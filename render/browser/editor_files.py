@@ -6,7 +6,7 @@ from maps import drag, drop, load, pairs, paste, press, rows, save
 from support import equal, settle, text
 
 SETTINGS = """# a comment of somebody
-seed: 7
+seed: 9007199254740993
 collision_system: soft   # kept, with what stands behind it
 on_target: finish
 
@@ -58,7 +58,7 @@ def test_yaml_keeps_what_it_does_not_edit(world):
         [read] = world.check(changed)
         equal(read["rows"], ["..#.", ".#..", ".#.."])
         equal([read["agents"], read["goals"]], [[[0, 0], [2, 3], [1, 3]], [[2, 0], [0, 3], [1, 2]]])
-        equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [7, 3, "soft", 3])
+        equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [9007199254740993, 3, "soft", 3])
         page.set_input_files("#picker", changed)
         settle(page)
         equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
@@ -127,6 +127,7 @@ def test_errors_are_told_with_line_and_column(world):
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
         ("bad.yaml", "map: |\n  ..\nwhat is this\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
+        ("bad.json", '{"map": "..", "seed": 9007199254740993}', "bad.json: line 1, column 1: seed has too many digits to be kept from JSON, expected this config as YAML"),
         ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: a config in braces has to be JSON, and this is none"),
     ]
     with world.open("editor") as page:

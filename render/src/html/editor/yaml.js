@@ -37,11 +37,19 @@ function whereInJson(text, message) {
 
 // JSON is read too; its other fields become lines of YAML, which allows JSON as values.
 function blocksOfJson(text) {
-  let object;
+  let [object, tooLong] = [null, null];
+  // Scripts count to 2⁵³ exactly, seeds go up to 2⁶³.
+  const look = (name, value) => {
+    if (Number.isInteger(value) && !Number.isSafeInteger(value)) tooLong = name;
+    return value;
+  };
   try {
-    object = JSON.parse(text);
+    object = JSON.parse(text, look);
   } catch (error) {
     throw new Wrong(...whereInJson(text, error.message), "a config in braces has to be JSON, and this is none");
+  }
+  if (tooLong !== null) {
+    throw new Wrong(1, 1, `${tooLong} has too many digits to be kept from JSON, expected this config as YAML`);
   }
   return Object.entries(object).map(([name, value]) => {
     const isText = name === "map" && typeof value === "string";

@@ -22,7 +22,7 @@ class LongList {
 
   set(length, chosen) {
     this.length = length;
-    this.spacer.style.height = `${length * this.rowHeight}px`;
+    this.spacer.style.height = this.box.style.maxHeight = `${length * this.rowHeight}px`;
     this.pick(chosen);
   }
 
