@@ -34,8 +34,8 @@ impl Generator {
             sum += weight;
             sum / total > draw
         });
-        // The last quotient is 1, which is above any draw.
-        Ok(index.unwrap_or(weights.len() - 1))
+        // INVARIANT: the last quotient is 1, which is above any draw.
+        Ok(index.unwrap_or_default())
     }
 }
 

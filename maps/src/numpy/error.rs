@@ -70,3 +70,26 @@ impl Error for NumpyError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_error_names_its_values_in_one_line() {
+        let told = [
+            (NumpyError::EmptyRange { lo: 3, hi: 2 }, &["`3`", "`2`"][..]),
+            (NumpyError::BadRange { lo: 0.5, hi: 0.25 }, &["`0.5`", "`0.25`"]),
+            (NumpyError::EmptyChoice, &["`0` items"]),
+            (NumpyError::BadWeight { index: 4, weight: -1.0 }, &["`-1`", "`4`"]),
+            (NumpyError::BadWeightSum { sum: 2.0 }, &["`2`"]),
+            (NumpyError::BadProbability { p: 1.5 }, &["`1.5`"]),
+            (NumpyError::NoEntropy(getrandom::Error::UNSUPPORTED), &["operating system"]),
+        ];
+        for (error, parts) in told {
+            let line = error.to_string();
+            assert!(parts.iter().all(|part| line.contains(part)) && !line.contains('\n'), "{line}");
+            assert_eq!(error.source().is_some(), matches!(error, NumpyError::NoEntropy(_)));
+        }
+    }
+}
