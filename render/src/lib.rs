@@ -6,13 +6,23 @@
 //! | module | what it makes |
 //! | --- | --- |
 //! | [`svg`] | animations and pictures for browsers and papers |
+//! | [`text`] | frames for the terminal |
+//! | [`raster`] | one frame as PNG |
+//! | [`gif`] | GIF animations |
+//! | [`video`] | MP4 and `WebM`, by the program ffmpeg |
 
 mod film;
+pub mod gif;
 mod ground;
+mod motion;
+pub mod raster;
 mod scene;
 mod style;
 pub mod svg;
+pub mod text;
+pub mod video;
 
 pub use film::Film;
 pub use ground::{Border, Ground};
+pub use motion::{MOST_FRAMES, MOST_PIXELS as MOST_FRAME_PIXELS};
 pub use style::{Color, Colors, Style};
