@@ -4,6 +4,7 @@ mod bench;
 mod conform;
 mod output;
 mod port;
+mod render;
 mod run;
 
 use std::process::ExitCode;
@@ -23,6 +24,8 @@ struct Arguments {
 enum Command {
     /// Play one episode and print its metrics
     Run(run::Run),
+    /// Draw a recorded episode
+    Render(render::Render),
     /// Check that all engines follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
     /// Answer the questions of `conform --port` on standard input, as a port of our own
@@ -42,6 +45,7 @@ fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
+        Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
         Command::Bench(bench) => bench.run(),

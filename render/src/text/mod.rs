@@ -55,7 +55,12 @@ pub fn frame(ground: Ground<'_>, state: &Snapshot, style: &Style) -> Result<Stri
     let drawing = Drawing { ground, state, style, cell_width, part };
     let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));
     let lines = drawing.lines();
-    Ok(lines.iter().take(most_rows).map(|line| truncate_str(line, longest, "")).collect::<Vec<_>>().join("\n"))
+    Ok(lines
+        .iter()
+        .take(most_rows)
+        .map(|line| truncate_str(line, longest, ""))
+        .collect::<Vec<_>>()
+        .join("\n"))
 }
 
 /// What a cell shows.
