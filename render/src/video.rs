@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 
 use pogema_core::{Error, shorten};
 
-use crate::film::{Film, refused};
+use crate::film::Film;
 use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::Style;
@@ -15,6 +15,9 @@ use crate::style::Style;
 const RATE: f64 = 30.0;
 /// So much of what ffmpeg says at its end is passed on. Units: characters.
 const LONGEST_REASON: usize = 200;
+
+const MISSING: &str = "videos need the program `ffmpeg`, which is not on the PATH: install it, for example by \
+                       `apt install ffmpeg` or `brew install ffmpeg`, or draw a GIF";
 
 /// What a video is packed in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +97,24 @@ pub fn write(
     unfinished.persist(path).map_err(|error| failed(error.error))
 }
 
+/// Passes if there is an ffmpeg to make videos.
+///
+/// # Errors
+/// [`Error::State`] if it is missing, [`Error::Io`] if it cannot be started.
+pub fn check_ffmpeg() -> Result<(), Error> {
+    let mut command = Command::new("ffmpeg");
+    let started =
+        command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    started.map(|_| ()).map_err(not_started)
+}
+
+fn not_started(error: std::io::Error) -> Error {
+    match error.kind() {
+        ErrorKind::NotFound => Error::State { reason: MISSING.into() },
+        _ => Error::io("ffmpeg", error),
+    }
+}
+
 fn start(
     motion: &Motion<'_>,
     step_time: f64,
@@ -108,14 +129,7 @@ fn start(
     command.args(["-framerate", &format!("{:.4}", motion.rate(step_time)), "-i", "-", "-an"]);
     command.args(format.arguments()).arg(file);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(said);
-    command.spawn().map_err(|error| match error.kind() {
-        ErrorKind::NotFound => refused(
-            "program for videos",
-            "ffmpeg",
-            "on the PATH: install it from ffmpeg.org or by the system's packages, or draw a GIF",
-        ),
-        _ => Error::io("ffmpeg", error),
-    })
+    command.spawn().map_err(not_started)
 }
 
 /// Hands over all frames. If ffmpeg ends early, its exit status tells why.

@@ -99,7 +99,10 @@ impl Pictures {
             }
             check_writable(path)?;
         }
-        self.video.as_deref().map(video::Format::of).transpose()?;
+        if let Some(path) = &self.video {
+            video::Format::of(path)?;
+            video::check_ffmpeg()?;
+        }
         if let Some(agent) = self.egocentric.filter(|&agent| agent >= num_agents) {
             return refused(format!("agent is `{agent}`, expected 0 to {}", num_agents.saturating_sub(1)));
         }

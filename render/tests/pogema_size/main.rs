@@ -1,7 +1,10 @@
 //! Our drawings beside those that POGEMA 1.4.0 itself makes of the same episodes.
+//!
+//! The environment variable `POGEMA_ORACLE_PYTHON` names a Python that has it.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[path = "../common/mod.rs"]
 mod common;
 
 use std::io::Write as _;
@@ -30,8 +33,7 @@ with tempfile.NamedTemporaryFile("r") as file:
 
 /// POGEMA's drawing of an episode, which is checked to be the same one.
 fn drawn_by_pogema(text: &str, trace: &Trace, egocentric: Option<usize>) -> String {
-    let python =
-        std::env::var("POGEMA_ORACLE_PYTHON").expect("POGEMA_ORACLE_PYTHON names a Python with POGEMA");
+    let python = std::env::var("POGEMA_ORACLE_PYTHON").unwrap();
     let actions: Vec<_> = trace.steps.iter().map(|step| &step.actions).collect();
     let config = pogema_maps::value_from_yaml(text).unwrap();
     let asked = serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric });
