@@ -29,7 +29,7 @@ pub fn elements<'a>(document: &'a Document<'_>, class: &str, tag: &str) -> Vec<N
 }
 
 pub fn attribute(node: Node<'_, '_>, name: &str) -> f64 {
-    node.attribute(name).unwrap_or_else(|| panic!("{name}")).parse().unwrap()
+    node.attribute(name).unwrap().parse().unwrap()
 }
 
 fn list(text: &str) -> Vec<f64> {
@@ -37,7 +37,7 @@ fn list(text: &str) -> Vec<f64> {
 }
 
 fn keys(node: Node<'_, '_>, name: &str) -> Vec<f64> {
-    list(node.attribute(name).unwrap_or_else(|| panic!("{name}")))
+    list(node.attribute(name).unwrap())
 }
 
 impl Circle {
@@ -117,7 +117,7 @@ pub fn points(path: &str) -> Vec<[f64; 2]> {
             ("v", &[down]) => [row + down, col],
             ("l", &[right, down]) => [row + down, col + right],
             ("z", &[]) => continue,
-            _ => panic!("{piece}"),
+            _ => unreachable!("{piece}"),
         });
     }
     points
