@@ -113,7 +113,7 @@ const REFUSED: [(&str, &str); 51] = [
     ("render trace.jsonl --png a.png --width 0", "`--width` is `0`, expected at least 1"),
     (
         "render trace.jsonl --png a.png --width 90000",
-        "size of the picture is `90000 x 72000 pixels`, expected 1 to 67108864 pixels in all",
+        "size of the picture is `90000 x 72000 pixels`, expected 1 to 67108864 pixels in all: choose another width",
     ),
     ("render trace.jsonl --gif a.gif --fps 0", "`--fps` is `0`, expected more than 0"),
     (

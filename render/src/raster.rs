@@ -23,13 +23,16 @@ pub fn png(film: &Film, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     canvas.encode_png().map_err(|error| Error::State { reason: format!("PNG: {error}") })
 }
 
-/// The width of a picture whose longer side is `longer`.
+/// The width of a picture whose longer side is about `longer`: cells are whole pixels where they can be, so that
+/// all look the same.
 ///
 /// Units: pixels.
 pub fn width_for(film: &Film, style: &Style, longer: u32) -> u32 {
     let ground = film.ground();
     let (height, width) = (ground.rows(style.border).len() + 1, ground.cols(style.border).len() + 1);
-    (f64::from(longer) * width as f64 / height.max(width) as f64).ceil() as u32
+    let cell = f64::from(longer) / height.max(width) as f64;
+    let cell = if cell >= 1.0 { cell.floor() } else { cell };
+    (width as f64 * cell).ceil() as u32
 }
 
 /// Draws the frames of a scene and what is between them; what never changes is drawn but once.
@@ -39,9 +42,8 @@ pub(crate) struct Painter<'a> {
     background: Pixmap,
     /// The obstacles that are seen later, each with the frame and its shape.
     fading: Vec<(usize, Path)>,
-    agents: Vec<(Color, Vec<Look>)>,
-    goals: Vec<(Color, Vec<Look>)>,
-    window: Option<Vec<Look>>,
+    agents: Vec<usize>,
+    goals: Vec<usize>,
 }
 
 impl<'a> Painter<'a> {
@@ -53,23 +55,23 @@ impl<'a> Painter<'a> {
         let (width, height) = (whole(width.into()), whole(f64::from(rows) * scale));
         if width == 0 || width.saturating_mul(height) > most {
             let value = format!("{width} x {height} pixels");
-            return Err(refused("size of the picture", value, &format!("1 to {most} pixels in all")));
+            return Err(refused(
+                "size of the picture",
+                value,
+                &format!("1 to {most} pixels in all: choose another width"),
+            ));
         }
         let failed = || Error::State { reason: format!("no memory for {width} x {height} pixels") };
         let background = Pixmap::new(width as u32, height as u32).ok_or_else(failed)?;
         let transform =
             Transform::from_scale(scale as f32, scale as f32).pre_translate(-left as f32, -top as f32);
-        let colored = |looks: fn(&Scene<'a>, usize) -> Vec<Look>| {
-            move |agent| (scene.color(agent), looks(scene, agent))
-        };
         let mut painter = Self {
             scene,
             transform,
             background,
             fading: Vec::new(),
-            agents: scene.agents().into_iter().map(colored(Scene::agent)).collect(),
-            goals: scene.goals().into_iter().map(colored(Scene::goal)).collect(),
-            window: scene.style.egocentric.filter(|_| scene.style.show_agents).map(|own| scene.agent(own)),
+            agents: scene.agents(),
+            goals: scene.goals(),
         };
         painter.paint_background();
         Ok(painter)
@@ -88,14 +90,14 @@ impl<'a> Painter<'a> {
             let strength = (time - (*seen as f64 - 1.0)).clamp(0.0, 1.0);
             fill(&mut canvas, shape, obstacle, SHADED + strength * (1.0 - SHADED), self.transform);
         }
-        let circles = |thing: &(Color, Vec<Look>)| {
-            let ([col, row], opacity) = place(&thing.1, time)?;
-            Some((PathBuilder::from_circle(col, row, size::AGENT as f32)?, thing.0, opacity))
+        let circle = |agent: usize, look: fn(&Scene<'a>, usize, usize) -> Look| {
+            let ([col, row], opacity) = self.place(agent, look, time)?;
+            Some((PathBuilder::from_circle(col, row, size::AGENT as f32)?, self.scene.color(agent), opacity))
         };
-        for (path, color, opacity) in self.agents.iter().filter_map(circles) {
+        for (path, color, opacity) in self.agents.iter().filter_map(|&agent| circle(agent, Scene::agent)) {
             fill(&mut canvas, &path, color, opacity, self.transform);
         }
-        for (path, color, opacity) in self.goals.iter().filter_map(circles) {
+        for (path, color, opacity) in self.goals.iter().filter_map(|&agent| circle(agent, Scene::goal)) {
             stroke(&mut canvas, &path, color, opacity, None, self.transform);
         }
         self.paint_window(&mut canvas, time);
@@ -125,7 +127,8 @@ impl<'a> Painter<'a> {
     }
 
     fn paint_window(&self, canvas: &mut Pixmap, time: f64) {
-        let Some(([col, row], _)) = self.window.as_ref().and_then(|looks| place(looks, time)) else { return };
+        let place = self.scene.window().and_then(|agent| self.place(agent, Scene::agent, time));
+        let Some(([col, row], _)) = place else { return };
         let reach = self.scene.film.config.radius as f32 + size::WINDOW as f32;
         let corner = size::CORNER as f32;
         let dash = StrokeDash::new(vec![size::DASH as f32; 2], 0.0);
@@ -133,18 +136,23 @@ impl<'a> Painter<'a> {
             stroke(canvas, &path, self.scene.style.colors.own, 1.0, dash, self.transform);
         }
     }
-}
 
-/// Where something is between two frames, as (col, row), and how strong; none if it is hidden.
-fn place(looks: &[Look], time: f64) -> Option<([f32; 2], f64)> {
-    let last = looks.len() - 1;
-    let frame = (time.max(0.0) as usize).min(last);
-    let (from, to) = (looks[frame], looks[(frame + 1).min(last)]);
-    let share = (time - frame as f64).clamp(0.0, 1.0);
-    let between = |from: f64, to: f64| from + share * (to - from);
-    let col = between(from.cell.col.into(), to.cell.col.into()) as f32;
-    let row = between(from.cell.row.into(), to.cell.row.into()) as f32;
-    from.is_visible.then(|| ([col, row], between(from.opacity, to.opacity)))
+    /// Where something is between two frames, as (col, row), and how strong; none if it is hidden.
+    fn place(
+        &self,
+        agent: usize,
+        look: fn(&Scene<'a>, usize, usize) -> Look,
+        time: f64,
+    ) -> Option<([f32; 2], f64)> {
+        let last = self.scene.states.len() - 1;
+        let frame = (time.max(0.0) as usize).min(last);
+        let (from, to) = (look(self.scene, agent, frame), look(self.scene, agent, (frame + 1).min(last)));
+        let share = (time - frame as f64).clamp(0.0, 1.0);
+        let between = |from: f64, to: f64| from + share * (to - from);
+        let col = between(from.cell.col.into(), to.cell.col.into()) as f32;
+        let row = between(from.cell.row.into(), to.cell.row.into()) as f32;
+        from.is_visible.then(|| ([col, row], between(from.opacity, to.opacity)))
+    }
 }
 
 /// The lines between the cells and around them, half a cell longer at both ends.

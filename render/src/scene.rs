@@ -155,30 +155,24 @@ impl<'a> Scene<'a> {
         self.agents().into_iter().filter(is_drawn).collect()
     }
 
-    /// An agent at each frame.
-    pub fn agent(&self, agent: usize) -> Vec<Look> {
-        let ground = self.film.ground();
-        let opacity = |state: &Snapshot| match self.style.egocentric {
-            Some(own) => {
-                let cell = state.cells[agent];
-                if ground.sees(state.cells[own], cell.row.into(), cell.col.into()) { 1.0 } else { SHADED }
-            }
-            None => 1.0,
-        };
-        self.looks(|state| Look {
-            cell: state.cells[agent],
-            is_visible: state.active[agent],
-            opacity: opacity(state),
-        })
+    /// An agent at a frame.
+    pub fn agent(&self, agent: usize, frame: usize) -> Look {
+        let state = self.states[frame];
+        let (cell, ground) = (state.cells[agent], self.film.ground());
+        let is_seen = |own: usize| ground.sees(state.cells[own], cell.row.into(), cell.col.into());
+        let opacity = if self.style.egocentric.is_none_or(is_seen) { 1.0 } else { SHADED };
+        Look { cell, is_visible: state.active[agent], opacity }
     }
 
-    /// The goal of an agent at each frame.
-    pub fn goal(&self, agent: usize) -> Vec<Look> {
-        self.looks(|state| Look { cell: state.goals[agent], is_visible: state.active[agent], opacity: 1.0 })
+    /// The goal of an agent at a frame.
+    pub fn goal(&self, agent: usize, frame: usize) -> Look {
+        let state = self.states[frame];
+        Look { cell: state.goals[agent], is_visible: state.active[agent], opacity: 1.0 }
     }
 
-    fn looks(&self, look: impl Fn(&Snapshot) -> Look) -> Vec<Look> {
-        self.states.iter().map(|state| look(state)).collect()
+    /// The agent whose window is drawn.
+    pub fn window(&self) -> Option<usize> {
+        self.style.egocentric.filter(|_| self.style.show_agents)
     }
 
     /// The colour of an agent and its goal.

@@ -109,8 +109,7 @@ impl Picture<'_> {
     fn agents(&mut self) {
         self.put(format_args!("<g class=\"agents\">\n"));
         for agent in self.scene.agents() {
-            let looks = self.scene.agent(agent);
-            self.circle(&looks, "fill", agent);
+            self.circle("a", "fill", agent, |scene, frame| scene.agent(agent, frame));
         }
         self.put(format_args!("</g>\n"));
     }
@@ -121,33 +120,28 @@ impl Picture<'_> {
             number(size::STROKE)
         ));
         for agent in self.scene.goals() {
-            let looks = self.scene.goal(agent);
-            self.circle(&looks, "stroke", agent);
+            self.circle("g", "stroke", agent, |scene, frame| scene.goal(agent, frame));
         }
         self.put(format_args!("</g>\n"));
     }
 
-    fn circle(&mut self, looks: &[Look], painted: &str, agent: usize) {
-        let (first, color) = (looks[0], self.scene.color(agent));
+    fn circle(&mut self, id: &str, painted: &str, agent: usize, look: impl Fn(&Scene<'_>, usize) -> Look) {
+        let (first, color) = (look(self.scene, 0), self.scene.color(agent));
         self.put(format_args!(
-            "<circle id=\"{}{agent}\" r=\"{}\" cx=\"{}\" cy=\"{}\" {painted}=\"{color}\"{}{}",
-            if painted == "fill" { 'a' } else { 'g' },
+            "<circle id=\"{id}{agent}\" r=\"{}\" cx=\"{}\" cy=\"{}\" {painted}=\"{color}\"{}{}",
             number(size::AGENT),
             first.cell.col,
             first.cell.row,
             opacity_attribute(first.opacity),
             visibility_attribute(first),
         ));
-        self.animate("circle", looks);
+        self.animate("circle", look);
     }
 
     /// The dashed square around the cells that the agent sees.
     fn window(&mut self) {
-        let Some(agent) = self.scene.style.egocentric.filter(|_| self.scene.style.show_agents) else {
-            return;
-        };
-        let looks = self.scene.agent(agent);
-        let (first, color) = (looks[0], self.scene.style.colors.own);
+        let Some(agent) = self.scene.window() else { return };
+        let (first, color) = (self.scene.agent(agent, 0), self.scene.style.colors.own);
         let reach = self.scene.film.config.radius as f64 + size::WINDOW;
         let side = number(2.0 * reach);
         self.put(format_args!(
@@ -159,15 +153,16 @@ impl Picture<'_> {
             number(size::DASH),
             visibility_attribute(first),
         ));
-        self.animate("rect", &looks);
+        self.animate("rect", |scene, frame| scene.agent(agent, frame));
     }
 
     /// Ends the element that was begun, with all that changes about it inside.
-    fn animate(&mut self, tag: &str, looks: &[Look]) {
+    fn animate(&mut self, tag: &str, look: impl Fn(&Scene<'_>, usize) -> Look) {
         let Some(timing) = &self.timing else { return self.close(tag, &[]) };
-        let motion = timing.motion(|at| looks[at].cell);
-        let visibility = timing.visibility(|at| looks[at].is_visible);
-        let opacity = timing.numbers("opacity", |at| looks[at].opacity);
+        let look = |frame| look(self.scene, frame);
+        let motion = timing.motion(|frame| look(frame).cell);
+        let visibility = timing.visibility(|frame| look(frame).is_visible);
+        let opacity = timing.numbers("opacity", |frame| look(frame).opacity);
         self.close(tag, &[motion, visibility, opacity]);
     }
 

@@ -124,7 +124,8 @@ fn a_picture_is_as_wide_as_asked_and_as_high_as_its_map() {
         let picture = Picture::of(&raster::png(&film, &Style::default(), width).unwrap());
         assert_eq!((picture.width, picture.height), (width as usize, (width as usize * 5).div_ceil(7)));
     }
-    assert_eq!(raster::width_for(&film, &Style::default(), 700), 700);
+    let width_for = |longer| raster::width_for(&film, &Style::default(), longer);
+    assert_eq!([700, 699, 13, 7, 6, 1].map(width_for), [700, 693, 7, 7, 6, 1]);
     let high = still(&["..", "..", "..", ".."], &[([0, 0], [0, 1])]);
     assert_eq!(raster::width_for(&high, &Style::default(), 700), 500);
 }

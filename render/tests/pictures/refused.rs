@@ -51,17 +51,20 @@ fn agents_off_the_map_and_lists_that_do_not_fit() {
 fn pictures_of_no_pixels_or_too_many() {
     let film = still(&[".."], &[([0, 0], [0, 1])]);
     let draw = |width| raster::png(&film, &Style::default(), width).unwrap_err().to_string();
-    assert_eq!(draw(0), "size of the picture is `0 x 0 pixels`, expected 1 to 67108864 pixels in all");
+    assert_eq!(
+        draw(0),
+        "size of the picture is `0 x 0 pixels`, expected 1 to 67108864 pixels in all: choose another width"
+    );
     assert_eq!(
         draw(50_000),
-        "size of the picture is `50000 x 40000 pixels`, expected 1 to 67108864 pixels in all"
+        "size of the picture is `50000 x 40000 pixels`, expected 1 to 67108864 pixels in all: choose another width"
     );
     assert!(draw(u32::MAX).starts_with("size of the picture is `4294967295 x "));
     let moving =
         |style: &Style, width| gif::encode(&film, style, width, &mut |_, _| ()).unwrap_err().to_string();
     assert_eq!(
         moving(&Style::default(), 4000),
-        "size of the picture is `4000 x 3200 pixels`, expected 1 to 8388608 pixels in all"
+        "size of the picture is `4000 x 3200 pixels`, expected 1 to 8388608 pixels in all: choose another width"
     );
     assert_eq!(
         moving(&Style { step_time: 1e6, ..Style::default() }, 100),
