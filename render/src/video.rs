@@ -52,7 +52,20 @@ impl Format {
     fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Mp4 => &["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"],
-            Self::Webm => &["-c:v", "libvpx-vp9", "-crf", "28", "-b:v", "0", "-pix_fmt", "yuv420p"],
+            Self::Webm => &[
+                "-c:v",
+                "libvpx-vp9",
+                "-crf",
+                "28",
+                "-b:v",
+                "0",
+                "-cpu-used",
+                "4",
+                "-row-mt",
+                "1",
+                "-pix_fmt",
+                "yuv420p",
+            ],
         }
     }
 }

@@ -42,8 +42,8 @@ impl Part {
             [("rows", &self.rows, &self.whole[0]), ("columns", &self.cols, &self.whole[1])]
         {
             if part != whole {
-                let (last, end) = (part.end - 1, whole.end - 1);
-                let _ = write!(text, "  {name} {}..{last} of {}..{end}", part.start, whole.start);
+                let (start, last, all) = (part.start, part.end - 1, whole.len());
+                let _ = write!(text, "  {name} {start}..{last} of {all}");
             }
         }
         text

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod drawn;
+mod ground;
 mod moving;
 mod pixels;
 mod refused;

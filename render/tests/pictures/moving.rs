@@ -132,3 +132,29 @@ fn every_agent_may_have_a_color_of_its_own() {
         assert!(distance <= 8, "agent {agent} is {found}, not {expected}");
     }
 }
+
+#[test]
+fn a_view_keeps_what_it_has_seen() {
+    let film =
+        film("{size: 12, num_agents: 3, seed: 3, obs_radius: 2, on_target: restart, max_episode_steps: 20}");
+    let shown = encode(&film, &Style { egocentric: Some(1), ..Style::default() }, 15 * 20);
+    let ground = film.ground();
+    let cells: Vec<_> = (-1..13).flat_map(|row| (-1..13).map(move |col| (row, col))).collect();
+    let mut num_seen = Vec::new();
+    for frame in 0..=film.steps.len() {
+        let sees =
+            |row, col| film.states().take(frame + 1).any(|state| ground.sees(state.cells[1], row, col));
+        let obstacles = cells.iter().filter(|(row, col)| ground.is_obstacle(*row, *col));
+        let mut seen = 0;
+        for &(row, col) in obstacles {
+            let [y, x] = [row, col].map(|at| (at + 2) as usize * 20);
+            let Color([red, ..]) = shown.pixel((frame + 1) as u32 * 25, y, x);
+            // The obstacles' red is 132, and a fifth of it on white 230; the palette has even steps between.
+            let expected: u8 = if sees(row, col) { 132 } else { 230 };
+            assert!(red.abs_diff(expected) < 8, "({row}, {col}) at frame {frame} is {red}, not {expected}");
+            seen += usize::from(sees(row, col));
+        }
+        num_seen.push(seen);
+    }
+    assert!(num_seen[0] < num_seen[film.steps.len()]);
+}

@@ -71,12 +71,10 @@ fn a_cut_map_says_so_and_shows_the_agent_it_is_about() {
         let style = text::Style { view: Some(view), most: Some((12, 40)), ..text::Style::default() };
         let text = frame(&film, style);
         let (first, rest) = text.split_once('\n').unwrap();
-        assert!(
-            first.contains(" of 0..63") && first.contains("rows ") && first.contains("columns "),
-            "{first}"
-        );
+        assert!(first.contains(" of 64") && first.contains("rows ") && first.contains("columns "), "{first}");
         let letter = pogema_core::picture::agent_letter(view);
         assert!(rest.contains(letter), "{letter}\n{text}");
+        assert!(text.lines().count() == 12 && text.ends_with('┘'), "{text}");
     }
 }
 
@@ -86,6 +84,13 @@ fn a_view_shows_its_window_and_its_own_goal_alone() {
     let film = still(&[".......#", "........"], &[([0, 0], [1, 6]), ([0, 2], [1, 0]), ([0, 3], [1, 1])]);
     let style = text::Style { view: Some(0), border: Border::None, ..text::Style::default() };
     assert_eq!(frame(&film, style), "step 0\na · b          \n· · ·       A  ");
+}
+
+#[test]
+fn an_agent_hides_a_goal_and_a_lower_index_a_higher_one() {
+    let film = still(&["...."], &[([0, 0], [0, 3]), ([0, 1], [0, 3]), ([0, 0], [0, 1])]);
+    let style = text::Style { border: Border::None, ..text::Style::default() };
+    assert_eq!(frame(&film, style), "step 0\na b · A");
 }
 
 #[test]
