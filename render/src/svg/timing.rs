@@ -19,7 +19,8 @@ pub struct Timing {
 impl Timing {
     /// The clock of so many frames; none if there is but one.
     pub fn new(num_frames: usize, step_time: f64) -> Option<Self> {
-        let duration = number_to(num_frames as f64 * step_time, 4);
+        // An animation that takes no time is not played.
+        let duration = number_to((num_frames as f64 * step_time).max(1e-3), 4);
         let decimals = 3 + num_frames.checked_ilog10()? as usize;
         let tail = format!("dur=\"{duration}s\" repeatCount=\"indefinite\"/>");
         (num_frames > 1).then_some(Self { num_frames, tail, decimals })

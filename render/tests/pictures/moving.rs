@@ -145,16 +145,16 @@ fn a_view_keeps_what_it_has_seen() {
         let sees =
             |row, col| film.states().take(frame + 1).any(|state| ground.sees(state.cells[1], row, col));
         let obstacles = cells.iter().filter(|(row, col)| ground.is_obstacle(*row, *col));
-        let mut seen = 0;
+        let mut count = 0;
         for &(row, col) in obstacles {
             let [y, x] = [row, col].map(|at| (at + 2) as usize * 20);
             let Color([red, ..]) = shown.pixel((frame + 1) as u32 * 25, y, x);
             // The obstacles' red is 132, and a fifth of it on white 230; the palette has even steps between.
             let expected: u8 = if sees(row, col) { 132 } else { 230 };
             assert!(red.abs_diff(expected) < 8, "({row}, {col}) at frame {frame} is {red}, not {expected}");
-            seen += usize::from(sees(row, col));
+            count += usize::from(sees(row, col));
         }
-        num_seen.push(seen);
+        num_seen.push(count);
     }
     assert!(num_seen[0] < num_seen[film.steps.len()]);
 }

@@ -129,47 +129,59 @@ fn obstacles_are_those_of_the_map_and_its_border() {
     }
 }
 
+/// The states that the view of an agent shows.
+fn states_of(film: &Film, own: usize) -> Vec<&Snapshot> {
+    let mut states: Vec<_> = film.states().collect();
+    if film.config.on_goal == OnGoal::Finish
+        && let Some(end) = states.iter().position(|state| !state.active[own])
+    {
+        states.truncate(end + 1);
+    }
+    states
+}
+
 #[test]
-fn a_view_shades_what_its_agent_does_not_see() {
-    for film in episodes() {
-        for own in [0, 5] {
-            let text = svg::draw(&film, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
-            let document = Document::parse(&text).unwrap();
-            let mut states: Vec<_> = film.states().collect();
-            if film.config.on_goal == OnGoal::Finish
-                && let Some(end) = states.iter().position(|state| !state.active[own])
-            {
-                states.truncate(end + 1);
+fn a_view_shades_agents_that_its_agent_does_not_see() {
+    for (film, own) in episodes().iter().flat_map(|film| [(film, 0), (film, 5)]) {
+        let text = svg::draw(film, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let states = states_of(film, own);
+        for node in elements(&document, "agents", "circle") {
+            let agent: usize = node.attribute("id").unwrap()[1..].parse().unwrap();
+            let circle = Circle::of(node);
+            assert_eq!(circle.color, if agent == own { "#c1433c" } else { "#6e81af" });
+            assert_follows(&circle, &states, |state| state.cells[agent], agent);
+            for (frame, state) in states.iter().enumerate() {
+                let Cell { row, col } = state.cells[agent];
+                let is_seen = film.ground().sees(state.cells[own], row.into(), col.into());
+                let found = circle.opacity_at(time_of(frame, states.len()));
+                let expected = if is_seen { 1.0 } else { 0.2 };
+                assert!((found - expected).abs() < NEAR, "agent {agent} frame {frame}");
             }
-            let sees = |state: &Snapshot, row: i32, col: i32| film.ground().sees(state.cells[own], row, col);
-            for node in elements(&document, "agents", "circle") {
-                let agent: usize = node.attribute("id").unwrap()[1..].parse().unwrap();
-                let circle = Circle::of(node);
-                assert_eq!(circle.color, if agent == own { "#c1433c" } else { "#6e81af" });
-                for (frame, state) in states.iter().enumerate() {
-                    let Cell { row, col } = state.cells[agent];
-                    let expected = if sees(state, row.into(), col.into()) { 1.0 } else { 0.2 };
-                    let found = circle.opacity_at(time_of(frame, states.len()));
-                    assert!((found - expected).abs() < NEAR, "agent {agent} frame {frame}");
-                }
-            }
-            let goals: Vec<_> = elements(&document, "goals", "circle")
-                .iter()
-                .map(|node| node.attribute("id").unwrap().to_owned())
-                .collect();
-            assert_eq!(goals, [format!("g{own}")]);
-            for path in elements(&document, "obstacles", "path") {
-                let fade = path.children().find(|child| child.has_tag_name("animate"));
-                let is_shaded = path.attribute("opacity") == Some(".2");
-                for at in squares(path.attribute("d").unwrap()) {
-                    let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
-                    let first = states.iter().position(|state| sees(state, row, col));
-                    let told = fade.map(|node| {
-                        let times = node.attribute("keyTimes").unwrap().split(';').rev().nth(1).unwrap();
-                        (times.parse::<f64>().unwrap() * (states.len() + 1) as f64).round() as usize - 1
-                    });
-                    assert_eq!(told.or((!is_shaded).then_some(0)), first, "({row}, {col})");
-                }
+        }
+        let goals = elements(&document, "goals", "circle");
+        let goals: Vec<_> = goals.iter().map(|node| node.attribute("id").unwrap()).collect();
+        assert_eq!(goals, [format!("g{own}")]);
+    }
+}
+
+#[test]
+fn a_view_shades_obstacles_until_its_agent_sees_them() {
+    for (film, own) in episodes().iter().flat_map(|film| [(film, 0), (film, 5)]) {
+        let text = svg::draw(film, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let states = states_of(film, own);
+        for path in elements(&document, "obstacles", "path") {
+            let fade = path.children().find(|child| child.has_tag_name("animate"));
+            let told = fade.map(|node| {
+                let times = node.attribute("keyTimes").unwrap().split(';').rev().nth(1).unwrap();
+                (times.parse::<f64>().unwrap() * (states.len() + 1) as f64).round() as usize - 1
+            });
+            let is_shaded = path.attribute("opacity") == Some(".2");
+            for at in squares(path.attribute("d").unwrap()) {
+                let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
+                let first = states.iter().position(|state| film.ground().sees(state.cells[own], row, col));
+                assert_eq!(told.or((!is_shaded).then_some(0)), first, "({row}, {col})");
             }
         }
     }
