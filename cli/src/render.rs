@@ -20,7 +20,7 @@ pub struct Render {
     /// Play the episode in the terminal, as happens if no file is asked for
     #[arg(long)]
     text: bool,
-    /// The part from one step to another, such as `10..20`
+    /// The part from one step to another, such as `10..20`; `--frame` then counts from its beginning
     #[arg(long, value_name = "A..B")]
     steps: Option<Steps>,
     #[command(flatten)]
