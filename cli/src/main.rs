@@ -5,6 +5,7 @@ mod conform;
 mod maps;
 mod output;
 mod port;
+mod render;
 mod run;
 
 use std::process::ExitCode;
@@ -26,6 +27,8 @@ enum Command {
     Run(run::Run),
     /// Look at maps, make, convert and judge them
     Maps(maps::Maps),
+    /// Draw a recorded episode
+    Render(render::Render),
     /// Check that all engines follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
     /// Answer the questions of `conform --port` on standard input, as a port of our own
@@ -46,6 +49,7 @@ fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
+        Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
         Command::Bench(bench) => bench.run(),

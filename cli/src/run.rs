@@ -3,15 +3,16 @@
 mod episode;
 mod policy;
 mod settings;
-mod show;
 
 use std::path::PathBuf;
 
 use clap::Args;
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
+use pogema_render::Film;
 use serde_json::json;
 
 use crate::output::{check_writable, say};
+use crate::render::Pictures;
 use episode::Episode;
 use policy::{Policy, PolicyName};
 
@@ -28,30 +29,30 @@ pub struct Run {
     /// Draw every step in the terminal
     #[arg(long)]
     render: bool,
-    /// Frames per second of `--render` on a terminal
-    #[arg(long, value_name = "N", default_value_t = 8.0)]
-    fps: f64,
     /// Write what happened to this file, as JSON lines; compressed if it ends in `.zst`
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    pictures: Pictures,
 }
 
 impl Run {
     pub fn run(&self) -> Result<(), Error> {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
+        self.pictures.check(config.num_agents)?;
         let mut policy = Policy::new(self.policy, self.actions.as_deref(), &config)?;
-        let mut episode = Episode::start(config, self.trace.is_some())?;
+        let mut episode = Episode::start(config, self.trace.is_some() || self.pictures.are_wanted())?;
         for warning in episode.warnings() {
             eprintln!("warning: {warning}");
         }
-        let mut screen = self.render.then(|| show::Screen::new(self.fps));
+        let mut screen = self.render.then(|| self.pictures.screen());
         loop {
             if let Some(screen) = &mut screen {
-                screen.draw(&episode)?;
+                screen.draw(episode.ground(), &episode.snapshot())?;
             }
             if episode.is_over() {
                 break;
@@ -59,12 +60,26 @@ impl Run {
             let Some(actions) = policy.act(&episode)? else { break };
             episode.step(actions)?;
         }
-        if let (Some(path), Some(trace)) = (&self.trace, episode.trace()) {
+        if let Some(trace) = episode.trace() {
+            self.keep(&trace)?;
+        }
+        self.summarise(&episode)
+    }
+
+    /// Writes and draws a recorded episode.
+    fn keep(&self, trace: &Trace) -> Result<(), Error> {
+        if let Some(path) = &self.trace {
             let mut text = Vec::new();
             trace.write(&mut text)?;
             pogema_conformance::files::write(path, &text)?;
         }
-        self.summarise(&episode)
+        if self.pictures.are_wanted() { self.pictures.draw(&Film::of(trace), &self.title()) } else { Ok(()) }
+    }
+
+    /// What was played, in a few words.
+    fn title(&self) -> String {
+        let words = [self.settings.what(), Some(self.policy.to_string())];
+        words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     fn summarise(&self, episode: &Episode) -> Result<(), Error> {

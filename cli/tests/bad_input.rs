@@ -32,7 +32,7 @@ const FILES: [(&str, &str); 17] = [
 ];
 
 /// Arguments and the line they are answered with.
-const REFUSED: [(&str, &str); 34] = [
+const REFUSED: [(&str, &str); 51] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     ("run --sped 3", "unexpected argument '--sped' found"),
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
@@ -100,6 +100,38 @@ const REFUSED: [(&str, &str); 34] = [
     ("bench --seconds 0", "config: `seconds` is `0`, expected a time above 0"),
     ("bench --rounds 0", "invalid value '0' for '--rounds <N>': 0 is not in 1..18446744073709551615"),
     ("bench --json no/where.json", "no/where.json: `no`: No such file or directory (os error 2)"),
+    ("render", "the following required arguments were not provided:"),
+    ("render nowhere.jsonl", "nowhere.jsonl: No such file or directory (os error 2)"),
+    ("render old.jsonl", "old.jsonl: trace: line 1: column 1: expected value"),
+    (
+        "render trace.jsonl --svg nowhere/a.svg",
+        "nowhere/a.svg: `nowhere`: No such file or directory (os error 2)",
+    ),
+    ("render trace.jsonl --frame 1", "frame is `1`, expected 0 to 0"),
+    ("render trace.jsonl --png a.png --frame 1", "frame is `1`, expected 0 to 0"),
+    ("render trace.jsonl --svg a.svg --egocentric 1", "agent is `1`, expected 0 to 0"),
+    ("render trace.jsonl --png a.png --width 0", "`--width` is `0`, expected at least 1"),
+    (
+        "render trace.jsonl --png a.png --width 90000",
+        "size of the picture is `90000 x 72000 pixels`, expected 1 to 67108864 pixels in all: choose another width",
+    ),
+    ("render trace.jsonl --gif a.gif --fps 0", "`--fps` is `0`, expected more than 0"),
+    (
+        "render trace.jsonl --gif a.gif --fps 0.001",
+        "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",
+    ),
+    ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name one file, `a`"),
+    ("render trace.jsonl --video a.avi", "a.avi: the name of a video ends in `.mp4` or `.webm`"),
+    (
+        "render trace.jsonl --steps 3..1",
+        "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected two steps such as `10..20`",
+    ),
+    ("render trace.jsonl --steps 0..1", "frame is `1`, expected 0 to 0"),
+    (
+        "render trace.jsonl --colors red",
+        "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected one such as `#c1433c`",
+    ),
+    ("run --gif a.gif --view 5", "agent is `5`, expected 0 to 0"),
 ];
 
 fn folder() -> tempfile::TempDir {

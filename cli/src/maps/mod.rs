@@ -35,6 +35,8 @@ enum Command {
     Export(convert::Export),
     /// A large map cut into tiles
     Tiles(convert::Tiles),
+    /// A page to draw maps on, for any browser
+    Editor(show::Editor),
     /// Figures of maps, and of a scenario: who cannot reach their goals, and what cannot be solved
     Stats(stats::Stats),
 }
@@ -48,6 +50,7 @@ impl Maps {
             Command::Import(import) => import.run(),
             Command::Export(export) => export.run(),
             Command::Tiles(tiles) => tiles.run(),
+            Command::Editor(editor) => editor.run(),
             Command::Stats(stats) => stats.run(),
         }
     }

@@ -1,12 +1,15 @@
 //! `pogema maps list` and `show`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use comfy_table::CellAlignment;
 use pogema_core::{Error, Map};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{MapStats, MapText, PUZZLES};
+use pogema_render::html;
 
-use super::Sources;
+use super::{Sources, write_out};
 use crate::output::{markdown_table, say};
 
 #[derive(Args, Debug)]
@@ -82,6 +85,19 @@ impl Show {
             say(&picture(&text, room))?;
         }
         Ok(())
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct Editor {
+    /// The page to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl Editor {
+    pub fn run(&self) -> Result<(), Error> {
+        write_out(Some(&self.out), html::editor().as_bytes())
     }
 }
 

@@ -8,6 +8,7 @@ use pogema_core::{
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_planners::AStarTeam;
 use pogema_reference::Reference;
+use pogema_render::Ground;
 
 pub struct Episode {
     config: GridConfig,
@@ -100,8 +101,10 @@ impl Episode {
         self.environment.snapshot()
     }
 
-    pub fn instance(&self) -> &Instance {
-        &self.instance
+    /// What there is to draw besides the state.
+    pub fn ground(&self) -> Ground<'_> {
+        let radius = self.config.rules().radius;
+        Ground { map: self.instance.map(), outside: self.instance.outside(), radius }
     }
 
     pub fn config(&self) -> &GridConfig {

@@ -69,6 +69,15 @@ enum CollisionSystem {
 }
 
 impl Settings {
+    /// The map or config that was asked for.
+    pub fn what(&self) -> Option<String> {
+        let config = self.config.as_ref().map(|path| path.display().to_string());
+        self.map.clone().or(config).map(|name| match self.seed {
+            Some(seed) => format!("{name}, seed {seed}"),
+            None => name,
+        })
+    }
+
     /// The config that file and flags make together.
     pub fn config(&self) -> Result<GridConfig, Error> {
         let mut fields = match &self.config {

@@ -45,7 +45,7 @@ const EPISODES: [(&str, &str, &str, f64); 5] = [
     (
         "nothing",
         "All on their goals at once",
-        "{size: 6, num_agents: 5, seed: 2, density: 0.1, on_target: nothing, reward: shared}",
+        "{size: 6, num_agents: 5, seed: 2, density: 0.1, on_target: nothing, reward: shared, empty_outside: false}",
         0.1,
     ),
     (

@@ -38,7 +38,7 @@ const EDITOR: [&str; 8] = [
 /// The page that replays an episode.
 ///
 /// # Errors
-/// If the lists of a step are not as long as there are agents, if an agent is off the map, or if it is not next
+/// If the lists of a step are not as long as there are agents, if a cell is off the map, or if an agent is not next
 /// to where it was a step before.
 pub fn replay(film: &Film, title: &str) -> Result<String, Error> {
     let page = Page {

@@ -1,12 +1,12 @@
 //! An episode as JSON for a page: a header one can read, and everything that is long as packed bytes.
 //!
-//! The bytes are the parts of [`Parts`] one after the other, integers in little endian, deflated, in base64;
+//! The bytes are the map, the noise beyond its wall if there is any, and the parts of [`Parts`], one after the other, integers in little endian, deflated, in base64;
 //! `film.js` reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec_zlib;
-use pogema_core::{Action, Cell, Config, Error, Metrics, Snapshot, TraceStep};
+use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, TraceStep};
 use serde::Serialize;
 
 use crate::Film;
@@ -21,6 +21,7 @@ struct Header<'a> {
     width: usize,
     num_agents: usize,
     num_steps: usize,
+    has_noise: bool,
     config: Config,
     metrics: Option<&'a Metrics>,
     /// Why moves were reverted, as far as it happened; the packed reasons are places in this list.
@@ -68,19 +69,24 @@ struct Parts {
 /// As [`super::replay`].
 pub fn pack(film: &Film) -> Result<String, Error> {
     let num_agents = film.config.num_agents;
-    check_state(film, &film.start, 0)?;
+    film.check()?;
+    Error::check_length("cells", num_agents, film.start.cells.len())?;
+    Error::check_length("on_goal", num_agents, film.start.on_goal.len())?;
     let mut parts = Parts::default();
     parts.add_start(film);
     let mut before = &film.start;
     for (step, after) in (1..).zip(&film.steps) {
         check_step(after, num_agents)?;
-        check_state(film, &after.state, step)?;
         parts.add_step(film, before, after, step)?;
         before = &after.state;
     }
     let mut bytes = bits(film.map.obstacles());
     let Parts { starts, flags, moves, rewards, ended, goals, reverted, others, marks, reasons } = parts;
-    for part in [&starts, &flags, &moves, &rewards, &ended, &goals, &reverted, &others, &marks] {
+    let beyond = match &film.outside {
+        Outside::Free => Vec::new(),
+        Outside::Noise(noise) => bits(noise.obstacles()),
+    };
+    for part in [&beyond, &starts, &flags, &moves, &rewards, &ended, &goals, &reverted, &others, &marks] {
         bytes.extend_from_slice(part);
     }
     let header = Header {
@@ -88,6 +94,7 @@ pub fn pack(film: &Film) -> Result<String, Error> {
         width: film.map.width(),
         num_agents,
         num_steps: film.steps.len(),
+        has_noise: !beyond.is_empty(),
         config: film.config,
         metrics: film.steps.iter().rev().find_map(|step| step.metrics.as_ref()),
         reasons,
@@ -195,27 +202,9 @@ fn wrong(step: u32, reason: String) -> Error {
 }
 
 fn check_step(step: &TraceStep, num_agents: usize) -> Result<(), Error> {
+    Error::check_length("on_goal", num_agents, step.state.on_goal.len())?;
     Error::check_length("actions", num_agents, step.actions.len())?;
     Error::check_length("rewards", num_agents, step.rewards.len())?;
     Error::check_length("terminated", num_agents, step.terminated.len())?;
     Error::check_length("truncated", num_agents, step.truncated.len())
-}
-
-fn check_state(film: &Film, state: &Snapshot, step: u32) -> Result<(), Error> {
-    let num_agents = film.config.num_agents;
-    Error::check_length("cells", num_agents, state.cells.len())?;
-    Error::check_length("goals", num_agents, state.goals.len())?;
-    Error::check_length("active", num_agents, state.active.len())?;
-    Error::check_length("on_goal", num_agents, state.on_goal.len())?;
-    for (what, cells) in [("cell", &state.cells), ("goal", &state.goals)] {
-        if let Some(agent) = cells.iter().position(|&cell| !film.map.contains(cell)) {
-            let (height, width) = (film.map.height(), film.map.width());
-            let cell = cells[agent];
-            let reason = format!(
-                "the {what} {cell} of agent {agent} is outside the map of {height} rows and {width} columns"
-            );
-            return Err(wrong(step, reason));
-        }
-    }
-    Ok(())
 }

@@ -59,7 +59,7 @@ fn cells_off_the_map_are_refused() {
     off.steps[1].state.goals[2] = Cell::new(6, 0);
     assert_eq!(
         reason(&off),
-        "trace: line 4: the goal (6, 0) of agent 2 is outside the map of 6 rows and 6 columns"
+        "a cell of frame 2 is `(6, 0)`, expected a cell of the map of 6 rows and 6 columns"
     );
 }
 

@@ -26,7 +26,10 @@ class Film {
       return new Kind(buffer.slice(begin, at));
     };
     const bits = take(Math.ceil((this.height * this.width) / 8));
-    this.isObstacle = new Uint8Array(this.height * this.width).map((_, index) => (bits[index >> 3] >> (index & 7)) & 1);
+    const unpacked = (packed, length) => new Uint8Array(length).map((_, index) => (packed[index >> 3] >> (index & 7)) & 1);
+    this.isObstacle = unpacked(bits, this.height * this.width);
+    const numBeyond = (this.height + 2 * this.config.radius) * (this.width + 2 * this.config.radius);
+    this.noise = header.has_noise ? unpacked(take(Math.ceil(numBeyond / 8)), numBeyond) : null;
     const starts = take(4 * agents, Uint16Array);
     const flags = take(agents);
     const moves = take(all);
@@ -214,8 +217,10 @@ class Film {
     return channels;
   }
 
-  // The ring of obstacles around the map; what lies beyond it is free.
+  // The ring of obstacles around the map, and what lies beyond it: nothing, or noise.
   isWall(row, col) {
-    return row >= -1 && col >= -1 && row <= this.height && col <= this.width ? 1 : 0;
+    if (row >= -1 && col >= -1 && row <= this.height && col <= this.width) return 1;
+    const radius = this.config.radius;
+    return this.noise?.[(row + radius) * (this.width + 2 * radius) + col + radius] ?? 0;
   }
 }

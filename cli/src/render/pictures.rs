@@ -1,0 +1,197 @@
+//! Which pictures are drawn of an episode, and how: the flags that `run` and `render` share.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use pogema_conformance::files;
+use pogema_core::Error;
+use pogema_render::{Border, Color, Colors, Film, Style, gif, html, raster, svg, text, video};
+
+use super::screen::Screen;
+use crate::output::check_writable;
+
+/// The longer side of pictures. Units: pixels.
+const LONGER_SIDE_OF_PNG: u32 = 1024;
+const LONGER_SIDE_OF_GIF: u32 = 512;
+const LONGER_SIDE_OF_VIDEO: u32 = 720;
+
+/// Frames per second in the terminal.
+const TERMINAL_FPS: f64 = 8.0;
+
+#[derive(Args, Debug)]
+pub struct Pictures {
+    /// Write an SVG: an animation, or with `--frame` a picture
+    #[arg(long, value_name = "FILE", help_heading = "Pictures")]
+    svg: Option<PathBuf>,
+    /// Write one frame as PNG, the first unless `--frame` says otherwise
+    #[arg(long, value_name = "FILE", help_heading = "Pictures")]
+    png: Option<PathBuf>,
+    /// Write an animated GIF
+    #[arg(long, value_name = "FILE", help_heading = "Pictures")]
+    gif: Option<PathBuf>,
+    /// Write a video, `.mp4` or `.webm`; needs the program ffmpeg
+    #[arg(long, value_name = "FILE", help_heading = "Pictures")]
+    video: Option<PathBuf>,
+    /// Write a page that replays the episode, for any browser
+    #[arg(long, value_name = "FILE", help_heading = "Pictures")]
+    html: Option<PathBuf>,
+    /// The frame of pictures that stand still: 0 after the reset, 1 after the first step
+    #[arg(long, value_name = "N", help_heading = "Pictures")]
+    frame: Option<usize>,
+    /// Draw what this agent sees
+    #[arg(long, value_name = "AGENT", visible_alias = "view", help_heading = "Pictures")]
+    egocentric: Option<usize>,
+    /// Leave out the lines between cells
+    #[arg(long, help_heading = "Pictures")]
+    no_lines: bool,
+    /// Leave out agents and goals
+    #[arg(long, help_heading = "Pictures")]
+    no_agents: bool,
+    /// How much of the border is drawn
+    #[arg(long, value_enum, default_value_t = BorderName::Thin, help_heading = "Pictures")]
+    border: BorderName,
+    /// Colours of the agents in turn, such as `#c1433c,#2e6f9e`
+    #[arg(long, value_name = "COLORS", value_delimiter = ',', help_heading = "Pictures")]
+    colors: Vec<Color>,
+    /// Pixels from left to right of PNG, GIF and video
+    #[arg(long, value_name = "PX", help_heading = "Pictures")]
+    width: Option<u32>,
+    /// Steps per second: 4 unless told otherwise, and 8 in the terminal
+    #[arg(long, value_name = "N", help_heading = "Pictures")]
+    fps: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BorderName {
+    /// The map alone
+    None,
+    /// The wall around the map
+    Thin,
+    /// All that agents can see, as wide as their radius
+    Full,
+}
+
+impl Pictures {
+    /// Whether a file is asked for.
+    pub fn are_wanted(&self) -> bool {
+        self.files().next().is_some()
+    }
+
+    /// The frame that was asked for.
+    pub fn frame(&self) -> Option<usize> {
+        self.frame
+    }
+
+    /// The files that are asked for, each with its flag.
+    fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let files = [
+            ("--svg", &self.svg),
+            ("--png", &self.png),
+            ("--gif", &self.gif),
+            ("--video", &self.video),
+            ("--html", &self.html),
+        ];
+        files.into_iter().filter_map(|(flag, path)| Some((flag, path.as_deref()?)))
+    }
+
+    /// Passes if all that was asked for can be drawn and written, as far as that can be told before the episode.
+    ///
+    /// # Errors
+    /// About the first file that cannot be written or value that makes no sense.
+    pub fn check(&self, num_agents: usize) -> Result<(), Error> {
+        let refused = |reason: String| Err(Error::State { reason });
+        for (at, (flag, path)) in self.files().enumerate() {
+            if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
+                return refused(format!("`{other}` and `{flag}` name one file, `{}`", path.display()));
+            }
+            check_writable(path)?;
+        }
+        if let Some(path) = &self.video {
+            video::Format::of(path)?;
+            video::check_ffmpeg()?;
+        }
+        if let Some(agent) = self.egocentric.filter(|&agent| agent >= num_agents) {
+            return refused(format!("agent is `{agent}`, expected 0 to {}", num_agents.saturating_sub(1)));
+        }
+        if let Some(fps) = self.fps.filter(|fps| self.are_wanted() && !(*fps > 0.0 && fps.is_finite())) {
+            return refused(format!("`--fps` is `{fps}`, expected more than 0"));
+        }
+        match self.width {
+            Some(0) => refused("`--width` is `0`, expected at least 1".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws and writes all that is asked for; the page of a replay has a title.
+    pub fn draw(&self, film: &Film, title: &str) -> Result<(), Error> {
+        let style = self.style();
+        let width = |longer| self.width.unwrap_or_else(|| raster::width_for(film, &style, longer));
+        if let Some(path) = &self.svg {
+            files::write(path, svg::draw(film, &style)?.as_bytes())?;
+        }
+        if let Some(path) = &self.html {
+            files::write(path, html::replay(film, title)?.as_bytes())?;
+        }
+        if let Some(path) = &self.png {
+            files::write(path, &raster::png(film, &style, width(LONGER_SIDE_OF_PNG))?)?;
+        }
+        if let Some(path) = &self.gif {
+            let bytes = gif::encode(film, &style, width(LONGER_SIDE_OF_GIF), &mut progress("GIF"))?;
+            files::write(path, &bytes)?;
+        }
+        if let Some(path) = &self.video {
+            video::write(film, &style, width(LONGER_SIDE_OF_VIDEO), path, &mut progress("video"))?;
+        }
+        Ok(())
+    }
+
+    /// A screen for the same episode.
+    pub fn screen(&self) -> Screen {
+        let border = self.border.into();
+        let style = text::Style { view: self.egocentric, border, ..text::Style::default() };
+        Screen::new(style, self.fps.unwrap_or(TERMINAL_FPS))
+    }
+
+    fn style(&self) -> Style {
+        let usual = Style::default();
+        let mut colors = Colors::default();
+        if !self.colors.is_empty() {
+            colors.agents.clone_from(&self.colors);
+        }
+        Style {
+            static_frame: self.frame,
+            egocentric: self.egocentric,
+            show_agents: !self.no_agents,
+            show_lines: !self.no_lines,
+            border: self.border.into(),
+            step_time: self.fps.map_or(usual.step_time, f64::recip),
+            colors,
+        }
+    }
+}
+
+impl From<BorderName> for Border {
+    fn from(name: BorderName) -> Self {
+        match name {
+            BorderName::None => Self::None,
+            BorderName::Thin => Self::Thin,
+            BorderName::Full => Self::Full,
+        }
+    }
+}
+
+/// A bar on the terminal, told how many frames are done, and how many there are.
+fn progress(what: &'static str) -> impl FnMut(usize, usize) {
+    let bar = ProgressBar::no_length().with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} frames") {
+        bar.set_style(style);
+    }
+    move |done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        if done == all {
+            bar.finish_and_clear();
+        }
+    }
+}

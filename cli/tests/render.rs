@@ -1,0 +1,139 @@
+//! `pogema render` and the pictures of `pogema run`.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const RUN: &str = "run --size 6 --num-agents 3 --seed 1 --steps 12 --on-target restart";
+const KINDS: [(&str, &str, &[u8]); 3] =
+    [("--svg", "a.svg", b"<svg"), ("--png", "a.png", b"\x89PNG"), ("--gif", "a.gif", b"GIF89a")];
+
+/// Runs the program in a folder; of `path` alone programs are found.
+fn pogema(folder: &Path, path: &Path, arguments: &str) -> Output {
+    let arguments = arguments.split_whitespace();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn run_and_render_draw_the_same() {
+    let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let trace = second.path().join("t.jsonl.zst");
+    let flags = "--egocentric 1 --border full --fps 10 --width 90 --colors #ff0000,#00ff00";
+    let flags = format!("--svg a.svg --png a.png --gif a.gif {flags}");
+    let output = pogema(first.path(), first.path(), &format!("{RUN} --trace {} {flags}", trace.display()));
+    assert!(output.status.success(), "{output:?}");
+    let output = pogema(second.path(), second.path(), &format!("render t.jsonl.zst {flags}"));
+    assert_eq!((output.status.code(), output.stdout.len(), output.stderr.len()), (Some(0), 0, 0));
+    for (_, name, begin) in KINDS {
+        let [one, other] = [&first, &second].map(|folder| std::fs::read(folder.path().join(name)).unwrap());
+        assert!(one == other && one.starts_with(begin), "{name}");
+    }
+    assert_eq!(names(first.path()), ["a.gif", "a.png", "a.svg"]);
+}
+
+#[test]
+fn without_a_file_the_episode_is_played_as_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |arguments: &str| {
+        let output = pogema(folder.path(), folder.path(), arguments);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let run = said(&format!("{RUN} --render --trace t.jsonl"));
+    let played = said("render t.jsonl");
+    assert_eq!(run.rsplit_once("\n12 steps").unwrap().0, played.trim_end());
+    assert_eq!(played.matches("step ").count(), 13);
+    let part = said("render t.jsonl --steps 4..6 --svg a.svg --text");
+    assert!(played.contains(part.trim_end()) && part.starts_with("step 4\n") && part.contains("step 6\n"));
+    let frame = said("render t.jsonl --frame 5");
+    assert!(frame.starts_with("step 5\n") && frame.matches("step").count() == 1 && played.contains(&frame));
+    let view = said("render t.jsonl --frame 5 --view 2 --border none");
+    assert!(view.contains('c') && !view.contains('A') && !view.contains('│'));
+}
+
+#[cfg(unix)]
+mod videos {
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
+
+    use super::{RUN, names, pogema};
+
+    /// A folder with a program `ffmpeg`, and a folder with a trace.
+    fn folders(ffmpeg: Option<&str>) -> [tempfile::TempDir; 2] {
+        let [programs, work] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        if let Some(script) = ffmpeg {
+            let path = programs.path().join("ffmpeg");
+            std::fs::write(&path, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{script}")).unwrap();
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        assert!(pogema(work.path(), programs.path(), &format!("{RUN} --trace t.jsonl")).status.success());
+        [programs, work]
+    }
+
+    fn refused(folder: &Path, programs: &Path, arguments: &str) -> String {
+        let output = pogema(folder, programs, arguments);
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{output:?}");
+        String::from_utf8(output.stderr).unwrap().trim_end().to_owned()
+    }
+
+    #[test]
+    fn ffmpeg_gets_every_frame_and_the_file_appears_at_the_end() {
+        // A stand-in that writes what it was asked for and how much it was given.
+        let script = r#"[ "$1" = -version ] && exit; for last; do :; done; (echo "$*"; wc -c) > "$last""#;
+        let [programs, work] = folders(Some(script));
+        for (name, codec) in [("a.mp4", "libx264"), ("b.webm", "libvpx-vp9")] {
+            let arguments = format!("render t.jsonl --video {name} --width 61 --fps 10");
+            let output = pogema(work.path(), programs.path(), &arguments);
+            assert!(output.status.success(), "{output:?}");
+            let text = std::fs::read_to_string(work.path().join(name)).unwrap();
+            let (asked, given) = text.split_once('\n').unwrap();
+            assert!(asked.contains("-pix_fmt rgba -video_size 62x62 -framerate 30.0000 -i -"), "{asked}");
+            assert!(asked.contains(codec), "{asked}");
+            // 13 states and one more to hold the first, three frames each.
+            assert_eq!(given.trim().parse::<usize>().unwrap(), 14 * 3 * 62 * 62 * 4);
+        }
+        assert_eq!(names(work.path()), ["a.mp4", "b.webm", "t.jsonl"]);
+    }
+
+    #[test]
+    fn a_failing_ffmpeg_is_quoted_and_leaves_what_was_there() {
+        let script = r#"[ "$1" = -version ] && exit; for last; do :; done; echo half > "$last"
+            echo first >&2; echo "Unknown encoder 'libx264'" >&2; exit 3"#;
+        let [programs, work] = folders(Some(script));
+        std::fs::write(work.path().join("a.mp4"), "before").unwrap();
+        let said = refused(work.path(), programs.path(), "render t.jsonl --video a.mp4");
+        assert_eq!(said, "error: a.mp4: ffmpeg failed (exit status: 3): Unknown encoder 'libx264'");
+        assert_eq!(std::fs::read_to_string(work.path().join("a.mp4")).unwrap(), "before");
+        assert_eq!(names(work.path()), ["a.mp4", "t.jsonl"]);
+    }
+
+    #[test]
+    fn an_ffmpeg_that_writes_nothing_has_failed() {
+        let [programs, work] = folders(Some("cat > /dev/null"));
+        let said = refused(work.path(), programs.path(), "render t.jsonl --video a.mp4");
+        assert_eq!(said, "error: a.mp4: ffmpeg wrote nothing");
+        assert_eq!(names(work.path()), ["t.jsonl"]);
+    }
+
+    #[test]
+    fn without_ffmpeg_nothing_is_played() {
+        let [programs, work] = folders(None);
+        for arguments in ["render t.jsonl --video a.mp4", "run --trace b.jsonl --video a.mp4"] {
+            let said = refused(work.path(), programs.path(), arguments);
+            let begin = "error: videos need the program `ffmpeg`, which is not on the PATH: install it";
+            assert!(said.starts_with(begin) && said.lines().count() == 1, "{said}");
+        }
+        assert_eq!(names(work.path()), ["t.jsonl"]);
+    }
+}

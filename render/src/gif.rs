@@ -1,0 +1,171 @@
+//! Animated GIFs.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+
+use gif::{DisposalMethod, Encoder, Frame, Repeat};
+use pogema_core::Error;
+use tiny_skia::Pixmap;
+
+use crate::film::Film;
+use crate::motion::Motion;
+use crate::scene::Scene;
+use crate::style::{Color, Style};
+
+/// Frames of a second, if a step is a quarter of one.
+const RATE: f64 = 20.0;
+/// The shortest delay that browsers keep to. Units: hundredths of a second.
+const SHORTEST: u16 = 2;
+/// The number of a colour that leaves a pixel as it was.
+const UNCHANGED: u8 = u8::MAX;
+
+/// Draws an episode as a GIF that repeats forever.
+///
+/// `progress` is told after each frame how many are done, and how many there are.
+///
+/// Units: `width` in pixels.
+///
+/// # Errors
+/// As for [`crate::svg::draw`], and if there were more frames or pixels than [`crate::MOST_FRAMES`] and
+/// [`crate::MOST_FRAME_PIXELS`].
+pub fn encode(
+    film: &Film,
+    style: &Style,
+    width: u32,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Vec<u8>, Error> {
+    let style = Style { static_frame: None, ..style.clone() };
+    let scene = Scene::new(film, &style)?;
+    let motion = Motion::new(&scene, width, RATE, 1)?;
+    let first = motion.frame(0);
+    let too_wide = |_| Error::State { reason: "GIF: a picture has at most 65535 pixels a side".into() };
+    let width = u16::try_from(first.width()).map_err(too_wide)?;
+    let height = u16::try_from(first.height()).map_err(too_wide)?;
+    let palette = Palette::of(&scene);
+    let failed = |error: gif::EncodingError| Error::State { reason: format!("GIF: {error}") };
+    let mut encoder = Encoder::new(Vec::new(), width, height, &palette.bytes()).map_err(failed)?;
+    encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
+    let delay = 100.0 / motion.rate(style.step_time);
+    let mut last = palette.numbers(&first);
+    let mut waiting = whole(&last, width, height);
+    for index in 1..=motion.num_frames() {
+        waiting.delay = waiting.delay.saturating_add(delay_at(index, delay));
+        progress(index, motion.num_frames());
+        let next =
+            if index < motion.num_frames() { palette.numbers(&motion.frame(index)) } else { Vec::new() };
+        // A frame that changes nothing only lengthens the one before.
+        if next != last {
+            let frame = changed(&last, &next, width);
+            encoder.write_frame(&std::mem::replace(&mut waiting, frame)).map_err(failed)?;
+            last = next;
+        }
+    }
+    encoder.into_inner().map_err(|error| Error::State { reason: format!("GIF: {error}") })
+}
+
+/// How long the frame before this one is shown, so that rounding never adds up.
+fn delay_at(index: usize, delay: f64) -> u16 {
+    let until = |index: usize| (index as f64 * delay).round();
+    ((until(index) - until(index - 1)) as u16).max(SHORTEST)
+}
+
+fn whole(numbers: &[u8], width: u16, height: u16) -> Frame<'static> {
+    Frame {
+        width,
+        height,
+        buffer: Cow::Owned(numbers.to_vec()),
+        dispose: DisposalMethod::Keep,
+        ..Frame::default()
+    }
+}
+
+/// The smallest part of a picture that holds all that changed; empty if nothing did.
+fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
+    let width = usize::from(width);
+    let rows = || last.chunks(width).zip(next.chunks(width)).enumerate().filter(|(_, (from, to))| from != to);
+    let (top, bottom) = (rows().map(|(row, _)| row).min(), rows().map(|(row, _)| row).max());
+    let (Some(top), Some(bottom)) = (top, bottom) else { return Frame::default() };
+    let is_changed = |(from, to): (&u8, &u8)| from != to;
+    let left =
+        rows().filter_map(|(_, (from, to))| from.iter().zip(to).position(is_changed)).min().unwrap_or(0);
+    let right =
+        rows().filter_map(|(_, (from, to))| from.iter().zip(to).rposition(is_changed)).max().unwrap_or(left);
+    let mut buffer = Vec::with_capacity((bottom - top + 1) * (right - left + 1));
+    for row in top..=bottom {
+        let part = row * width + left..=row * width + right;
+        buffer.extend(
+            last[part.clone()]
+                .iter()
+                .zip(&next[part])
+                .map(|(from, to)| if from == to { UNCHANGED } else { *to }),
+        );
+    }
+    Frame {
+        top: top as u16,
+        left: left as u16,
+        width: (right - left + 1) as u16,
+        height: (bottom - top + 1) as u16,
+        buffer: Cow::Owned(buffer),
+        transparent: Some(UNCHANGED),
+        dispose: DisposalMethod::Keep,
+        ..Frame::default()
+    }
+}
+
+/// The colours of a scene, each on its way from white in even steps.
+struct Palette {
+    colors: Vec<[u8; 3]>,
+    /// The nearest colour of each colour of five bits a channel.
+    nearest: Vec<u8>,
+}
+
+impl Palette {
+    /// Bits of each channel that [`Palette::numbers`] looks at.
+    const BITS: u32 = 5;
+
+    fn of(scene: &Scene<'_>) -> Self {
+        let mut used: BTreeSet<Color> = scene.agents().into_iter().map(|agent| scene.color(agent)).collect();
+        used.insert(scene.style.colors.obstacle);
+        let most = usize::from(UNCHANGED) - 1;
+        let levels = (most / used.len()).clamp(1, 24);
+        let mut colors = vec![Color::WHITE.0];
+        for color in used.into_iter().take(most) {
+            let channel = |channel: u8, level: usize| {
+                let white = 255 * (levels - level) + usize::from(channel) * level;
+                (white / levels) as u8
+            };
+            colors.extend((1..=levels).map(|level| color.0.map(|value| channel(value, level))));
+        }
+        let side = 1 << Self::BITS;
+        let middle = |at: usize| ((at * 255) / (side - 1)) as u8;
+        let all =
+            (0..side * side * side).map(|at| [at / (side * side), at / side % side, at % side].map(middle));
+        let nearest = all.map(|color| nearest(&colors, color)).collect();
+        Self { colors, nearest }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = self.colors.concat();
+        bytes.resize(256 * 3, 0);
+        bytes
+    }
+
+    /// The colour of each pixel, by number.
+    fn numbers(&self, canvas: &Pixmap) -> Vec<u8> {
+        let most = (1 << Self::BITS) - 1;
+        let part = |value: u8| (usize::from(value) * most + 127) / 255;
+        let number = |pixel: &[u8]| {
+            let [red, green, blue] = [part(pixel[0]), part(pixel[1]), part(pixel[2])];
+            self.nearest[(red << (2 * Self::BITS)) + (green << Self::BITS) + blue]
+        };
+        canvas.data().chunks_exact(4).map(number).collect()
+    }
+}
+
+fn nearest(colors: &[[u8; 3]], wanted: [u8; 3]) -> u8 {
+    let distance = |color: &[u8; 3]| {
+        color.iter().zip(wanted).map(|(one, other)| u32::from(one.abs_diff(other)).pow(2)).sum::<u32>()
+    };
+    let number = (0..colors.len()).min_by_key(|&number| distance(&colors[number]));
+    number.unwrap_or_default() as u8
+}

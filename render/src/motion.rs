@@ -1,0 +1,54 @@
+//! The frames of a moving picture.
+
+use pogema_core::Error;
+use tiny_skia::Pixmap;
+
+use crate::film::refused;
+use crate::raster::Painter;
+use crate::scene::Scene;
+
+/// Most frames of a moving picture, those between two steps included.
+pub const MOST_FRAMES: usize = 20_000;
+/// Most pixels of each of its frames.
+pub const MOST_PIXELS: usize = 1 << 23;
+
+/// A scene cut into evenly spaced frames.
+pub(crate) struct Motion<'a> {
+    painter: Painter<'a>,
+    /// How many frames a step takes.
+    per_step: usize,
+    num_frames: usize,
+}
+
+impl<'a> Motion<'a> {
+    /// # Errors
+    /// If there would be too many frames, or too many pixels to a frame.
+    pub fn new(scene: &'a Scene<'a>, width: u32, rate: f64, multiple: u32) -> Result<Self, Error> {
+        let per_step = (rate * scene.style.step_time).round().max(1.0) as usize;
+        // The first and the last state are held for a step, as in POGEMA's animations.
+        let num_frames = (scene.states.len() + 1).saturating_mul(per_step);
+        if num_frames > MOST_FRAMES {
+            let expected = format!("at most {MOST_FRAMES}: draw fewer steps or more steps a second");
+            return Err(refused("number of frames", num_frames, &expected));
+        }
+        Ok(Self { painter: Painter::new(scene, width, MOST_PIXELS, multiple)?, per_step, num_frames })
+    }
+
+    pub fn num_frames(&self) -> usize {
+        self.num_frames
+    }
+
+    /// How many frames of a second.
+    pub fn rate(&self, step_time: f64) -> f64 {
+        self.per_step as f64 / step_time
+    }
+
+    /// Width and height. Units: pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.painter.size()
+    }
+
+    pub fn frame(&self, index: usize) -> Pixmap {
+        self.painter.paint(index as f64 / self.per_step as f64 - 1.0)
+    }
+}

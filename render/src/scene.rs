@@ -1,0 +1,196 @@
+//! What is to be seen of an episode at each frame, whatever it is drawn with.
+
+use pogema_core::{Cell, Config, Error, OnGoal, Snapshot};
+
+use crate::film::{Film, refused};
+use crate::style::{Color, Style};
+
+/// How strongly things are drawn that the agent whose view it is does not see.
+pub const SHADED: f64 = 0.2;
+
+/// Sizes in cells, as facts of POGEMA's pictures.
+///
+/// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
+pub mod size {
+    /// Radius of agents and goals.
+    pub const AGENT: f64 = 0.35;
+    /// Width of lines and of goals' rings.
+    pub const STROKE: f64 = 0.1;
+    /// Side of an obstacle.
+    pub const OBSTACLE: f64 = 0.7;
+    /// Radius of an obstacle's corners and of the window's.
+    pub const CORNER: f64 = 0.15;
+    /// Length of the dashes around the window, and of the gaps between them.
+    pub const DASH: f64 = 0.25;
+    /// How far the window's frame is from the centres of the outermost cells seen.
+    pub const WINDOW: f64 = 0.45;
+    /// How far the picture reaches beyond the outermost cells' centres.
+    pub const MARGIN: f64 = 1.0;
+}
+
+/// An agent or a goal at one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    pub cell: Cell,
+    pub is_visible: bool,
+    pub opacity: f64,
+}
+
+/// Obstacles that are first seen at the same time.
+pub struct Obstacles {
+    /// The frame at which the agent whose view it is first sees them.
+    pub seen: Option<usize>,
+    /// Each as (row, col), row by row.
+    pub cells: Vec<(i32, i32)>,
+}
+
+/// A style applied to an episode; both are known to fit.
+pub struct Scene<'a> {
+    pub film: &'a Film,
+    pub style: &'a Style,
+    /// The states that are drawn.
+    pub states: Vec<&'a Snapshot>,
+    /// The states up to the first that is drawn, which is among them: what the agent has seen by then.
+    before: Vec<&'a Snapshot>,
+}
+
+impl<'a> Scene<'a> {
+    /// # Errors
+    /// If the style names an agent or frame that there is not, or an agent is not on the map.
+    pub fn new(film: &'a Film, style: &'a Style) -> Result<Self, Error> {
+        film.check()?;
+        if style.colors.agents.is_empty() {
+            return Err(refused("number of agents' colours", 0, "at least 1"));
+        }
+        if !(style.step_time > 0.0 && style.step_time.is_finite()) {
+            return Err(refused("time of a step", style.step_time, "more than 0 seconds"));
+        }
+        let mut states: Vec<&Snapshot> = film.states().collect();
+        if let Some(agent) = style.egocentric {
+            film.check_agent(agent)?;
+            states.truncate(num_frames_of(&film.config, agent, &states));
+        }
+        let Some(frame) = style.static_frame else {
+            let before = states[..1].to_vec();
+            return Ok(Self { film, style, states, before });
+        };
+        let state = film.state(frame)?;
+        let before = film.states().take(frame + 1).collect();
+        Ok(Self { film, style, states: vec![state], before })
+    }
+
+    /// The left, upper edge of the picture and its width and height. Units: cells, from the centre of (0, 0).
+    pub fn view_box(&self) -> [i32; 4] {
+        let ground = self.film.ground();
+        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let margin = size::MARGIN as i32;
+        [
+            cols.start - margin,
+            rows.start - margin,
+            cols.end - cols.start + 2 * margin - 1,
+            rows.end - rows.start + 2 * margin - 1,
+        ]
+    }
+
+    /// All obstacles, grouped by when they are first seen; those never seen come last. Without a view all are
+    /// seen at once.
+    pub fn obstacles(&self) -> Vec<Obstacles> {
+        let ground = self.film.ground();
+        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let num_cols = cols.len();
+        let first_seen = self.first_seen();
+        let mut groups = vec![Vec::new(); self.states.len() + 1];
+        for (at_row, row) in rows.enumerate() {
+            for (at_col, col) in cols.clone().enumerate() {
+                if ground.is_obstacle(row, col) {
+                    let seen = first_seen.as_ref().map_or(0, |first| first[at_row * num_cols + at_col]);
+                    groups[seen.min(self.states.len())].push((row, col));
+                }
+            }
+        }
+        let frame = |at: usize| (at < self.states.len()).then_some(at);
+        let groups = groups.into_iter().enumerate().map(|(at, cells)| Obstacles { seen: frame(at), cells });
+        groups.filter(|group| !group.cells.is_empty()).collect()
+    }
+
+    /// The frame at which each cell is first seen, row by row; `usize::MAX` for never.
+    fn first_seen(&self) -> Option<Vec<usize>> {
+        let agent = self.style.egocentric?;
+        let ground = self.film.ground();
+        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let mut first = vec![usize::MAX; rows.len() * cols.len()];
+        let past = self.before.iter().map(|state| (0, state));
+        let mut last = None;
+        for (frame, state) in past.chain(self.states.iter().enumerate()) {
+            let cell = state.cells[agent];
+            if last.replace(cell) == Some(cell) {
+                continue;
+            }
+            let radius = ground.radius as i32;
+            let around = |at: u16, range: &std::ops::Range<i32>| {
+                (i32::from(at) - radius).max(range.start)..(i32::from(at) + radius + 1).min(range.end)
+            };
+            for row in around(cell.row, &rows) {
+                for col in around(cell.col, &cols) {
+                    let at = (row - rows.start) as usize * cols.len() + (col - cols.start) as usize;
+                    first[at] = first[at].min(frame);
+                }
+            }
+        }
+        Some(first)
+    }
+
+    /// The agents that take part at one of the frames.
+    pub fn agents(&self) -> Vec<usize> {
+        if !self.style.show_agents {
+            return Vec::new();
+        }
+        let takes_part = |&agent: &usize| self.states.iter().any(|state| state.active[agent]);
+        (0..self.film.start.cells.len()).filter(takes_part).collect()
+    }
+
+    /// The agents whose goals are drawn: in an agent's view its own alone.
+    pub fn goals(&self) -> Vec<usize> {
+        let is_drawn = |agent: &usize| self.style.egocentric.is_none_or(|own| own == *agent);
+        self.agents().into_iter().filter(is_drawn).collect()
+    }
+
+    /// An agent at a frame.
+    pub fn agent(&self, agent: usize, frame: usize) -> Look {
+        let state = self.states[frame];
+        let (cell, ground) = (state.cells[agent], self.film.ground());
+        let is_seen = |own: usize| ground.sees(state.cells[own], cell.row.into(), cell.col.into());
+        let opacity = if self.style.egocentric.is_none_or(is_seen) { 1.0 } else { SHADED };
+        Look { cell, is_visible: state.active[agent], opacity }
+    }
+
+    /// The goal of an agent at a frame.
+    pub fn goal(&self, agent: usize, frame: usize) -> Look {
+        let state = self.states[frame];
+        Look { cell: state.goals[agent], is_visible: state.active[agent], opacity: 1.0 }
+    }
+
+    /// The agent whose window is drawn.
+    pub fn window(&self) -> Option<usize> {
+        self.style.egocentric.filter(|_| self.style.show_agents)
+    }
+
+    /// The colour of an agent and its goal.
+    pub fn color(&self, agent: usize) -> Color {
+        let colors = &self.style.colors;
+        match self.style.egocentric {
+            Some(own) if own == agent => colors.own,
+            Some(_) => colors.others,
+            None => colors.agents[agent % colors.agents.len()],
+        }
+    }
+}
+
+/// With goals that end an agent's part, its view ends with it.
+fn num_frames_of(config: &Config, agent: usize, states: &[&Snapshot]) -> usize {
+    let end = states.iter().position(|state| !state.active[agent]);
+    match end {
+        Some(end) if config.on_goal == OnGoal::Finish => end + 1,
+        _ => states.len(),
+    }
+}

@@ -1,0 +1,162 @@
+//! When what changes.
+
+use std::fmt::Write as _;
+
+use pogema_core::Cell;
+
+/// The clock of an animation.
+///
+/// Time is counted in slots, one more than there are steps: the first frame is reached at slot 1, the next at slot
+/// 2 and so on, and the last is held for one slot more. So POGEMA's animations go.
+pub struct Timing {
+    num_frames: usize,
+    /// What every element that animates ends with.
+    tail: String,
+    /// Decimals of a fraction that are enough for a hundredth of a cell.
+    decimals: usize,
+}
+
+impl Timing {
+    /// The clock of so many frames; none if there is but one.
+    pub fn new(num_frames: usize, step_time: f64) -> Option<Self> {
+        // An animation that takes no time is not played.
+        let duration = number_to((num_frames as f64 * step_time).max(1e-3), 4);
+        let decimals = 3 + num_frames.checked_ilog10()? as usize;
+        let tail = format!("dur=\"{duration}s\" repeatCount=\"indefinite\"/>");
+        (num_frames > 1).then_some(Self { num_frames, tail, decimals })
+    }
+
+    /// The way from cell to cell, relative to the first; none if there is none.
+    pub fn motion(&self, cell: impl Fn(usize) -> Cell) -> Option<String> {
+        let (mut path, mut length) = (Path::default(), 0.0);
+        let lengths = self.frames(|at| {
+            if at > 0 {
+                length += path.go(cell(at - 1), cell(at));
+            }
+            length
+        });
+        if length == 0.0 {
+            return None;
+        }
+        let (times, points) = self.keys(&lengths, |at| number_to(at / length, self.decimals_of(length)));
+        let path = path.finish();
+        Some(format!(
+            "<animateMotion path=\"{path}\" keyPoints=\"{points}\" keyTimes=\"{times}\" calcMode=\"linear\" {}",
+            self.tail
+        ))
+    }
+
+    /// An attribute that goes evenly from value to value; none if it never changes.
+    pub fn numbers(&self, attribute: &str, value: impl Fn(usize) -> f64) -> Option<String> {
+        let values = self.frames(value);
+        if values.iter().all(|value| *value == values[0]) {
+            return None;
+        }
+        let (times, values) = self.keys(&values, number);
+        Some(format!(
+            "<animate attributeName=\"{attribute}\" values=\"{values}\" keyTimes=\"{times}\" {}",
+            self.tail
+        ))
+    }
+
+    /// Whether a thing is to be seen, from frame to frame; none if that never changes.
+    pub fn visibility(&self, is_visible: impl Fn(usize) -> bool) -> Option<String> {
+        let word = |at: usize| if is_visible(at) { "visible" } else { "hidden" };
+        let (mut values, mut times) = (word(0).to_owned(), "0".to_owned());
+        for frame in (1..self.num_frames).filter(|&at| is_visible(at) != is_visible(at - 1)) {
+            let _ = write!(values, ";{}", word(frame));
+            let _ = write!(times, ";{}", self.time(frame + 1));
+        }
+        (times != "0").then(|| {
+            format!(
+                "<animate attributeName=\"visibility\" values=\"{values}\" keyTimes=\"{times}\" calcMode=\"discrete\" {}",
+                self.tail
+            )
+        })
+    }
+
+    fn frames(&self, mut value: impl FnMut(usize) -> f64) -> Vec<f64> {
+        (0..self.num_frames).map(&mut value).collect()
+    }
+
+    /// Times and values at the corners of the line through the values of all frames.
+    fn keys(&self, frames: &[f64], text: impl Fn(f64) -> String) -> (String, String) {
+        let (first, last) = (frames[0], frames[frames.len() - 1]);
+        let slots: Vec<f64> = [&[first], frames, &[last]].concat();
+        let (mut times, mut values) = ("0".to_owned(), text(first));
+        for slot in 1..slots.len() {
+            let rise = slots[slot] - slots[slot - 1];
+            let is_corner = slots.get(slot + 1).is_none_or(|next| next - slots[slot] != rise);
+            if is_corner {
+                let _ = write!(times, ";{}", self.time(slot));
+                let _ = write!(values, ";{}", text(slots[slot]));
+            }
+        }
+        (times, values)
+    }
+
+    /// A slot as a fraction of the whole time.
+    fn time(&self, slot: usize) -> String {
+        number_to(slot as f64 / (self.num_frames + 1) as f64, self.decimals)
+    }
+
+    fn decimals_of(&self, length: f64) -> usize {
+        self.decimals.min(3 + (length as usize).checked_ilog10().unwrap_or(0) as usize)
+    }
+}
+
+/// A path of straight pieces, each as long as it can be.
+#[derive(Default)]
+struct Path {
+    text: String,
+    /// (rows, cols) of the piece that is not yet written.
+    piece: (i32, i32),
+}
+
+impl Path {
+    /// Goes from one cell to the next; the distance. Units: cells.
+    fn go(&mut self, from: Cell, to: Cell) -> f64 {
+        let (down, right) =
+            (i32::from(to.row) - i32::from(from.row), i32::from(to.col) - i32::from(from.col));
+        let (rows, cols) = self.piece;
+        let is_straight = rows * right == cols * down && rows * down >= 0 && cols * right >= 0;
+        if !is_straight {
+            self.flush();
+        }
+        self.piece = (self.piece.0 + down, self.piece.1 + right);
+        f64::from(down).hypot(f64::from(right))
+    }
+
+    fn flush(&mut self) {
+        let _ = match std::mem::take(&mut self.piece) {
+            (0, 0) => Ok(()),
+            (0, cols) => write!(self.text, "h{cols}"),
+            (rows, 0) => write!(self.text, "v{rows}"),
+            (rows, cols) => write!(self.text, "l{cols} {rows}"),
+        };
+    }
+
+    fn finish(mut self) -> String {
+        self.flush();
+        format!("M0 0{}", self.text)
+    }
+}
+
+/// A number in as few characters as it needs.
+pub fn number(value: f64) -> String {
+    number_to(value, 3)
+}
+
+fn number_to(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    match text
+        .strip_prefix("-0.")
+        .map(|rest| ("-.", rest))
+        .or(text.strip_prefix("0.").map(|rest| (".", rest)))
+    {
+        Some((sign, rest)) => format!("{sign}{rest}"),
+        None if text == "-0" => "0".to_owned(),
+        None => text.to_owned(),
+    }
+}

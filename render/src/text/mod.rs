@@ -1,0 +1,169 @@
+//! Frames of text for the terminal.
+
+mod part;
+
+use console::{Style as Paint, truncate_str};
+use pogema_core::picture::agent_letter;
+use pogema_core::{Cell, Error, Snapshot};
+
+use crate::film::{check_agent, refused};
+use crate::ground::{Border, Ground};
+use part::Part;
+
+/// Up to so many agents are letters; more are numbers, since digits have no capitals for goals.
+const MOST_LETTERS: usize = 26;
+
+/// How a frame of text is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Style {
+    /// Draw what this agent sees and its own goal; all else is blank.
+    pub view: Option<usize>,
+    /// How much of the border is drawn; the thin one is a frame of lines.
+    pub border: Border,
+    /// Whether colours are used.
+    pub is_colored: bool,
+    /// The most rows and columns of characters; a larger map is cut around the agent whose view it is, or around
+    /// the first that takes part.
+    pub most: Option<(usize, usize)>,
+}
+
+impl Default for Style {
+    fn default() -> Self {
+        Self { view: None, border: Border::Thin, is_colored: false, most: None }
+    }
+}
+
+/// Draws a state as lines of text, the first of which tells the step and what is cut off.
+///
+/// Agents are letters and their goals the same letters in capitals; of more than 26 agents all are numbers, and
+/// their goals have a `*`.
+///
+/// # Errors
+/// [`Error::State`] if there is no such agent; [`Error::Length`] if the state's lists do not fit each other.
+pub fn frame(ground: Ground<'_>, state: &Snapshot, style: &Style) -> Result<String, Error> {
+    let num_agents = state.cells.len();
+    Error::check_length("goals", num_agents, state.goals.len())?;
+    Error::check_length("active", num_agents, state.active.len())?;
+    if let Some(agent) = style.view {
+        check_agent(agent, num_agents)?;
+    }
+    if style.most.is_some_and(|(rows, cols)| rows == 0 || cols == 0) {
+        return Err(refused("size of the terminal", "0", "at least one row and one column"));
+    }
+    let cell_width = if num_agents > MOST_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
+    let part = Part::of(ground, state, style, cell_width);
+    let drawing = Drawing { ground, state, style, cell_width, part };
+    let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));
+    let lines = drawing.lines();
+    Ok(lines
+        .iter()
+        .take(most_rows)
+        .map(|line| truncate_str(line, longest, ""))
+        .collect::<Vec<_>>()
+        .join("\n"))
+}
+
+/// What a cell shows.
+#[derive(Clone, Copy)]
+enum Mark {
+    Unseen,
+    Free,
+    Obstacle,
+    Agent(usize),
+    Goal(usize),
+}
+
+struct Drawing<'a> {
+    ground: Ground<'a>,
+    state: &'a Snapshot,
+    style: &'a Style,
+    cell_width: usize,
+    part: Part,
+}
+
+impl Drawing<'_> {
+    fn lines(&self) -> Vec<String> {
+        let part = &self.part;
+        let edge = "─".repeat(part.cols.len() * (self.cell_width + 1) + 1);
+        let is_framed = self.style.border == Border::Thin;
+        let mut lines = vec![format!("step {}{}", self.state.step, part.cut())];
+        if is_framed {
+            lines.push(format!("┌{edge}┐"));
+        }
+        let marks = self.marks();
+        for row in marks.chunks(part.cols.len()) {
+            let cells = row.iter().map(|&mark| self.paint(mark)).collect::<Vec<_>>().join(" ");
+            lines.push(if is_framed { format!("│ {cells} │") } else { cells });
+        }
+        if is_framed {
+            lines.push(format!("└{edge}┘"));
+        }
+        lines
+    }
+
+    /// What each cell of the part shows, row by row; an agent hides a goal, a lower index a higher one.
+    fn marks(&self) -> Vec<Mark> {
+        let Part { rows, cols, .. } = &self.part;
+        let ground = |row, col| match (self.is_seen(row, col), self.ground.is_obstacle(row, col)) {
+            (false, _) => Mark::Unseen,
+            (true, true) => Mark::Obstacle,
+            (true, false) => Mark::Free,
+        };
+        let mut marks: Vec<Mark> =
+            rows.clone().flat_map(|row| cols.clone().map(move |col| ground(row, col))).collect();
+        let mut put = |agent: usize, cell: Cell, mark: Mark| {
+            let (row, col) = (i32::from(cell.row), i32::from(cell.col));
+            if self.state.active[agent] && rows.contains(&row) && cols.contains(&col) {
+                marks[(row - rows.start) as usize * cols.len() + (col - cols.start) as usize] = mark;
+            }
+        };
+        for agent in (0..self.state.cells.len()).rev() {
+            // An agent knows where its own goal is, whether it sees the cell or not.
+            if self.style.view.is_none_or(|own| own == agent) {
+                put(agent, self.state.goals[agent], Mark::Goal(agent));
+            }
+        }
+        for agent in (0..self.state.cells.len()).rev() {
+            let cell = self.state.cells[agent];
+            if self.is_seen(cell.row.into(), cell.col.into()) {
+                put(agent, cell, Mark::Agent(agent));
+            }
+        }
+        marks
+    }
+
+    fn is_seen(&self, row: i32, col: i32) -> bool {
+        self.style.view.is_none_or(|own| self.ground.sees(self.state.cells[own], row, col))
+    }
+
+    fn paint(&self, mark: Mark) -> String {
+        let width = self.cell_width;
+        let plain = Paint::new().force_styling(self.style.is_colored);
+        match mark {
+            Mark::Unseen => " ".repeat(width),
+            Mark::Free => plain.dim().apply_to(format!("{:>width$}", '·')).to_string(),
+            Mark::Obstacle => "█".repeat(width),
+            Mark::Agent(agent) => {
+                colored(plain, agent).bold().apply_to(format!("{:>width$}", self.name(agent))).to_string()
+            }
+            Mark::Goal(agent) => {
+                let name = if width == 1 {
+                    self.name(agent).to_ascii_uppercase()
+                } else {
+                    format!("*{}", self.name(agent))
+                };
+                colored(plain, agent).dim().apply_to(format!("{name:>width$}")).to_string()
+            }
+        }
+    }
+
+    fn name(&self, agent: usize) -> String {
+        if self.cell_width == 1 { agent_letter(agent).to_string() } else { agent.to_string() }
+    }
+}
+
+/// Six colours that can be told apart on black and on white.
+fn colored(paint: Paint, agent: usize) -> Paint {
+    const COLORS: [u8; 6] = [196, 33, 40, 208, 129, 220];
+    paint.color256(COLORS[agent % COLORS.len()])
+}
