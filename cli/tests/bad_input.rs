@@ -56,8 +56,8 @@ const REFUSED: [(&str, &str); 51] = [
     ),
     (
         "run --map five-rooms",
-        "five-rooms: No such file or directory (os error 2); it is no known map either, the nearest of those is \
-         `four-rooms`",
+        "five-rooms: there is no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
+         known map; the nearest is `four-rooms`",
     ),
     ("run twins.yaml", "instance: agent 1: start (0, 0) is the start of agent 0 too"),
     ("run goals.yaml", "targets_xy has length 1, expected 2"),

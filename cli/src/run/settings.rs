@@ -124,7 +124,11 @@ impl Settings {
         } else if self.map.is_some() && Path::new(&word).exists() {
             the_one(&word, read_maps(Path::new(&word), Reading::default())?)?
         } else {
-            chosen(&library, &word, fields.get("seed").and_then(Value::as_u64))?
+            let seed = fields.get("seed").and_then(Value::as_u64);
+            chosen(&library, &word, seed).map_err(|error| match &self.map {
+                Some(_) => Error::io(&word, format!("there is no such file; {error}")),
+                None => error,
+            })?
         };
         put_map(&text, fields)
     }
