@@ -10,6 +10,7 @@ from playwright.sync_api import sync_playwright
 
 import editor
 import editor_files
+import pictures
 import replay
 import replay_film
 from support import FLAGS, World
@@ -26,7 +27,7 @@ def main(folder, *wanted):
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in (replay_film, replay, editor, editor_files)
+            for module in (replay_film, replay, editor, editor_files, pictures)
             for name, test in tests_of(module)
             if not wanted or any(part in f"{module.__name__}.{name}" for part in wanted)
         ]
