@@ -29,19 +29,18 @@ def reviewed(part: str) -> dict[str, str]:
     return {name: reason for name, reason in listed.items() if name.startswith(f"{part}/")}
 
 
-def main(part: str, folder: Path) -> None:
+def main(part: str, folder: Path, total: int) -> None:
     """Prints the score of a part."""
     endless = set(names(folder.parent / "timeouts.txt", with_places=True))
     missed = [name for name in names(folder / "missed.txt", with_places=True) if name not in endless]
     missed, listed = [PLACE.sub(": ", name) for name in missed], reviewed(part)
-    caught = len(names(folder / "caught.txt") + names(folder / "previously_caught.txt")) + len(endless)
     unknown = sorted(set(missed) - listed.keys())
     in_vain = sorted(listed.keys() - set(missed))
     num_reviewed = sum(name in listed for name in missed)
-    print(f"{part}: {caught} caught or not built, {len(missed)} missed, of which {num_reviewed} are reviewed")
+    print(f"{part}: of {total} mutants {len(missed)} missed, of which {num_reviewed} are reviewed")
     wrong = [f"missed: {name}" for name in unknown] + [f"reviewed in vain: {name}" for name in in_vain]
     sys.exit("\n".join(wrong) if wrong else 0)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::CellAlignment;
-use pogema_core::{Error, Map};
+use pogema_core::{Config, Error, Map, Outside, Snapshot};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{MapStats, MapText, PUZZLES};
-use pogema_render::html;
+use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
+use pogema_render::{Film, Style, html, raster, svg};
 
 use super::{Sources, write_out};
 use crate::output::{markdown_table, say};
@@ -66,12 +66,20 @@ pub struct Show {
     /// Widest picture; a map of more columns is drawn smaller
     #[arg(long, value_name = "COLUMNS")]
     width: Option<usize>,
+    /// Write a picture of the map to this file too
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// The same as PNG
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
 }
 
 impl Show {
     pub fn run(&self) -> Result<(), Error> {
         let room = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
-        for NamedMap { name, text } in self.sources.meant_by(&self.map)? {
+        let maps = self.sources.meant_by(&self.map)?;
+        self.draw(&maps)?;
+        for NamedMap { name, text } in maps {
             let figures = MapStats::of(&text.map);
             say(&format!(
                 "{name}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
@@ -86,6 +94,42 @@ impl Show {
         }
         Ok(())
     }
+
+    fn draw(&self, maps: &[NamedMap]) -> Result<(), Error> {
+        if self.svg.is_none() && self.png.is_none() {
+            return Ok(());
+        }
+        let [NamedMap { text, .. }] = maps else {
+            let reason = format!("`{}` means {} maps, a picture is of one", self.map, maps.len());
+            return Err(Error::State { reason });
+        };
+        let (film, style) = (still(text), Style { static_frame: Some(0), ..Style::default() });
+        if let Some(path) = &self.svg {
+            write_out(Some(path), svg::draw(&film, &style)?.as_bytes())?;
+        }
+        if let Some(path) = &self.png {
+            let width = raster::width_for(&film, &style, LONGER_SIDE);
+            write_out(Some(path), &raster::png(&film, &style, width)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// The longer side of a PNG. Units: pixels.
+const LONGER_SIDE: u32 = 1024;
+
+/// The map and its agents before anybody has moved.
+fn still(text: &MapText) -> Film {
+    let num_agents = text.starts.len();
+    let start = Snapshot {
+        cells: text.starts.clone(),
+        goals: text.goals.clone(),
+        active: vec![true; num_agents],
+        on_goal: vec![false; num_agents],
+        ..Snapshot::default()
+    };
+    let config = Config { num_agents, ..GridConfig::default().rules() };
+    Film { config, map: text.map.clone(), outside: Outside::Free, start, steps: Vec::new() }
 }
 
 #[derive(Args, Debug)]

@@ -54,9 +54,11 @@ impl SeedSequence {
     ///
     /// Source: NumPy 1.26, `SeedSequence(None)`.
     pub fn from_os() -> Result<Self, NumpyError> {
-        let low = getrandom::u64().map_err(NumpyError::NoEntropy)?;
-        let high = getrandom::u64().map_err(NumpyError::NoEntropy)?;
-        Ok(Self::from_words(&[low as u32, (low >> 32) as u32, high as u32, (high >> 32) as u32]))
+        let mut words = [0; POOL_WORDS];
+        for word in &mut words {
+            *word = getrandom::u32().map_err(NumpyError::NoEntropy)?;
+        }
+        Ok(Self::from_words(&words))
     }
 
     /// The mixed entropy.
