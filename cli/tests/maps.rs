@@ -92,6 +92,11 @@ fn maps_are_shown_and_judged() {
     assert_eq!(shown, "row: 1 rows, 4 columns, 4 free cells, density 0.000, 1 component\naBbA\n");
     let small = said(at, &["maps", "show", "four-rooms", "--width", "7"]);
     assert_eq!(small.lines().skip(1).map(|line| line.chars().count()).collect::<Vec<_>>(), [7; 4]);
+    let turn = said(at, &["maps", "show", "puzzle-square-turn"]);
+    assert!(
+        turn.ends_with("\n#####  #####\n#ab##  #DA##\n#dc##  #CB##\n#####  #####\n#####  #####\n"),
+        "{turn}"
+    );
     let judged = said(at, &["maps", "stats", "row.txt"]);
     assert!(judged.contains("unsolvable: agents 0, 1 share a corridor"), "{judged}");
     let judged = said(at, &["maps", "stats", "row.txt", "--on-target", "finish", "--json"]);

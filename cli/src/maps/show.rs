@@ -145,10 +145,22 @@ impl Editor {
     }
 }
 
-/// The map text, or, where that is too wide or has no letters for it, dots of two by four cells or more.
+/// The map text; starts and goals side by side where they share cells; or, where there is no room or are no letters
+/// for it, dots of two by four cells or more.
 fn picture(text: &MapText, room: usize) -> String {
-    match text.to_text() {
-        Ok(rows) if text.map.width() <= room => rows,
+    if text.map.width() > room {
+        return braille(&text.map, room);
+    }
+    let starts = MapText { goals: Vec::new(), ..text.clone() };
+    let goals = MapText { starts: Vec::new(), ..text.clone() };
+    match (text.to_text(), starts.rows(), goals.rows()) {
+        (Ok(rows), ..) => rows,
+        (_, Ok(starts), Ok(goals)) => starts
+            .iter()
+            .zip(&goals)
+            .map(|(one, other)| format!("{one}  {other}"))
+            .collect::<Vec<_>>()
+            .join("\n"),
         _ => braille(&text.map, room),
     }
 }
