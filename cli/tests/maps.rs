@@ -154,7 +154,10 @@ fn wrong_input_is_told_with_file_and_place() {
         ("copy.yaml", "one: ..\n"),
         ("far.scen", "version 1\n0\tm\t9\t9\t0\t0\t8\t8\t1\n"),
         ("row.txt", "....\n"),
-        ("full.txt", "...\n"),
+        ("far.yaml", "agents_xy: [[5, 5]]\ntargets_xy: [[0, 1]]\n"),
+        ("loop.yaml", "agents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [7, 0]]]\n"),
+        ("pools.yaml", "map: \"....\"\npossible_agents_xy: [[9, 9]]\npossible_targets_xy: [[0, 0]]\n"),
+        ("five.yaml", "map_name: 5\n"),
     ];
     let folder = folder(&files);
     let at = folder.path();
@@ -170,6 +173,13 @@ fn wrong_input_is_told_with_file_and_place() {
     refuse(&["maps", "import", "two.yaml", "copy.yaml"], &["copy.yaml", "second map named `one`"]);
     refuse(&["maps", "export", "two.yaml", "--to", "text"], &["2 maps"]);
     refuse(&["maps", "export", "row.txt", "--to", "text", "--scenario", "far.scen"], &["far.scen", "9 rows"]);
+    for to in ["text", "scen", "config", "set"] {
+        let export = ["maps", "export", "row.txt", "--to", to, "--scenario", "far.yaml"];
+        refuse(&export, &["far.yaml", "agents_xy", "(5, 5)"]);
+    }
+    refuse(&["maps", "stats", "row.txt", "--scenario", "loop.yaml"], &["loop.yaml", "targets_xy", "(7, 0)"]);
+    refuse(&["maps", "export", "pools.yaml", "--to", "text"], &["possible_agents_xy", "(9, 9)"]);
+    refuse(&["run", "five.yaml"], &["map_name", "`5`"]);
     refuse(&["maps", "tiles", "row.txt", "--side", "3"], &["`3`", "1 rows and 4 columns"]);
     refuse(&["maps", "stats", "row.txt", "--num-agents", "9", "--seed", "1"], &["num_agents"]);
     refuse(&["maps", "stats", "two.yaml", "--scenario", "far.scen"], &["2 maps"]);

@@ -276,8 +276,8 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
     Ok(first.iter().zip(sequences).map(stream).collect())
 }
 
-/// Passes if every cell of a pool is on the map.
-fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
+/// Passes if every cell of a field is on the map.
+pub(crate) fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
     let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
     let expected = format!("cells inside the map of {} rows and {} columns", map.height(), map.width());
     Err(Error::config(field, cell, expected))

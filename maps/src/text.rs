@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use pogema_core::{Cell, Error, Map};
 
+use crate::source::check_on_map;
+
 /// What a map text says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapText {
@@ -31,13 +33,17 @@ impl MapText {
     ///
     /// # Errors
     /// [`Error::Instance`] if there are no letters for it: more than 26 agents, two of them on one cell, or agents
-    /// beside pools.
+    /// beside pools; [`Error::Config`] for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
         let width = self.map.width();
         let mut letters: Vec<char> = self.map.rows().concat().chars().collect();
+        check_on_map(&self.map, "agents_xy", &self.starts)?;
+        check_on_map(&self.map, "targets_xy", &self.goals)?;
         if let Some((starts, goals)) = &self.pools {
+            check_on_map(&self.map, "possible_agents_xy", starts)?;
+            check_on_map(&self.map, "possible_targets_xy", goals)?;
             let mut kinds = vec![0; letters.len()];
             for (cells, kind) in [(starts, 1), (goals, 2)] {
                 for &cell in cells {

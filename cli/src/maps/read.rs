@@ -93,7 +93,7 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
     Ok(vec![NamedMap { name: stem(path), text }])
 }
 
-/// The starts and goals of a scenario file: MovingAI's, or a YAML file with `agents_xy` and `targets_xy`.
+/// The starts and goals of a scenario file, all on the map: MovingAI's, or a YAML file with `agents_xy` and `targets_xy`.
 pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Error> {
     let text = read_text(path)?;
     let scenario = if ending(path) == "scen" {
@@ -101,7 +101,9 @@ pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Er
     } else {
         Scenario::from_yaml(&text)
     };
-    scenario.map_err(|error| Error::io(path, error))
+    scenario
+        .and_then(|scenario| scenario.check_on(map).map(|()| scenario))
+        .map_err(|error| Error::io(path, error))
 }
 
 /// A file as text, without the mark that some programs put first.

@@ -116,7 +116,11 @@ impl Settings {
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     fn choose_map(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
-        let named = fields.remove("map_name").and_then(|name| name.as_str().map(str::to_owned));
+        let named = fields.get("map_name").and_then(Value::as_str).map(str::to_owned);
+        // What is no text is left for the config to refuse.
+        if named.is_some() {
+            fields.remove("map_name");
+        }
         let Some(word) = self.map.clone().or(named) else { return Ok(()) };
         let library = self.sources.library()?;
         let text = if let Ok(text) = library.map(&word) {

@@ -5,6 +5,7 @@ use serde_json::{Map as Object, Value, json};
 
 use super::scen::Task;
 use crate::config::{Targets, cells_of, read_targets, value_from_yaml};
+use crate::source::check_on_map;
 
 /// Where each agent starts, and its goal or its goals one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,6 +57,20 @@ impl Scenario {
         }
         let starts = tasks.iter().map(|task| task.start).collect();
         Ok(Self { starts, goals: Targets::Single(tasks.iter().map(|task| task.goal).collect()) })
+    }
+
+    /// Passes if all starts and goals are on a map.
+    ///
+    /// # Errors
+    /// [`Error::Config`] about the first cell that is not.
+    pub fn check_on(&self, map: &Map) -> Result<(), Error> {
+        check_on_map(map, "agents_xy", &self.starts)?;
+        match &self.goals {
+            Targets::Single(goals) => check_on_map(map, "targets_xy", goals),
+            Targets::Sequences(sequences) => {
+                sequences.iter().try_for_each(|goals| check_on_map(map, "targets_xy", goals))
+            }
+        }
     }
 
     /// The first agents alone.

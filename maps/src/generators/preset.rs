@@ -23,7 +23,7 @@ pub enum Preset {
     Warehouse,
 }
 
-/// What map names begin with: those of validation come first.
+/// Training goes on where validation ends.
 const SEEDS_OF_VALIDATION: Range<u64> = 0..128;
 const SEEDS_OF_RANDOM_TRAINING: Range<u64> = 128..128 + 512;
 const SEEDS_OF_MAZE_TRAINING: Range<u64> = 128..128 + 2048;
