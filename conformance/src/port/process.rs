@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::Stdio;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -57,6 +57,8 @@ pub struct Process {
     child: Box<dyn ChildWrapper>,
     input: Option<Sender<Vec<u8>>>,
     output: Receiver<Said>,
+    /// Whether more had come behind the last answer.
+    is_followed: bool,
     tail: Arc<Mutex<VecDeque<u8>>>,
     timeout: Duration,
 }
@@ -64,7 +66,8 @@ pub struct Process {
 /// What came from the port's stdout.
 #[derive(Debug)]
 enum Said {
-    Line(Vec<u8>),
+    /// A line, and whether more had come behind it.
+    Line(Vec<u8>, bool),
     TooLong,
     /// The end, and what stood behind the last line.
     End(Vec<u8>),
@@ -100,15 +103,20 @@ impl Process {
         std::thread::spawn(move || write_all(stdin, &to_write));
         let (said, output) = channel();
         std::thread::spawn(move || read_lines(BufReader::new(stdout), &said));
-        Ok(Self { child, input: Some(input), output, tail, timeout: command.timeout })
+        Ok(Self { child, input: Some(input), output, is_followed: false, tail, timeout: command.timeout })
     }
 
     fn exchange<T: DeserializeOwned>(&mut self, ask: &Ask) -> Result<T, Misbehaviour> {
         let kind = kind_of(ask);
-        match self.output.try_recv() {
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) | Ok(Said::End(_)) => {}
-            Ok(Said::TooLong) => return Err(self.saw("wrote a line that nobody asked for".into())),
-            Ok(Said::Line(line)) => {
+        let unasked = if self.is_followed {
+            self.output.recv_timeout(self.timeout).ok()
+        } else {
+            self.output.try_recv().ok()
+        };
+        match unasked {
+            None | Some(Said::End(_)) => {}
+            Some(Said::TooLong) => return Err(self.saw("wrote a line that nobody asked for".into())),
+            Some(Said::Line(line, _)) => {
                 return Err(self.saw(format!("wrote a line that nobody asked for: `{}`", quote(&line))));
             }
         }
@@ -131,7 +139,10 @@ impl Process {
         loop {
             let patience = until.saturating_duration_since(Instant::now()).min(GLANCE);
             match self.output.recv_timeout(patience) {
-                Ok(Said::Line(line)) => return Ok(line),
+                Ok(Said::Line(line, is_followed)) => {
+                    self.is_followed = is_followed;
+                    return Ok(line);
+                }
                 Ok(Said::TooLong) => {
                     return Err(
                         self.saw(format!("answered `{kind}` with a line of more than {LONGEST_LINE} bytes"))
@@ -233,7 +244,7 @@ fn write_all(mut stdin: impl Write, lines: &Receiver<Vec<u8>>) {
     }
 }
 
-fn read_lines(mut stdout: impl BufRead, said: &Sender<Said>) {
+fn read_lines(mut stdout: BufReader<impl Read>, said: &Sender<Said>) {
     loop {
         let mut line = Vec::new();
         let longest = LONGEST_LINE as u64 + 1;
@@ -242,7 +253,7 @@ fn read_lines(mut stdout: impl BufRead, said: &Sender<Said>) {
         let next = match end {
             true if line.len() > LONGEST_LINE => Said::TooLong,
             true => Said::End(line),
-            false => Said::Line(line),
+            false => Said::Line(line, !stdout.buffer().is_empty()),
         };
         if said.send(next).is_err() || end {
             return;

@@ -80,8 +80,8 @@ def go_wrong(answer):
     if WAY == "short-window":
         say(json.dumps({**answer, "observations": [[0, 1]] * len(answer["cells"])}))
     if WAY == "twice":
-        say(json.dumps(answer))
-        say(json.dumps(answer))
+        # At once, so that the second line is there before the next question.
+        say(json.dumps(answer) + "\n" + json.dumps(answer))
     if WAY == "stderr-flood":
         for _ in range(200_000):
             print("a very long complaint about nothing at all, over and over", file=sys.stderr)
