@@ -131,9 +131,7 @@ impl Engine {
         let aim = |(first, targets, ahead): Aims<'_>| {
             for (index, (aim, found)) in targets.iter_mut().zip(ahead).enumerate() {
                 let agent = first + index;
-                if W::FAR && agent + AHEAD < cells.len() {
-                    fetch(board.square(crowd.target(agent + AHEAD)));
-                }
+                fetch_ahead::<W>(board, agent, cells.len(), |later| crowd.target(later));
                 let target = crowd.target(agent);
                 let square = board.square(target).agent.load(Relaxed);
                 let there = if active[agent] { square } else { OBSTACLE };
@@ -156,9 +154,9 @@ impl Engine {
     /// Rule: collide/soft/chain
     fn withdraw_hindered<W: Way>(&self, agents: Range<usize>) {
         for agent in agents {
-            if W::FAR && agent + AHEAD < self.cells.len() {
-                fetch(self.board.square(self.board.place(self.cells[agent + AHEAD])));
-            }
+            fetch_ahead::<W>(&self.board, agent, self.cells.len(), |later| {
+                self.board.place(self.cells[later])
+            });
             let mut place = self.board.place(self.cells[agent]);
             if self.board.square(place).claim.load(Relaxed) == NOBODY
                 || !self.active[agent]
@@ -205,10 +203,8 @@ impl Engine {
         let enter = |(first, cells): (usize, &mut [Cell])| {
             for index in 0..cells.len() {
                 let agent = first + index;
-                if W::FAR && index + AHEAD < cells.len() {
-                    fetch(board.square(targets[agent + AHEAD]));
-                    fetch(board.square(board.place(cells[index + AHEAD])));
-                }
+                fetch_ahead::<W>(board, agent, targets.len(), |later| targets[later]);
+                fetch_ahead::<W>(board, index, cells.len(), |later| board.place(cells[later]));
                 let (number, cell) = (agent as u32, &mut cells[index]);
                 let square = board.square(targets[agent]);
                 let mut is_shown = active[agent];
@@ -252,6 +248,15 @@ impl Engine {
                 square.agent.store(agent as u32, Relaxed);
             }
         }
+    }
+}
+
+/// Asks for a square that is needed some agents later.
+#[inline]
+fn fetch_ahead<W: Way>(board: &Board, agent: usize, num_agents: usize, place: impl Fn(usize) -> u32) {
+    let later = agent + AHEAD;
+    if W::FAR && later < num_agents {
+        fetch(board.square(place(later)));
     }
 }
 
