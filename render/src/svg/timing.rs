@@ -110,7 +110,7 @@ impl Timing {
 struct Path {
     text: String,
     /// (rows, cols) of the piece that is not yet written.
-    piece: (i32, i32),
+    piece: (i64, i64),
 }
 
 impl Path {
@@ -118,13 +118,15 @@ impl Path {
     fn go(&mut self, from: Cell, to: Cell) -> f64 {
         let (down, right) =
             (i32::from(to.row) - i32::from(from.row), i32::from(to.col) - i32::from(from.col));
+        let distance = f64::from(down).hypot(f64::from(right));
+        let (down, right) = (i64::from(down), i64::from(right));
         let (rows, cols) = self.piece;
         let is_straight = rows * right == cols * down && rows * down >= 0 && cols * right >= 0;
         if !is_straight {
             self.flush();
         }
         self.piece = (self.piece.0 + down, self.piece.1 + right);
-        f64::from(down).hypot(f64::from(right))
+        distance
     }
 
     fn flush(&mut self) {
@@ -158,5 +160,20 @@ fn number_to(value: f64, decimals: usize) -> String {
         Some((sign, rest)) => format!("{sign}{rest}"),
         None if text == "-0" => "0".to_owned(),
         None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_jump_across_the_largest_maps() {
+        let jumps =
+            [(0, 0), (60_000, 65_535), (5_000, 1), (65_535, 65_535)].map(|(row, col)| Cell::new(row, col));
+        let motion = Timing::new(jumps.len(), 0.25).and_then(|timing| timing.motion(|at| jumps[at]));
+        assert!(
+            motion.is_some_and(|text| text.contains("path=\"M0 0l65535 60000l-65534 -55000l65534 60535\""))
+        );
     }
 }
