@@ -9,7 +9,7 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 use pogema_conformance::golden;
 
 /// A crate uses lower layers only, never its own.
-const LAYERS: [(&str, u8); 9] = [
+const LAYERS: [(&str, u8); 10] = [
     ("pogema-core", 0),
     ("pogema-reference", 1),
     ("pogema-fast", 1),
@@ -19,6 +19,7 @@ const LAYERS: [(&str, u8); 9] = [
     ("pogema-conformance", 2),
     ("pogema", 3),
     ("pogema-benches", 3),
+    ("pogema-python", 3),
 ];
 
 #[test]

@@ -109,6 +109,26 @@ impl Engine {
         (self.height, self.width)
     }
 
+    /// Where each agent is; a finished agent stays where it finished.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Where each agent wants to go now.
+    pub fn goals(&self) -> &[Cell] {
+        &self.goals
+    }
+
+    /// Which agents still take part.
+    pub fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// Steps since the reset, less those taken back.
+    pub fn num_steps(&self) -> u64 {
+        self.step
+    }
+
     /// Bytes that the environment holds, apart from what its goal streams hold behind pointers and from kept
     /// steps.
     pub fn num_bytes(&self) -> usize {

@@ -70,6 +70,13 @@ impl InstanceSource {
         &self.config
     }
 
+    /// The possible starts and goals, in the order to which resets have shuffled them so far.
+    ///
+    /// Rule: place/pools
+    pub fn pools(&self) -> Option<(&[Cell], &[Cell])> {
+        self.pools.as_ref().map(|pools| (&pools.starts[..], &pools.goals[..]))
+    }
+
     /// Makes the instance of the next reset.
     ///
     /// # Errors

@@ -71,6 +71,12 @@ impl AStarAgent {
         Ok(first_move(cell, goal, &self.obstacles))
     }
 
+    /// Forgets what it has seen and where it was, for a new episode.
+    pub fn forget(&mut self) {
+        self.obstacles.clear();
+        self.last = None;
+    }
+
     /// Overwrites what it knows of the cells it sees now; other agents are no obstacles to it.
     fn look(&mut self, (row, col): Place, view: &View<'_>) {
         let radius = view.side as i32 / 2;

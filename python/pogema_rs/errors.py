@@ -1,0 +1,77 @@
+"""The errors of pogema_rs.
+
+POGEMA 1.4.0 and its 2.0 line raise different classes for the same mistake; each class here is all of them, so that
+whatever a program catches catches ours. Every message is one line: what was wrong, and what was expected.
+"""
+
+from gymnasium.error import ResetNeeded
+
+__all__ = [
+    "ActionCountError",
+    "ActionError",
+    "AutoResetError",
+    "EmptyMapError",
+    "InstanceError",
+    "JumpedError",
+    "MapTextError",
+    "NotResetError",
+    "OutsideMapError",
+    "RefusedConfigError",
+    "StateError",
+    "UnknownIntegrationError",
+]
+
+
+class _Quiet(KeyError):
+    """A KeyError that shows its message, not the quoted message."""
+
+    def __str__(self) -> str:
+        return ValueError.__str__(self)
+
+
+class RefusedConfigError(ValueError):
+    """A field of a config holds what it may not hold; `GridConfig` shows it as pydantic's ValidationError."""
+
+
+class OutsideMapError(IndexError, ValueError):
+    """A start or goal lies outside the map."""
+
+
+class EmptyMapError(ZeroDivisionError, ValueError):
+    """A map has no cells."""
+
+
+class MapTextError(_Quiet, ValueError):
+    """A map text holds a character without a meaning, or letters beside other places for agents."""
+
+
+class InstanceError(OverflowError, IndexError, ValueError):
+    """No instance can be made of a config: no room, or starts and goals that do not fit each other."""
+
+
+class ActionCountError(AssertionError, ValueError):
+    """There is not one action for each agent."""
+
+
+class ActionError(IndexError, ValueError):
+    """A number is no action."""
+
+
+class NotResetError(ResetNeeded, AttributeError):
+    """The environment was not reset yet."""
+
+
+class StateError(ValueError, RuntimeError):
+    """A call that the state does not allow."""
+
+
+class JumpedError(IndexError, ValueError):
+    """An A* agent is told of a place that it cannot have come to in one step."""
+
+
+class AutoResetError(_Quiet, ValueError):
+    """`auto_reset` with an integration that knows none."""
+
+
+class UnknownIntegrationError(_Quiet, ValueError):
+    """An integration that there is not."""

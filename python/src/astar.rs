@@ -1,0 +1,70 @@
+//! POGEMA's A* agent.
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
+
+use numpy::{AllowTypeChange, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use pogema_core::{Action, Error};
+use pogema_maps::numpy::Generator;
+use pogema_planners::View;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors;
+
+/// One agent that walks shortest paths over the obstacles it has seen, action for action as POGEMA's.
+#[pyclass(module = "pogema_rs._engine")]
+pub struct AStarAgent {
+    /// Never waited for: what it draws with may only not be shared.
+    agent: Mutex<pogema_planners::AStarAgent>,
+    was_random: Arc<AtomicBool>,
+}
+
+#[pymethods]
+impl AStarAgent {
+    #[new]
+    fn new(seed: u64) -> Self {
+        let was_random = Arc::new(AtomicBool::new(false));
+        let (mut generator, flag) = (Generator::seeded(seed), Arc::clone(&was_random));
+        let random_action = move || {
+            flag.store(true, Relaxed);
+            // INVARIANT: the range is not empty.
+            let index = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
+            Action::ALL[index as usize]
+        };
+        let agent = pogema_planners::AStarAgent::new(Box::new(random_action));
+        Self { agent: Mutex::new(agent), was_random }
+    }
+
+    /// The action for an observation of the type `POMAPF`, and whether it was drawn.
+    fn act(
+        &mut self,
+        py: Python<'_>,
+        xy: (i32, i32),
+        target_xy: (i32, i32),
+        obstacles: PyArrayLike2<'_, f32, AllowTypeChange>,
+    ) -> PyResult<(u8, bool)> {
+        let [rows, side] = [obstacles.shape()[0], obstacles.shape()[1]];
+        if rows != side || side % 2 == 0 {
+            return Err(PyValueError::new_err(format!(
+                "obstacles have shape ({rows}, {side}), expected a square of an odd side"
+            )));
+        }
+        let obstacles = obstacles.to_vec()?;
+        let view = View { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
+        self.was_random.store(false, Relaxed);
+        let action = self.agent().act(view).map_err(|error: Error| errors::astar(py, &error))?;
+        Ok((action.into(), self.was_random.load(Relaxed)))
+    }
+
+    /// Forgets all it has seen, for a new episode; what it draws goes on.
+    fn clear_state(&mut self) {
+        self.agent().forget();
+    }
+}
+
+impl AStarAgent {
+    fn agent(&mut self) -> &mut pogema_planners::AStarAgent {
+        self.agent.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}

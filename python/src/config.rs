@@ -1,0 +1,36 @@
+//! What is derived of a config.
+
+use pogema_core::{Error, Map};
+use pogema_maps::{FIELDS, GridConfig, InstanceSource, nearest, parse_map_text};
+use pyo3::prelude::*;
+use serde_json::json;
+
+use crate::errors;
+
+/// Everything that POGEMA derives of a config, from and to an object in JSON; the map stays out if `keeps_map`.
+#[pyfunction]
+pub fn derive_config(py: Python<'_>, config: &str) -> PyResult<String> {
+    let config = GridConfig::from_json(config).map_err(|error| errors::config(py, &error))?;
+    let mut fields = config.to_value();
+    fields["width"] = json!(config.width);
+    fields["height"] = json!(config.height);
+    fields["size"] = json!(config.size);
+    Ok(fields.to_string())
+}
+
+/// The known field that is most like a name.
+#[pyfunction]
+pub fn nearest_field(name: &str) -> &'static str {
+    nearest(name, FIELDS).unwrap_or_default()
+}
+
+/// The source of a config's instances, and the config.
+pub fn source(config: &str, registered: Option<&str>) -> Result<InstanceSource, Error> {
+    let mut config = GridConfig::from_json(config)?;
+    // A name that nobody registered means nothing to POGEMA.
+    if registered.is_none() {
+        config.map_name = None;
+    }
+    let map: Option<Map> = registered.map(parse_map_text).transpose()?.map(|text| text.map);
+    InstanceSource::new(config, map)
+}

@@ -1,0 +1,47 @@
+//! Errors as the Python classes that POGEMA's users catch.
+
+use pogema_core::Error;
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+/// An error of a class of `pogema_rs.errors`.
+fn of_class(py: Python<'_>, class: &str, error: &Error) -> PyErr {
+    let class = py
+        .import("pogema_rs.errors")
+        .and_then(|module| module.getattr(class)?.cast_into::<PyType>().map_err(PyErr::from));
+    class.map_or_else(|missing| missing, |class| PyErr::from_type(class, error.to_string()))
+}
+
+/// What a wrong config raises; the Python side makes it the class that POGEMA raises.
+pub fn config(py: Python<'_>, error: &Error) -> PyErr {
+    let is_outside =
+        matches!(error, Error::Config { expected, .. } if expected.starts_with("cells inside the map"));
+    let is_unknown = matches!(error, Error::Map { reason, .. } if reason.starts_with("unknown character"));
+    let class = match error {
+        _ if is_outside => "OutsideMapError",
+        _ if is_unknown => "MapTextError",
+        _ => "RefusedConfigError",
+    };
+    of_class(py, class, error)
+}
+
+/// What an instance that cannot be made raises.
+pub fn instance(py: Python<'_>, error: &Error) -> PyErr {
+    of_class(py, "InstanceError", error)
+}
+
+/// What any other call raises.
+pub fn call(py: Python<'_>, error: &Error) -> PyErr {
+    let class = match error {
+        Error::Length { what: "actions", .. } => "ActionCountError",
+        Error::Action { .. } => "ActionError",
+        Error::State { reason } if reason.contains("not reset") => "NotResetError",
+        _ => "StateError",
+    };
+    of_class(py, class, error)
+}
+
+/// What an A* agent raises that was not told of a new episode.
+pub fn astar(py: Python<'_>, error: &Error) -> PyErr {
+    of_class(py, "JumpedError", error)
+}

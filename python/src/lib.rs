@@ -1,0 +1,19 @@
+//! The compiled part of the Python package `pogema_rs`; what is public of it is named in Python.
+
+mod astar;
+mod config;
+mod engine;
+mod errors;
+mod film;
+mod lists;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<engine::Engine>()?;
+    module.add_class::<astar::AStarAgent>()?;
+    module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
+    module.add_function(wrap_pyfunction!(config::nearest_field, module)?)?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}
