@@ -4,24 +4,39 @@ use pogema_core::{Cell, GoalStream, Instance};
 
 use crate::config::{GridConfig, Targets};
 
-/// The goals POGEMA foretells: until an agent walking straight from goal to goal would need the whole episode.
-/// None where it would go on for ever, since only the goal just reached can be drawn again.
+/// The goals POGEMA foretells right after a reset: until an agent walking straight from goal to goal would need the
+/// whole episode. None where it would go on for ever, since only the goal just reached can be drawn again.
 ///
 /// Rule: goal/restart/foretold
 ///
 /// Source: POGEMA 1.4.0, `envs.py`, `PogemaLifeLong.get_lifelong_targets_xy`
 pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Vec<Cell>>> {
+    foretold_from(config, instance, instance.starts(), &instance.first_goals())
+}
+
+/// What POGEMA foretells later in the episode: the draws of the reset once more, but from where the agents are now
+/// and with the goals that they have now.
+///
+/// Rule: goal/restart/foretold
+pub fn foretold_from(
+    config: &GridConfig,
+    instance: &Instance,
+    cells: &[Cell],
+    goals: &[Cell],
+) -> Option<Vec<Vec<Cell>>> {
     if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
         return Some(sequences.clone());
     }
-    let agents = instance.goals().iter().zip(instance.starts());
-    agents.map(|(stream, &start)| foretold_to_one(stream.clone(), start, config.max_episode_steps)).collect()
+    let agents = instance.goals().iter().zip(cells.iter().zip(goals));
+    agents
+        .map(|(stream, (&cell, &goal))| foretold_to_one(stream.clone(), cell, goal, config.max_episode_steps))
+        .collect()
 }
 
-fn foretold_to_one(mut stream: GoalStream, start: Cell, max_steps: i64) -> Option<Vec<Cell>> {
+fn foretold_to_one(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i64) -> Option<Vec<Cell>> {
     /// So many equal draws in a row are no chance.
     const MOST_REPEATS: usize = 10_000;
-    let mut at = stream.first();
+    let mut at = goal;
     let mut goals = vec![at];
     let mut length = distance(start, at);
     let mut num_repeats = 0;

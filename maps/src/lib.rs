@@ -37,7 +37,7 @@ pub use config::{
 };
 pub use distance::{distances_to, free_neighbours};
 pub use exhaustive::{Verdict, search};
-pub use foretell::foretold_goals;
+pub use foretell::{foretold_from, foretold_goals};
 pub use library::Library;
 pub use place::{capacity, place_at_random};
 pub use source::{Generated, InstanceSource};

@@ -70,6 +70,13 @@ impl InstanceSource {
         &self.config
     }
 
+    /// Chooses the seed of what is made from now on; pools stay as resets have shuffled them.
+    ///
+    /// Rule: seed/streams
+    pub fn reseed(&mut self, seed: Option<u64>) {
+        self.config.seed = seed;
+    }
+
     /// The possible starts and goals, in the order to which resets have shuffled them so far.
     ///
     /// Rule: place/pools

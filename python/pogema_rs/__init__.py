@@ -1,5 +1,6 @@
 """POGEMA, bit for bit and hundreds of times faster."""
 
 from pogema_rs._engine import __version__
+from pogema_rs.grid_config import GridConfig
 
-__all__ = ["__version__"]
+__all__ = ["GridConfig", "__version__"]

@@ -1,13 +1,13 @@
 //! What is derived of a config.
 
 use pogema_core::{Error, Map};
-use pogema_maps::{FIELDS, GridConfig, InstanceSource, nearest, parse_map_text};
+use pogema_maps::{GridConfig, InstanceSource, nearest, parse_map_text};
 use pyo3::prelude::*;
 use serde_json::json;
 
 use crate::errors;
 
-/// Everything that POGEMA derives of a config, from and to an object in JSON; the map stays out if `keeps_map`.
+/// Everything that POGEMA derives of a config, from and to an object in JSON.
 #[pyfunction]
 pub fn derive_config(py: Python<'_>, config: &str) -> PyResult<String> {
     let config = GridConfig::from_json(config).map_err(|error| errors::config(py, &error))?;
@@ -18,10 +18,10 @@ pub fn derive_config(py: Python<'_>, config: &str) -> PyResult<String> {
     Ok(fields.to_string())
 }
 
-/// The known field that is most like a name.
+/// The known name that is most like the one given.
 #[pyfunction]
-pub fn nearest_field(name: &str) -> &'static str {
-    nearest(name, FIELDS).unwrap_or_default()
+pub fn nearest_name(name: &str, known: Vec<String>) -> String {
+    nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned()
 }
 
 /// The source of a config's instances, and the config.

@@ -5,7 +5,7 @@ use pogema_core::{
     Action, Cell, Config, Environment, EpisodeMeter, Instance, MapfOut, Metrics, Observation, Occupancy,
     OnGoal, Outside, PomapfOut, StepOut,
 };
-use pogema_maps::{InstanceSource, Targets, foretold_goals};
+use pogema_maps::{InstanceSource, Targets, foretold_from};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -93,6 +93,11 @@ impl Engine {
         self.recorder.begin(&rules, &generated.instance, &self.game);
         self.instance = Some(generated.instance);
         Ok(generated.warnings)
+    }
+
+    /// Chooses the seed of the episodes from the next reset on; what resets did to pools stays.
+    fn reseed(&mut self, seed: Option<u64>) {
+        self.source.reseed(seed);
     }
 
     /// Forgets what the metrics counted so far.
@@ -221,7 +226,12 @@ impl Engine {
 
     /// The goals that each agent is going to get, as POGEMA foretells them; none if the list would never end.
     fn foretold_goals(&self) -> Option<Vec<Pairs>> {
-        let goals = foretold_goals(self.source.config(), self.instance.as_ref()?)?;
+        let goals = foretold_from(
+            self.source.config(),
+            self.instance.as_ref()?,
+            self.game.cells(),
+            self.game.goals(),
+        )?;
         Some(goals.iter().map(|goals| pairs(goals, 0)).collect())
     }
 

@@ -14,6 +14,6 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<engine::Engine>()?;
     module.add_class::<astar::AStarAgent>()?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
-    module.add_function(wrap_pyfunction!(config::nearest_field, module)?)?;
+    module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -1,0 +1,256 @@
+"""One environment with POGEMA's interface: lists of arrays in, lists of arrays out."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any, Optional, Union
+
+import gymnasium
+import numpy as np
+
+from pogema_rs import _engine, grid_registry
+from pogema_rs.errors import ActionCountError, NotResetError, StateError
+from pogema_rs.grid import Grid, GridLifeLong, foretold_goals
+from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.semantics import Semantics
+
+__all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
+
+_PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
+
+
+class ActionsSampler:
+    """Draws random actions with a generator of its own.
+
+    Rule: seed/streams
+    """
+
+    def __init__(self, num_actions: int, seed: Optional[int] = 42) -> None:
+        self._num_actions = num_actions
+        self.update_seed(seed)
+
+    def update_seed(self, seed: Optional[int] = None) -> None:
+        """Begins the random numbers of a seed."""
+        self._rnd = np.random.default_rng(seed)
+
+    def sample_actions(self, dim: int = 1) -> np.ndarray:
+        """`dim` actions, int64."""
+        return self._rnd.integers(self._num_actions, size=dim)
+
+
+class PogemaBase(gymnasium.Env):
+    """POGEMA's name for what its environments share."""
+
+
+class Pogema(PogemaBase):
+    """An environment with its time limit and metrics; `pogema_v0` makes one.
+
+    Shape: the `default` observation of each agent is float32 `(3, side, side)` with the channels obstacles, agents and
+    goal; `POMAPF` and `MAPF` are dictionaries.
+
+    Errors: those of `pogema_rs.errors`. A call that fails leaves the environment as it was.
+
+    Rule: observe/default, observe/pomapf, observe/mapf
+
+    Source: POGEMA 1.4.0, `envs.py`
+    """
+
+    metadata = {"render_modes": ["ansi"]}
+    _grid_class = Grid
+
+    def __init__(
+        self,
+        grid_config: Optional[GridConfig] = None,
+        *,
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
+        limits_steps: bool = True,
+    ) -> None:
+        self.grid_config = GridConfig(num_agents=2) if grid_config is None else grid_config
+        self.semantics = Semantics(semantics)
+        self.grid: Optional[Grid] = None
+        self._has_metrics = limits_steps and not self.grid_config.persistent
+        # POGEMA's time limit and its choice of class are those of the config that the environment was made with.
+        self._fixed = {
+            "on_target": self.grid_config.on_target,
+            "persistent": self.grid_config.persistent,
+            "max_episode_steps": self.grid_config.max_episode_steps if limits_steps else 2**63 - 1,
+        }
+        self._remember_config()
+        self._engine = _engine.Engine(
+            engine_json(self.grid_config, **self._fixed), self._registered(), self.semantics.occupancy_is_exact
+        )
+        self.action_space = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
+        self.observation_space = _observation_space(self.grid_config)
+        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
+
+    # The config may be changed or replaced between two resets, which POGEMA's users do; what it held at the last one
+    # is kept, so that an unchanged one need not be read again.
+
+    def _remember_config(self) -> None:
+        fields = self.grid_config.__dict__
+        self._last_config = self.grid_config
+        self._last_fields = {name: fields[name] for name in GridConfig.model_fields}
+        self._last_places = {name: [*fields[name]] for name in _PLACES if fields[name] is not None}
+
+    def _registered(self) -> Optional[str]:
+        return grid_registry.map_text(self.grid_config.map_name)
+
+    def _begin_episode(self) -> None:
+        fields, last = self.grid_config.__dict__, self._last_fields
+        is_same = self.grid_config is self._last_config
+        changed = [name for name in last if fields[name] is not last[name] and fields[name] != last[name]]
+        changed += [name for name, places in self._last_places.items() if fields[name] != places]
+        if is_same and all(name == "seed" for name in changed):
+            if changed:
+                self._engine.reseed(self.grid_config.seed)
+            noticed = self._engine.reset()
+        else:
+            fixed = dict(self._fixed)
+            pools = self._engine.pools()
+            if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
+                fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
+            noticed = self._engine.reset(engine_json(self.grid_config, **fixed), self._registered())
+        if changed or not is_same:
+            self._remember_config()
+        for text in noticed:
+            warnings.warn(text, UserWarning, stacklevel=3)
+        self.grid = self._grid_class._of(self._engine, self.grid_config)
+
+    def reset(
+        self, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
+    ) -> Union[tuple[list, list], list]:
+        """Begins an episode: observations and infos, a list of each.
+
+        As POGEMA 1.4.0 does it, `seed` changes nothing; under the semantics "2.0" it becomes the seed of the config,
+        for this reset and those to come.
+
+        Rule: seed/reset
+        """
+        if seed is not None and self.semantics.reset_takes_seed:
+            self.grid_config.seed = seed
+            self._sampler.update_seed(seed)
+        self._begin_episode()
+        if self.semantics.reset_clears_metrics:
+            self._engine.clear_metrics()
+        observations = self._engine.observe()
+        return (observations, self._engine.infos()) if return_info else observations
+
+    def step(self, action: Sequence[int]) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
+        """Plays one step: observations, rewards, terminated, truncated, infos, a list of each.
+
+        `infos[0]["metrics"]` holds the figures of the episode in the step that ends it. The actions stay as they are,
+        where POGEMA writes into them under `soft`.
+
+        Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
+
+        Rule: move/actions, end/terminated, end/truncated
+        """
+        return self._engine.step(action, self._has_metrics)
+
+    @property
+    def was_on_goal(self) -> Optional[list[bool]]:
+        """Which agents that take part stood on their goals after the last move; none before the first reset."""
+        return None if self.grid is None else self._engine.on_goal
+
+    def check_reset(self) -> None:
+        """Raises `NotResetError` before the first reset."""
+        if self.grid is None:
+            raise NotResetError("the environment was not reset yet")
+
+    def render(self, mode: str = "human") -> Optional[str]:
+        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        self.check_reset()
+        return self.grid.render(mode=mode)
+
+    def sample_actions(self) -> np.ndarray:
+        """A random action for each agent, int64 `(agents,)`, from a generator that begins with the config's seed."""
+        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
+
+    def get_num_agents(self) -> int:
+        """Number of agents."""
+        return self.grid_config.num_agents
+
+    def _started(self) -> Grid:
+        self.check_reset()
+        return self.grid
+
+    def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
+        """See `Grid.get_obstacles`."""
+        return self._started().get_obstacles(ignore_borders=ignore_borders)
+
+    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+        """See `Grid.get_agents_xy`."""
+        return self._started().get_agents_xy(only_active=only_active, ignore_borders=ignore_borders)
+
+    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+        """See `Grid.get_targets_xy`."""
+        return self._started().get_targets_xy(only_active=only_active, ignore_borders=ignore_borders)
+
+    def get_agents_xy_relative(self) -> list:
+        """See `Grid.get_agents_xy_relative`."""
+        return self._started().get_agents_xy_relative()
+
+    def get_targets_xy_relative(self) -> list:
+        """See `Grid.get_targets_xy_relative`."""
+        return self._started().get_targets_xy_relative()
+
+    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Any:
+        """See `Grid.get_state`."""
+        return self._started().get_state(ignore_borders=ignore_borders, as_dict=as_dict)
+
+    def step_back(self) -> bool:
+        """Takes the last step back; says whether there was one. Needs `persistent` in the config.
+
+        Rule: history/step-back
+        """
+        self.check_reset()
+        return self._engine.step_back()
+
+
+class PogemaLifeLong(Pogema):
+    """An environment with `on_target="restart"`."""
+
+    _grid_class = GridLifeLong
+
+    def get_lifelong_targets_xy(self, ignore_borders: bool = False) -> list:
+        """The goals that each agent gets if it walks from goal to goal, as POGEMA foretells them.
+
+        Rule: goal/restart/foretold
+        """
+        return foretold_goals(self._started(), ignore_borders)
+
+
+class PogemaCoopFinish(Pogema):
+    """An environment with `on_target="nothing"`."""
+
+    is_multiagent = True
+
+    @property
+    def num_agents(self) -> int:
+        """Number of agents."""
+        return self.get_num_agents()
+
+
+_CLASSES = {"restart": PogemaLifeLong, "nothing": PogemaCoopFinish, "finish": Pogema}
+
+
+def _make_pogema(grid_config: GridConfig, semantics: Union[str, Semantics] = Semantics.RELEASED) -> Pogema:
+    try:
+        made = _CLASSES[grid_config.on_target]
+    except (KeyError, TypeError):
+        raise StateError(f"on_target is {grid_config.on_target!r}, expected one of {list(_CLASSES)}") from None
+    return made(grid_config, semantics=semantics)
+
+
+def _observation_space(grid_config: GridConfig) -> gymnasium.Space:
+    side = 2 * grid_config.obs_radius + 1
+    box = gymnasium.spaces.Box
+    if grid_config.observation_type == "default":
+        return box(-1.0, 1.0, shape=(3, side, side))
+    return gymnasium.spaces.Dict(
+        obstacles=box(0.0, 1.0, shape=(side, side)),
+        agents=box(0.0, 1.0, shape=(side, side)),
+        xy=box(low=-1024, high=1024, shape=(2,), dtype=int),
+        target_xy=box(low=-1024, high=1024, shape=(2,), dtype=int),
+    )

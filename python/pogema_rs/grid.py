@@ -1,0 +1,234 @@
+"""What is on the map: a view of an environment's state under POGEMA's names.
+
+All coordinates are (row, col) and count the border, unless `ignore_borders` is set.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs import _engine, grid_registry
+from pogema_rs.errors import StateError
+from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.utils import render_grid
+
+__all__ = ["Grid", "GridLifeLong"]
+
+
+class Grid:
+    """The map and its agents.
+
+    Made by an environment it shows that environment's present state; made from a config it shows what a reset gives.
+    It cannot be written to: what POGEMA's users change by hand raises an error here and changes nothing.
+
+    Rule: border/ring, border/outside, grid/coordinates
+
+    Source: POGEMA 1.4.0, `grid.py`, `Grid`
+    """
+
+    def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
+        engine = _engine.Engine(engine_json(grid_config), grid_registry.map_text(grid_config.map_name))
+        engine.reset()
+        self._show(engine, grid_config)
+        if not add_artificial_border:
+            raise StateError("add_artificial_border is False, expected True: an environment always has its border")
+
+    @classmethod
+    def _of(cls, engine: _engine.Engine, grid_config: GridConfig) -> Grid:
+        grid = cls.__new__(cls)
+        grid._show(engine, grid_config)
+        return grid
+
+    def _show(self, engine: _engine.Engine, grid_config: GridConfig) -> None:
+        self._engine = engine
+        self.config = grid_config
+        self._obstacles: Optional[np.ndarray] = None
+
+    @property
+    def obstacles(self) -> np.ndarray:
+        """The map with its border, 1 for an obstacle: float64 if what lies beyond the wall is free, else int64."""
+        if self._obstacles is None:
+            dtype = np.float64 if self._engine.is_free_outside else np.int64
+            self._obstacles = self._engine.obstacles().astype(dtype)
+            self._obstacles.flags.writeable = False
+        return self._obstacles
+
+    @property
+    def positions(self) -> np.ndarray:
+        """The cells that are marked as occupied, float64 of the shape of `obstacles`."""
+        marked = np.zeros(self.obstacles.shape)
+        for cell in self._engine.occupied():
+            marked[cell] = 1
+        marked.flags.writeable = False
+        return marked
+
+    @property
+    def positions_xy(self) -> list[tuple[int, int]]:
+        """Where each agent is."""
+        return self._engine.cells(self.config.obs_radius)
+
+    @property
+    def finishes_xy(self) -> list[tuple[int, int]]:
+        """Where each agent wants to go; of NumPy's integers where a goal was drawn since the reset, as in POGEMA."""
+        goals = self._engine.goals(self.config.obs_radius)
+        is_drawn = self._engine.is_drawn
+        return [
+            (np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)
+        ]
+
+    @property
+    def starts_xy(self) -> list[tuple[int, int]]:
+        """Where each agent is: POGEMA's list of starts moves with the agents."""
+        return self.positions_xy
+
+    @property
+    def is_active(self) -> dict[int, bool]:
+        """Which agents take part, by index."""
+        return dict(enumerate(self._engine.active))
+
+    def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
+        """A copy of `obstacles`, with or without the border."""
+        radius = self.config.obs_radius
+        inside = slice(radius, -radius)
+        return self.obstacles[inside, inside].copy() if ignore_borders else self.obstacles.copy()
+
+    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+        """Where each agent is: tuples, or lists where the border is not counted.
+
+        `only_active` leaves out the agents that are gone; POGEMA's own drops agent 0 or raises.
+        """
+        return self._prepared(self.positions_xy, only_active, ignore_borders)
+
+    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+        """Where each agent wants to go: tuples, or lists where the border is not counted."""
+        return self._prepared(self.finishes_xy, only_active, ignore_borders)
+
+    def _prepared(self, places: list, only_active: bool, ignore_borders: bool) -> list:
+        if only_active:
+            places = [place for place, active in zip(places, self._engine.active) if active]
+        if ignore_borders:
+            radius = self.config.obs_radius
+            return [[row - radius, col - radius] for row, col in places]
+        return places
+
+    @staticmethod
+    def to_relative(coordinates: list, offset: list) -> list:
+        """Each place counted from its own origin."""
+        return [(row - from_row, col - from_col) for (row, col), (from_row, from_col) in zip(coordinates, offset)]
+
+    def get_agents_xy_relative(self) -> list[tuple[int, int]]:
+        """Where each agent is, counted from its start."""
+        return self.to_relative(self.positions_xy, self._initial_xy)
+
+    def get_targets_xy_relative(self) -> list[tuple[int, int]]:
+        """Where each agent wants to go, counted from its start."""
+        return self.to_relative(self.finishes_xy, self._initial_xy)
+
+    @property
+    def _initial_xy(self) -> list[tuple[int, int]]:
+        return self._engine.starts(self.config.obs_radius)
+
+    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Any:
+        """Agents, goals and the map: a dictionary, or one flat array.
+
+        Places are divided by one less than the map's sides; a map of one row or column has none to divide by, and
+        raises `ZeroDivisionError` as POGEMA does.
+        """
+        radius, height, width = self.config.obs_radius, self.config.height - 1, self.config.width - 1
+
+        def normalized(places: list) -> list[tuple[float, float]]:
+            return [((row - radius) / height, (col - radius) / width) for row, col in places]
+
+        agents_xy, targets_xy = normalized(self.positions_xy), normalized(self.finishes_xy)
+        obstacles = self.get_obstacles(ignore_borders)
+        if as_dict:
+            return {"obstacles": obstacles, "agents_xy": agents_xy, "targets_xy": targets_xy}
+        return np.concatenate([np.array(part).flatten() for part in (agents_xy, targets_xy, obstacles)])
+
+    def get_observation_shape(self) -> tuple[int, int, int]:
+        """POGEMA's figure, which leaves the goal's channel out."""
+        side = 2 * self.config.obs_radius + 1
+        return 2, side, side
+
+    def get_num_actions(self) -> int:
+        """Number of actions."""
+        return len(self.config.MOVES)
+
+    def get_grid_config(self) -> GridConfig:
+        """A copy of the config."""
+        return deepcopy(self.config)
+
+    def _window(self, padded: np.ndarray, agent_id: int) -> np.ndarray:
+        row, col = self.positions_xy[agent_id]
+        radius = self.config.obs_radius
+        return padded[row - radius : row + radius + 1, col - radius : col + radius + 1].astype(np.float32)
+
+    def get_obstacles_for_agent(self, agent_id: int) -> np.ndarray:
+        """The obstacles in an agent's window, float32 `(side, side)`."""
+        return self._window(self.obstacles, agent_id)
+
+    def get_positions(self, agent_id: int) -> np.ndarray:
+        """The agents in an agent's window, float32 `(side, side)`."""
+        return self._window(self.positions, agent_id)
+
+    def get_target(self, agent_id: int) -> tuple[float, float]:
+        """The direction of an agent's goal, of length 1; zeros on the goal."""
+        (row, col), (goal_row, goal_col) = self.positions_xy[agent_id], self.finishes_xy[agent_id]
+        if (row, col) == (goal_row, goal_col):
+            return 0.0, 0.0
+        down, right = goal_row - row, goal_col - col
+        distance = np.sqrt(down**2 + right**2)
+        return down / distance, right / distance
+
+    def get_square_target(self, agent_id: int) -> np.ndarray:
+        """The goal in an agent's window, each coordinate moved inside: float32 `(side, side)`.
+
+        Rule: observe/default/goal
+        """
+        radius = self.config.obs_radius
+        (row, col), (goal_row, goal_col) = self.positions_xy[agent_id], self.finishes_xy[agent_id]
+        window = np.zeros((2 * radius + 1, 2 * radius + 1), dtype=np.float32)
+        window[tuple(radius + np.clip((goal_row - row, goal_col - col), -radius, radius))] = 1
+        return window
+
+    def has_obstacle(self, x: int, y: int) -> bool:
+        """Whether a cell holds an obstacle."""
+        return self.obstacles[x, y] == self.config.OBSTACLE
+
+    def on_goal(self, agent_id: int) -> bool:
+        """Whether an agent is where it wants to go."""
+        return self.positions_xy[agent_id] == self.finishes_xy[agent_id]
+
+    def render(self, mode: str = "human") -> Optional[str]:
+        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
+
+    def _refuse(self, *_: Any, **__: Any) -> None:
+        raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
+
+    move = move_without_checks = move_agent_to_cell = hide_agent = show_agent = add_artificial_border = _refuse
+
+
+class GridLifeLong(Grid):
+    """The map and its agents with `on_target="restart"`."""
+
+
+def foretold_goals(grid: Grid, ignore_borders: bool) -> list:
+    """See `PogemaLifeLong.get_lifelong_targets_xy`."""
+    config, radius = grid.config, grid.config.obs_radius
+    if config.targets_xy is not None:
+        if ignore_borders:
+            return config.targets_xy
+        return [[[row + radius, col + radius] for row, col in sequence] for sequence in config.targets_xy]
+    goals = grid._engine.foretold_goals()
+    if goals is None:
+        raise StateError("the list of goals would never end: possible_targets_xy holds one cell alone")
+    shift = 0 if ignore_borders else radius
+    first = grid.get_targets_xy(ignore_borders=ignore_borders)
+    return [
+        [start, *([np.int64(row + shift), np.int64(col + shift)] for row, col in rest[1:])]
+        for start, rest in zip(first, goals)
+    ]

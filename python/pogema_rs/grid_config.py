@@ -1,0 +1,162 @@
+"""The config of an environment, under POGEMA's names."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Optional, Union
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from pogema_rs import _engine
+from pogema_rs._coerce import coerced
+from pogema_rs.errors import EmptyMapError, MapTextError, RefusedConfigError
+
+__all__ = ["GridConfig"]
+
+
+class GridConfig(BaseModel):
+    """Everything that fixes an environment.
+
+    Fields, defaults and derivations are those of POGEMA 1.4.0. A field that there is not is ignored, as there, but with
+    a warning that names the nearest one. Assigning to a field later is not checked until the next reset.
+
+    Errors: `pydantic.ValidationError`, which is a ValueError, for a value of the wrong type or range; `IndexError` for
+    a start or goal outside the map; `KeyError` for a character of a map that has no meaning, and for letters beside
+    other places; `ZeroDivisionError` for a map without cells.
+
+    Rule: config/fields, config/size, config/map, config/agents, config/positions
+
+    Source: POGEMA 1.4.0, `grid_config.py`, `GridConfig`
+    """
+
+    model_config = ConfigDict(extra="ignore", arbitrary_types_allowed=True, protected_namespaces=())
+
+    MOVES: list = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]
+    FREE: Literal[0] = 0
+    OBSTACLE: Literal[1] = 1
+    empty_outside: bool = True
+    on_target: Literal["finish", "nothing", "restart"] = "finish"
+    seed: Optional[int] = None
+    width: Optional[int] = None
+    height: Optional[int] = None
+    size: int = 8
+    density: float = 0.3
+    obs_radius: int = 5
+    agents_xy: Optional[list] = None
+    targets_xy: Optional[list] = None
+    num_agents: Optional[int] = None
+    possible_agents_xy: Optional[list] = None
+    possible_targets_xy: Optional[list] = None
+    collision_system: Literal["block_both", "priority", "soft"] = "priority"
+    persistent: bool = False
+    observation_type: Literal["POMAPF", "MAPF", "default"] = "default"
+    map: Optional[Union[list, str]] = None
+    map_name: Optional[str] = None
+    integration: Optional[Literal["SampleFactory", "PyMARL", "rllib", "gymnasium", "PettingZoo"]] = None
+    max_episode_steps: int = 64
+    auto_reset: Optional[bool] = None
+
+    # What the engine derives; all other fields stay as they were given.
+    _DERIVED: ClassVar[tuple[str, ...]] = ("width", "height", "size", "density", "num_agents")
+    _PLACES: ClassVar[tuple[str, ...]] = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
+
+    def __init__(self, **fields: Any) -> None:
+        known = type(self).model_fields
+        _warn_of_unknown(fields, known)
+        own = {name: value for name, value in fields.items() if name in GridConfig.model_fields}
+        try:
+            own = _derived(coerced(own))
+        except RefusedConfigError as refused:
+            raise _validation_error(type(self).__name__, refused, fields) from None
+        super().__init__(**{**{name: fields[name] for name in fields if name in known}, **own})
+
+    def update_config(self, **fields: Any) -> None:
+        """Sets some fields and derives the others anew; with an error nothing changes.
+
+        A `size` forgets width and height, and either of these forgets the size.
+        """
+        merged = self.dict()
+        if "size" in fields:
+            merged.pop("width", None)
+            merged.pop("height", None)
+        elif "width" in fields or "height" in fields:
+            merged.pop("size", None)
+        updated = GridConfig(**{**merged, **fields})
+        for name in GridConfig.model_fields:
+            setattr(self, name, getattr(updated, name))
+
+    def dict(self, **kwargs: Any) -> dict[str, Any]:  # noqa: A003 - POGEMA's users call it so
+        """All fields by name, as `model_dump` gives them."""
+        return self.model_dump(**kwargs)
+
+    def json(self, **kwargs: Any) -> str:
+        """All fields as JSON, as `model_dump_json` gives them."""
+        return self.model_dump_json(**kwargs)
+
+    def copy(self, **kwargs: Any) -> GridConfig:
+        """A copy, as `model_copy` gives it."""
+        return self.model_copy(**kwargs)
+
+
+# The engine plays the same episode in whatever framework.
+_OF_ENGINE = tuple(name for name in GridConfig.model_fields if name not in ("integration", "auto_reset"))
+
+
+def engine_json(config: GridConfig | Mapping[str, Any], **changes: Any) -> str:
+    """A config as the engine reads it."""
+    fields = config if isinstance(config, Mapping) else config.__dict__
+    own = {name: fields[name] for name in _OF_ENGINE if name in fields}
+    return json.dumps({**own, **changes}, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays, and any other sequence, as JSON can hold them."""
+    return value.tolist() if hasattr(value, "tolist") else list(value)
+
+
+def _warn_of_unknown(fields: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    for name in fields:
+        if name not in known:
+            nearest = _engine.nearest_name(name, list(known))
+            warnings.warn(
+                f"GridConfig has no field `{name}`, which is ignored; the nearest one is `{nearest}`",
+                UserWarning,
+                stacklevel=3,
+            )
+
+
+def _derived(fields: dict[str, Any]) -> dict[str, Any]:
+    text = fields.get("map")
+    if text is not None and not (text.strip() if isinstance(text, str) else any(len(row) for row in text)):
+        raise EmptyMapError("config: `map` has no cells")
+    if isinstance(text, str):
+        _check_letters(text, fields)
+    derived = json.loads(_engine.derive_config(engine_json(fields)))
+    result = {**fields, **{name: derived[name] for name in GridConfig._DERIVED}}
+    if isinstance(text, str):
+        result["map"] = derived["map"]
+        result.update({name: derived[name] for name in GridConfig._PLACES})
+        for name in ("possible_agents_xy", "possible_targets_xy"):
+            if derived[name] is not None and name not in fields:
+                result[name] = [tuple(cell) for cell in derived[name]]
+    return result
+
+
+def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
+    has_letters = any(character.isascii() and character.isalpha() for character in text)
+    if has_letters and any(character in "@$!" for character in text):
+        raise MapTextError("config: `map` has letters beside `@`, `$` or `!`, expected one or the other")
+    if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:
+        raise MapTextError("config: `map` has letters beside agents_xy and targets_xy, expected one or the other")
+
+
+def _validation_error(title: str, refused: RefusedConfigError, fields: Mapping[str, Any]) -> ValidationError:
+    text = str(refused).removeprefix("config: ")
+    name = next((name for name in GridConfig.model_fields if text.startswith(f"`{name}`")), None)
+    error = PydanticCustomError("pogema", "{text}", {"text": text})
+    place: tuple[str, ...] = (name,) if name else ()
+    details = InitErrorDetails(type=error, loc=place, input=fields.get(name) if name else fields)
+    return ValidationError.from_exception_data(title, [details])
