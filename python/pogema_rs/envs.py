@@ -14,6 +14,7 @@ from pogema_rs.errors import ActionCountError, NotResetError, StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals
 from pogema_rs.grid_config import GridConfig, engine_json
 from pogema_rs.semantics import Semantics
+from pogema_rs.svg_animation.animation_wrapper import Filmed
 
 __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
 
@@ -39,7 +40,7 @@ class ActionsSampler:
         return self._rnd.integers(self._num_actions, size=dim)
 
 
-class PogemaBase(gymnasium.Env):
+class PogemaBase(Filmed, gymnasium.Env):
     """POGEMA's name for what its environments share."""
 
 
@@ -128,6 +129,7 @@ class Pogema(PogemaBase):
         Rule: seed/reset
         """
         if seed is not None and self.semantics.reset_takes_seed:
+            super().reset(seed=seed)
             self.grid_config.seed = seed
             self._sampler.update_seed(seed)
         self._begin_episode()

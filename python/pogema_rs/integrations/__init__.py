@@ -1,0 +1,1 @@
+"""Environments for the frameworks that train on them."""

@@ -1,0 +1,103 @@
+"""The way to an environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Optional, Union
+
+import gymnasium
+
+from pogema_rs.envs import _make_pogema
+from pogema_rs.errors import AutoResetError, UnknownIntegrationError
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.integrations.sample_factory import (
+    AutoResetWrapper,
+    IsMultiAgentWrapper,
+    MetricsForwardingWrapper,
+)
+from pogema_rs.semantics import Semantics
+from pogema_rs.wrappers.forwarding import Wrapper
+
+__all__ = ["SingleAgentWrapper", "make_pogema", "make_single_agent_gym", "pogema_v0"]
+
+
+class SingleAgentWrapper(Wrapper):
+    """Agent 0 alone; the others act at random, by the action space's own random numbers.
+
+    Under the semantics "2.0" `reset(seed=...)` chooses those too.
+    """
+
+    def reset(
+        self, *, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
+    ) -> Any:
+        """Begins an episode: the observation and info of agent 0."""
+        environment = self.unwrapped
+        if seed is not None and environment.semantics.reset_takes_seed:
+            environment.action_space.seed(seed)
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return (observations[0], infos[0]) if return_info else observations[0]
+
+    def step(self, action: int) -> Any:
+        """Plays one step: what it brought agent 0."""
+        environment = self.unwrapped
+        others = [environment.action_space.sample() for _ in range(environment.get_num_agents() - 1)]
+        return tuple(values[0] for values in self.env.step([action, *others]))
+
+
+def _config(grid_config: Union[GridConfig, Mapping[str, Any], None]) -> GridConfig:
+    if grid_config is None:
+        return GridConfig()
+    return GridConfig(**grid_config) if isinstance(grid_config, Mapping) else grid_config
+
+
+def make_single_agent_gym(
+    grid_config: Union[GridConfig, Mapping[str, Any], None] = None,
+    semantics: Union[str, Semantics] = Semantics.RELEASED,
+    **_: Any,
+) -> SingleAgentWrapper:
+    """An environment for agents that are alone, as `gymnasium.make("Pogema-v0")` makes it."""
+    return SingleAgentWrapper(_make_pogema(_config(grid_config), semantics))
+
+
+def make_pogema(
+    grid_config: Union[GridConfig, Mapping[str, Any], None] = None,
+    *args: Any,
+    semantics: Union[str, Semantics] = Semantics.RELEASED,
+    **kwargs: Any,
+) -> Any:
+    """An environment of a config, for the framework that its `integration` names.
+
+    `semantics` is "1.4.0", or "2.0" for what that line changed: every agent is seen, `reset(seed=...)` chooses the
+    episode, and metrics begin anew with each reset.
+
+    Errors: `KeyError` for `auto_reset` without Sample Factory, and for an unknown integration; `NotImplementedError`
+    for `rllib`, as POGEMA has it.
+
+    Source: POGEMA 1.4.0, `integrations/make_pogema.py`
+    """
+    config = _config(grid_config)
+    name = config.integration
+    if config.auto_reset and name != "SampleFactory":
+        raise AutoResetError(f"auto_reset is set with the integration {name}, expected `SampleFactory`")
+    if name is None:
+        return _make_pogema(config, semantics)
+    if name == "SampleFactory":
+        env: gymnasium.Env = _make_pogema(config, semantics)
+        env = IsMultiAgentWrapper(MetricsForwardingWrapper(env))
+        return env if config.auto_reset is False else AutoResetWrapper(env)
+    if name == "gymnasium":
+        return make_single_agent_gym(config, semantics)
+    if name == "PyMARL":
+        from pogema_rs.integrations.pymarl import PyMarlPogema
+
+        return PyMarlPogema(config, *args, semantics=semantics, **kwargs)
+    if name == "PettingZoo":
+        from pogema_rs.integrations.pettingzoo import parallel_env
+
+        return parallel_env(config, semantics)
+    if name == "rllib":
+        raise NotImplementedError("integration is `rllib`, expected `PettingZoo`, which RLlib can wrap")
+    raise UnknownIntegrationError(f"integration is {name!r}, expected one of POGEMA's")
+
+
+pogema_v0 = make_pogema

@@ -1,0 +1,104 @@
+"""Environments for PettingZoo."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Optional, Union
+
+import gymnasium
+import numpy as np
+
+from pogema_rs.envs import _make_pogema
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.semantics import Semantics
+
+try:
+    from pettingzoo import ParallelEnv
+except ImportError as missing:
+    raise ImportError("the PettingZoo integration needs `pip install pogema-rs[pettingzoo]`") from missing
+
+__all__ = ["PogemaParallel", "parallel_env"]
+
+
+def parallel_env(
+    grid_config: Optional[GridConfig] = None, semantics: Union[str, Semantics] = Semantics.RELEASED
+) -> PogemaParallel:
+    """An environment of agents `player_0`, `player_1` and so on."""
+    return PogemaParallel(grid_config or GridConfig(), semantics=semantics)
+
+
+class PogemaParallel(ParallelEnv):
+    """An environment as dictionaries by the agents' names.
+
+    What a step returns is about the agents that took part before it. As in POGEMA the metrics are with `player_0`, and
+    lost if it has left before the end; `self.pogema` has them always.
+
+    Source: POGEMA 1.4.0, `integrations/pettingzoo.py`
+    """
+
+    def __init__(
+        self,
+        grid_config: GridConfig,
+        render_mode: str = "ansi",
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
+    ) -> None:
+        self.metadata = {"render_modes": ["ansi"], "name": "pogema", "is_parallelizable": True}
+        self.render_mode = render_mode
+        self.pogema = _make_pogema(grid_config, semantics)
+        self.possible_agents = [f"player_{agent}" for agent in range(self.pogema.get_num_agents())]
+        self.agent_name_mapping = {name: agent for agent, name in enumerate(self.possible_agents)}
+        self.agents: list[str] = []
+        self.num_moves: Optional[int] = None
+
+    @functools.cached_property
+    def observation_spaces(self) -> dict[str, gymnasium.Space]:
+        """The space of each agent's observations."""
+        return {name: self.pogema.observation_space for name in self.possible_agents}
+
+    @functools.cached_property
+    def action_spaces(self) -> dict[str, gymnasium.Space]:
+        """The space of each agent's actions, each with random numbers of its own."""
+        return {name: gymnasium.spaces.Discrete(self.pogema.action_space.n) for name in self.possible_agents}
+
+    def observation_space(self, agent: str) -> gymnasium.Space:
+        """The space of an agent's observations."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> gymnasium.Space:
+        """The space of an agent's actions."""
+        return self.action_spaces[agent]
+
+    def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
+        """Begins an episode: observations and infos by name."""
+        observations, infos = self.pogema.reset(seed=seed, options=options)
+        self.agents = self.possible_agents[:]
+        self.num_moves = 0
+        return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
+
+    def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
+        """Plays one step; an agent without an action stays, and names that there are not are ignored."""
+        result = self.pogema.step([actions.get(name, 0) for name in self.possible_agents])
+        present = [(name, self.agent_name_mapping[name]) for name in self.agents]
+        observations, rewards, terminated, truncated, infos = (
+            {name: values[agent] for name, agent in present} for values in result
+        )
+        is_over = all(result[2]) or all(result[3])
+        active = self.pogema.grid.is_active
+        self.agents = [name for name, agent in present if active[agent] and not is_over]
+        return observations, rewards, terminated, truncated, infos
+
+    def state(self) -> np.ndarray:
+        """See `Grid.get_state`."""
+        return self.pogema.get_state()
+
+    def render(self, mode: str = "human") -> Optional[str]:
+        """Prints the map."""
+        return self.pogema.render(mode=mode)
+
+    def close(self) -> None:
+        """Does nothing."""
+
+    @property
+    def unwrapped(self) -> PogemaParallel:
+        """Itself."""
+        return self

@@ -1,0 +1,97 @@
+"""Filming of episodes."""
+
+from __future__ import annotations
+
+import os
+from os import PathLike
+from typing import Any, Optional, Union
+
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw
+from pogema_rs.wrappers.forwarding import Wrapper
+
+__all__ = ["AnimationConfig", "AnimationMonitor", "Filmed"]
+
+
+class Filmed:
+    """What an environment offers to draw its episodes."""
+
+    def enable_animation(self) -> None:
+        """Films the episodes from the next reset on."""
+        self._engine.film(True)
+
+    def render_animation(self, animation_config: Optional[AnimationConfig] = None) -> SvgAnimation:
+        """The episode so far as an animation, which notebooks show.
+
+        Errors: `StateError` if the episode is not filmed, or has no such agent or frame.
+        """
+        return draw(self._engine, animation_config or AnimationConfig())
+
+    def save_animation(
+        self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
+    ) -> None:
+        """Writes the animation of the episode so far to a file."""
+        self.render_animation(animation_config).save(name)
+
+    def save_replay(self, name: Union[str, PathLike] = "replay.html", title: str = "POGEMA episode") -> None:
+        """Writes the episode so far as a page that replays it in any browser."""
+        page = self._engine.draw_html(title)
+        with open(name, "w", encoding="utf-8") as file:
+            file.write(page)
+
+
+class AnimationMonitor(Wrapper):
+    """Films an environment and saves the episodes that its config asks for.
+
+    As in POGEMA, episode k of those begun is saved unless k + 1 is a multiple of `save_every_idx_episode`, and each
+    one if that is 1.
+
+    Source: POGEMA 1.4.0, `svg_animation/animation_wrapper.py`, `AnimationMonitor`
+    """
+
+    def __init__(self, env: Any, animation_config: Optional[AnimationConfig] = None) -> None:
+        super().__init__(env)
+        self.animation_config = animation_config or AnimationConfig()
+        self._episode_idx = 0
+        env.unwrapped.enable_animation()
+
+    def reset(self, **kwargs: Any) -> Any:
+        """As the environment inside."""
+        result = self.env.reset(**kwargs)
+        self._episode_idx += 1
+        return result
+
+    def step(self, action: Any) -> Any:
+        """As the environment inside; saves the episode that ends with it, if it is one of those wanted."""
+        result = self.env.step(action)
+        _, _, terminated, truncated, _ = result
+        if _all(terminated) or _all(truncated):
+            every = self.animation_config.save_every_idx_episode
+            if every and ((self._episode_idx + 1) % every or every == 1):
+                os.makedirs(self.animation_config.directory, exist_ok=True)
+                name = self.pick_name(self.unwrapped.grid_config, self._episode_idx)
+                self.save_animation(os.path.join(self.animation_config.directory, name))
+        return result
+
+    @staticmethod
+    def pick_name(grid_config: Optional[GridConfig], episode_idx: Optional[int] = None, zfill_ep: int = 5) -> str:
+        """The file name of an episode: its number, map and seed."""
+        parts = ["pogema"]
+        if episode_idx is not None:
+            parts.append(f"ep{str(episode_idx).zfill(zfill_ep)}")
+        if grid_config is None:
+            parts.append("render")
+        else:
+            parts += [grid_config.map_name] if grid_config.map_name else []
+            parts += [f"seed{grid_config.seed}"] if grid_config.seed is not None else []
+        return "-".join(parts) + ".svg"
+
+    def save_animation(
+        self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
+    ) -> None:
+        """Writes the animation of the episode so far to a file."""
+        self.unwrapped.save_animation(name, animation_config)
+
+
+def _all(ends: Any) -> bool:
+    return all(ends) if isinstance(ends, (list, tuple)) else bool(ends)

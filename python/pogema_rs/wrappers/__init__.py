@@ -1,0 +1,5 @@
+"""Wrappers around environments."""
+
+from pogema_rs.wrappers.forwarding import Wrapper
+
+__all__ = ["Wrapper"]
