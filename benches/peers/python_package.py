@@ -1,0 +1,99 @@
+"""Times the Python package beside POGEMA 1.4.0 and beside the Rust batch, in one run on one machine.
+
+python3.11 benches/peers/python_package.py [--rounds N] [--json FILE]
+
+Needs the program built (`cargo build --release`), the package installed by `python/run`, and POGEMA behind
+POGEMA_ORACLE_PYTHON. The peers take turns; each ratio is the median over the rounds of the ratios within a round.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+OURS = ROOT / "target/python/new/bin/python"
+PROGRAM = ROOT / "target/release/pogema"
+BATCH = "64 lanes of 64 agents, 32 x 32, MAPF, 2 threads"
+
+
+class Worker:
+    """A package in a process of its own."""
+
+    def __init__(self, python, package):
+        self.child = subprocess.Popen(
+            [python, "-B", HERE / "worker.py", package],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def time(self, *work):
+        """Calls per second."""
+        print(json.dumps(work), file=self.child.stdin, flush=True)
+        line = self.child.stdout.readline()
+        if not line:
+            sys.exit(f"python_package: {self.child.args[-1]} ended at {work}")
+        return json.loads(line)
+
+
+def imports_per_second(python, package):
+    """Imports in a process each, less what Python itself takes to start."""
+
+    def seconds(code):
+        began = time.perf_counter()
+        subprocess.run([python, "-B", "-c", code], check=True)
+        return time.perf_counter() - began
+
+    return 1 / (min(seconds(f"import {package}") for _ in range(5)) - min(seconds("pass") for _ in range(5)))
+
+
+def rust_batch():
+    """Steps of all environments of the Rust batch, with observations."""
+    table = ROOT / "target/python/batch.json"
+    command = [PROGRAM, "bench", "--rows", BATCH, "--seconds", "0.3", "--json", table]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    (row,) = json.loads(table.read_text())["rows"]
+    return row["speed"]["step_f32"] / 64 / 64
+
+
+def measure(peer, ours, pogema):
+    """The rows of one round: name, figure of the peer, ours; both per second and of the same amount of work."""
+    vector = ours.time("vector", 64, 64, 2)
+    step_64 = peer.time("step", 64)
+    return [
+        ("step, 64 agents", step_64, ours.time("step", 64)),
+        ("step, 1 agent", peer.time("step", 1), ours.time("step", 1)),
+        ("reset with a new seed, 64 agents", peer.time("reset", 64), ours.time("reset", 64)),
+        ("VecEnv of 64, 64 agents, 2 threads", step_64, 64 * vector),
+        ("the same, beside the Rust batch", rust_batch(), vector),
+        ("import", imports_per_second(pogema, "pogema"), imports_per_second(OURS, "pogema_rs")),
+    ]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    pogema = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("python_package: POGEMA_ORACLE_PYTHON is not set")
+    peer, ours = Worker(pogema, "pogema"), Worker(OURS, "pogema_rs")
+    rounds = [measure(peer, ours, pogema) for _ in range(arguments.rounds)]
+    table = []
+    for rows in zip(*rounds):
+        name = rows[0][0]
+        theirs, own = (statistics.median(row[at] for row in rows) for at in (1, 2))
+        table.append({"work": name, "peer": theirs, "ours": own, "times": statistics.median(r[2] / r[1] for r in rows)})
+    if arguments.json:
+        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
+    print(f"{'work':36}{'peer/s':>12}{'ours/s':>12}{'times':>9}")
+    for row in table:
+        print(f"{row['work']:36}{row['peer']:12.4g}{row['ours']:12.4g}{row['times']:9.2f}")
+
+
+main()

@@ -1,0 +1,100 @@
+"""Times one package: a line of JSON on stdin names the work, one on stdout gives the figure per second.
+
+python worker.py pogema|pogema_rs
+"""
+
+import importlib
+import json
+import sys
+import time
+
+import numpy as np
+
+SECONDS = 0.3
+STRETCHES = 3
+ACTIONS = 64
+
+package = importlib.import_module(sys.argv[1])
+
+
+def fastest(work):
+    """Calls of `work` per second, in the fastest stretch: other work on the machine only ever slows it down."""
+    best = 0.0
+    for _ in range(STRETCHES):
+        calls, start = 0, time.perf_counter()
+        while (spent := time.perf_counter() - start) < SECONDS or calls == 0:
+            work()
+            calls += 1
+        best = max(best, calls / spent)
+    return best
+
+
+def drawn(*shape):
+    return np.random.default_rng(0).integers(0, 5, (ACTIONS, *shape))
+
+
+def environment(num_agents):
+    config = package.GridConfig(
+        num_agents=num_agents,
+        size=32,
+        density=0.3,
+        obs_radius=5,
+        seed=0,
+        collision_system="soft",
+        on_target="nothing",
+        max_episode_steps=10**9,
+    )
+    env = package.pogema_v0(grid_config=config)
+    env.reset()
+    return env
+
+
+def step(num_agents):
+    """Steps with observations."""
+    env, actions, at = environment(num_agents), drawn(num_agents).tolist(), 0
+
+    def work():
+        nonlocal at
+        env.step(list(actions[at % ACTIONS]))
+        at += 1
+
+    return fastest(work)
+
+
+def reset(num_agents):
+    """Resets, each with another seed."""
+    env = environment(num_agents)
+
+    def work():
+        env.grid_config.seed += 1
+        env.reset()
+
+    return fastest(work)
+
+
+def vector(num_envs, num_agents, num_threads):
+    """Steps of all environments with observations."""
+    config = {
+        "num_agents": num_agents,
+        "size": 32,
+        "density": 0.3,
+        "collision_system": "soft",
+        "on_target": "nothing",
+        "max_episode_steps": 256,
+    }
+    env = package.VecEnv(package.GridConfig(**config), num_envs, num_threads=num_threads)
+    env.reset(seed=0)
+    actions, at = drawn(num_envs, num_agents), 0
+
+    def work():
+        nonlocal at
+        env.step(actions[at % ACTIONS])
+        at += 1
+
+    return fastest(work)
+
+
+WORKS = {"step": step, "reset": reset, "vector": vector}
+for line in sys.stdin:
+    name, *sizes = json.loads(line)
+    print(json.dumps(WORKS[name](*sizes)), flush=True)

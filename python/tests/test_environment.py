@@ -1,0 +1,250 @@
+"""What code for POGEMA does with one environment; only the import is another."""
+
+import copy
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pogema_rs
+import pytest
+from pogema_rs import AnimationConfig, AnimationMonitor, BatchAStarAgent, GridConfig, pogema_v0
+from pydantic import ValidationError
+
+
+def play(env, act, most=1000):
+    observations, infos = env.reset()
+    for _ in range(most):
+        observations, rewards, terminated, truncated, infos = env.step(act(observations))
+        if all(terminated) or all(truncated):
+            return infos[0]["metrics"]
+    raise AssertionError("the episode does not end")
+
+
+def test_quickstart():
+    env = pogema_v0(grid_config=GridConfig(num_agents=2, size=8, density=0.4, seed=1, max_episode_steps=128, obs_radius=3))
+    metrics = play(env, lambda _: env.sample_actions())
+    assert list(metrics) == ["ISR", "CSR", "ep_length"]
+    assert env.observation_space.shape == (3, 7, 7)
+    assert env.action_space.n == 5
+
+
+def test_custom_map_with_letters():
+    grid = """
+    .....#.....
+    .....#.....
+    ...........
+    .....#.....
+    a....#....A
+    """
+    env = pogema_v0(grid_config=GridConfig(map=grid, observation_type="POMAPF", on_target="nothing"))
+    env.reset()
+    assert env.get_agents_xy(ignore_borders=True) == [[4, 0]]
+    assert env.get_targets_xy(ignore_borders=True) == [[4, 10]]
+    team = BatchAStarAgent()
+    assert play(env, team.act)["CSR"] == 1.0
+
+
+@pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
+def test_the_astar_agents_play_every_mode(on_target):
+    config = GridConfig(num_agents=4, seed=5, density=0.1, on_target=on_target, observation_type="POMAPF")
+    metrics = play(pogema_v0(config), BatchAStarAgent().act)
+    assert metrics["avg_throughput" if on_target == "restart" else "ISR"] > 0.3
+
+
+def test_reward_and_observation_wrappers_stack():
+    class Reward(gymnasium.Wrapper):
+        def step(self, action):
+            observations, rewards, *rest = self.env.step(action)
+            return (observations, [reward - 0.1 for reward in rewards], *rest)
+
+    class Flat(gymnasium.Wrapper):
+        def reset(self, **kwargs):
+            observations, infos = self.env.reset(**kwargs)
+            return [seen.flatten() for seen in observations], infos
+
+        def step(self, action):
+            observations, *rest = self.env.step(action)
+            return ([seen.flatten() for seen in observations], *rest)
+
+    env = Flat(Reward(Reward(pogema_v0(GridConfig(num_agents=3, seed=1)))))
+    observations, _ = env.reset()
+    assert observations[0].shape == (363,)
+    assert env.step([0, 0, 0])[1] == [-0.2, -0.2, -0.2]
+    assert env.unwrapped.get_num_agents() == 3
+
+
+def test_our_wrapper_passes_on_what_it_does_not_have():
+    env = pogema_rs.Wrapper(pogema_rs.Wrapper(pogema_v0(GridConfig(num_agents=3, seed=1))))
+    env.reset()
+    assert env.get_num_agents() == 3
+    assert env.grid_config.seed == 1
+    assert not hasattr(env, "nothing_of_this_name")
+
+
+def test_the_config_may_change_between_resets():
+    config = GridConfig(seed=1, num_agents=2)
+    env = pogema_v0(config)
+    first, _ = env.reset()
+    config.seed = 2
+    env.reset()
+    second = env.get_agents_xy()
+    assert second == _starts(GridConfig(seed=2, num_agents=2))
+    env.unwrapped.grid_config = GridConfig(seed=1, num_agents=3, size=16)
+    assert len(env.reset()[0]) == 3
+    assert env.get_agents_xy() == _starts(GridConfig(seed=1, num_agents=3, size=16))
+
+
+def _starts(config):
+    env = pogema_v0(config)
+    env.reset()
+    return env.get_agents_xy()
+
+
+def test_semantics():
+    config = {"num_agents": 2, "seed": 7}
+    released, developed = pogema_v0(config), pogema_v0(config, semantics="2.0")
+    for env in (released, developed):
+        env.reset(seed=1)
+    assert released.get_agents_xy() == _starts(GridConfig(**config))
+    assert developed.get_agents_xy() == _starts(GridConfig(num_agents=2, seed=1))
+    assert developed.grid_config.seed == 1
+    with pytest.raises(ValueError, match="expected|valid"):
+        pogema_v0(config, semantics="3.0")
+
+
+def test_metrics_leak_in_1_4_0_alone():
+    # One of two agents reaches its goal and the episode is left; in the next one both do.
+    def isr(semantics):
+        env = pogema_v0({"map": "aA.\nb.B"}, semantics=semantics)
+        env.reset()
+        env.step([4, 0])
+        return play(env, lambda _: [4, 4])["ISR"]
+
+    assert isr("1.4.0") == 1.5
+    assert isr("2.0") == 1.0
+
+
+def test_films(tmp_path):
+    env = AnimationMonitor(
+        pogema_v0(GridConfig(num_agents=3, seed=2, map_name=None)),
+        AnimationConfig(directory=str(tmp_path / "renders"), save_every_idx_episode=1),
+    )
+    play(env, lambda _: env.sample_actions())
+    assert [path.name for path in (tmp_path / "renders").iterdir()] == ["pogema-ep00001-seed2.svg"]
+    for config in (
+        AnimationConfig(egocentric_idx=1),
+        AnimationConfig(static=True, frame_idx=3),
+        AnimationConfig(static_frame_idx=0, show_agents=False, show_grid_lines=False),
+    ):
+        env.save_animation(tmp_path / "one.svg", config)
+        assert (tmp_path / "one.svg").read_text().startswith("<svg")
+    inner = env.unwrapped
+    assert "data:image/svg+xml;base64" in inner.render_animation()._repr_html_()
+    inner.save_replay(tmp_path / "replay.html")
+    assert "<html" in (tmp_path / "replay.html").read_text()
+    with pytest.raises(ValueError, match="agent"):
+        inner.render_animation(AnimationConfig(egocentric_idx=3))
+
+
+def test_an_episode_that_is_not_filmed_cannot_be_drawn(tmp_path):
+    env = pogema_v0(GridConfig())
+    env.reset()
+    with pytest.raises(ValueError, match="filmed"):
+        env.save_animation(tmp_path / "one.svg")
+    assert not (tmp_path / "one.svg").exists()
+
+
+def test_an_unknown_field_is_ignored_with_one_warning():
+    with pytest.warns(UserWarning, match="`num_agents`") as caught:
+        config = GridConfig(num_agent=3)
+    assert len(caught) == 1
+    assert config.num_agents == 1
+
+
+@pytest.mark.parametrize(
+    ("fields", "theirs"),
+    [
+        ({"size": 1}, ValidationError),
+        ({"width": 3}, ValidationError),
+        ({"density": float("nan")}, ValidationError),
+        ({"collision_system": "hard"}, ValidationError),
+        ({"num_agents": 0}, ValidationError),
+        ({"seed": -1}, ValidationError),
+        ({"targets_xy": []}, ValidationError),
+        ({"map": "..\n."}, ValidationError),
+        ({"map": "aA?"}, KeyError),
+        ({"map": "aA@"}, KeyError),
+        ({"map": "aA", "agents_xy": [[0, 0]], "targets_xy": [[0, 1]]}, KeyError),
+        ({"agents_xy": [[9, 9]], "targets_xy": [[0, 0]]}, IndexError),
+        ({"map": ""}, ZeroDivisionError),
+    ],
+)
+def test_a_wrong_config_raises_what_pogema_raises(fields, theirs):
+    with pytest.raises(theirs) as caught:
+        GridConfig(**fields)
+    assert isinstance(caught.value, ValueError)
+    assert "expected" in str(caught.value) or "no cells" in str(caught.value)
+
+
+def test_update_config_changes_all_or_nothing():
+    config = GridConfig(size=8, seed=1)
+    config.update_config(width=4, height=5)
+    assert (config.width, config.height, config.size) == (4, 5, 5)
+    config.update_config(size=6)
+    assert (config.width, config.height) == (6, 6)
+    before = config.dict()
+    with pytest.raises(ValueError):
+        config.update_config(density=2)
+    assert config.dict() == before
+
+
+def test_configs_are_extended_copied_and_pickled():
+    class Extended(GridConfig):
+        with_animation: bool = False
+
+    config = Extended(size=5, with_animation=True, seed=3)
+    assert config.with_animation
+    assert config.width == 5
+    for same in (copy.deepcopy(config), config.copy()):
+        assert same == config
+    plain = GridConfig(size=5, agents_xy=[[0, 0]], targets_xy=[[1, 1]])
+    assert pickle.loads(pickle.dumps(plain)) == plain
+    assert GridConfig(**plain.dict()) == plain
+
+
+def test_too_many_agents_raise_what_either_line_raises():
+    env = pogema_v0(GridConfig(size=3, density=0.0, num_agents=9))
+    for theirs in (OverflowError, ValueError):
+        with pytest.raises(theirs, match="room"):
+            env.reset()
+
+
+def test_the_callers_lists_stay_as_they_are():
+    actions, pool = [4, 3, 1], [[0, 0], [0, 1], [2, 2], [1, 1]]
+    kept = copy.deepcopy(pool)
+    env = pogema_v0(GridConfig(size=3, density=0, num_agents=3, possible_agents_xy=pool, possible_targets_xy=pool,
+                               collision_system="soft", seed=1))
+    env.reset()
+    env.step(actions)
+    env.reset()
+    assert (actions, pool) == ([4, 3, 1], kept)
+
+
+def test_warnings_of_the_maker_reach_the_user():
+    config = GridConfig(map=[[1, 0], [0, 0]], agents_xy=[[0, 0]], targets_xy=[[1, 1]])
+    with pytest.warns(UserWarning, match="obstacle"):
+        pogema_v0(config).reset()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pogema_v0(GridConfig(seed=1)).reset()
+
+
+def test_a_grid_cannot_be_changed_by_hand():
+    env = pogema_v0(GridConfig(seed=1))
+    env.reset()
+    with pytest.raises(ValueError, match="read-only"):
+        env.grid.obstacles[0, 0] = 1
+    with pytest.raises(ValueError, match="by hand"):
+        env.grid.hide_agent(0)
+    assert isinstance(env.grid.positions, np.ndarray)
