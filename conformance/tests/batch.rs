@@ -6,7 +6,7 @@
 use pogema_core::{
     Action, Collision, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut,
 };
-use pogema_fast::{Batch, Observations, words_per_agent};
+use pogema_fast::{Autoreset, Batch, Observations, words_per_agent};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
@@ -188,31 +188,29 @@ fn an_episode_that_cannot_begin_is_told_at_the_next_step() {
         (1, 1) => Err(Error::instance("there is no more")),
         _ => instance(OnGoal::Finish, lane, episode),
     };
-    let mut batch = Batch::new(config(OnGoal::Finish), 2, 2, source).unwrap();
-    batch.reset().unwrap();
-    let (mut rewards, mut terminated, mut truncated) = ([0.0; 24], [false; 24], [false; 24]);
-    for step in 0..12 {
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        let result = batch.step(&[Action::Stay; 24], out, Observations::None);
-        assert_eq!(result.is_ok(), step < 11, "step {step}");
+    for autoreset in [Autoreset::SameStep, Autoreset::NextStep] {
+        let mut batch = Batch::new(config(OnGoal::Finish), 2, 2, source).unwrap().with_autoreset(autoreset);
+        batch.reset().unwrap();
+        let (mut rewards, mut terminated, mut truncated) = ([0.0; 24], [false; 24], [false; 24]);
+        for step in 0..12 {
+            let out =
+                StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+            let result = batch.step(&[Action::Stay; 24], out, Observations::None);
+            assert_eq!(result.is_ok(), step < 11, "step {step}");
+        }
+        assert!(truncated.iter().all(|&cut| cut));
+        let (ended, _) = batch.ended(1).unwrap().unwrap();
+        assert_eq!(ended.snapshot(), batch.lane(1).unwrap().snapshot());
+        assert_eq!(refusal(batch.reset()), "instance: there is no more");
     }
-    assert!(truncated.iter().all(|&cut| cut));
-    let (ended, _) = batch.ended(1).unwrap().unwrap();
-    assert_eq!(ended.snapshot(), batch.lane(1).unwrap().snapshot());
-    assert_eq!(refusal(batch.reset()), "instance: there is no more");
 }
 
 #[test]
-fn a_lane_of_another_shape_and_a_panic_of_the_source_are_refused() {
+fn a_panic_of_the_source_is_refused() {
     let source = |lane: usize, episode: u64| {
         assert!(episode == 0, "no second episode");
-        let mut fields =
-            json!({"size": 9, "density": 0.2, "num_agents": NUM_AGENTS, "obs_radius": 3, "seed": 1});
-        fields["size"] = (9 + lane).into();
-        Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
+        instance(OnGoal::Finish, lane, episode)
     };
-    let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
-    assert_eq!(refusal(batch.reset()), "rows of the lane's map has length 10, expected 9");
     let mut batch = Batch::new(config(OnGoal::Finish), 1, 1, source).unwrap();
     batch.reset().unwrap();
     assert_eq!(refusal(batch.reset()), "instance: the source panicked at lane 0, episode 1");

@@ -14,6 +14,7 @@
 //! | `goals` | what reaching a goal does; rewards and ends |
 //! | `observe` | what agents see |
 //! | `history` | steps kept and taken back |
+//! | `masks` | which actions make sense |
 //! | `batch` | many environments |
 //! | `simd` | windows to bits to values, plainly and with AVX2 or AVX-512 |
 //!
@@ -42,11 +43,12 @@ mod collide;
 mod goals;
 mod grid;
 mod history;
+mod masks;
 mod observe;
 mod simd;
 mod step;
 
-pub use batch::{Batch, Instances, Observations};
+pub use batch::{Autoreset, Batch, Instances, Observations};
 pub use observe::words_per_agent;
 pub use simd::{Path, Value};
 pub use step::Engine;

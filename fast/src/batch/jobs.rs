@@ -24,7 +24,7 @@ pub enum Observations<'a> {
 
 impl Observations<'_> {
     /// Entries per lane.
-    fn per_lane(&self, config: &Config) -> usize {
+    pub(super) fn per_lane(&self, config: &Config) -> usize {
         match self {
             Self::None => 0,
             Self::F32(_) | Self::U8(_) => config.num_observed(),

@@ -1,50 +1,49 @@
 //! Many environments, stepped and observed by one call.
 
 mod jobs;
+mod lane;
 mod prepare;
 
-use pogema_core::{Action, Config, Environment, EpisodeMeter, Error, Instance, Metrics, StepOut};
+use pogema_core::{Action, Config, Error, Metrics, StepOut};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{Engine, Path};
 
 use jobs::Jobs;
+use lane::Lane;
 use prepare::Preparer;
 
 pub use jobs::Observations;
 pub use prepare::Instances;
 
-/// Many environments of one shape, the lanes, each with its own map and its own episodes.
+/// What follows the end of a lane's episode by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Autoreset {
+    /// The next episode begins within the same step: rewards and ends are those of the last step, observations
+    /// those of the new episode.
+    #[default]
+    SameStep,
+    /// The next episode begins with the next step, which ignores the lane's actions: rewards are 0, nothing ends,
+    /// observations are those of the new episode.
+    NextStep,
+    /// Nothing: steps leave the lane as it ended, with rewards of 0 and the ends of its last step, until a reset.
+    Off,
+}
+
+/// Many environments of one config, the lanes, each with its own map and its own episodes.
 ///
 /// Every array has a leading axis `lanes`. An episode that ends, since all agents terminated or were cut off, is
-/// followed by the lane's next one within the same step: rewards and ends are those of the last step, observations
-/// those of the new episode. The ended episode stays readable through [`Batch::ended`] until the lane ends again.
+/// followed by what [`Autoreset`] says, and stays readable through [`Batch::ended`] until the lane's next one ends.
 ///
 /// What comes out does not depend on the number of threads.
 pub struct Batch {
     config: Config,
+    autoreset: Autoreset,
     lanes: Vec<Lane>,
     pool: Option<ThreadPool>,
     preparer: Preparer,
     is_started: bool,
-}
-
-/// One environment of a batch.
-struct Lane {
-    index: usize,
-    engine: Engine,
-    meter: EpisodeMeter,
-    /// The number of the episode after the present one.
-    next_episode: u64,
-    /// Its instance, if it is here already.
-    pending: Option<Instance>,
-    /// The environment at the end of its last episode, and what that came to.
-    ended: Engine,
-    metrics: Option<Metrics>,
-    has_just_ended: bool,
-    /// Why the lane has no next episode.
-    failure: Option<Error>,
 }
 
 impl Batch {
@@ -72,7 +71,14 @@ impl Batch {
         let pool = (num_threads > 1).then(|| ThreadPoolBuilder::new().num_threads(num_threads).build());
         let pool = pool.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
         let preparer = Preparer::new(Box::new(source), num_lanes)?;
-        Ok(Self { config, lanes, pool, preparer, is_started: false })
+        Ok(Self { config, autoreset: Autoreset::default(), lanes, pool, preparer, is_started: false })
+    }
+
+    /// The same batch with another rule for the ends of episodes, to be chosen before the first reset.
+    #[must_use]
+    pub fn with_autoreset(mut self, autoreset: Autoreset) -> Self {
+        self.autoreset = autoreset;
+        self
     }
 
     /// The rules and sizes of every lane.
@@ -88,22 +94,61 @@ impl Batch {
     /// Begins the next episode of every lane, the first time episode 0.
     ///
     /// # Errors
-    /// If a lane has no next instance, or one of another shape than the first lane's. Every lane is then as it
-    /// was.
+    /// If a lane has no next instance, or one that does not fit the config; every lane is then as it was. If
+    /// memory does not suffice for a lane's map; that lane is then as it was.
     pub fn reset(&mut self) -> Result<(), Error> {
+        self.reset_lanes(&vec![true; self.lanes.len()])
+    }
+
+    /// Begins the next episode of some lanes and leaves the others as they are; the first time it has to be all.
+    ///
+    /// # Errors
+    /// As for [`Batch::reset`]; if there is not one flag per lane, or a lane is left out the first time.
+    pub fn reset_lanes(&mut self, chosen: &[bool]) -> Result<(), Error> {
+        self.check_chosen(chosen)?;
         let preparer = &self.preparer;
-        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| lane.look_ahead(preparer).map(|_| ()))?;
-        let mut size = None;
-        for instance in self.lanes.iter().filter_map(|lane| lane.pending.as_ref()) {
-            let size = *size.get_or_insert((instance.map().height(), instance.map().width()));
-            check_shape(instance, &self.config, size)?;
-        }
-        over_lanes(self.pool.as_ref(), &mut self.lanes, Lane::begin)?;
+        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| {
+            if chosen[lane.index] { lane.look_ahead(preparer) } else { Ok(()) }
+        })?;
+        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| {
+            if chosen[lane.index] { lane.begin() } else { Ok(()) }
+        })?;
         self.is_started = true;
         Ok(())
     }
 
-    /// Plays one step in every lane, begins new episodes where one ended, and observes.
+    /// Begins episode 0 of another source in some lanes, and leaves the others as they are; their later episodes
+    /// come from the new source, too, under the numbers that follow, but for one that lies ready already.
+    ///
+    /// # Errors
+    /// As for [`Batch::reset_lanes`]; if the thread of the source cannot be started.
+    pub fn reset_with(&mut self, source: impl Instances + 'static, chosen: &[bool]) -> Result<(), Error> {
+        self.check_chosen(chosen)?;
+        let (pool, config) = (self.pool.as_ref(), &self.config);
+        let preparer = Preparer::new(Box::new(source), self.lanes.len())?;
+        let first = |lane: &mut Lane| {
+            let instance = preparer.take(lane.index)?;
+            instance.check_fits(config).map(|()| Some(instance))
+        };
+        let firsts =
+            over_lanes(
+                pool,
+                &mut self.lanes,
+                |lane| if chosen[lane.index] { first(lane) } else { Ok(None) },
+            )?;
+        self.preparer = preparer;
+        let mut begun = Ok(());
+        for (lane, instance) in self.lanes.iter_mut().zip(firsts) {
+            match instance {
+                Some(instance) => begun = begun.and(lane.begin_anew(instance, &self.preparer)),
+                None => self.preparer.want(lane.index, lane.wanted),
+            }
+        }
+        self.is_started |= begun.is_ok();
+        begun
+    }
+
+    /// Plays one step in every lane, begins new episodes as [`Autoreset`] says, and observes.
     ///
     /// Shape: `actions` and each buffer of `out` are `[lanes, agents]`.
     ///
@@ -124,18 +169,11 @@ impl Batch {
         if let Some(failure) = self.lanes.iter().find_map(|lane| lane.failure.as_ref()) {
             return Err(failure.clone());
         }
-        let size = self.lanes[0].engine.size();
-        let preparer = &self.preparer;
+        let (autoreset, preparer) = (self.autoreset, &self.preparer);
         let beyond_cache = observations.is_beyond_cache();
         let steps = Some((actions, out));
         let jobs = Jobs { lanes: &mut self.lanes, steps, observations, beyond_cache };
-        jobs.run(self.pool.as_ref(), &|lane, actions, out| {
-            lane.step(actions, out)?;
-            if lane.has_just_ended {
-                lane.begin_next(preparer, size);
-            }
-            Ok(())
-        })
+        jobs.run(self.pool.as_ref(), &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
     }
 
     /// Observes every lane.
@@ -152,12 +190,60 @@ impl Batch {
         jobs.run(self.pool.as_ref(), &|_, _, _| Ok(()))
     }
 
+    /// Observes the last episodes of some lanes at their ends, in the order given.
+    ///
+    /// # Errors
+    /// For a lane that is not there or of which no episode ended yet, or for a buffer of the wrong length.
+    pub fn observe_ended(&self, lanes: &[usize], observations: Observations<'_>) -> Result<(), Error> {
+        let no_end = |lane| Error::State { reason: format!("no episode of lane {lane} ended yet") };
+        let engine = |&lane| Ok(self.ended(lane)?.ok_or_else(|| no_end(lane))?.0);
+        let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
+        observations.check(lanes.len(), &self.config)?;
+        let beyond_cache = observations.is_beyond_cache();
+        let per_lane = observations.per_lane(&self.config);
+        match observations {
+            Observations::None => Ok(()),
+            Observations::F32(out) => self.in_parts(per_lane, out, |index, out| {
+                engines[index].observe_all(out, beyond_cache);
+                Ok(())
+            }),
+            Observations::U8(out) => self.in_parts(per_lane, out, |index, out| {
+                engines[index].observe_all(out, beyond_cache);
+                Ok(())
+            }),
+            Observations::Bits(out) => self.in_parts(per_lane, out, |index, out| {
+                engines[index].observe_bits(0..self.config.num_agents, out)
+            }),
+        }
+    }
+
+    /// Writes for every lane which actions make sense, as [`Engine::mask_actions`] does.
+    ///
+    /// Shape: `[lanes, agents, 5]`
+    ///
+    /// # Errors
+    /// Before the first reset, or for a buffer of the wrong length.
+    pub fn mask_actions(&self, out: &mut [i8]) -> Result<(), Error> {
+        self.check_started()?;
+        let per_lane = self.config.num_agents * Action::ALL.len();
+        Error::check_length("action masks", self.lanes.len() * per_lane, out.len())?;
+        self.in_parts(per_lane, out, |lane, out| self.lanes[lane].engine.mask_actions(out))
+    }
+
     /// The environment of a lane.
     ///
     /// # Errors
     /// If there is no such lane.
     pub fn lane(&self, lane: usize) -> Result<&Engine, Error> {
         self.check_lane(lane).map(|lane| &lane.engine)
+    }
+
+    /// The number of a lane's present episode; none before the first reset.
+    ///
+    /// # Errors
+    /// If there is no such lane.
+    pub fn episode(&self, lane: usize) -> Result<Option<u64>, Error> {
+        self.check_lane(lane).map(|lane| lane.episode)
     }
 
     /// Whether an episode of a lane ended in the last step.
@@ -176,10 +262,7 @@ impl Batch {
     ///
     /// Rule: metrics/finish, metrics/nothing, metrics/restart
     pub fn ended(&self, lane: usize) -> Result<Option<(&Engine, Metrics)>, Error> {
-        let lane = self.check_lane(lane)?;
-        // Without a next episode the environment stays where the last one ended.
-        let engine = if lane.failure.is_some() { &lane.engine } else { &lane.ended };
-        Ok(lane.metrics.map(|metrics| (engine, metrics)))
+        self.check_lane(lane).map(Lane::ended)
     }
 
     fn check_started(&self) -> Result<(), Error> {
@@ -189,88 +272,43 @@ impl Batch {
         Err(Error::State { reason: "the batch was not reset yet".into() })
     }
 
+    fn check_chosen(&self, chosen: &[bool]) -> Result<(), Error> {
+        Error::check_length("chosen lanes", self.lanes.len(), chosen.len())?;
+        if chosen.contains(&false) { self.check_started() } else { Ok(()) }
+    }
+
     fn check_lane(&self, lane: usize) -> Result<&Lane, Error> {
         let expected = || format!("below {}, the number of lanes", self.lanes.len());
         self.lanes.get(lane).ok_or_else(|| Error::config("lane", lane, expected()))
     }
-}
 
-impl Lane {
-    fn new(index: usize, config: Config, path: Path) -> Result<Self, Error> {
-        Ok(Self {
-            index,
-            engine: Engine::with_path(config, path)?,
-            meter: EpisodeMeter::new(&config),
-            next_episode: 0,
-            pending: None,
-            ended: Engine::with_path(config, path)?,
-            metrics: None,
-            has_just_ended: false,
-            failure: None,
-        })
-    }
-
-    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
-        let StepOut { rewards, terminated, truncated } = out;
-        self.engine.step(actions, StepOut { rewards, terminated, truncated })?;
-        let metrics = self.meter.feed(self.engine.on_goal(), terminated, truncated);
-        self.has_just_ended = metrics.is_some();
-        self.metrics = metrics.or(self.metrics);
-        Ok(())
-    }
-
-    /// The instance of the next episode.
-    fn look_ahead(&mut self, preparer: &Preparer) -> Result<&Instance, Error> {
-        if self.pending.is_none() {
-            let taken = preparer.take(self.index);
-            self.next_episode += u64::from(taken.is_ok());
-            preparer.want(self.index, self.next_episode);
-            self.pending = Some(taken?);
+    /// Writes a buffer part by part, on the threads of the pool if there is one.
+    fn in_parts<T: Send>(
+        &self,
+        per_part: usize,
+        out: &mut [T],
+        write: impl Fn(usize, &mut [T]) -> Result<(), Error> + Sync,
+    ) -> Result<(), Error> {
+        match &self.pool {
+            Some(pool) => pool.install(|| {
+                let parts = out.par_chunks_mut(per_part).enumerate();
+                parts.try_for_each(|(part, out)| write(part, out))
+            }),
+            None => out.chunks_mut(per_part).enumerate().try_for_each(|(part, out)| write(part, out)),
         }
-        // INVARIANT: there is one now.
-        self.pending.as_ref().ok_or_else(|| Error::State { reason: "no instance was made".into() })
-    }
-
-    /// Begins the episode whose instance is here.
-    fn begin(&mut self) -> Result<(), Error> {
-        self.pending.take().map_or(Ok(()), |instance| self.engine.start(instance))?;
-        self.meter.reset();
-        self.failure = None;
-        self.has_just_ended = false;
-        Ok(())
-    }
-
-    /// Puts the ended episode aside and begins the next one, if there is one.
-    fn begin_next(&mut self, preparer: &Preparer, size: (usize, usize)) {
-        match self.try_begin_next(preparer, size) {
-            Ok(()) => std::mem::swap(&mut self.engine, &mut self.ended),
-            Err(error) => self.failure = Some(error),
-        }
-    }
-
-    fn try_begin_next(&mut self, preparer: &Preparer, size: (usize, usize)) -> Result<(), Error> {
-        let config = *self.engine.config();
-        check_shape(self.look_ahead(preparer)?, &config, size)?;
-        self.pending.take().map_or(Ok(()), |instance| self.ended.start(instance))
     }
 }
 
 /// Does something to all lanes, on the threads of a pool if there is one; the error is that of the first lane that
 /// has one.
-fn over_lanes(
+fn over_lanes<T: Send>(
     pool: Option<&ThreadPool>,
     lanes: &mut [Lane],
-    work: impl Fn(&mut Lane) -> Result<(), Error> + Sync,
-) -> Result<(), Error> {
+    work: impl Fn(&mut Lane) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
     let done: Vec<_> = match pool {
         Some(pool) => pool.install(|| lanes.par_iter_mut().map(&work).collect()),
         None => lanes.iter_mut().map(work).collect(),
     };
     done.into_iter().collect()
-}
-
-fn check_shape(instance: &Instance, config: &Config, (height, width): (usize, usize)) -> Result<(), Error> {
-    instance.check_fits(config)?;
-    Error::check_length("rows of the lane's map", height, instance.map().height())?;
-    Error::check_length("columns of the lane's map", width, instance.map().width())
 }

@@ -1,0 +1,302 @@
+//! What follows the end of a lane's episode, lane by lane beside a reference that is reset by hand; lanes have maps of
+//! different sizes.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_core::{
+    Action, Cell, Collision, Config, Environment, EpisodeMeter, Error, Instance, OnGoal, Snapshot, StepOut,
+};
+use pogema_fast::{Autoreset, Batch, Observations};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+use serde_json::json;
+
+const NUM_LANES: usize = 6;
+const NUM_AGENTS: usize = 5;
+const NUM_STEPS: u64 = 50;
+const MODES: [Autoreset; 3] = [Autoreset::SameStep, Autoreset::NextStep, Autoreset::Off];
+
+fn config() -> Config {
+    let (collision, on_goal) = (Collision::Soft, OnGoal::Finish);
+    Config { num_agents: NUM_AGENTS, radius: 2, max_steps: 9, collision, on_goal, ..Config::default() }
+}
+
+/// The instance of a lane and episode, of a size that depends on both.
+fn instance(salt: u64, lane: usize, episode: u64) -> Result<Instance, Error> {
+    let seed = salt + 1000 * lane as u64 + episode;
+    let fields = json!({"width": 5 + lane, "height": 6 + episode % 3, "density": 0.2, "num_agents": NUM_AGENTS,
+                        "obs_radius": 2, "seed": seed, "max_episode_steps": 9, "collision_system": "soft"});
+    Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
+}
+
+fn new_batch(autoreset: Autoreset, num_threads: usize) -> Batch {
+    let source = |lane, episode| instance(0, lane, episode);
+    Batch::new(config(), NUM_LANES, num_threads, source).unwrap().with_autoreset(autoreset)
+}
+
+/// Some action for each lane and agent; of a lane every third episode or so comes to its goals.
+fn actions(step: u64) -> Vec<Action> {
+    let action = |agent: usize| Action::ALL[((agent as u64 * 7919 + step * 40_503) >> 5) as usize % 5];
+    (0..NUM_LANES * NUM_AGENTS).map(action).collect()
+}
+
+/// What a step shows of a lane.
+#[derive(Clone, Debug, PartialEq)]
+struct Shown {
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+    observed: Vec<f32>,
+    state: Snapshot,
+    episode: Option<u64>,
+    has_ended: bool,
+}
+
+/// A reference that is reset by hand.
+struct Plain {
+    lane: usize,
+    environment: Reference,
+    meter: EpisodeMeter,
+    episode: u64,
+    last: Option<(Vec<bool>, Vec<bool>)>,
+}
+
+impl Plain {
+    fn new(lane: usize) -> Self {
+        let mut environment = Reference::new(config()).unwrap();
+        environment.reset(&instance(0, lane, 0).unwrap()).unwrap();
+        Self { lane, environment, meter: EpisodeMeter::new(&config()), episode: 0, last: None }
+    }
+
+    fn begin_next(&mut self) {
+        self.episode += 1;
+        self.environment.reset(&instance(0, self.lane, self.episode).unwrap()).unwrap();
+        self.meter.reset();
+        self.last = None;
+    }
+
+    fn step(&mut self, autoreset: Autoreset, actions: &[Action]) -> Shown {
+        let (mut rewards, mut terminated) = (vec![0.0; NUM_AGENTS], vec![false; NUM_AGENTS]);
+        let mut truncated = terminated.clone();
+        let mut has_ended = false;
+        if let Some(last) = self.last.clone() {
+            if autoreset == Autoreset::NextStep {
+                self.begin_next();
+            } else {
+                (terminated, truncated) = last;
+            }
+        } else {
+            let out =
+                StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+            self.environment.step(actions, out).unwrap();
+            let on_goal = self.environment.snapshot().on_goal;
+            has_ended = self.meter.feed(&on_goal, &terminated, &truncated).is_some();
+            if has_ended {
+                self.last = Some((terminated.clone(), truncated.clone()));
+            }
+            if has_ended && autoreset == Autoreset::SameStep {
+                self.begin_next();
+            }
+        }
+        let mut observed = vec![0.5; config().num_observed()];
+        self.environment.observe(&mut observed).unwrap();
+        let (state, episode) = (self.environment.snapshot(), Some(self.episode));
+        Shown { rewards, terminated, truncated, observed, state, episode, has_ended }
+    }
+}
+
+fn step_batch(batch: &mut Batch, step: u64) -> Vec<Shown> {
+    let num_agents = NUM_LANES * NUM_AGENTS;
+    let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![true; num_agents]);
+    let mut truncated = terminated.clone();
+    let mut observed = vec![0.5; NUM_LANES * config().num_observed()];
+    let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+    batch.step(&actions(step), out, Observations::F32(&mut observed)).unwrap();
+    let shown = |lane: usize| {
+        let agents = lane * NUM_AGENTS..(lane + 1) * NUM_AGENTS;
+        Shown {
+            rewards: rewards[agents.clone()].to_vec(),
+            terminated: terminated[agents.clone()].to_vec(),
+            truncated: truncated[agents].to_vec(),
+            observed: observed.chunks(config().num_observed()).nth(lane).unwrap().to_vec(),
+            state: batch.lane(lane).unwrap().snapshot(),
+            episode: batch.episode(lane).unwrap(),
+            has_ended: batch.has_just_ended(lane).unwrap(),
+        }
+    };
+    (0..NUM_LANES).map(shown).collect()
+}
+
+#[test]
+fn lanes_of_different_sizes_follow_the_chosen_autoreset_on_any_number_of_threads() {
+    for (autoreset, num_threads) in
+        MODES.into_iter().flat_map(|mode| [1, 2, 6].map(|threads| (mode, threads)))
+    {
+        let mut batch = new_batch(autoreset, num_threads);
+        assert_eq!(batch.episode(0).unwrap(), None);
+        batch.reset().unwrap();
+        let mut plain: Vec<_> = (0..NUM_LANES).map(Plain::new).collect();
+        let mut num_ended = 0;
+        for step in 0..NUM_STEPS {
+            let shown = step_batch(&mut batch, step);
+            let actions = actions(step);
+            let lanes = plain.iter_mut().zip(actions.chunks(NUM_AGENTS));
+            let expected: Vec<_> = lanes.map(|(lane, actions)| lane.step(autoreset, actions)).collect();
+            assert_eq!(shown, expected, "{autoreset:?}, {num_threads} threads, step {step}");
+            num_ended += shown.iter().filter(|lane| lane.has_ended).count();
+            // By hand at last, where nothing follows by itself.
+            let chosen: Vec<bool> =
+                (0..NUM_LANES).map(|lane| plain[lane].last.is_some() && step % 4 == 0).collect();
+            if autoreset == Autoreset::Off {
+                batch.reset_lanes(&chosen).unwrap();
+                plain
+                    .iter_mut()
+                    .zip(chosen)
+                    .filter(|(_, chosen)| *chosen)
+                    .for_each(|(lane, _)| lane.begin_next());
+            }
+        }
+        assert!(num_ended >= 3 * NUM_LANES, "only {num_ended} episodes ended");
+    }
+}
+
+#[test]
+fn a_reset_of_some_lanes_leaves_the_others_untouched_in_every_mode() {
+    for autoreset in MODES {
+        // After step 9 all lanes are over, after step 4 none.
+        for num_steps in [4, 9] {
+            let mut batch = new_batch(autoreset, 2);
+            batch.reset().unwrap();
+            (0..num_steps).for_each(|step| drop(step_batch(&mut batch, step)));
+            let state = |batch: &Batch| {
+                [0, 1, 2].map(|lane| (batch.lane(lane).unwrap().snapshot(), batch.episode(lane).unwrap()))
+            };
+            let before = state(&batch);
+            let chosen: Vec<bool> = (0..NUM_LANES).map(|lane| lane == 1).collect();
+            batch.reset_lanes(&chosen).unwrap();
+            let after = state(&batch);
+            assert_eq!((&after[0], &after[2]), (&before[0], &before[2]), "{autoreset:?} {num_steps}");
+            let next = before[1].1.unwrap() + 1;
+            let starts = instance(0, 1, next).unwrap().starts().to_vec();
+            assert_eq!((&after[1].0.cells, after[1].1), (&starts, Some(next)), "{autoreset:?} {num_steps}");
+        }
+    }
+}
+
+fn refusal<T>(result: Result<T, Error>) -> String {
+    result.err().unwrap().to_string()
+}
+
+#[test]
+fn a_reset_without_a_next_instance_changes_nothing() {
+    let source = |lane, episode| match (lane, episode) {
+        (2, 1) => Err(Error::instance("there is no more")),
+        _ => instance(0, lane, episode),
+    };
+    let mut batch = Batch::new(config(), NUM_LANES, 2, source).unwrap();
+    let expected = "chosen lanes has length 2, expected 6";
+    assert_eq!(refusal(batch.reset_lanes(&[true; 2])), expected);
+    let mut chosen = [true; NUM_LANES];
+    chosen[5] = false;
+    assert_eq!(refusal(batch.reset_lanes(&chosen)), "the batch was not reset yet");
+    batch.reset().unwrap();
+    let state = |batch: &Batch| {
+        let lanes = 0..NUM_LANES;
+        lanes
+            .map(|lane| (batch.lane(lane).unwrap().snapshot(), batch.episode(lane).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let before = state(&batch);
+    assert_eq!(refusal(batch.reset_lanes(&chosen)), "instance: there is no more");
+    assert_eq!(refusal(batch.reset_with(source_of_misfits, &chosen)), "starts has length 1, expected 5");
+    assert_eq!(state(&batch), before);
+    // The lanes that had an instance begin it now, and not the one after it.
+    chosen[2] = false;
+    batch.reset_lanes(&chosen).unwrap();
+    let episodes: Vec<_> = state(&batch).into_iter().map(|(_, episode)| episode.unwrap()).collect();
+    assert_eq!(episodes, [1, 1, 0, 1, 1, 0]);
+}
+
+fn source_of_misfits(_: usize, _: u64) -> Result<Instance, Error> {
+    let fields = json!({"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[0, 1]]});
+    Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
+}
+
+#[test]
+fn another_source_begins_at_its_episode_0_in_the_lanes_chosen_and_goes_on_in_the_others() {
+    for autoreset in MODES {
+        for num_steps in [0, 4, 9] {
+            let mut batch = new_batch(autoreset, 2);
+            batch.reset().unwrap();
+            (0..num_steps).for_each(|step| drop(step_batch(&mut batch, step)));
+            let untouched = batch.lane(0).unwrap().snapshot();
+            let episode = batch.episode(0).unwrap().unwrap();
+            let chosen: Vec<bool> = (0..NUM_LANES).map(|lane| lane % 2 == 1).collect();
+            batch.reset_with(|lane, episode| instance(77, lane, episode), &chosen).unwrap();
+            assert_eq!(batch.lane(0).unwrap().snapshot(), untouched);
+            let begun = |batch: &Batch, lane: usize, salt: u64, episode: u64| {
+                let starts = instance(salt, lane, episode).unwrap().starts().to_vec();
+                assert_eq!(batch.lane(lane).unwrap().cells(), starts, "{autoreset:?} {num_steps} {lane}");
+                assert_eq!(batch.episode(lane).unwrap(), Some(episode));
+            };
+            begun(&batch, 1, 77, 0);
+            batch.reset().unwrap();
+            begun(&batch, 3, 77, 1);
+            // What was prepared of the old source is still played.
+            let salt = if autoreset == Autoreset::NextStep && num_steps == 9 { 0 } else { 77 };
+            begun(&batch, 0, salt, episode + 1);
+        }
+    }
+}
+
+#[test]
+fn ends_are_observed_in_the_order_asked_for() {
+    let mut batch = new_batch(Autoreset::NextStep, 2);
+    batch.reset().unwrap();
+    let per_lane = config().num_observed();
+    let mut observed = vec![0.5; 2 * per_lane];
+    let too_early = refusal(batch.observe_ended(&[4, 1], Observations::F32(&mut observed)));
+    assert_eq!(too_early, "no episode of lane 4 ended yet");
+    let last = (0..9).map(|step| step_batch(&mut batch, step)).last().unwrap();
+    let short = refusal(batch.observe_ended(&[4], Observations::F32(&mut observed)));
+    assert_eq!(short, format!("observations has length {}, expected {per_lane}", 2 * per_lane));
+    for num_steps_later in 0..3 {
+        let mut bytes = vec![9; 2 * per_lane];
+        batch.observe_ended(&[4, 1], Observations::F32(&mut observed)).unwrap();
+        batch.observe_ended(&[4, 1], Observations::U8(&mut bytes)).unwrap();
+        assert_eq!(observed, [&last[4].observed[..], &last[1].observed].concat(), "{num_steps_later}");
+        assert_eq!(bytes, observed.iter().map(|&value| value as u8).collect::<Vec<_>>());
+        step_batch(&mut batch, 9 + num_steps_later);
+    }
+}
+
+#[test]
+fn masks_allow_what_no_obstacle_forbids() {
+    let mut batch = new_batch(Autoreset::SameStep, 2);
+    let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];
+    assert_eq!(refusal(batch.mask_actions(&mut masks)), "the batch was not reset yet");
+    batch.reset().unwrap();
+    assert_eq!(refusal(batch.mask_actions(&mut [0])), "action masks has length 1, expected 150");
+    let (mut num_inactive, mut num_forbidden) = (0, 0);
+    for step in 0..NUM_STEPS {
+        let shown = step_batch(&mut batch, step);
+        batch.mask_actions(&mut masks).unwrap();
+        for (index, mask) in masks.chunks(5).enumerate() {
+            let (lane, agent) = (index / NUM_AGENTS, index % NUM_AGENTS);
+            let Shown { state, episode, .. } = &shown[lane];
+            let instance = instance(0, lane, episode.unwrap()).unwrap();
+            let is_free = |(row, col): (i32, i32)| {
+                let cell = u16::try_from(row).ok().zip(u16::try_from(col).ok());
+                cell.is_some_and(|(row, col)| !instance.map().is_obstacle(Cell::new(row, col)))
+            };
+            let is_active = state.active[agent];
+            let expected = Action::ALL.map(|action| {
+                action == Action::Stay || is_active && is_free(state.cells[agent].toward(action))
+            });
+            assert_eq!(mask, expected.map(i8::from), "step {step}, lane {lane}, agent {agent}");
+            num_inactive += usize::from(!is_active);
+            num_forbidden += mask.iter().filter(|&&allowed| allowed == 0).count();
+        }
+    }
+    assert!(num_inactive > 0 && num_forbidden > 4 * num_inactive, "nothing was seen");
+}
