@@ -26,11 +26,17 @@ pub fn nearest_name(name: &str, known: Vec<String>) -> String {
 
 /// The source of a config's instances, and the config.
 pub fn source(config: &str, registered: Option<&str>) -> Result<InstanceSource, Error> {
+    let (config, map) = read(config, registered)?;
+    InstanceSource::new(config, map)
+}
+
+/// A config, and the map that its `map_name` names.
+pub fn read(config: &str, registered: Option<&str>) -> Result<(GridConfig, Option<Map>), Error> {
     let mut config = GridConfig::from_json(config)?;
     // A name that nobody registered means nothing to POGEMA.
     if registered.is_none() {
         config.map_name = None;
     }
-    let map: Option<Map> = registered.map(parse_map_text).transpose()?.map(|text| text.map);
-    InstanceSource::new(config, map)
+    let map = registered.map(parse_map_text).transpose()?.map(|text| text.map);
+    Ok((config, map))
 }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyType;
 
 /// An error of a class of `pogema_rs.errors`.
-fn of_class(py: Python<'_>, class: &str, error: &Error) -> PyErr {
+fn of_class(py: Python<'_>, class: &str, error: impl std::fmt::Display) -> PyErr {
     let class = py
         .import("pogema_rs.errors")
         .and_then(|module| module.getattr(class)?.cast_into::<PyType>().map_err(PyErr::from));
@@ -44,4 +44,17 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
 /// What an A* agent raises that was not told of a new episode.
 pub fn astar(py: Python<'_>, error: &Error) -> PyErr {
     of_class(py, "JumpedError", error)
+}
+
+/// What a call of many environments raises.
+pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
+    match error {
+        Error::Length { .. } | Error::Action { .. } | Error::State { .. } => call(py, error),
+        _ => instance(py, error),
+    }
+}
+
+/// What a number raises that is no action of one environment of many.
+pub fn action(py: Python<'_>, text: String) -> PyErr {
+    of_class(py, "ActionError", text)
 }

@@ -6,13 +6,17 @@ mod engine;
 mod errors;
 mod film;
 mod lists;
+mod seeds;
+mod vec;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<engine::Engine>()?;
+    module.add_class::<vec::Batch>()?;
     module.add_class::<astar::AStarAgent>()?;
+    module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -9,7 +9,7 @@ const MIX_RIGHT: u32 = 0x4973_F715;
 
 /// Spreads a seed's bits over a pool, from which generators take their first state.
 ///
-/// Only sequences without a spawn key are made; POGEMA never spawns.
+/// POGEMA never spawns; spawn keys are here for whoever wants many unlike seeds of one.
 ///
 /// Source: NumPy 1.26, `SeedSequence`, pool of four words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,6 +45,19 @@ impl SeedSequence {
             }
         }
         Self { pool }
+    }
+
+    /// A child of the sequence of a seed: unlike the children under other keys, and foretold by its own.
+    ///
+    /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
+    pub fn spawned(seed: u64, key: &[u64]) -> Self {
+        // The seed is filled up to the size of the pool, so that no word of it can be taken for one of the key.
+        let mut words = vec![seed as u32, (seed >> 32) as u32, 0, 0];
+        for &part in key {
+            words.push(part as u32);
+            words.extend(Some((part >> 32) as u32).filter(|&high| high != 0));
+        }
+        Self::from_words(&words)
     }
 
     /// A sequence nobody can foresee, of 128 bits from the operating system.
@@ -137,6 +150,15 @@ mod tests {
         let short = SeedSequence::from_words(&[7]);
         assert_eq!(SeedSequence::from_words(&[7, 0, 0, 0]), short);
         assert_ne!(SeedSequence::from_words(&[7, 0, 0, 0, 0]), short);
+    }
+
+    #[test]
+    fn children_are_those_of_numpy() {
+        let state = |seed, key: &[u64]| SeedSequence::spawned(seed, key).generate_state_u64::<1>()[0];
+        assert_eq!(state(0, &[0]), 8_668_861_027_912_758_289);
+        assert_eq!(state(42, &[3, 1]), 12_600_661_634_385_724_904);
+        assert_eq!(state((1 << 63) - 2, &[7, 1 << 40]), 3_659_487_751_733_228_297);
+        assert_eq!(SeedSequence::spawned(5, &[]), SeedSequence::from_u64(5));
     }
 
     #[test]

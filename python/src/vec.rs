@@ -1,0 +1,352 @@
+//! Many environments behind `VecEnv`.
+
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+
+use numpy::PyReadwriteArrayDyn;
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
+use pogema_core::{Action, Config, Error, Occupancy, StepOut};
+use pogema_fast::{Autoreset, Observations};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors;
+use crate::seeds::{Seed, Source};
+
+/// Where a step's rewards and ends go: rewards, terminated, truncated.
+///
+/// Shape: `(envs, agents)` each
+type Ends<'py> = (PyReadwriteArray2<'py, f32>, PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
+/// Where a state goes: observations, who takes part, and, if wanted, masks of actions.
+///
+/// Shape: `(envs, agents, 3, side, side)`, `(envs, agents)`, `(envs, agents, 5)`
+type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyReadwriteArray3<'py, i8>>);
+
+/// Many environments, stepped by one call, with buffers that the caller owns.
+///
+/// The lock is never waited for: it only tells that another thread is inside.
+#[pyclass(frozen, module = "pogema_rs._engine")]
+pub struct Batch {
+    game: Mutex<Option<Game>>,
+    /// The process that has the threads.
+    process: u32,
+}
+
+struct Game {
+    batch: pogema_fast::Batch,
+    source: Source,
+    actions: Vec<Action>,
+}
+
+#[pymethods]
+impl Batch {
+    /// Environments of some configs, each in JSON with the text of the map that its `map_name` names; `of_env` says
+    /// which one each environment has.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        configs: Vec<(String, Option<String>)>,
+        of_env: Vec<usize>,
+        autoreset: &str,
+        exact: bool,
+        num_threads: usize,
+    ) -> PyResult<Self> {
+        let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
+        let made = py.detach(|| Game::new(&configs, of_env, exact, num_threads));
+        let mut game = made.map_err(|error| errors::config(py, &error))?;
+        game.batch = game.batch.with_autoreset(autoreset);
+        Ok(Self { game: Mutex::new(Some(game)), process: std::process::id() })
+    }
+
+    /// Begins the next episodes of all environments, or of those chosen; with `seed`, or with one of `seeds` each,
+    /// their first ones.
+    #[pyo3(signature = (state, chosen=None, seed=None, seeds=None))]
+    fn reset(
+        &self,
+        py: Python<'_>,
+        state: State<'_>,
+        chosen: Option<Vec<bool>>,
+        seed: Option<u64>,
+        seeds: Option<Vec<u64>>,
+    ) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let game = Self::open(&mut guard)?;
+        py.detach(|| game.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
+        let mut buffer = Buffer::new(&state.0)?;
+        let batch = &mut game.batch;
+        let observed = buffer.lent()?;
+        py.detach(|| batch.observe(observed)).map_err(|error| errors::batch(py, &error))?;
+        show(py, &game.batch, None, (state.1, state.2))
+    }
+
+    /// Plays one step; returns the environments of which an episode ended.
+    ///
+    /// Shape: `actions` is `(envs, agents)`
+    fn step(
+        &self,
+        py: Python<'_>,
+        actions: PyReadonlyArray2<'_, i64>,
+        ends: Ends<'_>,
+        state: State<'_>,
+    ) -> PyResult<Vec<usize>> {
+        let mut guard = self.lock()?;
+        let game = Self::open(&mut guard)?;
+        game.read_actions(actions.as_slice()?).map_err(|(index, number)| {
+            let num_agents = game.batch.config().num_agents;
+            let (env, agent) = (index / num_agents, index % num_agents);
+            let text = Error::Action { agent: Some(agent), number }.to_string();
+            let text = text.replacen(" of agent", &format!(" of environment {env}, agent"), 1);
+            errors::action(py, text)
+        })?;
+        let (mut rewards, mut terminated, mut truncated) = ends;
+        let mut buffer = Buffer::new(&state.0)?;
+        let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
+        let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
+        let (batch, actions, observed) = (&mut game.batch, &game.actions, buffer.lent()?);
+        let played = py.detach(|| batch.step(actions, out, observed));
+        played.map_err(|error| errors::batch(py, &error))?;
+        show(py, &game.batch, None, (state.1, state.2))?;
+        let has_ended = |&env: &usize| game.batch.has_just_ended(env).unwrap_or_default();
+        Ok((0..game.batch.num_lanes()).filter(has_ended).collect())
+    }
+
+    /// Writes the states at the ends of the last episodes of some environments.
+    fn ended(&self, py: Python<'_>, envs: Vec<usize>, state: State<'_>) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let game = Self::open(&mut guard)?;
+        let mut buffer = Buffer::new(&state.0)?;
+        let (batch, observed) = (&game.batch, buffer.lent()?);
+        py.detach(|| batch.observe_ended(&envs, observed)).map_err(|error| errors::batch(py, &error))?;
+        show(py, batch, Some(&envs), (state.1, state.2))
+    }
+
+    /// The figures of the last episodes of some environments, by name.
+    fn metrics<'py>(&self, py: Python<'py>, envs: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut guard = self.lock()?;
+        let game = Self::open(&mut guard)?;
+        let named = |env| {
+            let dict = PyDict::new(py);
+            let ended = game.batch.ended(env).map_err(|error| errors::batch(py, &error))?;
+            for (name, value) in ended.iter().flat_map(|(_, metrics)| metrics.named()) {
+                dict.set_item(name, value)?;
+            }
+            Ok(dict)
+        };
+        envs.into_iter().map(named).collect()
+    }
+
+    /// Writes which actions make sense now.
+    fn mask_actions(&self, py: Python<'_>, masks: PyReadwriteArray3<'_, i8>) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let batch = &Self::open(&mut guard)?.batch;
+        write_masks(py, batch, None, masks)
+    }
+
+    /// POGEMA's seed of each environment's present episode.
+    fn episode_seeds(&self, py: Python<'_>) -> PyResult<Vec<u64>> {
+        let mut guard = self.lock()?;
+        let game = Self::open(&mut guard)?;
+        let seed = |(env, seed): (usize, &Seed)| {
+            let episode = game.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
+            let not_reset = || Error::State { reason: "the environments were not reset yet".into() };
+            let episode = episode.ok_or_else(|| errors::batch(py, &not_reset()))?;
+            Ok(seed.of_episode(env, episode))
+        };
+        game.source.seeds.iter().enumerate().map(seed).collect()
+    }
+
+    /// Number of agents of each environment, and how far they see.
+    fn sizes(&self) -> PyResult<(usize, usize)> {
+        let mut guard = self.lock()?;
+        let config = Self::open(&mut guard)?.batch.config();
+        Ok((config.num_agents, config.radius))
+    }
+
+    /// Lets go of the environments and of their threads; a forked child leaves both to its parent.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        if self.is_inherited() {
+            return Ok(());
+        }
+        let game = self.lock()?.take();
+        py.detach(|| drop(game));
+        Ok(())
+    }
+}
+
+impl Batch {
+    fn is_inherited(&self) -> bool {
+        std::process::id() != self.process
+    }
+
+    /// The environments, which nobody else may be using.
+    fn lock(&self) -> PyResult<MutexGuard<'_, Option<Game>>> {
+        if self.is_inherited() {
+            return Err(PyRuntimeError::new_err(
+                "this VecEnv was made before the process forked, and its threads stayed in the parent: make a new \
+                 VecEnv in the child, or start the child with the method `spawn`",
+            ));
+        }
+        self.game.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => PyRuntimeError::new_err(
+                "another thread is inside a call of this VecEnv: call it from one thread at a time",
+            ),
+            TryLockError::Poisoned(_) => {
+                PyRuntimeError::new_err("an earlier call of this VecEnv broke off: make a new VecEnv")
+            }
+        })
+    }
+
+    fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Game>>) -> PyResult<&'a mut Game> {
+        guard.as_mut().ok_or_else(|| PyRuntimeError::new_err("this VecEnv is closed: make a new one"))
+    }
+}
+
+impl Drop for Batch {
+    fn drop(&mut self) {
+        if self.is_inherited() {
+            // There is nobody to wait for: the threads did not come along.
+            std::mem::forget(self.game.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+}
+
+impl Game {
+    fn new(
+        configs: &[(String, Option<String>)],
+        of_env: Vec<usize>,
+        exact: bool,
+        num_threads: usize,
+    ) -> Result<Self, Error> {
+        let num_envs = of_env.len();
+        if num_envs == 0 {
+            return Err(Error::config("num_envs", num_envs, "at least 1"));
+        }
+        let source = Source::new(configs, of_env)?;
+        let rules = source.config(0).rules();
+        let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
+        let rules = Config { occupancy, ..rules };
+        let batch = pogema_fast::Batch::new(rules, num_envs, num_threads, source.clone())?;
+        Ok(Self { batch, source, actions: Vec::with_capacity(num_envs * rules.num_agents) })
+    }
+
+    fn reset(
+        &mut self,
+        chosen: Option<Vec<bool>>,
+        seed: Option<u64>,
+        seeds: Option<Vec<u64>>,
+    ) -> Result<(), Error> {
+        let num_envs = self.batch.num_lanes();
+        let chosen = chosen.unwrap_or_else(|| vec![true; num_envs]);
+        Error::check_length("chosen environments", num_envs, chosen.len())?;
+        let given: Vec<Seed> = match (seed, seeds) {
+            (Some(seed), _) => vec![Seed::Shared(seed); num_envs],
+            (None, Some(seeds)) => seeds.into_iter().map(Seed::Own).collect(),
+            (None, None) => return self.batch.reset_lanes(&chosen),
+        };
+        Error::check_length("seeds", num_envs, given.len())?;
+        let mut source = self.source.clone();
+        for ((seed, given), chosen) in source.seeds.iter_mut().zip(given).zip(&chosen) {
+            *seed = if *chosen { given } else { *seed };
+        }
+        self.batch.reset_with(source.clone(), &chosen)?;
+        self.source = source;
+        Ok(())
+    }
+
+    /// Takes actions over, or names the first that is none.
+    fn read_actions(&mut self, numbers: &[i64]) -> Result<(), (usize, i64)> {
+        let num_actions = Action::ALL.len() as u64;
+        if let Some(index) = numbers.iter().position(|&number| number as u64 >= num_actions) {
+            return Err((index, numbers[index]));
+        }
+        self.actions.clear();
+        self.actions.extend(numbers.iter().map(|&number| Action::ALL[number as usize]));
+        Ok(())
+    }
+}
+
+/// A caller's buffer for observations.
+enum Buffer<'py> {
+    F32(PyReadwriteArrayDyn<'py, f32>),
+    U8(PyReadwriteArrayDyn<'py, u8>),
+}
+
+impl<'py> Buffer<'py> {
+    fn new(array: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
+            return borrow(array).map(Self::F32);
+        }
+        let array = array.cast::<PyArrayDyn<u8>>();
+        let array = array.map_err(|_| PyTypeError::new_err("observations, expected float32 or uint8"))?;
+        borrow(array).map(Self::U8)
+    }
+
+    fn lent(&mut self) -> PyResult<Observations<'_>> {
+        match self {
+            Self::F32(array) => Ok(Observations::F32(array.as_slice_mut()?)),
+            Self::U8(array) => Ok(Observations::U8(array.as_slice_mut()?)),
+        }
+    }
+}
+
+fn borrow<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
+    array.try_readwrite().map_err(|error| {
+        PyRuntimeError::new_err(format!("the buffer for observations cannot be written now: {error}"))
+    })
+}
+
+/// Writes who takes part and what they may do, in all environments now, or in some at the ends of their episodes.
+fn show(
+    py: Python<'_>,
+    batch: &pogema_fast::Batch,
+    ended: Option<&[usize]>,
+    (mut active, masks): (PyReadwriteArray2<'_, bool>, Option<PyReadwriteArray3<'_, i8>>),
+) -> PyResult<()> {
+    let engine = |index: usize| match ended {
+        Some(envs) => batch.ended(envs[index]).map(|ended| ended.map(|(engine, _)| engine)),
+        None => batch.lane(index).map(Some),
+    };
+    let num_agents = batch.config().num_agents;
+    let active = active.as_slice_mut()?;
+    let want = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
+    Error::check_length("active", want, active.len()).map_err(|error| errors::batch(py, &error))?;
+    for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
+        let engine = engine(index).map_err(|error| errors::batch(py, &error))?;
+        // INVARIANT: what is not there was refused when it was to be observed.
+        engine.into_iter().for_each(|engine| part.copy_from_slice(engine.active()));
+    }
+    masks.map_or(Ok(()), |masks| write_masks(py, batch, ended, masks))
+}
+
+fn write_masks(
+    py: Python<'_>,
+    batch: &pogema_fast::Batch,
+    ended: Option<&[usize]>,
+    mut masks: PyReadwriteArray3<'_, i8>,
+) -> PyResult<()> {
+    let per_env = batch.config().num_agents * Action::ALL.len();
+    let out = masks.as_slice_mut()?;
+    let written = py.detach(|| match ended {
+        None => batch.mask_actions(out),
+        Some(envs) => envs.iter().zip(out.chunks_exact_mut(per_env)).try_for_each(|(&env, out)| {
+            batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out))
+        }),
+    });
+    written.map_err(|error| errors::batch(py, &error))
+}
+
+/// Number of threads that this process may run at once.
+#[pyfunction]
+pub fn num_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Gymnasium's names of what follows the end of an episode.
+fn read_autoreset(name: &str) -> Result<Autoreset, Error> {
+    match name {
+        "SameStep" => Ok(Autoreset::SameStep),
+        "NextStep" => Ok(Autoreset::NextStep),
+        "Disabled" => Ok(Autoreset::Off),
+        _ => Err(Error::config("autoreset_mode", name, "`SameStep`, `NextStep` or `Disabled`")),
+    }
+}
