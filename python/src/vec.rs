@@ -313,7 +313,9 @@ fn show(
     for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
         let engine = engine(index).map_err(|error| errors::batch(py, &error))?;
         // INVARIANT: what is not there was refused when it was to be observed.
-        engine.into_iter().for_each(|engine| part.copy_from_slice(engine.active()));
+        if let Some(engine) = engine {
+            part.copy_from_slice(engine.active());
+        }
     }
     masks.map_or(Ok(()), |masks| write_masks(py, batch, ended, masks))
 }

@@ -1,0 +1,168 @@
+"""`VecEnv` beside engines that are reset by hand, and as a vector of environments of Gymnasium's."""
+
+import gymnasium
+import numpy as np
+import pytest
+from vec_helpers import CONFIG, Plain, check_step, own_seeds, shared_seed
+
+from pogema_rs.vec_env import AutoresetMode, VecEnv
+
+MODES = list(AutoresetMode)
+
+
+def actions_of(rng, env):
+    return rng.integers(5, size=(env.num_envs, env.num_agents))
+
+
+def check_episodes(env, plain, num_steps, exact_mode):
+    """Plays both side by side; under DISABLED whatever is over is reset by hand every few steps."""
+    rng, num_ended = np.random.default_rng(0), 0
+    for step in range(num_steps):
+        actions = actions_of(rng, env)
+        got = env.step(actions)
+        num_ended += check_step(got, plain, exact_mode, actions, env.episode_seeds)
+        over = np.array([one.last is not None for one in plain])
+        if exact_mode == AutoresetMode.DISABLED and over.any() and step % 4 == 0:
+            env.reset(options={"reset_mask": over})
+            for one in np.array(plain)[over]:
+                one.begin()
+    assert num_ended > 2 * env.num_envs
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
+@pytest.mark.parametrize("dtype", ["float32", "uint8"])
+def test_every_autoreset_mode_plays_what_engines_play(mode, on_target, dtype):
+    config = {**CONFIG, "on_target": on_target}
+    env = VecEnv(config, 4, autoreset_mode=mode, dtype=dtype, masks=True)
+    observations, infos = env.reset(seed=11)
+    assert observations.dtype == dtype and set(infos) == {"is_active", "_is_active", "action_masks", "_action_masks"}
+    plain = [Plain(config, index, shared_seed(11)) for index in range(4)]
+    np.testing.assert_array_equal(observations, [one.observe() for one in plain])
+    np.testing.assert_array_equal(infos["action_masks"], [one.masks() for one in plain])
+    check_episodes(env, plain, 45, mode)
+    np.testing.assert_array_equal(env.action_masks(), [one.masks() for one in plain])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_maps_may_differ_and_each_environment_may_have_its_own_seed(mode):
+    shapes = [{"size": 7}, {"width": 12, "height": 5}, {"map": "\n".join(["....", ".#..", "...."])}, {"size": 40}]
+    configs = [{**CONFIG, **shape} for shape in shapes]
+    for config, shape in zip(configs, shapes):
+        if "size" not in shape:
+            del config["size"]
+    env = VecEnv(configs, autoreset_mode=mode, masks=True, semantics="2.0")
+    seeds = [5, 2**63 - 2, 0, 5]
+    env.reset(seed=seeds)
+    plain = [Plain(config, index, own_seeds(seeds), exact=True) for index, config in enumerate(configs)]
+    check_episodes(env, plain, 30, mode)
+
+
+def test_the_config_says_the_seed_until_a_reset_does_and_a_reset_without_one_goes_on():
+    configs = [{**CONFIG, "seed": 3}, {**CONFIG, "seed": 4}]
+    env = VecEnv(configs)
+    env.reset()
+    assert env.episode_seeds.tolist() == [shared_seed(3)(0, 0), shared_seed(4)(1, 0)]
+    env.reset()
+    env.reset(options={"reset_mask": np.array([False, True])})
+    assert env.episode_seeds.tolist() == [shared_seed(3)(0, 1), shared_seed(4)(1, 2)]
+    env.reset(seed=9, options={"reset_mask": np.array([True, False])})
+    assert env.episode_seeds.tolist() == [shared_seed(9)(0, 0), shared_seed(4)(1, 2)]
+    env.reset()
+    assert env.episode_seeds.tolist() == [shared_seed(9)(0, 1), shared_seed(4)(1, 3)]
+    env.reset(seed=np.array([6, 7]))
+    assert env.episode_seeds.tolist() == [6, 7]
+
+
+def test_without_any_seed_no_two_vectors_play_the_same():
+    one, other = VecEnv(CONFIG, 2), VecEnv(CONFIG, 2)
+    for env in (one, other):
+        env.reset()
+    assert len({*one.episode_seeds, *other.episode_seeds}) == 4
+
+
+def play(num_envs, num_threads, seed=21):
+    env = VecEnv(CONFIG, num_envs, num_threads=num_threads, masks=True)
+    seen, rng = [env.reset(seed=seed)[0][:3].copy()], np.random.default_rng(1)
+    for _ in range(40):
+        actions = rng.integers(5, size=(9, env.num_agents))[:num_envs]
+        observations, *ends, infos = env.step(actions)
+        seen += [part[:3].copy() for part in (observations, *ends, infos["is_active"], infos["action_masks"])]
+    return seen
+
+
+def test_an_environment_depends_on_neither_the_others_nor_the_threads():
+    expected = play(3, 1)
+    for num_envs, num_threads in [(3, 2), (3, 3), (9, 1), (9, 2), (9, 8)]:
+        for one, other in zip(expected, play(num_envs, num_threads)):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_spaces_hold_what_comes_out():
+    env = VecEnv(CONFIG, 3, dtype="uint8", autoreset_mode="next_step")
+    assert isinstance(env, gymnasium.vector.VectorEnv) and repr(env) == "VecEnv(num_envs=3)"
+    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert env.observation_space.shape == (3, 5, 3, 5, 5) and env.single_observation_space.shape == (5, 3, 5, 5)
+    assert env.single_action_space == gymnasium.spaces.MultiDiscrete([5] * 5) and env.action_space.shape == (3, 5)
+    observations, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observations) and env.single_observation_space.contains(observations[1])
+    actions = env.sample_actions()
+    assert env.action_space.contains(actions) and env.single_action_space.contains(actions[0])
+    observations, rewards, terminated, truncated, infos = env.step(env.action_space.sample())
+    assert (rewards.dtype, terminated.dtype, truncated.dtype) == (np.float32, np.bool_, np.bool_)
+    assert rewards.shape == terminated.shape == truncated.shape == infos["is_active"].shape == (3, 5)
+    assert observations.flags.c_contiguous and env.action_masks().shape == (3, 5, 5)
+    assert env.action_masks().dtype == np.int8 and "action_masks" not in infos
+
+
+def test_sampled_actions_follow_the_seed():
+    env = VecEnv(CONFIG, 3)
+    drawn = []
+    for seed in (4, 4, 5, [1, 2, 3]):
+        env.reset(seed=seed)
+        drawn.append(env.sample_actions())
+    assert (drawn[0] == drawn[1]).all() and (drawn[0] != drawn[2]).any()
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_gymnasiums_own_helpers_take_it(mode):
+    performance = pytest.importorskip("gymnasium.utils.performance")
+    if not hasattr(performance, "benchmark_vector_step"):
+        pytest.skip("this Gymnasium has no benchmark of vectors")
+    env = VecEnv({**CONFIG, "max_episode_steps": 2}, 3, autoreset_mode=mode)
+    assert performance.benchmark_vector_step(env, target_duration=0, seed=1) > 0
+    listed = gymnasium.wrappers.vector.DictInfoToList(env)
+    infos = [listed.reset(seed=0)[1]] + [listed.step(env.sample_actions())[4] for _ in range(4)]
+    assert [len(step) for step in infos] == [3] * 5
+    assert infos[2][0]["metrics"]["ISR"] <= 1 and infos[2][0]["is_active"].shape == (5,)
+    assert ("final_obs" in infos[2][0]) == (mode == AutoresetMode.SAME_STEP)
+
+
+def test_the_observations_are_overwritten_unless_there_are_two_buffers():
+    env = VecEnv(CONFIG, 2)
+    first, _ = env.reset(seed=0)
+    assert env.step(env.sample_actions())[0] is first
+    env = VecEnv(CONFIG, 2, double_buffer=True)
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    second = env.step(np.full((2, 5), 1))[0]
+    assert second is not first and (first == kept).all() and (second != kept).any()
+    with pytest.raises(ValueError):
+        env.step(np.full((2, 5), 9))
+    assert env.step(np.zeros((2, 5), int))[0] is first and (second != kept).any()
+
+
+def test_observations_go_where_the_caller_says():
+    env, other = VecEnv(CONFIG, 2, double_buffer=True), VecEnv(CONFIG, 2)
+    own, _ = env.reset(seed=0)
+    kept, out = own.copy(), np.full(own.shape, 7, np.float32)
+    other.reset(seed=0)
+    for _ in range(12):
+        actions = env.sample_actions()
+        assert env.step(actions, out=out)[0] is out
+        np.testing.assert_array_equal(out, other.step(actions)[0])
+    assert (own == kept).all()
+    assert env.reset(seed=0, out=out)[0] is out and (out == kept).all()
+    tall = np.zeros((4, *own.shape[1:]), np.float32)
+    np.testing.assert_array_equal(env.reset(seed=0, out=tall[1:3])[0], kept)
+    assert not tall[0].any() and not tall[3].any()

@@ -1,0 +1,316 @@
+"""What a `VecEnv` refuses, and that it goes on as if it had not been asked; processes, threads and memory."""
+
+import copy
+import gc
+import os
+import pickle
+import threading
+import time
+import tracemalloc
+import warnings
+
+import numpy as np
+import pytest
+from vec_helpers import CONFIG
+
+from pogema_rs import errors
+from pogema_rs.vec_env import VecEnv
+
+SHAPE = (2, 5, 3, 5, 5)
+
+
+@pytest.fixture
+def env():
+    env = VecEnv(CONFIG, 2)
+    env.reset(seed=0)
+    return env
+
+
+def readonly():
+    array = np.zeros(SHAPE, np.float32)
+    array.flags.writeable = False
+    return array
+
+
+class Tensor:
+    """Stands for what other libraries call a tensor."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __array__(self, dtype=None, copy=None):
+        return np.asarray(self.array, dtype)
+
+
+class Capsule:
+    """Stands for what can only share its memory."""
+
+    def __init__(self, array):
+        self.__dlpack__, self.__dlpack_device__ = array.__dlpack__, array.__dlpack_device__
+
+
+BAD_ACTIONS = [
+    (np.zeros((2, 4), int), ValueError, "shape (2, 4), expected (2, 5)"),
+    (np.zeros(10, int), ValueError, "shape (10,), expected (2, 5)"),
+    (3, ValueError, "shape (), expected (2, 5)"),
+    ([[1, 2], [3]], ValueError, "expected whole numbers in the shape (envs, agents)"),
+    (np.zeros((2, 5)), TypeError, "type float64, expected whole numbers 0 to 4"),
+    (np.full((2, 5), np.nan), TypeError, "type float64, expected whole numbers 0 to 4"),
+    ([[0, 0, 0, 0, float("nan")]] * 2, TypeError, "expected whole numbers"),
+    (np.zeros((2, 5), bool), TypeError, "type bool, expected whole numbers"),
+    ([["up"] * 5] * 2, TypeError, "expected whole numbers"),
+    (None, TypeError, "type object, expected whole numbers"),
+    ([[2**70] * 5] * 2, TypeError, "type object, expected whole numbers"),
+    ([[0] * 5, [0, 0, 0, 5, 9]], ValueError, "action of environment 1, agent 3 is `5`, expected 0 (stay), 1 (up)"),
+    ([[0] * 5, [0, 0, -1, 0, 0]], ValueError, "action of environment 1, agent 2 is `-1`, expected 0"),
+    (np.full((2, 5), 2**64 - 1, np.uint64), ValueError, "agent 0 is `9223372036854775807`, expected 0"),
+    (Tensor(np.full((2, 5), 7)), ValueError, "agent 0 is `7`"),
+]
+
+
+@pytest.mark.parametrize(("actions", "error", "text"), BAD_ACTIONS)
+def test_wrong_actions_are_told_and_nothing_is_played(env, actions, error, text):
+    observations, _ = env.reset(seed=0)
+    kept = observations.copy()
+    with pytest.raises(error) as raised:
+        env.step(actions)
+    assert text in str(raised.value) and "\n" not in str(raised.value)
+    assert (observations == kept).all()
+    for _ in range(8):
+        assert not env.step(np.zeros((2, 5), int))[3].any()
+    assert env.step(np.zeros((2, 5), int))[3].all()
+
+
+@pytest.mark.parametrize("dtype", ["i1", "u1", "i2", "<i4", ">i4", "u4", "i8", "u8", ">i8"])
+def test_actions_may_be_of_any_whole_type_and_layout(env, dtype):
+    actions = np.arange(10).reshape(2, 5) % 5
+    expected = env.step(actions)[0].copy()
+    numbers = actions.astype(dtype)
+    given = [numbers, np.asfortranarray(numbers), numbers[:, ::-1][:, ::-1], numbers.tolist(), Tensor(numbers)]
+    if numbers.dtype.isnative:
+        given.append(Capsule(numbers))
+    for one in given:
+        env.reset(seed=0)
+        np.testing.assert_array_equal(env.step(one)[0], expected)
+
+
+BAD_OUT = [
+    ([0], TypeError, f"list, expected a numpy array of float32 and the shape {SHAPE}"),
+    (np.zeros(SHAPE), TypeError, "float64, expected float32"),
+    (np.zeros(SHAPE, ">f4"), TypeError, ">f4, expected float32"),
+    (np.zeros((1, *SHAPE[1:]), np.float32), ValueError, f"expected {SHAPE}"),
+    (np.zeros((4, *SHAPE[1:]), np.float32)[::2], ValueError, "expected a C-contiguous array"),
+    (np.asfortranarray(np.zeros(SHAPE, np.float32)), ValueError, "expected a C-contiguous array"),
+    (np.zeros(751 * 4, np.uint8)[1:-3].view(np.float32).reshape(SHAPE), ValueError, "scattered"),
+    (readonly(), ValueError, "expected a writeable array"),
+]
+
+
+@pytest.mark.parametrize(("out", "error", "text"), BAD_OUT)
+def test_wrong_buffers_are_told_and_nothing_is_played(env, out, error, text):
+    seeds = env.episode_seeds.tolist()
+    for call in (lambda: env.step(np.zeros((2, 5), int), out=out), lambda: env.reset(seed=1, out=out)):
+        with pytest.raises(error) as raised:
+            call()
+        assert text in str(raised.value)
+    assert env.episode_seeds.tolist() == seeds
+
+
+BAD_RESETS = [
+    ({"seed": -1}, ValueError, "seed is -1, expected 0 to 9223372036854775806"),
+    ({"seed": 2**63 - 1}, ValueError, "expected 0 to 9223372036854775806"),
+    ({"seed": 1.0}, TypeError, "seed is 1.0, expected a whole number"),
+    ({"seed": True}, TypeError, "seed is True, expected a whole number"),
+    ({"seed": "1"}, TypeError, "expected a whole number"),
+    ({"seed": [1]}, ValueError, "seed holds 1 seeds, expected 2, one per environment"),
+    ({"seed": [1, None]}, TypeError, "seed[1] is None, expected a whole number"),
+    ({"seed": [1, -3]}, ValueError, "seed[1] is -3, expected 0"),
+    ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected `reset_mask` alone"),
+    ({"options": {"reset_mask": [True, False]}}, TypeError, "is a list, expected a numpy array of bool"),
+    ({"options": {"reset_mask": np.array([1, 0])}}, TypeError, "is an array of int64, expected a numpy array of bool"),
+    ({"options": {"reset_mask": np.array([True])}}, ValueError, "has the shape (1,), expected (2,)"),
+    ({"options": {"reset_mask": np.zeros(2, bool)}}, ValueError, "expected at least one True"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "error", "text"), BAD_RESETS)
+def test_wrong_resets_are_told_and_change_nothing(env, arguments, error, text):
+    seeds = env.episode_seeds.tolist()
+    with pytest.raises(error) as raised:
+        env.reset(**arguments)
+    assert text in str(raised.value)
+    assert env.episode_seeds.tolist() == seeds
+
+
+BAD_VECTORS = [
+    ({"num_envs": 0}, ValueError, "num_envs is 0, expected at least 1"),
+    ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
+    ({"num_threads": 3}, ValueError, "num_threads is 3, expected 1 to 2, the number of environments"),
+    ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
+    ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32' or 'uint8'"),
+    ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),
+    ({"semantics": "3"}, ValueError, "semantics is '3', expected one of '1.4.0', '2.0'"),
+    ({"grid_config": 7}, TypeError, "grid_config is a int, expected a GridConfig or a dict"),
+    ({"grid_config": []}, ValueError, "expected 0, one for each config"),
+    ({"grid_config": [CONFIG] * 3}, ValueError, "num_envs is 2, expected 3, one for each config of the list"),
+    ({"grid_config": [CONFIG, {**CONFIG, "num_agents": 4}]}, ValueError, "`num_agents` is `4`, expected 5, since env"),
+    ({"grid_config": [CONFIG, {**CONFIG, "obs_radius": 3}]}, ValueError, "`obs_radius` is `3`, expected 2"),
+    ({"grid_config": [CONFIG, {**CONFIG, "on_target": "nothing"}]}, ValueError, "environment 1 has to share it"),
+    ({"grid_config": {**CONFIG, "observation_type": "MAPF"}}, ValueError, "expected `default`"),
+    ({"grid_config": {**CONFIG, "persistent": True}}, ValueError, "expected false"),
+    ({"grid_config": {**CONFIG, "desnity": 1}}, ValueError, "`density`"),
+    ({"grid_config": {**CONFIG, "obs_radius": 0}}, ValueError, "`obs_radius` is `0`, expected"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "error", "text"), BAD_VECTORS)
+def test_wrong_vectors_are_told(arguments, error, text):
+    with pytest.raises(error) as raised:
+        VecEnv(**{"grid_config": CONFIG, "num_envs": 2, **arguments})
+    assert text in str(raised.value)
+
+
+def test_an_environment_without_room_is_named_by_the_first_reset():
+    env = VecEnv([CONFIG, {**CONFIG, "size": 2}])
+    with pytest.raises(errors.InstanceError, match="environment 1, episode 0, seed [0-9]+: .*num_agents"):
+        env.reset(seed=0)
+    with pytest.raises(errors.NotResetError):
+        env.step(np.zeros((2, 5), int))
+
+
+def test_a_config_may_be_anything_that_knows_its_fields():
+    class Config:
+        def dict(self):
+            return {**CONFIG, "integration": "SampleFactory", "auto_reset": True, "map": None}
+
+    env, other = VecEnv(Config(), 2), VecEnv(CONFIG, 2)
+    np.testing.assert_array_equal(env.reset(seed=2)[0], other.reset(seed=2)[0])
+
+
+def test_nothing_can_be_done_before_a_reset_or_after_a_close():
+    env = VecEnv(CONFIG, 2)
+    actions, some = np.zeros((2, 5), int), {"reset_mask": np.array([True, False])}
+    calls = [lambda: env.step(actions), env.action_masks, lambda: env.episode_seeds, lambda: env.reset(options=some)]
+    for call in calls:
+        with pytest.raises(errors.NotResetError, match="not reset yet"):
+            call()
+    env.reset()
+    env.close()
+    env.close()
+    for call in [*calls, env.reset]:
+        with pytest.raises(RuntimeError, match="this VecEnv is closed"):
+            call()
+
+
+def test_it_is_neither_pickled_nor_copied(env):
+    for way in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="make a new one of the same config, in each process"):
+            way(env)
+
+
+def wait_for(child):
+    """The exit code of a child that is to end soon."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        pid, status = os.waitpid(child, os.WNOHANG)
+        if pid:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.01)
+    os.kill(child, 9)
+    os.waitpid(child, 0)
+    return "hung"
+
+
+def in_child(env):
+    """0 if a forked child is refused in every call and can use a vector of its own."""
+    calls = [lambda: env.step(np.zeros((2, 5), int)), env.reset, env.action_masks, lambda: env.episode_seeds]
+    for call in calls:
+        try:
+            call()
+            return 1
+        except RuntimeError as error:
+            if "made before the process forked" not in str(error):
+                return 2
+    own = VecEnv(CONFIG, 2, num_threads=2)
+    own.reset(seed=0)
+    own.step(own.sample_actions())
+    own.close()
+    env.close()
+    return 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
+@pytest.mark.parametrize("num_threads", [1, 2])
+def test_a_forked_child_is_refused_and_the_parent_goes_on(num_threads):
+    env = VecEnv(CONFIG, 2, num_threads=num_threads)
+    env.reset(seed=0)
+    with warnings.catch_warnings():
+        # Python 3.12 warns of what is tested here.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        code = 3
+        try:
+            code = in_child(env)
+            del env
+            gc.collect()
+        finally:
+            os._exit(code)
+    for _ in range(20):
+        env.step(env.sample_actions())
+    assert wait_for(child) == 0
+    env.step(env.sample_actions())
+
+
+def test_two_threads_at_once_are_told():
+    env = VecEnv({**CONFIG, "num_agents": 32, "size": 24, "max_episode_steps": 10_000}, 64, num_threads=1)
+    env.reset(seed=0)
+    actions, told, played = np.zeros((64, 32), int), [], []
+
+    def step():
+        for _ in range(20_000):
+            try:
+                env.step(actions)
+                played.append(1)
+            except RuntimeError as error:
+                told.append(str(error))
+            if told:
+                return
+
+    threads = [threading.Thread(target=step) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert told and all("another thread is inside a call of this VecEnv" in text for text in told)
+    env.step(actions)
+    assert played
+
+
+def resident():
+    """Bytes of memory of this process; 0 where it cannot be told."""
+    if not os.path.exists("/proc/self/statm"):
+        return 0
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_ten_thousand_steps_take_no_more_memory_than_a_hundred():
+    env = VecEnv({**CONFIG, "on_target": "restart"}, 8, masks=True)
+    env.reset(seed=0)
+
+    def play(num_steps):
+        for _ in range(num_steps):
+            env.step(env.sample_actions())
+        gc.collect()
+
+    play(100)
+    tracemalloc.start()
+    play(100)
+    traced, held = tracemalloc.get_traced_memory()[0], resident()
+    play(10_000)
+    # What Python keeps for reuse comes and goes; one byte per step and environment would be ten times as much.
+    assert tracemalloc.get_traced_memory()[0] - traced < 8_000
+    tracemalloc.stop()
+    # The allocator keeps pages of its own, per thread, which it fills one after the other.
+    assert resident() - held < 4 << 20
