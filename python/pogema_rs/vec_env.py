@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal, NoReturn, Optional, Union
+from typing import Any, NoReturn, Optional, Union
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from pogema_rs import _engine
+from pogema_rs import _engine, grid_registry
 from pogema_rs._vec_input import AutoresetMode, check_out, read_actions, read_autoreset, read_mask, read_seed
+from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.semantics import Semantics
 
-__all__ = ["AutoresetMode", "VecEnv", "config_json"]
+__all__ = ["AutoresetMode", "VecEnv"]
 
 NUM_ACTIONS = 5
 _DTYPES = {"float32": np.dtype(np.float32), "uint8": np.dtype(np.uint8)}
-_EXACT = {"1.4.0": False, "2.0": True}
 
 
-def config_json(config: Any) -> str:
-    """A config as the engine reads it: from a mapping, or from anything with `dict()` or `model_dump()`."""
-    if not isinstance(config, Mapping):
+def _config_texts(config: Any) -> tuple[str, Optional[str]]:
+    """A config as the engine reads it, and the text of the map that it names."""
+    if not isinstance(config, GridConfig):
         dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
-        if dump is None:
-            raise TypeError(f"grid_config is a {type(config).__name__}, expected a GridConfig or a dict, or a list of them")
-        config = dump()
-    # Which framework asks makes no difference to an episode.
-    fields = {name: value for name, value in config.items() if name not in ("integration", "auto_reset")}
-    return json.dumps(fields, default=lambda value: value.tolist() if hasattr(value, "tolist") else list(value))
+        if dump is None and not isinstance(config, Mapping):
+            kind = type(config).__name__
+            raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
+        config = GridConfig(**(config if isinstance(config, Mapping) else dump()))
+    return engine_json(config), grid_registry.map_text(config.map_name)
 
 
 class VecEnv(VectorEnv):
@@ -62,8 +61,8 @@ class VecEnv(VectorEnv):
     where no obstacle forbids the move; when episodes ended `metrics`, a dict of float arrays `(num_envs,)` that are NaN
     where `_metrics` is False.
 
-    One thread at a time may call it, and it does not survive a fork; either is a RuntimeError. Warnings about single
-    instances are not shown, and a `map_name` is not looked up.
+    One thread at a time may call it, and it does not survive a fork; either is a RuntimeError. A config is read once,
+    and changes of it later change nothing; warnings about single instances are not shown.
     """
 
     def __init__(
@@ -74,27 +73,29 @@ class VecEnv(VectorEnv):
         num_threads: Optional[int] = None,
         dtype: Union[str, np.dtype, type] = "float32",
         autoreset_mode: Union[AutoresetMode, str] = AutoresetMode.SAME_STEP,
-        semantics: Literal["1.4.0", "2.0"] = "1.4.0",
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
         double_buffer: bool = False,
         masks: bool = False,
     ) -> None:
-        """An environment for each of a list of configs, or `num_envs` of one config.
+        """An environment for each of a list of configs, or `num_envs` of one; each is a GridConfig or a dict.
 
-        The configs of a list may have different maps, but must agree on agents, radius and rules. `semantics="2.0"`
-        marks every active agent's cell as occupied, as POGEMA's 2.0 line does. Without `num_threads` all cores work.
+        The configs of a list may have different maps, but must agree on agents, radius and rules. With the semantics
+        `2.0` every agent is seen, as in POGEMA's 2.0 line. Without `num_threads` all cores work.
 
         Errors: ValueError or TypeError naming what was expected; `InstanceError` comes with the first reset.
         """
         self.closed = True
-        if semantics not in _EXACT:
-            raise ValueError(f"semantics is {semantics!r}, expected one of {', '.join(map(repr, _EXACT))}")
+        if semantics not in [known.value for known in Semantics]:
+            expected = " or ".join(repr(known.value) for known in Semantics)
+            raise ValueError(f"semantics is {semantics!r}, expected {expected}")
+        self.semantics = Semantics(semantics)
         self._dtype = _read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
         configs, of_env = _read_configs(grid_config, num_envs)
         self.num_envs = len(of_env)
         self.num_threads = _read_threads(num_threads, self.num_envs)
         self._batch = _engine.Batch(
-            configs, of_env, self.autoreset_mode.value, _EXACT[semantics], self.num_threads
+            configs, of_env, self.autoreset_mode.value, self.semantics.occupancy_is_exact, self.num_threads
         )
         self.num_agents, radius = self._batch.sizes()
         side = 2 * radius + 1
@@ -171,8 +172,10 @@ class VecEnv(VectorEnv):
         return observations, rewards, terminated, truncated, infos
 
     def action_masks(self) -> np.ndarray:
-        """Which actions make sense now, `(num_envs, agents, 5)`, int8: 1 for staying and for a move whose cell is on the
-        map and free of obstacles, whoever stands there. An agent that takes no part may only stay.
+        """Which actions make sense now, `(num_envs, agents, 5)`, int8.
+
+        1 for staying, and for a move whose cell is on the map and free of obstacles, whoever stands there. An agent
+        that takes no part may only stay.
 
         Errors: `NotResetError` before the first reset.
         """
@@ -251,20 +254,20 @@ def _read_dtype(dtype: Any) -> np.dtype:
     raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'uint8'")
 
 
-def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[tuple[str, None]], list[int]]:
+def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[tuple[str, Optional[str]]], list[int]]:
     """The configs that differ, and which one each environment has."""
     if isinstance(grid_config, (list, tuple)):
         if num_envs not in (None, len(grid_config)):
             raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-        texts = [config_json(config) for config in grid_config]
+        texts = [_config_texts(config) for config in grid_config]
     else:
         num_envs = 1 if num_envs is None else num_envs
         _check_whole("num_envs", num_envs)
-        texts = [config_json(grid_config)] * num_envs
+        texts = [_config_texts(grid_config)] * num_envs
     if not texts:
         raise ValueError("num_envs is 0, expected at least 1")
     places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
-    return [(text, None) for text in places], [places[text] for text in texts]
+    return list(places), [places[text] for text in texts]
 
 
 def _read_threads(num_threads: Optional[int], num_envs: int) -> int:

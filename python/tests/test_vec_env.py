@@ -3,9 +3,8 @@
 import gymnasium
 import numpy as np
 import pytest
-from vec_helpers import CONFIG, Plain, check_step, own_seeds, shared_seed
-
 from pogema_rs.vec_env import AutoresetMode, VecEnv
+from vec_helpers import CONFIG, Plain, check_step, own_seeds, shared_seed
 
 MODES = list(AutoresetMode)
 

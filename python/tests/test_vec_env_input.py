@@ -11,10 +11,10 @@ import warnings
 
 import numpy as np
 import pytest
-from vec_helpers import CONFIG
-
-from pogema_rs import errors
+from pogema_rs import GridConfig, errors
+from pogema_rs.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 from pogema_rs.vec_env import VecEnv
+from vec_helpers import CONFIG
 
 SHAPE = (2, 5, 3, 5, 5)
 
@@ -149,8 +149,8 @@ BAD_VECTORS = [
     ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
     ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32' or 'uint8'"),
     ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),
-    ({"semantics": "3"}, ValueError, "semantics is '3', expected one of '1.4.0', '2.0'"),
-    ({"grid_config": 7}, TypeError, "grid_config is a int, expected a GridConfig or a dict"),
+    ({"semantics": "3"}, ValueError, "semantics is '3', expected '1.4.0' or '2.0'"),
+    ({"grid_config": 7}, TypeError, "grid_config holds a int, expected a GridConfig or a dict"),
     ({"grid_config": []}, ValueError, "expected 0, one for each config"),
     ({"grid_config": [CONFIG] * 3}, ValueError, "num_envs is 2, expected 3, one for each config of the list"),
     ({"grid_config": [CONFIG, {**CONFIG, "num_agents": 4}]}, ValueError, "`num_agents` is `4`, expected 5, since env"),
@@ -158,7 +158,6 @@ BAD_VECTORS = [
     ({"grid_config": [CONFIG, {**CONFIG, "on_target": "nothing"}]}, ValueError, "environment 1 has to share it"),
     ({"grid_config": {**CONFIG, "observation_type": "MAPF"}}, ValueError, "expected `default`"),
     ({"grid_config": {**CONFIG, "persistent": True}}, ValueError, "expected false"),
-    ({"grid_config": {**CONFIG, "desnity": 1}}, ValueError, "`density`"),
     ({"grid_config": {**CONFIG, "obs_radius": 0}}, ValueError, "`obs_radius` is `0`, expected"),
 ]
 
@@ -183,8 +182,20 @@ def test_a_config_may_be_anything_that_knows_its_fields():
         def dict(self):
             return {**CONFIG, "integration": "SampleFactory", "auto_reset": True, "map": None}
 
-    env, other = VecEnv(Config(), 2), VecEnv(CONFIG, 2)
-    np.testing.assert_array_equal(env.reset(seed=2)[0], other.reset(seed=2)[0])
+    expected = VecEnv(CONFIG, 2).reset(seed=2)[0]
+    for config in (Config(), GridConfig(**CONFIG), [CONFIG, Config()]):
+        np.testing.assert_array_equal(VecEnv(config, 2).reset(seed=2)[0], expected)
+
+
+def test_a_config_may_name_a_registered_map():
+    rows = [".#.", "...", "#.."]
+    config = {"num_agents": 2, "obs_radius": 2, "max_episode_steps": 5}
+    RegisteredGrid("three by three", "\n".join(rows))
+    try:
+        named, given = VecEnv({**config, "map_name": "three by three"}, 2), VecEnv({**config, "map": "\n".join(rows)}, 2)
+    finally:
+        del GRID_STR_REGISTRY["three by three"]
+    np.testing.assert_array_equal(named.reset(seed=2)[0], given.reset(seed=2)[0])
 
 
 def test_nothing_can_be_done_before_a_reset_or_after_a_close():

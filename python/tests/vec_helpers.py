@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-
 from pogema_rs import _engine
 from pogema_rs.vec_env import AutoresetMode
 
