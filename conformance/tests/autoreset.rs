@@ -6,7 +6,7 @@
 use pogema_core::{
     Action, Cell, Collision, Config, Environment, EpisodeMeter, Error, Instance, OnGoal, Snapshot, StepOut,
 };
-use pogema_fast::{Autoreset, Batch, Observations};
+use pogema_fast::{Autoreset, Batch, Observations, View};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
@@ -106,12 +106,18 @@ impl Plain {
 }
 
 fn step_batch(batch: &mut Batch, step: u64) -> Vec<Shown> {
+    step_masked(batch, step).0
+}
+
+fn step_masked(batch: &mut Batch, step: u64) -> (Vec<Shown>, Vec<i8>) {
     let num_agents = NUM_LANES * NUM_AGENTS;
     let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![true; num_agents]);
     let mut truncated = terminated.clone();
     let mut observed = vec![0.5; NUM_LANES * config().num_observed()];
+    let mut masks = vec![7; num_agents * 5];
+    let view = View { observations: Observations::F32(&mut observed), masks: Some(&mut masks) };
     let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-    batch.step(&actions(step), out, Observations::F32(&mut observed)).unwrap();
+    batch.step(&actions(step), out, view).unwrap();
     let shown = |lane: usize| {
         let agents = lane * NUM_AGENTS..(lane + 1) * NUM_AGENTS;
         Shown {
@@ -124,7 +130,7 @@ fn step_batch(batch: &mut Batch, step: u64) -> Vec<Shown> {
             has_ended: batch.has_just_ended(lane).unwrap(),
         }
     };
-    (0..NUM_LANES).map(shown).collect()
+    ((0..NUM_LANES).map(shown).collect(), masks)
 }
 
 #[test]
@@ -272,15 +278,20 @@ fn ends_are_observed_in_the_order_asked_for() {
 
 #[test]
 fn masks_allow_what_no_obstacle_forbids() {
+    fn view(masks: &mut [i8]) -> View<'_> {
+        View { observations: Observations::None, masks: Some(masks) }
+    }
     let mut batch = new_batch(Autoreset::SameStep, 2);
     let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];
-    assert_eq!(refusal(batch.mask_actions(&mut masks)), "the batch was not reset yet");
+    assert_eq!(refusal(batch.observe(view(&mut masks))), "the batch was not reset yet");
     batch.reset().unwrap();
-    assert_eq!(refusal(batch.mask_actions(&mut [0])), "action masks has length 1, expected 150");
+    assert_eq!(refusal(batch.observe(view(&mut [0]))), "action masks has length 1, expected 150");
     let (mut num_inactive, mut num_forbidden) = (0, 0);
     for step in 0..NUM_STEPS {
-        let shown = step_batch(&mut batch, step);
-        batch.mask_actions(&mut masks).unwrap();
+        let (shown, masks) = step_masked(&mut batch, step);
+        let mut again = vec![7; masks.len()];
+        batch.observe(view(&mut again)).unwrap();
+        assert_eq!(again, masks);
         for (index, mask) in masks.chunks(5).enumerate() {
             let (lane, agent) = (index / NUM_AGENTS, index % NUM_AGENTS);
             let Shown { state, episode, .. } = &shown[lane];

@@ -2,10 +2,12 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
-use numpy::PyReadwriteArrayDyn;
-use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
+use numpy::{
+    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3,
+    PyReadwriteArrayDyn,
+};
 use pogema_core::{Action, Config, Error, Occupancy, StepOut};
-use pogema_fast::{Autoreset, Observations};
+use pogema_fast::{Autoreset, Observations, View};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -72,11 +74,12 @@ impl Batch {
         let mut guard = self.lock()?;
         let game = Self::open(&mut guard)?;
         py.detach(|| game.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
-        let mut buffer = Buffer::new(&state.0)?;
+        let (observations, active, mut masks) = state;
+        let mut buffer = Buffer::new(&observations)?;
+        let view = View { observations: buffer.lent()?, masks: lent(&mut masks)? };
         let batch = &mut game.batch;
-        let observed = buffer.lent()?;
-        py.detach(|| batch.observe(observed)).map_err(|error| errors::batch(py, &error))?;
-        show(py, &game.batch, None, (state.1, state.2))
+        py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
+        write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
     }
 
     /// Plays one step; returns the environments of which an episode ended.
@@ -99,25 +102,32 @@ impl Batch {
             errors::action(py, text)
         })?;
         let (mut rewards, mut terminated, mut truncated) = ends;
-        let mut buffer = Buffer::new(&state.0)?;
+        let (observations, active, mut masks) = state;
+        let mut buffer = Buffer::new(&observations)?;
+        let view = View { observations: buffer.lent()?, masks: lent(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
-        let (batch, actions, observed) = (&mut game.batch, &game.actions, buffer.lent()?);
-        let played = py.detach(|| batch.step(actions, out, observed));
-        played.map_err(|error| errors::batch(py, &error))?;
-        show(py, &game.batch, None, (state.1, state.2))?;
-        let has_ended = |&env: &usize| game.batch.has_just_ended(env).unwrap_or_default();
-        Ok((0..game.batch.num_lanes()).filter(has_ended).collect())
+        let (batch, actions) = (&mut game.batch, &game.actions);
+        let played = py.detach(|| batch.step(actions, out, view));
+        let shown = played.and_then(|()| write_active(batch, None, active));
+        shown.map_err(|error| errors::batch(py, &error))?;
+        let has_ended = |&env: &usize| batch.has_just_ended(env).unwrap_or_default();
+        Ok((0..batch.num_lanes()).filter(has_ended).collect())
     }
 
     /// Writes the states at the ends of the last episodes of some environments.
     fn ended(&self, py: Python<'_>, envs: Vec<usize>, state: State<'_>) -> PyResult<()> {
         let mut guard = self.lock()?;
         let game = Self::open(&mut guard)?;
-        let mut buffer = Buffer::new(&state.0)?;
-        let (batch, observed) = (&game.batch, buffer.lent()?);
-        py.detach(|| batch.observe_ended(&envs, observed)).map_err(|error| errors::batch(py, &error))?;
-        show(py, batch, Some(&envs), (state.1, state.2))
+        let (observations, active, mut masks) = state;
+        let mut buffer = Buffer::new(&observations)?;
+        let (batch, observed, masks) = (&game.batch, buffer.lent()?, lent(&mut masks)?);
+        let written = py.detach(|| {
+            batch.observe_ended(&envs, observed)?;
+            masks.map_or(Ok(()), |masks| write_ended_masks(batch, &envs, masks))
+        });
+        let written = written.and_then(|()| write_active(batch, Some(&envs), active));
+        written.map_err(|error| errors::batch(py, &error))
     }
 
     /// The figures of the last episodes of some environments, by name.
@@ -138,8 +148,10 @@ impl Batch {
     /// Writes which actions make sense now.
     fn mask_actions(&self, py: Python<'_>, masks: PyReadwriteArray3<'_, i8>) -> PyResult<()> {
         let mut guard = self.lock()?;
-        let batch = &Self::open(&mut guard)?.batch;
-        write_masks(py, batch, None, masks)
+        let batch = &mut Self::open(&mut guard)?.batch;
+        let mut masks = Some(masks);
+        let view = View { observations: Observations::None, masks: lent(&mut masks)? };
+        py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))
     }
 
     /// POGEMA's seed of each environment's present episode.
@@ -295,46 +307,40 @@ fn borrow<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyRead
     })
 }
 
-/// Writes who takes part and what they may do, in all environments now, or in some at the ends of their episodes.
-fn show(
-    py: Python<'_>,
+fn lent<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResult<Option<&'a mut [i8]>> {
+    Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
+}
+
+/// Writes who takes part, in all environments now, or in some at the ends of their episodes.
+fn write_active(
     batch: &pogema_fast::Batch,
     ended: Option<&[usize]>,
-    (mut active, masks): (PyReadwriteArray2<'_, bool>, Option<PyReadwriteArray3<'_, i8>>),
-) -> PyResult<()> {
-    let engine = |index: usize| match ended {
-        Some(envs) => batch.ended(envs[index]).map(|ended| ended.map(|(engine, _)| engine)),
-        None => batch.lane(index).map(Some),
-    };
+    mut active: PyReadwriteArray2<'_, bool>,
+) -> Result<(), Error> {
+    let no_array = |_| Error::State { reason: "active is scattered in memory".into() };
+    let active = active.as_slice_mut().map_err(no_array)?;
     let num_agents = batch.config().num_agents;
-    let active = active.as_slice_mut()?;
     let want = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
-    Error::check_length("active", want, active.len()).map_err(|error| errors::batch(py, &error))?;
+    Error::check_length("active", want, active.len())?;
     for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
-        let engine = engine(index).map_err(|error| errors::batch(py, &error))?;
-        // INVARIANT: what is not there was refused when it was to be observed.
+        let engine = match ended {
+            Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
+            None => Some(batch.lane(index)?),
+        };
+        // INVARIANT: an end that is not there was refused when it was to be observed.
         if let Some(engine) = engine {
             part.copy_from_slice(engine.active());
         }
     }
-    masks.map_or(Ok(()), |masks| write_masks(py, batch, ended, masks))
+    Ok(())
 }
 
-fn write_masks(
-    py: Python<'_>,
-    batch: &pogema_fast::Batch,
-    ended: Option<&[usize]>,
-    mut masks: PyReadwriteArray3<'_, i8>,
-) -> PyResult<()> {
+fn write_ended_masks(batch: &pogema_fast::Batch, envs: &[usize], out: &mut [i8]) -> Result<(), Error> {
     let per_env = batch.config().num_agents * Action::ALL.len();
-    let out = masks.as_slice_mut()?;
-    let written = py.detach(|| match ended {
-        None => batch.mask_actions(out),
-        Some(envs) => envs.iter().zip(out.chunks_exact_mut(per_env)).try_for_each(|(&env, out)| {
-            batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out))
-        }),
-    });
-    written.map_err(|error| errors::batch(py, &error))
+    Error::check_length("action masks", envs.len() * per_env, out.len())?;
+    envs.iter()
+        .zip(out.chunks_exact_mut(per_env))
+        .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }
 
 /// Number of threads that this process may run at once.

@@ -84,11 +84,49 @@ impl Observations<'_> {
     }
 }
 
-/// Some lanes, the actions and buffers of their step if there is one, and where their observations go.
+/// What a step or a look at a batch shows of its lanes; observations alone are a view, too.
+#[derive(Debug)]
+pub struct View<'a> {
+    /// What agents see.
+    pub observations: Observations<'a>,
+    /// Which actions make sense, as [`crate::Engine::mask_actions`] writes them, if that is wanted.
+    ///
+    /// Shape: `[lanes, agents, 5]`
+    pub masks: Option<&'a mut [i8]>,
+}
+
+impl<'a> From<Observations<'a>> for View<'a> {
+    fn from(observations: Observations<'a>) -> Self {
+        Self { observations, masks: None }
+    }
+}
+
+impl View<'_> {
+    pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
+        self.observations.check(num_lanes, config)?;
+        let want = num_lanes * config.num_agents * Action::ALL.len();
+        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", want, masks.len()))
+    }
+
+    fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
+        let num_observed = num_lanes * self.observations.per_lane(config);
+        let (left, right) = self.observations.split_at(num_observed);
+        let num_masks = num_lanes * config.num_agents * Action::ALL.len();
+        let (left_masks, right_masks) = self.masks.map(|masks| masks.split_at_mut(num_masks)).unzip();
+        (Self { observations: left, masks: left_masks }, Self { observations: right, masks: right_masks })
+    }
+
+    fn write(self, lane: &Lane, beyond_cache: bool) -> Result<(), Error> {
+        self.observations.write(lane, beyond_cache)?;
+        self.masks.map_or(Ok(()), |masks| lane.engine.mask_actions(masks))
+    }
+}
+
+/// Some lanes, the actions and buffers of their step if there is one, and what is shown of them.
 pub(super) struct Jobs<'a> {
     pub lanes: &'a mut [Lane],
     pub steps: Option<(&'a [Action], StepOut<'a>)>,
-    pub observations: Observations<'a>,
+    pub view: View<'a>,
     /// Whether the observations of all lanes together are better written around the cache.
     pub beyond_cache: bool,
 }
@@ -128,7 +166,7 @@ impl Jobs<'_> {
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
             }
-            first.observations.write(lane, first.beyond_cache)?;
+            first.view.write(lane, first.beyond_cache)?;
             self = rest;
         }
         Ok(())
@@ -144,7 +182,7 @@ impl Jobs<'_> {
             fetch_all(&engine.targets);
             fetch_all(&engine.ahead);
         }
-        if !matches!(self.observations, Observations::None) {
+        if !matches!(self.view.observations, Observations::None) {
             fetch_all(engine.obstacles.words());
         }
         fetch_all(engine.occupied.words());
@@ -155,14 +193,14 @@ impl Jobs<'_> {
     fn split_at(self, num_lanes: usize) -> (Self, Self) {
         let Some(lane) = self.lanes.first() else { unreachable!("split only while there are lanes") };
         let config = pogema_core::Environment::config(&lane.engine);
-        let (num_agents, per_lane) = (num_lanes * config.num_agents, self.observations.per_lane(config));
+        let num_agents = num_lanes * config.num_agents;
         let beyond_cache = self.beyond_cache;
-        let (left, right) = self.observations.split_at(num_lanes * per_lane);
+        let (left, right) = self.view.split_at(num_lanes, config);
         let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
         let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
         (
-            Self { lanes: left_lanes, steps: left_steps, observations: left, beyond_cache },
-            Self { lanes: right_lanes, steps: right_steps, observations: right, beyond_cache },
+            Self { lanes: left_lanes, steps: left_steps, view: left, beyond_cache },
+            Self { lanes: right_lanes, steps: right_steps, view: right, beyond_cache },
         )
     }
 }

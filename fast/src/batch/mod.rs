@@ -14,7 +14,7 @@ use jobs::Jobs;
 use lane::Lane;
 use prepare::Preparer;
 
-pub use jobs::Observations;
+pub use jobs::{Observations, View};
 pub use prepare::Instances;
 
 /// What follows the end of a lane's episode by itself.
@@ -148,45 +148,47 @@ impl Batch {
         begun
     }
 
-    /// Plays one step in every lane, begins new episodes as [`Autoreset`] says, and observes.
+    /// Plays one step in every lane, begins new episodes as [`Autoreset`] says, and shows what comes out.
     ///
     /// Shape: `actions` and each buffer of `out` are `[lanes, agents]`.
     ///
     /// # Errors
     /// Before the first reset, for a list or buffer of the wrong length, or if a lane's next episode could not
     /// begin in an earlier step; nothing is played then.
-    pub fn step(
+    pub fn step<'a>(
         &mut self,
         actions: &[Action],
         out: StepOut<'_>,
-        observations: Observations<'_>,
+        view: impl Into<View<'a>>,
     ) -> Result<(), Error> {
+        let view = view.into();
         self.check_started()?;
         let num_agents = self.lanes.len() * self.config.num_agents;
         Error::check_length("actions", num_agents, actions.len())?;
         out.check(num_agents)?;
-        observations.check(self.lanes.len(), &self.config)?;
+        view.check(self.lanes.len(), &self.config)?;
         if let Some(failure) = self.lanes.iter().find_map(|lane| lane.failure.as_ref()) {
             return Err(failure.clone());
         }
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
-        let beyond_cache = observations.is_beyond_cache();
+        let beyond_cache = view.observations.is_beyond_cache();
         let steps = Some((actions, out));
-        let jobs = Jobs { lanes: &mut self.lanes, steps, observations, beyond_cache };
+        let jobs = Jobs { lanes: &mut self.lanes, steps, view, beyond_cache };
         jobs.run(self.pool.as_ref(), &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
     }
 
-    /// Observes every lane.
+    /// Observes every lane, or shows whatever else is asked for.
     ///
     /// # Errors
     /// Before the first reset, or for a buffer of the wrong length.
     ///
     /// Rule: observe/default
-    pub fn observe(&mut self, observations: Observations<'_>) -> Result<(), Error> {
+    pub fn observe<'a>(&mut self, view: impl Into<View<'a>>) -> Result<(), Error> {
+        let view = view.into();
         self.check_started()?;
-        observations.check(self.lanes.len(), &self.config)?;
-        let beyond_cache = observations.is_beyond_cache();
-        let jobs = Jobs { lanes: &mut self.lanes, steps: None, observations, beyond_cache };
+        view.check(self.lanes.len(), &self.config)?;
+        let beyond_cache = view.observations.is_beyond_cache();
+        let jobs = Jobs { lanes: &mut self.lanes, steps: None, view, beyond_cache };
         jobs.run(self.pool.as_ref(), &|_, _, _| Ok(()))
     }
 
@@ -215,19 +217,6 @@ impl Batch {
                 engines[index].observe_bits(0..self.config.num_agents, out)
             }),
         }
-    }
-
-    /// Writes for every lane which actions make sense, as [`Engine::mask_actions`] does.
-    ///
-    /// Shape: `[lanes, agents, 5]`
-    ///
-    /// # Errors
-    /// Before the first reset, or for a buffer of the wrong length.
-    pub fn mask_actions(&self, out: &mut [i8]) -> Result<(), Error> {
-        self.check_started()?;
-        let per_lane = self.config.num_agents * Action::ALL.len();
-        Error::check_length("action masks", self.lanes.len() * per_lane, out.len())?;
-        self.in_parts(per_lane, out, |lane, out| self.lanes[lane].engine.mask_actions(out))
     }
 
     /// The environment of a lane.
