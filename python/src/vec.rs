@@ -267,9 +267,11 @@ impl Game {
 
     /// Takes actions over, or names the first that is none.
     fn read_actions(&mut self, numbers: &[i64]) -> Result<(), (usize, i64)> {
-        let num_actions = Action::ALL.len() as u64;
-        if let Some(index) = numbers.iter().position(|&number| number as u64 >= num_actions) {
-            return Err((index, numbers[index]));
+        let is_action = |&number: &i64| (number as u64) < Action::ALL.len() as u64;
+        // Without an early end, so that many are looked at in one instruction.
+        if !numbers.iter().fold(true, |all, number| all & is_action(number)) {
+            let wrong = numbers.iter().position(|number| !is_action(number)).unwrap_or_default();
+            return Err((wrong, numbers[wrong]));
         }
         self.actions.clear();
         self.actions.extend(numbers.iter().map(|&number| Action::ALL[number as usize]));
