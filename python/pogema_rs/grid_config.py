@@ -138,15 +138,25 @@ def _derived(fields: dict[str, Any]) -> dict[str, Any]:
     result = {**fields, **{name: derived[name] for name in GridConfig._DERIVED}}
     if isinstance(text, str):
         result["map"] = derived["map"]
-        result.update({name: derived[name] for name in GridConfig._PLACES})
-        for name in ("possible_agents_xy", "possible_targets_xy"):
-            if derived[name] is not None and name not in fields:
+        if _has_letters(text):
+            result.update(agents_xy=derived["agents_xy"], targets_xy=derived["targets_xy"])
+        elif _gives_pools(text) and (fields.get("agents_xy") is None or fields.get("targets_xy") is None):
+            for name in ("possible_agents_xy", "possible_targets_xy"):
                 result[name] = [tuple(cell) for cell in derived[name]]
     return result
 
 
+def _has_letters(text: str) -> bool:
+    return any(character.isascii() and character.isalpha() for character in text)
+
+
+def _gives_pools(text: str) -> bool:
+    """Whether a map marks cells, and leaves none of the two pools empty."""
+    return any(sign in text for sign in "@$!") and all(any(sign in text for sign in pool) for pool in (".@", ".$"))
+
+
 def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
-    has_letters = any(character.isascii() and character.isalpha() for character in text)
+    has_letters = _has_letters(text)
     if has_letters and any(character in "@$!" for character in text):
         raise MapTextError("config: `map` has letters beside `@`, `$` or `!`, expected one or the other")
     if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:

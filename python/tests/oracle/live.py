@@ -1,0 +1,96 @@
+"""Both sides of the comparison, at work at the same time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+from compare import Comparison, Difference
+from player import Outcome, Package, Player
+from scripts import Call, Case, case
+from theirs import receive, send
+
+HERE = Path(__file__).resolve().parent
+VARIABLE = "POGEMA_ORACLE_PYTHON"
+
+
+class Oracle:
+    """POGEMA 1.4.0 in a process of its own."""
+
+    def __init__(self) -> None:
+        python = os.environ.get(VARIABLE)
+        if not python:
+            raise RuntimeError(
+                f"{VARIABLE} is not set: `python3.11 conformance/oracle/install.py target/oracle/venv` "
+                "installs POGEMA 1.4.0 and prints what it has to be"
+            )
+        self.process = subprocess.Popen([python, str(HERE / "theirs.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.version = receive(self.process.stdout)
+
+    def ask(self, script: list[Call]) -> None:
+        """Gives a script to play; its outcomes come by `answer`."""
+        send(self.process.stdin, script)
+
+    def answer(self) -> list[Outcome]:
+        """The outcomes of the oldest script asked for."""
+        return receive(self.process.stdout)
+
+    def close(self) -> None:
+        """Ends the process."""
+        self.process.stdin.close()
+        self.process.wait(timeout=30)
+        self.process.stdout.close()
+
+
+def ours() -> Package:
+    """The package under test."""
+    from pogema_rs.envs import _make_pogema
+    from pogema_rs.grid_config import GridConfig
+
+    return Package(GridConfig, _make_pogema)
+
+
+class Run:
+    """Cases played on both sides, one after the other, while the next one is played by POGEMA."""
+
+    def __init__(self, seed: int, numbers: range) -> None:
+        self.seed, self.numbers = seed, numbers
+        self.comparison = Comparison()
+        self.kinds: Counter[str] = Counter()
+        self.differences: list[Difference] = []
+
+    def play(self, most_differences: int = 5) -> None:
+        """Plays all, or until so many differ."""
+        oracle, package = Oracle(), ours()
+        try:
+            if oracle.version != "1.4.0":
+                raise RuntimeError(f"POGEMA is {oracle.version}, expected 1.4.0")
+            cases = (case(self.seed, number) for number in self.numbers)
+            waiting: list[Case] = []
+            for one in cases:
+                oracle.ask(one.script)
+                waiting.append(one)
+                if len(waiting) > 1:
+                    self._compare(waiting.pop(0), oracle, package)
+                if len(self.differences) >= most_differences:
+                    break
+            for one in waiting:
+                self._compare(one, oracle, package)
+        finally:
+            oracle.process.kill() if self.differences else oracle.close()
+
+    def _compare(self, one: Case, oracle: Oracle, package: Package) -> None:
+        self.kinds.update(one.kinds)
+        outcomes = Player(package).play(one.script)
+        difference = self.comparison.compare(one, oracle.answer(), outcomes)
+        if difference:
+            self.differences.append(difference)
+
+    def __str__(self) -> str:
+        counts = self.comparison
+        return (
+            f"{len(self.numbers)} cases with seed {self.seed}: {counts.num_calls} calls compared, {counts.num_steps} "
+            f"of them steps and {counts.num_errors} errors; {sum(counts.known.values())} differences by decision"
+        )

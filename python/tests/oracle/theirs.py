@@ -1,0 +1,44 @@
+"""POGEMA 1.4.0's side: plays the scripts that come in, each preceded by its length, and sends the outcomes back."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from typing import Any, BinaryIO
+
+from player import Package, Player
+
+
+def send(pipe: BinaryIO, value: Any) -> None:
+    """Writes one value."""
+    data = pickle.dumps(value, protocol=5)
+    pipe.write(len(data).to_bytes(8, "little") + data)
+    pipe.flush()
+
+
+def receive(pipe: BinaryIO) -> Any:
+    """Reads one value; EOFError at the end."""
+    head = pipe.read(8)
+    if len(head) < 8:
+        raise EOFError
+    return pickle.loads(pipe.read(int.from_bytes(head, "little")))
+
+
+def main() -> None:
+    """Serves until the input ends."""
+    import pogema
+    from pogema.envs import _make_pogema
+
+    out, sys.stdout = sys.stdout.buffer, sys.stderr
+    send(out, pogema.__version__)
+    package = Package(pogema.GridConfig, _make_pogema)
+    while True:
+        try:
+            script = receive(sys.stdin.buffer)
+        except EOFError:
+            return
+        send(out, Player(package).play(script))
+
+
+if __name__ == "__main__":
+    main()
