@@ -47,6 +47,9 @@ class Grid:
         self.config = grid_config
         self._obstacles: Optional[np.ndarray] = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_obstacles": None}
+
     @property
     def obstacles(self) -> np.ndarray:
         """The map with its border, 1 for an obstacle: float64 if what lies beyond the wall is free, else int64."""

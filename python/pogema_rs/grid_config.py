@@ -107,8 +107,11 @@ _OF_ENGINE = tuple(name for name in GridConfig.model_fields if name not in ("int
 
 def engine_json(config: GridConfig | Mapping[str, Any], **changes: Any) -> str:
     """A config as the engine reads it."""
-    fields = config if isinstance(config, Mapping) else config.__dict__
-    own = {name: fields[name] for name in _OF_ENGINE if name in fields}
+    if isinstance(config, Mapping):
+        own = {name: config[name] for name in _OF_ENGINE if name in config}
+    else:
+        # The longer side follows from the two, and may be less than a size that is given.
+        own = {name: config.__dict__[name] for name in _OF_ENGINE if name != "size"}
     return json.dumps({**own, **changes}, default=_plain)
 
 

@@ -2,10 +2,13 @@
 
 mod astar;
 mod config;
+mod drawn;
 mod engine;
 mod errors;
 mod film;
 mod lists;
+mod observe;
+mod state;
 
 use pyo3::prelude::*;
 
@@ -15,5 +18,6 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<astar::AStarAgent>()?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
+    module.add_function(wrap_pyfunction!(state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

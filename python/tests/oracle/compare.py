@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from player import Outcome
+from configs import Fields
 from scripts import Call, Case
 from surprises import SURPRISES
 
@@ -37,13 +38,20 @@ class Comparison:
         self.num_calls = 0
         self.num_steps = 0
         self.num_errors = 0
+        self.num_ends = 0
+        self.num_metrics = 0
+        self.has_vanished = False
         self.known: dict[str, int] = {}
 
     def compare(self, case: Case, theirs: list[Outcome], ours: list[Outcome]) -> Difference | None:
         """The first difference that nobody wants."""
+        self.has_vanished = False
         for index, (call, their, our) in enumerate(zip(case.script, theirs, ours)):
             self.num_calls += 1
-            self.num_steps += call[0] in ("step", "sample") and "value" in their
+            if call[0] in ("step", "sample") and "value" in their:
+                self._count_step(call, their)
+            elif call[0] == "reset":
+                self.has_vanished = False
             self.num_errors += "error" in their
             if case.surprise and index == len(case.script) - 1:
                 return self._surprised(case, index, their, our)
@@ -60,29 +68,63 @@ class Comparison:
             return Difference(case, min(len(theirs), len(ours)) - 1, "one of them ended", theirs[-1], ours[-1])
         return None
 
+    def _count_step(self, call: Call, their: Outcome) -> None:
+        self.num_steps += 1
+        self.has_vanished |= their["value"][1]
+        _, (_, _, terminated, truncated, infos) = their["value"][0]
+        is_over = any(all(flag == ("bool", "True") for flag in flags[1]) for flags in (terminated, truncated))
+        self.num_ends += is_over
+        self.num_metrics += "'metrics'" in repr(infos)
+
     def _surprised(self, case: Case, index: int, their: Outcome, our: Outcome) -> Difference | None:
         expected = _EXPECTED[case.surprise]
         for side, outcome, error in (("POGEMA", their, expected.theirs), ("ours", our, expected.ours)):
             if _classes(outcome)[:1] != ([error] if error else []):
                 reason = f"{case.surprise}: {side} was to give {error or 'a value'}"
                 return Difference(case, index, reason, their, our)
-        if their.get("value") == our.get("value"):
+        if "value" in our and their.get("value") == our["value"]:
             return Difference(case, index, f"{case.surprise}: no difference any more", their, our)
         self.known[case.surprise] = self.known.get(case.surprise, 0) + 1
         return None
 
     def _known(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:
         """The name of a difference by decision, and whether the rest of the case cannot be compared."""
+        if _is_masked(call, their) and "ValidationError" in _classes(our):
+            # docs/spec/defects.md, Instances and seeds: a KeyError hides what is wrong with the starts.
+            return "malformed starts", False
+        if "timeout" in their and call[1:2] == ("get_lifelong_targets_xy",) and "would never end" in _text(our):
+            # docs/spec/differences.md, Starts and goals: a pool of which one goal alone can be drawn.
+            return "goals foretold for ever", True
+        if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
+            # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, once that has become smaller.
+            return "pool outside the map", True
+        return self._known_of_play(case, call, their, our)
+
+    def _known_of_play(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:
         is_soft = "soft" in repr(case.script)
         wrote = "does not support item assignment" in _text(their)
         if call[0] == "step" and is_soft and wrote and call[2] == "tuple" and "value" in our:
+            # docs/spec/defects.md, Collisions and occupancy: the caller's actions stay the caller's.
             return "soft writes into a tuple", True
         if call == ("left",) and is_soft and their.get("value") != our.get("value"):
             return "soft writes into the actions", False
-        if call[0] in ("back", "step") and case.fields.get("persistent") and is_soft and "error" in their:
-            if any(text in _text(their) for text in ("is not in the map", "Can't force agent", "already occupied")):
-                return "a step back after agents have vanished", True
+        if call[0] == "back" and case.fields.get("persistent") and self.has_vanished:
+            # docs/spec/differences.md, Metrics and history: POGEMA loses marks, or raises.
+            return "a step back after agents have vanished", True
+        if call[0] == "back" and "Can't force agent to blocked position" in _text(their) and _has_pools(case.fields):
+            # docs/spec/differences.md, Metrics and history: the start was an obstacle.
+            return "a step back onto an obstacle", True
         return "", False
+
+
+def _is_masked(call: Call, their: Outcome) -> bool:
+    is_config = call[0] in ("config", "make")
+    return is_config and "num_agents" not in call[1] and _text(their) == "'agents_xy'"
+
+
+def _has_pools(fields: Fields) -> bool:
+    """Whether agents may start on obstacles."""
+    return "possible_agents_xy" in fields
 
 
 def _text(outcome: Outcome) -> str:

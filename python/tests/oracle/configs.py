@@ -67,13 +67,13 @@ class Draw:
         kind = self.one(MAPS)
         self.note(f"map {kind}")
         if kind in ("size", "rectangle", "default"):
-            fields["density"] = self.one((0.0, 0.1, 0.2, 0.3, 0.45, 0.6))
             height = width = 8
             if kind == "size":
                 height = width = fields["size"] = self.number(2, 7)
             elif kind == "rectangle":
                 height, width = self.number(1, 7), self.number(1, 7)
                 fields.update(height=height, width=width)
+            fields["density"] = self.one((0.0, 0.1, 0.2, 0.3, 0.45) if height * width > 25 else (0.0, 0.1))
             return ["." * width] * height
         height, width = self.number(1, 6), self.number(2, 7)
         if kind == "pools":

@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from compare import Comparison, Difference
 from player import Outcome, Package, Player
 from scripts import Call, Case, case
+from surprises import Surprise
 from theirs import receive, send
 
 HERE = Path(__file__).resolve().parent
@@ -52,6 +55,18 @@ def ours() -> Package:
     return Package(GridConfig, _make_pogema)
 
 
+@contextmanager
+def oracle() -> Iterator[Oracle]:
+    """POGEMA 1.4.0, ended in the end."""
+    pogema = Oracle()
+    try:
+        if pogema.version != "1.4.0":
+            raise RuntimeError(f"POGEMA is {pogema.version}, expected 1.4.0")
+        yield pogema
+    finally:
+        pogema.close()
+
+
 class Run:
     """Cases played on both sides, one after the other, while the next one is played by POGEMA."""
 
@@ -63,28 +78,31 @@ class Run:
 
     def play(self, most_differences: int = 5) -> None:
         """Plays all, or until so many differ."""
-        oracle, package = Oracle(), ours()
-        try:
-            if oracle.version != "1.4.0":
-                raise RuntimeError(f"POGEMA is {oracle.version}, expected 1.4.0")
-            cases = (case(self.seed, number) for number in self.numbers)
+        package = ours()
+        with oracle() as pogema:
             waiting: list[Case] = []
-            for one in cases:
-                oracle.ask(one.script)
-                waiting.append(one)
+            for number in self.numbers:
+                waiting.append(case(self.seed, number))
+                pogema.ask(waiting[-1].script)
                 if len(waiting) > 1:
-                    self._compare(waiting.pop(0), oracle, package)
+                    self._compare(waiting.pop(0), pogema, package)
                 if len(self.differences) >= most_differences:
                     break
             for one in waiting:
-                self._compare(one, oracle, package)
-        finally:
-            oracle.process.kill() if self.differences else oracle.close()
+                self._compare(one, pogema, package)
 
-    def _compare(self, one: Case, oracle: Oracle, package: Package) -> None:
+    @staticmethod
+    def surprise(surprise: Surprise) -> Difference | None:
+        """What is wrong with a difference by decision."""
+        one = Case(0, surprise.fields, list(surprise.script), set(), surprise.name)
+        with oracle() as pogema:
+            pogema.ask(one.script)
+            return Comparison().compare(one, pogema.answer(), Player(ours()).play(one.script))
+
+    def _compare(self, one: Case, pogema: Oracle, package: Package) -> None:
         self.kinds.update(one.kinds)
         outcomes = Player(package).play(one.script)
-        difference = self.comparison.compare(one, oracle.answer(), outcomes)
+        difference = self.comparison.compare(one, pogema.answer(), outcomes)
         if difference:
             self.differences.append(difference)
 
@@ -92,5 +110,6 @@ class Run:
         counts = self.comparison
         return (
             f"{len(self.numbers)} cases with seed {self.seed}: {counts.num_calls} calls compared, {counts.num_steps} "
-            f"of them steps and {counts.num_errors} errors; {sum(counts.known.values())} differences by decision"
+            f"of them steps, {counts.num_ends} of these the end of an episode ({counts.num_metrics} with metrics), and "
+            f"{counts.num_errors} errors; {sum(counts.known.values())} differences by decision"
         )

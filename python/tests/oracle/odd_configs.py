@@ -67,7 +67,6 @@ ACCEPTED: tuple[Fields, ...] = (
     {"map": "@.$", "seed": 1, "possible_agents_xy": [[0, 1]], "possible_targets_xy": [[0, 1]]},
     {"agents_xy": ([0, 0], (0, 1)), "targets_xy": ((1, 1), [1, 0]), "size": 3, "seed": 5},
     {"agents_xy": [[0, 0], [1, 1], [2, 2]], "targets_xy": [[1, 0], [0, 1], [0, 0]], "num_agents": 2, "size": 3, "seed": 5},
-    {"agents_xy": [[False, True]], "targets_xy": [[True, True]], "size": 3, "seed": 5},
     {"agents_xy": [], "seed": 1, "size": 3, "density": 0.0},
     {"map": "...", "agents_xy": [[0, 1]], "targets_xy": [[0, 1]], "obs_radius": 1},
     {"map": "...", "agents_xy": [[0, 1]], "targets_xy": [[[0, 1], [0, 1], [0, 2]]], "on_target": "restart"},

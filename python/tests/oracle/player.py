@@ -19,7 +19,7 @@ import numpy as np
 Described = tuple
 Outcome = dict[str, Any]
 
-TIME_LIMIT = 5.0
+TIME_LIMIT = 2.0
 GREEDY = 9
 
 _MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
@@ -115,9 +115,15 @@ class Player:
             plan = [wanted[i] if action == GREEDY and i < len(wanted) else action for i, action in enumerate(plan)]
         actions = contained(plan, form)
         try:
-            return described(self.env.step(actions))
+            return (described(self.env.step(actions)), self._has_vanished())
         finally:
             self.left = described(actions)
+
+    def _has_vanished(self) -> bool:
+        """Whether an agent that takes part is not marked where it stands."""
+        grid = self.env.unwrapped.grid
+        marks, active = grid.positions, grid.is_active
+        return any(active[agent] and not marks[cell] for agent, cell in enumerate(grid.positions_xy))
 
     def _left(self) -> Described:
         """What the last step made of the caller's actions."""
@@ -136,7 +142,8 @@ class Player:
 
     def _sample(self) -> Described:
         drawn = self.env.sample_actions()
-        return (described(drawn), described(self.env.step(drawn)))
+        told = described(drawn)
+        return (described(self.env.step(drawn)), self._has_vanished(), told)
 
     def _back(self) -> Described:
         return described(self.env.step_back())

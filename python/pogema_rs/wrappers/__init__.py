@@ -1,0 +1,1 @@
+"""What POGEMA puts around its environments, under POGEMA's names."""
