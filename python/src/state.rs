@@ -47,7 +47,7 @@ struct Episode {
 /// The environment that [`save`] made these bytes of.
 ///
 /// # Errors
-/// ValueError for any other bytes.
+/// `ValueError` for any other bytes.
 #[pyfunction]
 pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
     restored(saved).map_err(|error| errors::call(py, &error))

@@ -40,12 +40,12 @@ class Comparison:
         self.num_errors = 0
         self.num_ends = 0
         self.num_metrics = 0
-        self.has_vanished = False
+        self.has_vanished = self.was_reset = False
         self.known: dict[str, int] = {}
 
     def compare(self, case: Case, theirs: list[Outcome], ours: list[Outcome]) -> Difference | None:
         """The first difference that nobody wants."""
-        self.has_vanished = False
+        self.has_vanished = self.was_reset = False
         for index, (call, their, our) in enumerate(zip(case.script, theirs, ours)):
             self.num_calls += 1
             if call[0] in ("step", "sample") and "value" in their:
@@ -64,6 +64,11 @@ class Comparison:
             reason = _difference(call, their, our)
             if reason:
                 return Difference(case, index, reason, their, our)
+            if call[0] == "reset" and "error" in their and self.was_reset:
+                # POGEMA's time limit begins anew, though nothing else does; here nothing changes.
+                self.known["a reset that fails"] = self.known.get("a reset that fails", 0) + 1
+                return None
+            self.was_reset |= call[0] == "reset" and "value" in their
         if len(theirs) != len(ours):
             return Difference(case, min(len(theirs), len(ours)) - 1, "one of them ended", theirs[-1], ours[-1])
         return None
@@ -111,6 +116,9 @@ class Comparison:
         if call[0] == "back" and case.fields.get("persistent") and self.has_vanished:
             # docs/spec/differences.md, Metrics and history: POGEMA loses marks, or raises.
             return "a step back after agents have vanished", True
+        if call[0] == "back" and is_soft and "already occupied" in _text(their) and "value" in our:
+            # The same, of an agent that finished where another one had just left: it vanished in that very step.
+            return "a step back of an agent that followed and finished", True
         if call[0] == "back" and "Can't force agent to blocked position" in _text(their) and _has_pools(case.fields):
             # docs/spec/differences.md, Metrics and history: the start was an obstacle.
             return "a step back onto an obstacle", True

@@ -32,8 +32,8 @@ class Oracle:
         self.process = subprocess.Popen([python, str(HERE / "theirs.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self.version = receive(self.process.stdout)
 
-    def ask(self, script: list[Call]) -> None:
-        """Gives a script to play; its outcomes come by `answer`."""
+    def ask(self, script: list[Call] | int) -> None:
+        """Gives a script to play, or the number of a config to draw an instance of; the result comes by `answer`."""
         send(self.process.stdin, script)
 
     def answer(self) -> list[Outcome]:

@@ -11,13 +11,17 @@ from collections.abc import Iterator
 
 import pytest
 
+import generators
 from compare import Comparison
 from configs import COLLISIONS, MAPS, OBSERVATIONS, ON_TARGET, PLACES
 from live import Run, oracle
 from scripts import CONTAINERS, case
 from surprises import SURPRISES
 
-NUM_CASES = int(os.environ.get("POGEMA_ORACLE_CASES", "2000"))
+from pogema_rs import generator
+from pogema_rs.grid_config import GridConfig
+
+NUM_CASES = int(os.environ.get("POGEMA_ORACLE_CASES", "1500"))
 SEED = int(os.environ.get("POGEMA_ORACLE_SEED", "1"))
 
 KINDS = (
@@ -66,6 +70,14 @@ def test_the_cases_cover_everything(run: Run) -> None:
 def test_differences_by_decision(surprise: object) -> None:
     """Each difference is one, and of the kind that is told."""
     assert Run.surprise(surprise) is None
+
+
+def test_the_generators_draw_the_same() -> None:
+    """The functions that draw instances give the same, and take as much from their random numbers."""
+    with oracle() as pogema:
+        for number in range(generators.NUM_CASES):
+            pogema.ask(number)
+            assert generators.drawn(generator, GridConfig, number) == pogema.answer(), number
 
 
 def test_a_case_is_a_function_of_its_number() -> None:

@@ -6,6 +6,7 @@ import pickle
 import sys
 from typing import Any, BinaryIO
 
+import generators
 from player import Package, Player
 
 
@@ -27,6 +28,7 @@ def receive(pipe: BinaryIO) -> Any:
 def main() -> None:
     """Serves until the input ends."""
     import pogema
+    import pogema.generator
     from pogema.envs import _make_pogema
 
     out, sys.stdout = sys.stdout.buffer, sys.stderr
@@ -37,7 +39,10 @@ def main() -> None:
             script = receive(sys.stdin.buffer)
         except EOFError:
             return
-        send(out, Player(package).play(script))
+        if isinstance(script, int):
+            send(out, generators.drawn(pogema.generator, pogema.GridConfig, script))
+        else:
+            send(out, Player(package).play(script))
 
 
 if __name__ == "__main__":
