@@ -5,6 +5,7 @@ All coordinates are (row, col) and count the border, unless `ignore_borders` is 
 
 from __future__ import annotations
 
+import warnings
 from copy import deepcopy
 from typing import Any, Optional
 
@@ -31,7 +32,8 @@ class Grid:
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
         engine = _engine.Engine(engine_json(grid_config), grid_registry.map_text(grid_config.map_name))
-        engine.reset()
+        for text in engine.reset():
+            warnings.warn(text, UserWarning, stacklevel=2)
         self._show(engine, grid_config)
         if not add_artificial_border:
             raise StateError("add_artificial_border is False, expected True: an environment always has its border")

@@ -40,6 +40,7 @@ class Comparison:
         self.num_errors = 0
         self.num_ends = 0
         self.num_metrics = 0
+        self.num_warnings = 0
         self.has_vanished = self.was_reset = False
         self.known: dict[str, int] = {}
 
@@ -53,6 +54,7 @@ class Comparison:
             elif call[0] == "reset":
                 self.has_vanished = False
             self.num_errors += "error" in their
+            self.num_warnings += len(_warned(their))
             if case.surprise and index == len(case.script) - 1:
                 return self._surprised(case, index, their, our)
             known, ends = self._known(case, call, their, our)
@@ -103,6 +105,9 @@ class Comparison:
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
             # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, once that has become smaller.
             return "pool outside the map", True
+        if call[0] in ("reset", "grid") and "map_name" in case.fields and "has room" in _text(our) and "value" in their:
+            # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.
+            return "registered map without room", True
         return self._known_of_play(case, call, their, our)
 
     def _known_of_play(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:

@@ -12,7 +12,7 @@ Cells = list[list[int]]
 ON_TARGET = ("finish", "nothing", "restart")
 COLLISIONS = ("priority", "block_both", "soft")
 OBSERVATIONS = ("default", "POMAPF", "MAPF")
-MAPS = ("size", "size", "rectangle", "default", "text", "letters", "pools", "list")
+MAPS = ("registered", "size", "size", "rectangle", "default", "text", "letters", "pools", "list")
 PLACES = ("drawn", "drawn", "explicit", "sequences", "pools", "half")
 
 
@@ -22,6 +22,7 @@ class Draw:
     def __init__(self, generator: np.random.Generator) -> None:
         self.generator = generator
         self.kinds: set[str] = set()
+        self.registered: tuple[str, str] | None = None
 
     def chance(self, probability: float) -> bool:
         """True with a probability."""
@@ -75,7 +76,7 @@ class Draw:
                 fields.update(height=height, width=width)
             fields["density"] = self.one((0.0, 0.1, 0.2, 0.3, 0.45) if height * width > 25 else (0.0, 0.1))
             return ["." * width] * height
-        height, width = self.number(1, 6), self.number(2, 7)
+        height, width = self.number(1 if kind != "registered" else 3, 6), self.number(2, 7)
         if kind == "pools":
             signs, odds = ".#@$!", (0.4, 0.15, 0.2, 0.2, 0.05)
         else:
@@ -83,7 +84,10 @@ class Draw:
         rows = ["".join(self.generator.choice(list(signs), size=width, p=odds)) for _ in range(height)]
         if kind == "letters":
             rows = self._lettered(rows, fields)
-        if kind == "list":
+        if kind == "registered":
+            fields["map_name"] = "registered"
+            self.registered = ("registered", "\n".join(rows))
+        elif kind == "list":
             fields["map"] = [[int(sign == "#") for sign in row] for row in rows]
         else:
             fields["map"] = self.one(("\n", "\n   ", " ")).join(rows)

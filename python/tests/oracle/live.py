@@ -49,10 +49,12 @@ class Oracle:
 
 def ours() -> Package:
     """The package under test."""
+    from pogema_rs import grid_registry
     from pogema_rs.envs import _make_pogema
+    from pogema_rs.grid import Grid
     from pogema_rs.grid_config import GridConfig
 
-    return Package(GridConfig, _make_pogema)
+    return Package(GridConfig, _make_pogema, Grid, grid_registry)
 
 
 @contextmanager

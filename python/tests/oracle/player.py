@@ -39,6 +39,8 @@ class Package:
 
     config_class: Any
     make: Any
+    grid_class: Any
+    registry: Any
 
 
 def described(value: Any) -> Described:
@@ -69,7 +71,7 @@ class Player:
     def __init__(self, package: Package) -> None:
         self.package = package
         self.env: Any = None
-        self.reset_seen = False
+        self.registered: list[str] = []
 
     def play(self, script: list[tuple]) -> list[Outcome]:
         """The outcome of each call; after one that does not end, no more."""
@@ -79,6 +81,8 @@ class Player:
             outcomes.append(self._outcome(call))
             if "timeout" in outcomes[-1] or (call[0] == "make" and "error" in outcomes[-1]):
                 break
+        for name in self.registered:
+            del self.package.registry.GRID_STR_REGISTRY[name]
         return outcomes
 
     def _outcome(self, call: tuple) -> Outcome:
@@ -96,6 +100,15 @@ class Player:
                 signal.setitimer(signal.ITIMER_REAL, 0)
         outcome["warnings"] = [([kind.__name__ for kind in one.category.__mro__], str(one.message)) for one in caught]
         return outcome
+
+    def _register(self, name: str, text: str) -> Described:
+        made = self.package.registry.RegisteredGrid(name, text)
+        self.registered.append(name)
+        return described([made.get_obstacles(), made.get_agents_xy(), made.get_targets_xy()])
+
+    def _grid(self, fields: dict[str, Any]) -> Described:
+        grid = self.package.grid_class(self.package.config_class(**copy.deepcopy(fields)))
+        return described([grid.get_obstacles(), grid.get_obstacles(True), grid.positions_xy, grid.finishes_xy])
 
     def _config(self, fields: dict[str, Any]) -> Described:
         return described(self.package.config_class(**copy.deepcopy(fields)).dict())

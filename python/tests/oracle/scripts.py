@@ -89,7 +89,11 @@ class _Episodes:
 
     def script(self) -> list[Call]:
         draw = self.draw
-        self.calls = [("make", self.fields)]
+        self.calls = [("register", *draw.registered)] if draw.registered else []
+        self.calls.append(("make", self.fields))
+        if draw.chance(0.1) and self.fields.get("seed") is not None:
+            draw.note("grid of a config")
+            self.calls.append(("grid", self.fields))
         if draw.chance(0.06):
             draw.note("before the reset")
             self.calls += [("step", [0] * self.num_agents, "list"), ("render",), ("call", "get_agents_xy", (), {})]

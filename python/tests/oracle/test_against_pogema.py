@@ -36,7 +36,7 @@ KINDS = (
     *("agents_xy alone", "targets_xy alone", "possible_agents_xy alone", "possible_targets_xy alone"),
     *("refused config", "refused at the reset", "odd config", "surprise", "before the reset", "reset with a seed"),
     *("step", "odd action", "wrong action", "sampled actions", "seed changed", "config updated", "config replaced"),
-    *("render", "history", "no history", "step back", "elapsed steps"),
+    *("grid of a config", "render", "history", "no history", "step back", "elapsed steps"),
 )
 """What the drawn cases have to cover; each at least once in 250 cases."""
 
@@ -63,6 +63,7 @@ def test_the_cases_cover_everything(run: Run) -> None:
     assert not set(run.kinds) - set(KINDS), "a kind that is drawn is not asked for"
     assert run.comparison.num_steps > NUM_CASES
     assert run.comparison.num_ends > NUM_CASES / 20
+    assert run.comparison.num_warnings > NUM_CASES / 100
     assert run.comparison.num_metrics > NUM_CASES / 20
 
 

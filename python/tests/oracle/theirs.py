@@ -29,11 +29,13 @@ def main() -> None:
     """Serves until the input ends."""
     import pogema
     import pogema.generator
+    from pogema import grid_registry
     from pogema.envs import _make_pogema
+    from pogema.grid import Grid
 
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     send(out, pogema.__version__)
-    package = Package(pogema.GridConfig, _make_pogema)
+    package = Package(pogema.GridConfig, _make_pogema, Grid, grid_registry)
     while True:
         try:
             script = receive(sys.stdin.buffer)
