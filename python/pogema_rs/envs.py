@@ -11,7 +11,7 @@ import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError, NotResetError, StateError
-from pogema_rs.grid import Grid, GridLifeLong, foretold_goals
+from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_json
 from pogema_rs.semantics import Semantics
 from pogema_rs.wrappers import persistence
@@ -253,7 +253,8 @@ class PogemaLifeLong(Pogema):
 
         Rule: goal/restart/foretold
         """
-        return foretold_goals(self._started(), ignore_borders)
+        given = given_goals(self.grid_config, ignore_borders)
+        return given if given is not None else foretold_goals(self._started(), ignore_borders)
 
 
 class PogemaCoopFinish(Pogema):

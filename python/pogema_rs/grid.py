@@ -80,9 +80,7 @@ class Grid:
         """Where each agent wants to go; of NumPy's integers where a goal was drawn since the reset, as in POGEMA."""
         goals = self._engine.goals(self.config.obs_radius)
         is_drawn = self._engine.is_drawn
-        return [
-            (np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)
-        ]
+        return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
 
     @property
     def starts_xy(self) -> list[tuple[int, int]]:
@@ -221,13 +219,17 @@ class GridLifeLong(Grid):
     """The map and its agents with `on_target="restart"`."""
 
 
+def given_goals(config: GridConfig, ignore_borders: bool) -> Optional[list]:
+    """The goals that a config gives each agent, one after the other; none if it gives none."""
+    if config.targets_xy is None or ignore_borders:
+        return config.targets_xy
+    radius = config.obs_radius
+    return [[[row + radius, col + radius] for row, col in sequence] for sequence in config.targets_xy]
+
+
 def foretold_goals(grid: Grid, ignore_borders: bool) -> list:
-    """See `PogemaLifeLong.get_lifelong_targets_xy`."""
-    config, radius = grid.config, grid.config.obs_radius
-    if config.targets_xy is not None:
-        if ignore_borders:
-            return config.targets_xy
-        return [[[row + radius, col + radius] for row, col in sequence] for sequence in config.targets_xy]
+    """The goals that the agents of a grid are going to draw, as POGEMA foretells them."""
+    radius = grid.config.obs_radius
     goals = grid._engine.foretold_goals()
     if goals is None:
         raise StateError("the list of goals would never end: possible_targets_xy holds one cell alone")

@@ -168,7 +168,9 @@ def test_two_threads_on_one_environment() -> None:
     for thread in threads:
         thread.join()
     assert {type(error) for error in told} <= {errors.StateError}
-    assert all(str(error) == "another thread is using this environment, expected one thread at a time" for error in told)
+    assert all(
+        str(error) == "another thread is using this environment, expected one thread at a time" for error in told
+    )
     assert all(isinstance(error, RuntimeError) for error in told)
     assert env._engine.num_steps == sum(num_steps)
     env.step(np.zeros(4000, dtype=int))

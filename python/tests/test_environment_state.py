@@ -140,7 +140,9 @@ def test_spoiled_bytes_are_refused() -> None:
     for _ in range(300):
         start = int(generator.integers(len(saved) - 4))
         length = int(generator.integers(1, 4))
-        spoiled = saved[:start] + bytes(generator.integers(32, 127, size=length, dtype=np.uint8)) + saved[start + length :]
+        spoiled = (
+            saved[:start] + bytes(generator.integers(32, 127, size=length, dtype=np.uint8)) + saved[start + length :]
+        )
         try:
             engine = _engine.restore_engine(spoiled)
             engine.step([0, 1, 2, 3])

@@ -183,7 +183,12 @@ def _is_pool(name: Any, value: Any) -> bool:
 
 def _warned(outcome: Outcome) -> list[str]:
     """The warnings that both give, without the words: POGEMA's own are told by what they speak of."""
-    marks = (("cycling back", "round"), ("goes round", "round"), ("obstacle on a", "obstacle"), ("is on an obstacle", "obstacle"))
+    marks = (
+        ("cycling back", "round"),
+        ("goes round", "round"),
+        ("obstacle on a", "obstacle"),
+        ("is on an obstacle", "obstacle"),
+    )
     found = [kind for _, text in outcome["warnings"] for mark, kind in marks if mark in text]
     return sorted(found)
 

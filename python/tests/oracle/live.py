@@ -29,7 +29,9 @@ class Oracle:
                 f"{VARIABLE} is not set: `python3.11 conformance/oracle/install.py target/oracle/venv` "
                 "installs POGEMA 1.4.0 and prints what it has to be"
             )
-        self.process = subprocess.Popen([python, str(HERE / "theirs.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.process = subprocess.Popen(
+            [python, str(HERE / "theirs.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
         self.version = receive(self.process.stdout)
 
     def ask(self, script: list[Call] | int) -> None:

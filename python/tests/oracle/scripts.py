@@ -159,7 +159,9 @@ class _Episodes:
 
     def _changes(self) -> Fields:
         draw = self.draw
-        name = draw.one(("seed", "density", "size", "collision_system", "observation_type", "empty_outside", "obs_radius"))
+        name = draw.one(
+            ("seed", "density", "size", "collision_system", "observation_type", "empty_outside", "obs_radius")
+        )
         values = {
             "seed": draw.number(0, 2**40),
             "density": draw.one((0.0, 0.2, 0.4)),

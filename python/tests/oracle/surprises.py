@@ -150,8 +150,14 @@ SURPRISES = (
         ours="",
     ),
     # Coordinates are kept as plain numbers, whatever kind of number they came as; POGEMA refuses NumPy's.
-    _surprise("flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""),
-    _surprise("numpy coordinates", {"num_agents": 1, "agents_xy": [[np.int64(1), 1]]}, theirs="ValidationError", ours=""),
+    _surprise(
+        "flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""
+    ),
+    _surprise(
+        "numpy coordinates", {"num_agents": 1, "agents_xy": [[np.int64(1), 1]]}, theirs="ValidationError", ours=""
+    ),
     # A grid is a view of the environment: what it returns is not to be written to.
-    _surprise("write-protected grid", _SMALL, _RESET, ("call", "grid.hide_agent", (0,), {}), theirs="", ours="StateError"),
+    _surprise(
+        "write-protected grid", _SMALL, _RESET, ("call", "grid.hide_agent", (0,), {}), theirs="", ours="StateError"
+    ),
 )
