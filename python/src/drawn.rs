@@ -75,7 +75,7 @@ fn has_changed(past: &[Snapshot], agent: usize) -> bool {
 
 impl Engine {
     /// Takes in which goals are new: drawn ones are of NumPy's type in POGEMA, and given ones are not.
-    pub(crate) fn note_goals(&mut self, py: Python<'_>) -> PyResult<()> {
+    pub(crate) fn note_goals(&mut self) {
         let config = self.source.config();
         let is_lifelong = config.on_target == OnGoal::Restart;
         let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
@@ -85,11 +85,16 @@ impl Engine {
         if config.persistent {
             self.drawn.remember(self.game.past());
         }
-        if is_lifelong && has_sequences { self.warn_of_turns(py) } else { Ok(()) }
     }
 
+    /// Warns of goal sequences that have just come round to their first goals; the step is done, whatever becomes
+    /// of the warnings.
+    ///
     /// Rule: goal/restart/sequence
-    fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
+    pub(crate) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
+        if self.source.config().on_target != OnGoal::Restart {
+            return Ok(());
+        }
         for (agent, stream) in self.game.streams().iter().enumerate().filter(|(i, _)| self.game.on_goal()[*i])
         {
             if let Some((num_goals, 0)) = stream.turn() {

@@ -334,7 +334,7 @@ impl Engine {
         self.elapsed += 1;
         let is_over = i64::try_from(self.elapsed).is_ok_and(|elapsed| elapsed >= self.time_limit);
         self.truncated.fill(is_over);
-        self.note_goals(py)?;
+        self.note_goals();
         self.recorder.step(&self.actions, &self.game, (&self.rewards, &self.terminated, &self.truncated));
         let infos = infos(py, self.game.active())?;
         let metrics =
@@ -343,6 +343,7 @@ impl Engine {
             infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
         }
         let rewards = self.rewards.iter().map(|&reward| f64::from(reward)).collect();
+        self.warn_of_turns(py)?;
         Ok((self.observe(py)?, rewards, self.terminated.clone(), self.truncated.clone(), infos))
     }
 

@@ -174,3 +174,21 @@ def test_two_threads_on_one_environment() -> None:
     assert all(isinstance(error, RuntimeError) for error in told)
     assert env._engine.num_steps == sum(num_steps)
     env.step(np.zeros(4000, dtype=int))
+
+
+def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
+    """The step that a warning is about is played in any case."""
+    fields = {"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[[0, 1], [0, 0]]], "on_target": "restart"}
+    env, other = (_make_pogema(GridConfig(**fields, obs_radius=1, max_episode_steps=3)) for _ in range(2))
+    for each, action in ((env, "error"), (other, "ignore")):
+        each.reset()
+        each.step([4])
+        with warnings.catch_warnings():
+            warnings.simplefilter(action)
+            if action == "error":
+                with pytest.raises(UserWarning, match="goes round"):
+                    each.step([3])
+            else:
+                each.step([3])
+    assert state(env) == state(other)
+    assert env.step([4])[4] == other.step([4])[4] == [{"is_active": True, "metrics": {"avg_throughput": 1.0}}]
