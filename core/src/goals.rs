@@ -3,7 +3,9 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use crate::Cell;
+use serde::{Deserialize, Serialize};
+
+use crate::{Cell, Error};
 
 /// Draws an agent's next goal; the engines know no other randomness.
 ///
@@ -14,6 +16,16 @@ use crate::Cell;
 pub trait GoalSource: Debug + Send + Sync {
     /// The goal after the one just reached at `at`.
     fn next_goal(&mut self, at: Cell) -> Cell;
+
+    /// Its state as a text, from which [`GoalSource::restore`] goes on; none if it cannot be kept.
+    fn save(&self) -> Option<String> {
+        None
+    }
+
+    /// Takes on the state that a source for the same map and goals was saved in; says whether the text was one.
+    fn restore(&mut self, _saved: &str) -> bool {
+        false
+    }
 
     /// The same source in the same state.
     fn boxed_clone(&self) -> Box<dyn GoalSource>;
@@ -31,6 +43,22 @@ enum Rest {
     Same,
     Cycle { cells: Arc<[Cell]>, index: usize },
     Drawn(Box<dyn GoalSource>),
+}
+
+/// How far the goals of one agent are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StreamState {
+    /// There is one goal for ever.
+    Same,
+    /// Which goal of a sequence it is, from 0.
+    Turn(usize),
+    /// The state of a source, as it gave it.
+    Drawn(String),
+}
+
+fn unfit() -> Error {
+    Error::State { reason: "the state of the goals is none of this episode's".into() }
 }
 
 impl GoalStream {
@@ -61,6 +89,44 @@ impl GoalStream {
     /// The first goal.
     pub fn first(&self) -> Cell {
         self.first
+    }
+
+    /// How many cells the goals go round, if they do, and which of them is the present one, from 0.
+    pub fn turn(&self) -> Option<(usize, usize)> {
+        match &self.rest {
+            Rest::Cycle { cells, index } => Some((cells.len(), *index)),
+            Rest::Same | Rest::Drawn(_) => None,
+        }
+    }
+
+    /// How far the stream is, to go on from there later.
+    ///
+    /// # Errors
+    /// If its goals come from a source that cannot be kept.
+    pub fn save(&self) -> Result<StreamState, Error> {
+        let state = match &self.rest {
+            Rest::Same => StreamState::Same,
+            Rest::Cycle { index, .. } => StreamState::Turn(*index),
+            Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or_else(unfit)?),
+        };
+        Ok(state)
+    }
+
+    /// Goes on from where a stream of the same goals was saved.
+    ///
+    /// # Errors
+    /// If the state is none of such a stream.
+    pub fn restore(&mut self, state: &StreamState) -> Result<(), Error> {
+        let fits = match (&mut self.rest, state) {
+            (Rest::Same, StreamState::Same) => true,
+            (Rest::Cycle { cells, index }, StreamState::Turn(saved)) if *saved < cells.len() => {
+                *index = *saved;
+                true
+            }
+            (Rest::Drawn(source), StreamState::Drawn(saved)) => source.restore(saved),
+            _ => false,
+        };
+        if fits { Ok(()) } else { Err(unfit()) }
     }
 
     /// The goal that follows the one reached at `at`.

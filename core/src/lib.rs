@@ -32,7 +32,7 @@ pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
 pub use environment::{Environment, MapfOut, PomapfOut, Snapshot, StepOut};
 pub use error::{Error, shorten};
-pub use goals::{GoalSource, GoalStream};
+pub use goals::{GoalSource, GoalStream, StreamState};
 pub use history::{Change, changes, states_at_every_step};
 pub use instance::{Instance, Outside};
 pub use map::{Map, check_row_length};

@@ -70,7 +70,8 @@ impl Metrics {
 /// Rule: metrics/finish, metrics/nothing, metrics/restart
 ///
 /// Source: POGEMA 1.4.0, `wrappers/metrics.py`
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct EpisodeMeter {
     on_goal_mode: OnGoal,
     max_steps: i64,
@@ -93,6 +94,16 @@ impl EpisodeMeter {
             num_reached: 0,
             arrived: vec![NEVER; config.num_agents],
         }
+    }
+
+    /// Number of agents that are measured.
+    pub fn num_agents(&self) -> usize {
+        self.arrived.len()
+    }
+
+    /// Chooses the length of an episode over which throughput is measured, and goes on counting. Units: steps.
+    pub fn measure_over(&mut self, max_steps: i64) {
+        self.max_steps = max_steps;
     }
 
     /// Forgets an episode that was left early; POGEMA 1.4.0 would count it into the next one.

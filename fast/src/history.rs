@@ -1,6 +1,8 @@
 //! Steps kept, and taken back.
 
-use pogema_core::{Environment, Error, Snapshot};
+use std::collections::HashSet;
+
+use pogema_core::{Environment, Error, GoalStream, Instance, Snapshot};
 
 use crate::Engine;
 
@@ -18,6 +20,31 @@ impl Engine {
         }
     }
 
+    /// Goes on with an episode at a later state, its goals as far as they had come; `past` holds the kept steps.
+    ///
+    /// # Errors
+    /// If the states do not fit the instance, or the instance does not fit the config.
+    pub fn resume(
+        &mut self,
+        instance: &Instance,
+        streams: Vec<GoalStream>,
+        now: Snapshot,
+        past: Vec<Snapshot>,
+    ) -> Result<(), Error> {
+        instance.check_fits(&self.config)?;
+        let fits = |snapshot: &Snapshot| snapshot_fits(snapshot, instance);
+        if streams.len() != instance.goals().len() || !fits(&now) || !past.iter().all(fits) {
+            return Err(Error::State { reason: "the state does not fit the map and its agents".into() });
+        }
+        self.reset(instance)?;
+        self.streams = streams;
+        self.on_goal.clone_from(&now.on_goal);
+        self.num_on_goal = self.on_goal.iter().filter(|&&on_goal| on_goal).count();
+        self.take_on(now);
+        self.past = past;
+        Ok(())
+    }
+
     /// Rule: history/step-back
     pub(crate) fn take_back(&mut self) -> Result<bool, Error> {
         if !self.config.persistent {
@@ -28,6 +55,12 @@ impl Engine {
         }
         self.past.pop();
         let Some(before) = self.past.last().cloned() else { return Ok(false) };
+        self.take_on(before);
+        Ok(true)
+    }
+
+    /// Puts agents, goals and marks where a snapshot has them; what was on a goal stays.
+    fn take_on(&mut self, before: Snapshot) {
         for agent in 0..self.cells.len() {
             self.vacate(self.board.place(self.cells[agent]), agent as u32, false);
         }
@@ -40,6 +73,16 @@ impl Engine {
         self.goals = before.goals;
         self.active = before.active;
         self.take_squares();
-        Ok(true)
     }
+}
+
+fn snapshot_fits(snapshot: &Snapshot, instance: &Instance) -> bool {
+    let num_agents = instance.starts().len();
+    let lengths = [snapshot.cells.len(), snapshot.goals.len(), snapshot.active.len(), snapshot.on_goal.len()];
+    let mut cells = snapshot.cells.iter().chain(&snapshot.goals).chain(&snapshot.occupied);
+    let places = snapshot.cells.iter().zip(&snapshot.active).filter(|(_, active)| **active);
+    let mut taken = HashSet::new();
+    lengths == [num_agents; 4]
+        && cells.all(|&cell| instance.map().contains(cell))
+        && places.map(|(cell, _)| cell).all(|cell| taken.insert(cell))
 }

@@ -119,6 +119,11 @@ impl Engine {
         &self.goals
     }
 
+    /// The goals of each agent that are still to come.
+    pub fn streams(&self) -> &[GoalStream] {
+        &self.streams
+    }
+
     /// Which agents still take part.
     pub fn active(&self) -> &[bool] {
         &self.active

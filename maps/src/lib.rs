@@ -40,7 +40,7 @@ pub use exhaustive::{Verdict, search};
 pub use foretell::{foretold_from, foretold_goals};
 pub use library::Library;
 pub use place::{capacity, place_at_random};
-pub use source::{Generated, InstanceSource};
+pub use source::{Generated, InstanceSource, MadeInstance};
 pub use stats::{Doubt, MapStats, ScenarioStats};
 pub use text::{MapText, parse_map_text};
 pub use tiles::{PUBLISHED_TILE, tiles};

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside};
+use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside, StreamState};
+use serde::{Deserialize, Serialize};
 
 use crate::components::Components;
 use crate::config::{GridConfig, Targets};
@@ -22,6 +23,33 @@ pub struct Generated {
     pub instance: Instance,
     /// What POGEMA, too, would warn of, a line each; cells are counted without the border.
     pub warnings: Vec<String>,
+}
+
+/// The parts of an instance, to be kept and made anew.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MadeInstance {
+    map: Map,
+    outside: Outside,
+    starts: Vec<Cell>,
+    goals: Vec<Cell>,
+    states: Vec<StreamState>,
+}
+
+impl MadeInstance {
+    /// The parts of an instance.
+    ///
+    /// # Errors
+    /// If its goals come from a source that cannot be kept.
+    pub fn of(instance: &Instance) -> Result<Self, Error> {
+        Ok(Self {
+            map: instance.map().clone(),
+            outside: instance.outside().clone(),
+            starts: instance.starts().to_vec(),
+            goals: instance.first_goals(),
+            states: instance.goals().iter().map(GoalStream::save).collect::<Result<_, _>>()?,
+        })
+    }
 }
 
 /// Makes the instances of a config; each call of [`InstanceSource::generate`] is one reset of POGEMA.
@@ -82,6 +110,27 @@ impl InstanceSource {
     /// Rule: place/pools
     pub fn pools(&self) -> Option<(&[Cell], &[Cell])> {
         self.pools.as_ref().map(|pools| (&pools.starts[..], &pools.goals[..]))
+    }
+
+    /// The registered map that takes the place of the config's own.
+    ///
+    /// Rule: grid/named
+    pub fn registered(&self) -> Option<&Map> {
+        self.registered.as_ref()
+    }
+
+    /// An instance that was made by this source before, as it was.
+    ///
+    /// # Errors
+    /// If its parts do not fit the config or each other.
+    pub fn remake(&self, made: MadeInstance) -> Result<Instance, Error> {
+        let MadeInstance { map, outside, starts, goals, states } = made;
+        let mut streams = self.streams(&map, &goals, self.pools.as_ref())?;
+        Error::check_length("goals", states.len(), streams.len())?;
+        for (stream, state) in streams.iter_mut().zip(&states) {
+            stream.restore(state)?;
+        }
+        Instance::new(map, outside, starts, streams)
     }
 
     /// Makes the instance of the next reset.

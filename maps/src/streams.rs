@@ -50,6 +50,14 @@ impl GoalSource for ComponentSource {
         draw_until(&mut self.generator, self.reach.from(at), |cell| cell != at).unwrap_or(at)
     }
 
+    fn save(&self) -> Option<String> {
+        serde_json::to_string(&self.generator).ok()
+    }
+
+    fn restore(&mut self, saved: &str) -> bool {
+        restore(&mut self.generator, saved)
+    }
+
     fn boxed_clone(&self) -> Box<dyn GoalSource> {
         Box::new(self.clone())
     }
@@ -88,9 +96,23 @@ impl GoalSource for PoolSource {
         draw_until(&mut self.generator, &self.pool, |cell| cell != left_out).unwrap_or(at)
     }
 
+    fn save(&self) -> Option<String> {
+        serde_json::to_string(&self.generator).ok()
+    }
+
+    fn restore(&mut self, saved: &str) -> bool {
+        restore(&mut self.generator, saved)
+    }
+
     fn boxed_clone(&self) -> Box<dyn GoalSource> {
         Box::new(self.clone())
     }
+}
+
+/// Puts a saved generator into the place of another; says whether the text was one.
+fn restore(generator: &mut Generator, saved: &str) -> bool {
+    let read = serde_json::from_str(saved);
+    read.map(|read| *generator = read).is_ok()
 }
 
 fn left_out(radius: u16, at: Cell) -> Cell {

@@ -7,7 +7,7 @@ import numbers
 from collections.abc import Mapping
 from typing import Any
 
-from pogema_rs.errors import RefusedConfigError
+from pogema_rs.errors import NoCellError, OutsideMapError, RefusedConfigError
 
 _WHOLE = ("seed", "width", "height", "size", "obs_radius", "num_agents", "max_episode_steps")
 _FLAGS = ("empty_outside", "persistent", "auto_reset")
@@ -15,6 +15,7 @@ _MAY_BE_NONE = (
     *("seed", "width", "height", "agents_xy", "targets_xy", "num_agents", "possible_agents_xy"),
     *("possible_targets_xy", "map", "map_name", "integration", "auto_reset"),
 )
+_LARGEST = 65_535
 _TRUE = (True, 1, "1", "on", "t", "true", "y", "yes")
 _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 
@@ -93,6 +94,8 @@ def _cell(name: str, value: Any) -> Any:
     is_pair = isinstance(value, (list, tuple)) and len(value) == 2
     if not is_pair or not all(isinstance(number, numbers.Integral) for number in value):
         raise _refused(name, value, "a pair (row, col) of whole numbers")
+    if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST for number in value):
+        raise OutsideMapError(f"config: `{name}` has the cell {tuple(value)}, expected cells inside the map")
     return type(value)(int(number) for number in value) if type(value) in (list, tuple) else tuple(value)
 
 
@@ -105,17 +108,17 @@ def _targets(name: str, value: Any) -> list:
     if not goals or not isinstance(goals[0], (list, tuple)):
         raise _refused(name, value, "a list of cells, or a list of cells for each agent")
     if not goals[0]:
-        raise _refused(name, value, "cells that are not empty")
+        raise NoCellError("config: `targets_xy` begins with an empty list, expected cells in it")
     if not isinstance(goals[0][0], (list, tuple)):
         return _cells(name, goals)
     return [_cells(name, sequence) for sequence in goals]
 
 
 def _map(name: str, value: Any) -> Any:
-    if isinstance(value, str):
-        return value
+    if isinstance(value, (str, numbers.Number)):
+        return str(value)
     rows = value.tolist() if hasattr(value, "tolist") else value
-    rows = [_listed(name, row) for row in _listed(name, rows)]
-    if any(number not in (0, 1) for row in rows for number in row):
+    rows = _listed(name, rows)
+    if any(number not in (0, 1) for row in rows for number in _listed(name, row)):
         raise _refused(name, value, "rows of the numbers 0 and 1")
-    return [[int(number) for number in row] for row in rows]
+    return [(tuple if isinstance(row, tuple) else list)(int(number) for number in row) for row in rows]

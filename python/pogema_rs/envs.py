@@ -10,11 +10,12 @@ import gymnasium
 import numpy as np
 
 from pogema_rs import _engine, grid_registry
-from pogema_rs.errors import ActionCountError, NotResetError, StateError
-from pogema_rs.grid import Grid, GridLifeLong, foretold_goals
+from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError, NotResetError, StateError
+from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_json
 from pogema_rs.semantics import Semantics
 from pogema_rs.svg_animation.animation_wrapper import Filmed
+from pogema_rs.wrappers import persistence
 
 __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
 
@@ -72,14 +73,13 @@ class Pogema(PogemaBase):
         self.grid: Optional[Grid] = None
         self._has_metrics = limits_steps and not self.grid_config.persistent
         # POGEMA's time limit and its choice of class are those of the config that the environment was made with.
-        self._fixed = {
-            "on_target": self.grid_config.on_target,
-            "persistent": self.grid_config.persistent,
-            "max_episode_steps": self.grid_config.max_episode_steps if limits_steps else 2**63 - 1,
-        }
+        self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
         self._remember_config()
         self._engine = _engine.Engine(
-            engine_json(self.grid_config, **self._fixed), self._registered(), self.semantics.occupancy_is_exact
+            engine_json(self.grid_config, **self._fixed),
+            self._registered(),
+            self.semantics.occupancy_is_exact,
+            None if limits_steps else 2**63 - 1,
         )
         self.action_space = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self.observation_space = _observation_space(self.grid_config)
@@ -206,8 +206,43 @@ class Pogema(PogemaBase):
 
         Rule: history/step-back
         """
-        self.check_reset()
+        self._check_kept()
         return self._engine.step_back()
+
+    def _check_kept(self) -> None:
+        if not self._fixed["persistent"]:
+            raise NotKeptError("steps are kept only with persistent=True in the config")
+        if self.grid is None:
+            raise NoHistoryError("the environment was not reset yet")
+
+    def set_elapsed_steps(self, elapsed_steps: int) -> None:
+        """Chooses how many steps count towards the time limit so far. Needs `persistent` in the config.
+
+        Errors: `ValueError` for a config that is not persistent, and for a number below 0.
+        """
+        if not self._fixed["persistent"]:
+            raise NotKeptError("the time limit can be moved only with persistent=True in the config")
+        if elapsed_steps < 0:
+            raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
+        self._engine.elapsed = elapsed_steps
+
+    def get_history(self) -> list:
+        """For each agent an `AgentState` after the reset, and one for each later step that changed it.
+
+        Needs `persistent` in the config.
+
+        Rule: history/changes
+        """
+        self._check_kept()
+        return persistence.kept(self._engine, self.grid_config.obs_radius)
+
+    def get_full_history(self) -> list:
+        """For each agent an `AgentState` at every step so far, that of the reset included."""
+        num_steps = self._engine.num_steps
+        return [persistence.at_every_step(changes, num_steps) for changes in self.get_history()]
+
+    agent_state_to_full_list = staticmethod(persistence.at_every_step)
+    decompress_history = staticmethod(persistence.PersistentWrapper.decompress_history)
 
 
 class PogemaLifeLong(Pogema):
@@ -220,7 +255,8 @@ class PogemaLifeLong(Pogema):
 
         Rule: goal/restart/foretold
         """
-        return foretold_goals(self._started(), ignore_borders)
+        given = given_goals(self.grid_config, ignore_borders)
+        return given if given is not None else foretold_goals(self._started(), ignore_borders)
 
 
 class PogemaCoopFinish(Pogema):

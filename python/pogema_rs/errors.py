@@ -10,10 +10,14 @@ __all__ = [
     "ActionCountError",
     "ActionError",
     "AutoResetError",
+    "ElapsedStepsError",
     "EmptyMapError",
     "InstanceError",
     "JumpedError",
     "MapTextError",
+    "NoCellError",
+    "NoHistoryError",
+    "NotKeptError",
     "NotResetError",
     "OutsideMapError",
     "RefusedConfigError",
@@ -35,6 +39,10 @@ class RefusedConfigError(ValueError):
 
 class OutsideMapError(IndexError, ValueError):
     """A start or goal lies outside the map."""
+
+
+class NoCellError(IndexError, ValueError):
+    """An agent's list of goals is empty."""
 
 
 class EmptyMapError(ZeroDivisionError, ValueError):
@@ -63,6 +71,18 @@ class NotResetError(ResetNeeded, AttributeError):
 
 class StateError(ValueError, RuntimeError):
     """A call that the state does not allow."""
+
+
+class NoHistoryError(NotResetError, TypeError):
+    """No step was played yet that could be kept or taken back."""
+
+
+class NotKeptError(StateError, AttributeError):
+    """Steps are kept only with `persistent` in the config."""
+
+
+class ElapsedStepsError(AssertionError, ValueError):
+    """There is no such number of steps."""
 
 
 class JumpedError(IndexError, ValueError):

@@ -5,6 +5,7 @@ All coordinates are (row, col) and count the border, unless `ignore_borders` is 
 
 from __future__ import annotations
 
+import warnings
 from copy import deepcopy
 from typing import Any, Optional
 
@@ -31,7 +32,8 @@ class Grid:
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
         engine = _engine.Engine(engine_json(grid_config), grid_registry.map_text(grid_config.map_name))
-        engine.reset()
+        for text in engine.reset():
+            warnings.warn(text, UserWarning, stacklevel=2)
         self._show(engine, grid_config)
         if not add_artificial_border:
             raise StateError("add_artificial_border is False, expected True: an environment always has its border")
@@ -46,6 +48,9 @@ class Grid:
         self._engine = engine
         self.config = grid_config
         self._obstacles: Optional[np.ndarray] = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_obstacles": None}
 
     @property
     def obstacles(self) -> np.ndarray:
@@ -75,9 +80,7 @@ class Grid:
         """Where each agent wants to go; of NumPy's integers where a goal was drawn since the reset, as in POGEMA."""
         goals = self._engine.goals(self.config.obs_radius)
         is_drawn = self._engine.is_drawn
-        return [
-            (np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)
-        ]
+        return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
 
     @property
     def starts_xy(self) -> list[tuple[int, int]]:
@@ -216,13 +219,17 @@ class GridLifeLong(Grid):
     """The map and its agents with `on_target="restart"`."""
 
 
+def given_goals(config: GridConfig, ignore_borders: bool) -> Optional[list]:
+    """The goals that a config gives each agent, one after the other; none if it gives none."""
+    if config.targets_xy is None or ignore_borders:
+        return config.targets_xy
+    radius = config.obs_radius
+    return [[[row + radius, col + radius] for row, col in sequence] for sequence in config.targets_xy]
+
+
 def foretold_goals(grid: Grid, ignore_borders: bool) -> list:
-    """See `PogemaLifeLong.get_lifelong_targets_xy`."""
-    config, radius = grid.config, grid.config.obs_radius
-    if config.targets_xy is not None:
-        if ignore_borders:
-            return config.targets_xy
-        return [[[row + radius, col + radius] for row, col in sequence] for sequence in config.targets_xy]
+    """The goals that the agents of a grid are going to draw, as POGEMA foretells them."""
+    radius = grid.config.obs_radius
     goals = grid._engine.foretold_goals()
     if goals is None:
         raise StateError("the list of goals would never end: possible_targets_xy holds one cell alone")

@@ -107,8 +107,11 @@ _OF_ENGINE = tuple(name for name in GridConfig.model_fields if name not in ("int
 
 def engine_json(config: GridConfig | Mapping[str, Any], **changes: Any) -> str:
     """A config as the engine reads it."""
-    fields = config if isinstance(config, Mapping) else config.__dict__
-    own = {name: fields[name] for name in _OF_ENGINE if name in fields}
+    if isinstance(config, Mapping):
+        own = {name: config[name] for name in _OF_ENGINE if name in config}
+    else:
+        # The longer side follows from the two, and may be less than a size that is given.
+        own = {name: config.__dict__[name] for name in _OF_ENGINE if name != "size"}
     return json.dumps({**own, **changes}, default=_plain)
 
 
@@ -138,15 +141,25 @@ def _derived(fields: dict[str, Any]) -> dict[str, Any]:
     result = {**fields, **{name: derived[name] for name in GridConfig._DERIVED}}
     if isinstance(text, str):
         result["map"] = derived["map"]
-        result.update({name: derived[name] for name in GridConfig._PLACES})
-        for name in ("possible_agents_xy", "possible_targets_xy"):
-            if derived[name] is not None and name not in fields:
+        if _has_letters(text):
+            result.update(agents_xy=derived["agents_xy"], targets_xy=derived["targets_xy"])
+        elif _gives_pools(text) and (fields.get("agents_xy") is None or fields.get("targets_xy") is None):
+            for name in ("possible_agents_xy", "possible_targets_xy"):
                 result[name] = [tuple(cell) for cell in derived[name]]
     return result
 
 
+def _has_letters(text: str) -> bool:
+    return any(character.isascii() and character.isalpha() for character in text)
+
+
+def _gives_pools(text: str) -> bool:
+    """Whether a map marks cells, and leaves none of the two pools empty."""
+    return any(sign in text for sign in "@$!") and all(any(sign in text for sign in pool) for pool in (".@", ".$"))
+
+
 def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
-    has_letters = any(character.isascii() and character.isalpha() for character in text)
+    has_letters = _has_letters(text)
     if has_letters and any(character in "@$!" for character in text):
         raise MapTextError("config: `map` has letters beside `@`, `$` or `!`, expected one or the other")
     if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:

@@ -1,34 +1,38 @@
 //! One environment behind POGEMA's Python classes.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
+use numpy::PyArray2;
 use pogema_core::{
-    Action, Cell, Config, Environment, EpisodeMeter, Instance, MapfOut, Metrics, Observation, Occupancy,
-    OnGoal, Outside, PomapfOut, StepOut,
+    Action, Cell, Config, Environment, EpisodeMeter, Error, Instance, Metrics, Observation, Occupancy,
+    OnGoal, Outside, StepOut,
 };
-use pogema_maps::{InstanceSource, Targets, foretold_from};
+use pogema_maps::{InstanceSource, foretold_from};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 
+use crate::drawn::Drawn;
 use crate::film::Recorder;
-use crate::lists::{Pairs, infos, read_actions, tuples};
-use crate::{config, errors};
+use crate::lists::{Pairs, infos, read_actions};
+use crate::{config, errors, state};
 
-/// Row, column, goal's row and column, step, whether the agent takes part.
-type Change = (u16, u16, u16, u16, u64, bool);
+/// Row, column, goal's row and column, step, whether the agent takes part, whether the goal was drawn.
+type Change = (u16, u16, u16, u16, u64, bool, bool);
 /// What a step returns.
 type Stepped<'py> = (Bound<'py, PyList>, Vec<f64>, Vec<bool>, Vec<bool>, Bound<'py, PyList>);
 
 /// One environment with its config, its metrics and, if wanted, its film.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct Engine {
-    source: InstanceSource,
-    exact: bool,
-    game: pogema_fast::Engine,
-    instance: Option<Instance>,
-    meter: EpisodeMeter,
-    recorder: Recorder,
-    /// Whether each agent's goal was drawn since the reset.
-    is_drawn: Vec<bool>,
+    pub(crate) source: InstanceSource,
+    pub(crate) exact: bool,
+    /// Steps after which an episode is cut off, whatever a later config says.
+    pub(crate) time_limit: i64,
+    /// Steps that count towards the time limit.
+    pub(crate) elapsed: u64,
+    pub(crate) game: pogema_fast::Engine,
+    pub(crate) instance: Option<Instance>,
+    pub(crate) meter: EpisodeMeter,
+    pub(crate) recorder: Recorder,
+    pub(crate) drawn: Drawn,
     actions: Vec<Action>,
     rewards: Vec<f32>,
     terminated: Vec<bool>,
@@ -37,62 +41,33 @@ pub struct Engine {
 
 #[pymethods]
 impl Engine {
-    /// An environment for a config in JSON; `registered` is the text of the map that its `map_name` names, and
-    /// `exact` chooses exact occupancy.
+    /// An environment for a config in JSON; `registered` is the text of the map that its `map_name` names,
+    /// `exact` chooses exact occupancy, and `time_limit` is the config's `max_episode_steps` if it is left out.
     #[new]
-    #[pyo3(signature = (config, registered=None, exact=false))]
-    fn new(py: Python<'_>, config: &str, registered: Option<&str>, exact: bool) -> PyResult<Self> {
+    #[pyo3(signature = (config, registered=None, exact=false, time_limit=None))]
+    fn new(
+        py: Python<'_>,
+        config: &str,
+        registered: Option<&str>,
+        exact: bool,
+        time_limit: Option<i64>,
+    ) -> PyResult<Self> {
         let source = config::source(config, registered).map_err(|error| errors::config(py, &error))?;
-        let rules = rules(&source, exact);
-        let game = pogema_fast::Engine::new(rules).map_err(|error| errors::config(py, &error))?;
-        let num_agents = rules.num_agents;
-        Ok(Self {
-            source,
-            exact,
-            game,
-            instance: None,
-            meter: EpisodeMeter::new(&rules),
-            recorder: Recorder::default(),
-            is_drawn: vec![false; num_agents],
-            actions: Vec::with_capacity(num_agents),
-            rewards: vec![0.0; num_agents],
-            terminated: vec![false; num_agents],
-            truncated: vec![false; num_agents],
-        })
+        let time_limit = time_limit.unwrap_or(source.config().max_episode_steps);
+        Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
 
     /// Begins an episode; returns what the maker of the instance warns of. A new config takes the place of the old
     /// one with it, or not at all.
     #[pyo3(signature = (config=None, registered=None))]
     fn reset(
-        &mut self,
-        py: Python<'_>,
+        this: &Bound<'_, Self>,
         config: Option<&str>,
         registered: Option<&str>,
     ) -> PyResult<Vec<String>> {
-        let mut source = match config {
-            Some(config) => config::source(config, registered).map_err(|error| errors::config(py, &error))?,
-            None => self.source.clone(),
-        };
-        let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
-        let rules = rules(&source, self.exact);
-        if rules == *self.game.config() {
-            self.game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
-        } else {
-            let mut game = pogema_fast::Engine::new(rules).map_err(|error| errors::config(py, &error))?;
-            game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
-            self.game = game;
-            self.meter = EpisodeMeter::new(&rules);
-            self.rewards = vec![0.0; rules.num_agents];
-            self.terminated = vec![false; rules.num_agents];
-            self.truncated = vec![false; rules.num_agents];
-        }
-        self.source = source;
-        self.is_drawn.clear();
-        self.is_drawn.resize(rules.num_agents, false);
-        self.recorder.begin(&rules, &generated.instance, &self.game);
-        self.instance = Some(generated.instance);
-        Ok(generated.warnings)
+        let py = this.py();
+        let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
+        this.begin(py, config, registered)
     }
 
     /// Chooses the seed of the episodes from the next reset on; what resets did to pools stays.
@@ -108,36 +83,13 @@ impl Engine {
     /// Plays one step: observations, rewards, terminated, truncated, infos.
     #[pyo3(signature = (actions, has_metrics=true))]
     fn step<'py>(
-        &mut self,
-        py: Python<'py>,
+        this: &Bound<'py, Self>,
         actions: &Bound<'py, PyAny>,
         has_metrics: bool,
     ) -> PyResult<Stepped<'py>> {
-        self.check_started(py)?;
-        let (num_agents, got) = (self.game.config().num_agents, actions.len()?);
-        let fits = pogema_core::Error::check_length("actions", num_agents, got);
-        fits.map_err(|error| errors::call(py, &error))?;
-        if let Some((agent, number)) = read_actions(actions, self.game.active(), &mut self.actions)? {
-            let error = pogema_core::Error::Action { agent: Some(agent), number };
-            return Err(errors::call(py, &error));
-        }
-        let out = StepOut {
-            rewards: &mut self.rewards,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-        };
-        let (game, actions) = (&mut self.game, &self.actions);
-        py.detach(|| game.step(actions, out)).map_err(|error| errors::call(py, &error))?;
-        self.note_drawn();
-        self.recorder.step(&self.actions, &self.game, (&self.rewards, &self.terminated, &self.truncated));
-        let infos = infos(py, self.game.active())?;
-        let metrics =
-            has_metrics.then(|| self.meter.feed(self.game.on_goal(), &self.terminated, &self.truncated));
-        if let Some(metrics) = metrics.flatten() {
-            infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
-        }
-        let rewards = self.rewards.iter().map(|&reward| f64::from(reward)).collect();
-        Ok((self.observe(py)?, rewards, self.terminated.clone(), self.truncated.clone(), infos))
+        let py = this.py();
+        let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
+        this.play(py, actions, has_metrics)
     }
 
     /// The observations of all agents, of the type that the config names.
@@ -156,8 +108,24 @@ impl Engine {
     }
 
     /// Takes the last step back; says whether there was one.
-    fn step_back(&mut self, py: Python<'_>) -> PyResult<bool> {
-        self.game.step_back().map_err(|error| errors::call(py, &error))
+    fn step_back(this: &Bound<'_, Self>) -> PyResult<bool> {
+        let py = this.py();
+        let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
+        let Self { game, drawn, elapsed, .. } = &mut *this;
+        let last_two = game.past().len().saturating_sub(2);
+        let before = game.past()[last_two..].to_vec();
+        let went_back = game.step_back().map_err(|error| errors::call(py, &error))?;
+        if went_back {
+            drawn.take_back(&before);
+            *elapsed = game.num_steps();
+        }
+        Ok(went_back)
+    }
+
+    /// Chooses how many steps count towards the time limit so far.
+    #[setter]
+    fn set_elapsed(&mut self, elapsed: u64) {
+        self.elapsed = elapsed;
     }
 
     /// Whether agents take part.
@@ -202,7 +170,7 @@ impl Engine {
     /// Whether each agent's goal was drawn since the reset.
     #[getter]
     fn is_drawn(&self) -> Vec<bool> {
-        self.is_drawn.clone()
+        self.drawn.now().to_vec()
     }
 
     /// The map with its border, 1 for an obstacle.
@@ -220,7 +188,7 @@ impl Engine {
 
     /// Whether what lies beyond the wall is free.
     #[getter]
-    fn is_free_outside(&self) -> bool {
+    pub(crate) fn is_free_outside(&self) -> bool {
         self.instance.as_ref().is_none_or(|instance| *instance.outside() == Outside::Free)
     }
 
@@ -241,10 +209,18 @@ impl Engine {
     }
 
     /// For each agent its first state and each later one that differs: row, column, goal's row and column, step,
-    /// whether it takes part.
+    /// whether it takes part, whether the goal was drawn.
     fn history(&self) -> Vec<Vec<Change>> {
         let changes = pogema_core::changes(self.game.past());
-        changes.into_iter().map(|agent| agent.into_iter().map(Into::into).collect()).collect()
+        let of_agent = |(agent, changes): (usize, Vec<pogema_core::Change>)| {
+            let is_drawn = self.drawn.kept(agent).iter().chain(std::iter::repeat(&false));
+            let change = |(change, &is_drawn): (pogema_core::Change, &bool)| {
+                let pogema_core::Change { cell, goal, step, active } = change;
+                (cell.row, cell.col, goal.row, goal.col, step, active, is_drawn)
+            };
+            changes.into_iter().zip(is_drawn).map(change).collect()
+        };
+        changes.into_iter().enumerate().map(of_agent).collect()
     }
 
     /// Whether the episodes from the next reset on are filmed.
@@ -267,6 +243,11 @@ impl Engine {
         self.recorder.svg(&style).map_err(|error| errors::call(py, &error))
     }
 
+    /// What pickles and copies it: a function, and the bytes for it.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.import("pogema_rs._engine")?.getattr("restore_engine")?, (state::save(self, py)?,)))
+    }
+
     /// The film as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
         self.recorder.html(title).map_err(|error| errors::call(py, &error))
@@ -274,23 +255,104 @@ impl Engine {
 }
 
 impl Engine {
-    fn check_started(&self, py: Python<'_>) -> PyResult<()> {
+    /// An environment that wants a reset.
+    pub(crate) fn of(source: InstanceSource, exact: bool, time_limit: i64) -> Result<Self, Error> {
+        let rules = rules(&source, exact, time_limit);
+        let num_agents = rules.num_agents;
+        Ok(Self {
+            source,
+            exact,
+            time_limit,
+            elapsed: 0,
+            game: pogema_fast::Engine::new(rules)?,
+            instance: None,
+            meter: EpisodeMeter::new(&rules),
+            recorder: Recorder::default(),
+            drawn: Drawn::default(),
+            actions: Vec::with_capacity(num_agents),
+            rewards: vec![0.0; num_agents],
+            terminated: vec![false; num_agents],
+            truncated: vec![false; num_agents],
+        })
+    }
+
+    fn begin(
+        &mut self,
+        py: Python<'_>,
+        config: Option<&str>,
+        registered: Option<&str>,
+    ) -> PyResult<Vec<String>> {
+        let mut source = match config {
+            Some(config) => config::source(config, registered).map_err(|error| errors::config(py, &error))?,
+            None => self.source.clone(),
+        };
+        let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
+        let rules = rules(&source, self.exact, self.time_limit);
+        if rules == *self.game.config() {
+            self.game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
+        } else {
+            let mut game = pogema_fast::Engine::new(rules).map_err(|error| errors::config(py, &error))?;
+            game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
+            self.game = game;
+            self.rewards = vec![0.0; rules.num_agents];
+            self.terminated = vec![false; rules.num_agents];
+            self.truncated = vec![false; rules.num_agents];
+        }
+        if self.meter.num_agents() != rules.num_agents {
+            self.meter = EpisodeMeter::new(&rules);
+        }
+        self.meter.measure_over(source.config().max_episode_steps);
+        self.source = source;
+        self.elapsed = 0;
+        self.drawn.begin(rules.num_agents, rules.persistent);
+        self.recorder.begin(&rules, &generated.instance, &self.game);
+        self.instance = Some(generated.instance);
+        Ok(generated.warnings)
+    }
+
+    fn play<'py>(
+        &mut self,
+        py: Python<'py>,
+        actions: &Bound<'py, PyAny>,
+        has_metrics: bool,
+    ) -> PyResult<Stepped<'py>> {
+        let (num_agents, got) = (self.game.config().num_agents, actions.len()?);
+        let fits = Error::check_length("actions", num_agents, got);
+        fits.map_err(|error| errors::call(py, &error))?;
+        self.check_started(py)?;
+        if let Some((agent, number)) = read_actions(actions, self.game.active(), &mut self.actions)? {
+            let error = Error::Action { agent: Some(agent), number };
+            return Err(errors::call(py, &error));
+        }
+        let out = StepOut {
+            rewards: &mut self.rewards,
+            terminated: &mut self.terminated,
+            truncated: &mut self.truncated,
+        };
+        let (game, actions) = (&mut self.game, &self.actions);
+        py.detach(|| game.step(actions, out)).map_err(|error| errors::call(py, &error))?;
+        self.elapsed += 1;
+        let is_over = i64::try_from(self.elapsed).is_ok_and(|elapsed| elapsed >= self.time_limit);
+        self.truncated.fill(is_over);
+        self.note_goals();
+        self.recorder.step(&self.actions, &self.game, (&self.rewards, &self.terminated, &self.truncated));
+        let infos = infos(py, self.game.active())?;
+        let metrics =
+            has_metrics.then(|| self.meter.feed(self.game.on_goal(), &self.terminated, &self.truncated));
+        if let Some(metrics) = metrics.flatten() {
+            infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
+        }
+        let rewards = self.rewards.iter().map(|&reward| f64::from(reward)).collect();
+        self.warn_of_turns(py)?;
+        Ok((self.observe(py)?, rewards, self.terminated.clone(), self.truncated.clone(), infos))
+    }
+
+    pub(crate) fn check_started(&self, py: Python<'_>) -> PyResult<()> {
         if self.instance.is_some() {
             return Ok(());
         }
         let reason = "the environment was not reset yet".to_owned();
-        Err(errors::call(py, &pogema_core::Error::State { reason }))
-    }
-
-    /// POGEMA's goals are of NumPy's type once they were drawn, and not if they were given.
-    fn note_drawn(&mut self) {
-        let config = self.source.config();
-        if config.on_target != OnGoal::Restart || matches!(config.targets_xy, Some(Targets::Sequences(_))) {
-            return;
-        }
-        for (is_drawn, &on_goal) in self.is_drawn.iter_mut().zip(self.game.on_goal()) {
-            *is_drawn |= on_goal;
-        }
+        Err(errors::call(py, &Error::State { reason }))
     }
 
     /// POGEMA's figures; whole numbers where its are.
@@ -306,109 +368,17 @@ impl Engine {
         }
         Ok(named)
     }
-
-    fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let config = self.game.config();
-        let (num_agents, side) = (config.num_agents, config.side());
-        let array = PyArray4::<f32>::zeros(py, [num_agents, 3, side, side], false);
-        {
-            let mut values = array.readwrite();
-            let values = values.as_slice_mut()?;
-            py.detach(|| self.game.observe(values)).map_err(|error| errors::call(py, &error))?;
-        }
-        split(py, array.as_any(), num_agents)
-    }
-
-    fn observe_apart<'py>(&self, py: Python<'py>, is_global: bool) -> PyResult<Bound<'py, PyList>> {
-        let config = self.game.config();
-        let (num_agents, side) = (config.num_agents, config.side());
-        let obstacles = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
-        let agents = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
-        let (mut cells, mut goals) = (vec![0; 2 * num_agents], vec![0; 2 * num_agents]);
-        {
-            let (mut obstacles, mut agents) = (obstacles.readwrite(), agents.readwrite());
-            let (obstacles, agents) = (obstacles.as_slice_mut()?, agents.as_slice_mut()?);
-            let out = PomapfOut { obstacles, agents, cells: &mut cells, goals: &mut goals };
-            self.game.observe_pomapf(out).map_err(|error| errors::call(py, &error))?;
-        }
-        let (obstacles, agents) =
-            (split(py, obstacles.as_any(), num_agents)?, split(py, agents.as_any(), num_agents)?);
-        let xy = tuples(py, &chunks(&cells))?;
-        let target_xy = self.goal_tuples(py, &chunks(&goals))?;
-        let global = if is_global { Some(self.global_lists(py)?) } else { None };
-        let all = PyList::empty(py);
-        for agent in 0..num_agents {
-            let seen = PyDict::new(py);
-            seen.set_item(pyo3::intern!(py, "obstacles"), obstacles.get_item(agent)?)?;
-            seen.set_item(pyo3::intern!(py, "agents"), agents.get_item(agent)?)?;
-            seen.set_item(pyo3::intern!(py, "xy"), xy.get_item(agent)?)?;
-            seen.set_item(pyo3::intern!(py, "target_xy"), target_xy.get_item(agent)?)?;
-            if let Some((obstacles, cells, goals)) = &global {
-                seen.set_item(pyo3::intern!(py, "global_obstacles"), obstacles)?;
-                seen.set_item(pyo3::intern!(py, "global_xy"), cells.get_item(agent)?)?;
-                seen.set_item(pyo3::intern!(py, "global_target_xy"), goals.get_item(agent)?)?;
-            }
-            all.append(seen)?;
-        }
-        Ok(all)
-    }
-
-    /// Tuples of goals, of NumPy's integers where they were drawn.
-    fn goal_tuples<'py>(&self, py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {
-        let list = tuples(py, pairs)?;
-        for agent in (0..pairs.len()).filter(|&agent| self.is_drawn[agent]) {
-            let (row, col) = pairs[agent];
-            let numbers = PyArray1::from_slice(py, &[row, col]);
-            list.set_item(agent, (numbers.as_any().get_item(0)?, numbers.as_any().get_item(1)?))?;
-        }
-        Ok(list)
-    }
-
-    /// The map with its border, and all cells and goals in its coordinates.
-    fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
-        self.check_started(py)?;
-        let config = self.game.config();
-        let (height, width) = self.game.size();
-        let padded =
-            PyArray2::<u8>::zeros(py, [height + 2 * config.radius, width + 2 * config.radius], false);
-        let (mut cells, mut goals) = (vec![0; 2 * config.num_agents], vec![0; 2 * config.num_agents]);
-        {
-            let mut obstacles = padded.readwrite();
-            let out = MapfOut { obstacles: obstacles.as_slice_mut()?, cells: &mut cells, goals: &mut goals };
-            self.game.observe_mapf(out).map_err(|error| errors::call(py, &error))?;
-        }
-        Ok((padded, chunks(&cells), chunks(&goals)))
-    }
-
-    fn global_lists<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyList>, Bound<'py, PyList>)> {
-        let (padded, cells, goals) = self.global(py)?;
-        let dtype = if self.is_free_outside() { "float64" } else { "int64" };
-        let padded = padded.call_method1("astype", (dtype,))?;
-        Ok((padded, tuples(py, &cells)?, self.goal_tuples(py, &goals)?))
-    }
 }
 
-fn rules(source: &InstanceSource, exact: bool) -> Config {
+fn rules(source: &InstanceSource, exact: bool, time_limit: i64) -> Config {
     let rules = source.config().rules();
-    Config { occupancy: if exact { Occupancy::Exact } else { rules.occupancy }, ..rules }
-}
-
-/// The parts of an array, one per agent.
-fn split<'py>(py: Python<'py>, array: &Bound<'py, PyAny>, num_agents: usize) -> PyResult<Bound<'py, PyList>> {
-    let parts = PyList::empty(py);
-    for agent in 0..num_agents {
-        parts.append(array.get_item(agent)?)?;
+    Config {
+        max_steps: time_limit,
+        occupancy: if exact { Occupancy::Exact } else { rules.occupancy },
+        ..rules
     }
-    Ok(parts)
 }
 
 fn pairs(cells: &[Cell], shift: i64) -> Pairs {
     cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
-}
-
-fn chunks(numbers: &[i32]) -> Pairs {
-    numbers.chunks_exact(2).map(|pair| (i64::from(pair[0]), i64::from(pair[1]))).collect()
 }

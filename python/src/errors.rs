@@ -36,9 +36,16 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
         Error::Length { what: "actions", .. } => "ActionCountError",
         Error::Action { .. } => "ActionError",
         Error::State { reason } if reason.contains("not reset") => "NotResetError",
+        Error::State { reason } if reason.contains("persistent") => "NotKeptError",
         _ => "StateError",
     };
     of_class(py, class, error)
+}
+
+/// What a call raises while another thread's is under way.
+pub fn busy(py: Python<'_>) -> PyErr {
+    let reason = "another thread is using this environment, expected one thread at a time".to_owned();
+    of_class(py, "StateError", &Error::State { reason })
 }
 
 /// What an A* agent raises that was not told of a new episode.

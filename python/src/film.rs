@@ -1,8 +1,9 @@
 //! Films of episodes, and what is drawn of them.
 
-use pogema_core::{Action, Config, Environment, Error, Instance, TraceStep};
+use pogema_core::{Action, Config, Environment, Error, Instance, Snapshot, TraceStep};
 use pogema_fast::Engine;
 use pogema_render::{Film, Style, html, svg};
+use serde::{Deserialize, Serialize};
 
 /// Keeps the steps of an episode if somebody wants to draw them.
 #[derive(Default)]
@@ -10,6 +11,15 @@ pub struct Recorder {
     /// Whether the episodes from the next reset on are kept.
     pub is_wanted: bool,
     film: Option<Film>,
+}
+
+/// The states of a film; a snapshot does not hold its step, so the numbers of the steps stand beside them.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kept {
+    start: Snapshot,
+    steps: Vec<TraceStep>,
+    numbers: Vec<u64>,
 }
 
 impl Recorder {
@@ -34,6 +44,23 @@ impl Recorder {
             observations: None,
             metrics: None,
         });
+    }
+
+    /// What is needed besides the instance to go on with the film.
+    pub fn kept(&self) -> Option<Kept> {
+        let film = self.film.as_ref()?;
+        let numbers = film.steps.iter().map(|step| step.state.step).collect();
+        Some(Kept { start: film.start.clone(), steps: film.steps.clone(), numbers })
+    }
+
+    /// Goes on with a film of this instance.
+    pub fn resume(&mut self, rules: &Config, instance: &Instance, kept: Kept) {
+        let Kept { start, mut steps, numbers } = kept;
+        for (step, number) in steps.iter_mut().zip(numbers) {
+            step.state.step = number;
+        }
+        let (map, outside) = (instance.map().clone(), instance.outside().clone());
+        self.film = Some(Film { config: *rules, map, outside, start, steps });
     }
 
     pub fn svg(&self, style: &Style) -> Result<String, Error> {

@@ -2,11 +2,14 @@
 
 mod astar;
 mod config;
+mod drawn;
 mod engine;
 mod errors;
 mod film;
 mod lists;
+mod observe;
 mod seeds;
+mod state;
 mod vec;
 
 use pyo3::prelude::*;
@@ -19,5 +22,6 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
+    module.add_function(wrap_pyfunction!(state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -2,6 +2,7 @@
 
 use rand_core::Rng;
 use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
 
 use super::{NumpyError, SeedSequence};
 
@@ -12,7 +13,8 @@ use super::{NumpyError, SeedSequence};
 /// Source: NumPy 1.26, `default_rng` and `Generator` on `PCG64`.
 ///
 /// Rule: seed/streams
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Generator {
     pcg: Pcg64,
     /// The half that the next 32-bit draw takes; draws of 64 bits pass it by.

@@ -1,0 +1,103 @@
+"""What an environment with `persistent` in its config has kept of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from pogema_rs import _engine
+
+__all__ = ["AgentState", "PersistentWrapper"]
+
+
+class AgentState:
+    """Where an agent is and wants to go, from a step on; places are (row, col) and count the border.
+
+    Two states are equal if all but their steps is.
+
+    Rule: history/changes
+    """
+
+    def __init__(self, x: int, y: int, tx: int, ty: int, step: int, active: bool) -> None:
+        self.x = x
+        self.y = y
+        self.tx = tx
+        self.ty = ty
+        self.step = step
+        self.active = active
+
+    def get_xy(self) -> tuple[int, int]:
+        """Where the agent is."""
+        return self.x, self.y
+
+    def get_target_xy(self) -> tuple[int, int]:
+        """Where it wants to go."""
+        return self.tx, self.ty
+
+    def is_active(self) -> bool:
+        """Whether it takes part."""
+        return self.active
+
+    def get_step(self) -> int:
+        """Steps since the reset."""
+        return self.step
+
+    def _what(self) -> tuple:
+        return self.x, self.y, self.tx, self.ty, self.active
+
+    def __eq__(self, other: object) -> bool:
+        return self._what() == other._what() if isinstance(other, AgentState) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        numbers = [str(number) for number in (self.x, self.y, self.tx, self.ty, self.step)]
+        return f"[{', '.join(numbers)}, {self.active}]"
+
+    def __repr__(self) -> str:
+        return f"AgentState{self}"
+
+
+History = list[list[AgentState]]
+
+
+def kept(engine: _engine.Engine, shift: int) -> History:
+    """For each agent its first state and each later one that differs from the one before."""
+    return [[_state(shift, *change) for change in changes] for changes in engine.history()]
+
+
+def _state(shift: int, row: int, col: int, goal_row: int, goal_col: int, *rest: Any) -> AgentState:
+    step, active, is_drawn = rest
+    goal = (goal_row + shift, goal_col + shift)
+    if is_drawn:
+        goal = (np.int64(goal[0]), np.int64(goal[1]))
+    return AgentState(row + shift, col + shift, *goal, step, active)
+
+
+def at_every_step(changes: Iterable[AgentState], num_steps: int) -> list[AgentState]:
+    """The state of one agent at each of the steps from 0 to `num_steps`, both included."""
+    first, *rest = changes
+    states = [first]
+    for step in range(1, num_steps + 1):
+        if rest and rest[0].step == step:
+            states.append(rest.pop(0))
+        else:
+            states.append(states[-1])
+    return states
+
+
+class PersistentWrapper:
+    """The two functions of POGEMA's class that need no environment; an environment keeps its steps itself."""
+
+    agent_state_to_full_list = staticmethod(at_every_step)
+
+    @staticmethod
+    def decompress_history(history: History) -> History:
+        """The state of each agent at each step, up to the last one at which anything changed.
+
+        Rule: history/changes
+        """
+        num_steps = max(changes[-1].step for changes in history)
+        return [at_every_step(changes, num_steps) for changes in history]

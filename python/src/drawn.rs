@@ -1,0 +1,112 @@
+//! Which goals POGEMA holds as NumPy's numbers, which a user can see.
+
+use std::ffi::CString;
+
+use pogema_core::{OnGoal, Snapshot};
+use pogema_maps::Targets;
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::engine::Engine;
+
+/// Whether each agent's goal was drawn since the reset, now and at each change that persistent mode keeps.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drawn {
+    now: Vec<bool>,
+    kept: Vec<Vec<bool>>,
+}
+
+impl Drawn {
+    /// Begins an episode.
+    pub fn begin(&mut self, num_agents: usize, is_kept: bool) {
+        self.now = vec![false; num_agents];
+        self.kept = if is_kept { vec![vec![false]; num_agents] } else { Vec::new() };
+    }
+
+    /// Whether it is about so many agents, and keeps changes where they are kept.
+    pub fn fits(&self, num_agents: usize, is_kept: bool) -> bool {
+        self.now.len() == num_agents && self.kept.len() == if is_kept { num_agents } else { 0 }
+    }
+
+    /// Whether each agent's present goal was drawn.
+    pub fn now(&self) -> &[bool] {
+        &self.now
+    }
+
+    /// Whether the goal of an agent was drawn, at each of its changes.
+    pub fn kept(&self, agent: usize) -> &[bool] {
+        self.kept.get(agent).map_or(&[], |kept| kept)
+    }
+
+    /// Takes in that agents got new goals.
+    pub fn note(&mut self, got_new: &[bool]) {
+        for (is_drawn, &is_new) in self.now.iter_mut().zip(got_new) {
+            *is_drawn |= is_new;
+        }
+    }
+
+    /// Takes in a step that was kept.
+    pub fn remember(&mut self, past: &[Snapshot]) {
+        for (agent, (kept, &now)) in self.kept.iter_mut().zip(&self.now).enumerate() {
+            if has_changed(past, agent) {
+                kept.push(now);
+            }
+        }
+    }
+
+    /// Goes back with the last step, which is still in the past.
+    pub fn take_back(&mut self, past: &[Snapshot]) {
+        for (agent, (kept, now)) in self.kept.iter_mut().zip(&mut self.now).enumerate() {
+            if has_changed(past, agent) {
+                kept.pop();
+                *now = kept.last().copied().unwrap_or(false);
+            }
+        }
+    }
+}
+
+fn has_changed(past: &[Snapshot], agent: usize) -> bool {
+    let [.., before, after] = past else { return false };
+    let state = |snapshot: &Snapshot| (snapshot.cells[agent], snapshot.goals[agent], snapshot.active[agent]);
+    state(before) != state(after)
+}
+
+impl Engine {
+    /// Takes in which goals are new: drawn ones are of NumPy's type in POGEMA, and given ones are not.
+    pub(crate) fn note_goals(&mut self) {
+        let config = self.source.config();
+        let is_lifelong = config.on_target == OnGoal::Restart;
+        let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
+        if is_lifelong && !has_sequences {
+            self.drawn.note(self.game.on_goal());
+        }
+        if config.persistent {
+            self.drawn.remember(self.game.past());
+        }
+    }
+
+    /// Warns of goal sequences that have just come round to their first goals; the step is done, whatever becomes
+    /// of the warnings.
+    ///
+    /// Rule: goal/restart/sequence
+    pub(crate) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
+        if self.source.config().on_target != OnGoal::Restart {
+            return Ok(());
+        }
+        for (agent, stream) in self.game.streams().iter().enumerate().filter(|(i, _)| self.game.on_goal()[*i])
+        {
+            if let Some((num_goals, 0)) = stream.turn() {
+                let text = format!(
+                    "agent {agent} has reached all {num_goals} goals of its sequence, which goes round to the first \
+                     one; an episode has {} steps, so give it more goals",
+                    self.source.config().max_episode_steps
+                );
+                let category = py.get_type::<PyUserWarning>();
+                PyErr::warn(py, &category, &CString::new(text).unwrap_or_default(), 2)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,112 @@
+//! Observations as the arrays, tuples and dictionaries that POGEMA returns.
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
+use pogema_core::{Environment, MapfOut, PomapfOut};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::engine::Engine;
+use crate::errors;
+use crate::lists::{Pairs, tuples};
+
+impl Engine {
+    pub(crate) fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let config = self.game.config();
+        let (num_agents, side) = (config.num_agents, config.side());
+        let array = PyArray4::<f32>::zeros(py, [num_agents, 3, side, side], false);
+        {
+            let mut values = array.readwrite();
+            let values = values.as_slice_mut()?;
+            py.detach(|| self.game.observe(values)).map_err(|error| errors::call(py, &error))?;
+        }
+        split(py, array.as_any(), num_agents)
+    }
+
+    pub(crate) fn observe_apart<'py>(
+        &self,
+        py: Python<'py>,
+        is_global: bool,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let config = self.game.config();
+        let (num_agents, side) = (config.num_agents, config.side());
+        let obstacles = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
+        let agents = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
+        let (mut cells, mut goals) = (vec![0; 2 * num_agents], vec![0; 2 * num_agents]);
+        {
+            let (mut obstacles, mut agents) = (obstacles.readwrite(), agents.readwrite());
+            let (obstacles, agents) = (obstacles.as_slice_mut()?, agents.as_slice_mut()?);
+            let out = PomapfOut { obstacles, agents, cells: &mut cells, goals: &mut goals };
+            self.game.observe_pomapf(out).map_err(|error| errors::call(py, &error))?;
+        }
+        let (obstacles, agents) =
+            (split(py, obstacles.as_any(), num_agents)?, split(py, agents.as_any(), num_agents)?);
+        let xy = tuples(py, &chunks(&cells))?;
+        let target_xy = self.goal_tuples(py, &chunks(&goals))?;
+        let global = if is_global { Some(self.global_lists(py)?) } else { None };
+        let all = PyList::empty(py);
+        for agent in 0..num_agents {
+            let seen = PyDict::new(py);
+            seen.set_item(pyo3::intern!(py, "obstacles"), obstacles.get_item(agent)?)?;
+            seen.set_item(pyo3::intern!(py, "agents"), agents.get_item(agent)?)?;
+            seen.set_item(pyo3::intern!(py, "xy"), xy.get_item(agent)?)?;
+            seen.set_item(pyo3::intern!(py, "target_xy"), target_xy.get_item(agent)?)?;
+            if let Some((obstacles, cells, goals)) = &global {
+                seen.set_item(pyo3::intern!(py, "global_obstacles"), obstacles)?;
+                seen.set_item(pyo3::intern!(py, "global_xy"), cells.get_item(agent)?)?;
+                seen.set_item(pyo3::intern!(py, "global_target_xy"), goals.get_item(agent)?)?;
+            }
+            all.append(seen)?;
+        }
+        Ok(all)
+    }
+
+    /// Tuples of goals, of NumPy's integers where they were drawn.
+    fn goal_tuples<'py>(&self, py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {
+        let list = tuples(py, pairs)?;
+        for agent in (0..pairs.len()).filter(|&agent| self.drawn.now()[agent]) {
+            let (row, col) = pairs[agent];
+            let numbers = PyArray1::from_slice(py, &[row, col]);
+            list.set_item(agent, (numbers.as_any().get_item(0)?, numbers.as_any().get_item(1)?))?;
+        }
+        Ok(list)
+    }
+
+    /// The map with its border, and all cells and goals in its coordinates.
+    pub(crate) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
+        self.check_started(py)?;
+        let config = self.game.config();
+        let (height, width) = self.game.size();
+        let padded =
+            PyArray2::<u8>::zeros(py, [height + 2 * config.radius, width + 2 * config.radius], false);
+        let (mut cells, mut goals) = (vec![0; 2 * config.num_agents], vec![0; 2 * config.num_agents]);
+        {
+            let mut obstacles = padded.readwrite();
+            let out = MapfOut { obstacles: obstacles.as_slice_mut()?, cells: &mut cells, goals: &mut goals };
+            self.game.observe_mapf(out).map_err(|error| errors::call(py, &error))?;
+        }
+        Ok((padded, chunks(&cells), chunks(&goals)))
+    }
+
+    fn global_lists<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyList>, Bound<'py, PyList>)> {
+        let (padded, cells, goals) = self.global(py)?;
+        let dtype = if self.is_free_outside() { "float64" } else { "int64" };
+        let padded = padded.call_method1("astype", (dtype,))?;
+        Ok((padded, tuples(py, &cells)?, self.goal_tuples(py, &goals)?))
+    }
+}
+
+/// The parts of an array, one per agent.
+fn split<'py>(py: Python<'py>, array: &Bound<'py, PyAny>, num_agents: usize) -> PyResult<Bound<'py, PyList>> {
+    let parts = PyList::empty(py);
+    for agent in 0..num_agents {
+        parts.append(array.get_item(agent)?)?;
+    }
+    Ok(parts)
+}
+
+fn chunks(numbers: &[i32]) -> Pairs {
+    numbers.chunks_exact(2).map(|pair| (i64::from(pair[0]), i64::from(pair[1]))).collect()
+}

@@ -1,0 +1,143 @@
+//! An environment as bytes, so that it can be pickled and copied in the middle of an episode.
+
+use pogema_core::{Environment, EpisodeMeter, Error, GoalStream, Map, Snapshot, StreamState};
+use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::drawn::Drawn;
+use crate::engine::Engine;
+use crate::errors;
+use crate::film::{Kept, Recorder};
+
+const FORMAT: &str = "pogema-rs environment";
+const VERSION: u32 = 1;
+
+/// Everything that an environment's future depends on.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saved {
+    format: String,
+    version: u32,
+    config: Value,
+    registered: Option<Map>,
+    exact: bool,
+    time_limit: i64,
+    elapsed: u64,
+    meter: EpisodeMeter,
+    drawn: Drawn,
+    episode: Option<Episode>,
+    is_filmed: bool,
+    film: Option<Kept>,
+}
+
+/// An episode that has begun.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Episode {
+    instance: MadeInstance,
+    step: u64,
+    now: Snapshot,
+    past: Vec<Snapshot>,
+    streams: Vec<StreamState>,
+}
+
+/// The environment that [`save`] made these bytes of.
+///
+/// # Errors
+/// `ValueError` for any other bytes.
+#[pyfunction]
+pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
+    restored(saved).map_err(|error| errors::call(py, &error))
+}
+
+/// The whole state, as versioned JSON.
+pub fn save<'py>(engine: &Engine, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+    let saved = engine.saved().map_err(|error| errors::call(py, &error))?;
+    Ok(PyBytes::new(py, saved.as_bytes()))
+}
+
+impl Engine {
+    fn saved(&self) -> Result<String, Error> {
+        let mut config = self.source.config().to_value();
+        // The pools go on from where resets have shuffled them to.
+        if let Some((starts, goals)) = self.source.pools() {
+            config["possible_agents_xy"] = json!(starts);
+            config["possible_targets_xy"] = json!(goals);
+        }
+        let episode = self.instance.as_ref().map(|instance| {
+            Ok::<_, Error>(Episode {
+                instance: MadeInstance::of(instance)?,
+                step: self.game.num_steps(),
+                now: self.game.snapshot(),
+                past: self.game.past().to_vec(),
+                streams: self.game.streams().iter().map(GoalStream::save).collect::<Result<_, _>>()?,
+            })
+        });
+        let saved = Saved {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            config,
+            registered: self.source.registered().cloned(),
+            exact: self.exact,
+            time_limit: self.time_limit,
+            elapsed: self.elapsed,
+            meter: self.meter.clone(),
+            drawn: self.drawn.clone(),
+            episode: episode.transpose()?,
+            is_filmed: self.recorder.is_wanted,
+            film: self.recorder.kept(),
+        };
+        serde_json::to_string(&saved).map_err(|error| foreign(&error.to_string()))
+    }
+}
+
+fn foreign(reason: &str) -> Error {
+    Error::State { reason: format!("these bytes are no saved environment: {reason}") }
+}
+
+fn restored(saved: &[u8]) -> Result<Engine, Error> {
+    let saved: Value = serde_json::from_slice(saved).map_err(|error| foreign(&error.to_string()))?;
+    if saved["format"] != FORMAT || saved["version"] != VERSION {
+        return Err(foreign(&format!("expected the format `{FORMAT}`, version {VERSION}")));
+    }
+    let saved: Saved = serde_json::from_value(saved).map_err(|error| foreign(&error.to_string()))?;
+    let source = InstanceSource::new(GridConfig::from_value(&saved.config)?, saved.registered)?;
+    let mut engine = Engine::of(source, saved.exact, saved.time_limit)?;
+    let rules = *engine.game.config();
+    let fits = saved.meter.num_agents() == rules.num_agents
+        && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent);
+    if !fits {
+        return Err(foreign("the number of agents is another one than the config's"));
+    }
+    engine.elapsed = saved.elapsed;
+    engine.meter = saved.meter;
+    engine.drawn = saved.drawn;
+    engine.recorder = Recorder::default();
+    engine.recorder.is_wanted = saved.is_filmed;
+    if let Some(episode) = saved.episode {
+        resume(&mut engine, episode)?;
+        if let (Some(kept), Some(instance)) = (saved.film, &engine.instance) {
+            engine.recorder.resume(&rules, instance, kept);
+        }
+    }
+    Ok(engine)
+}
+
+fn resume(engine: &mut Engine, episode: Episode) -> Result<(), Error> {
+    let Episode { instance, step, now, past, streams: states } = episode;
+    let instance = engine.source.remake(instance)?;
+    let mut streams = instance.goals().to_vec();
+    Error::check_length("streams", streams.len(), states.len())?;
+    for (stream, state) in streams.iter_mut().zip(&states) {
+        stream.restore(state)?;
+    }
+    // A snapshot does not hold its step; the kept ones are those of all steps.
+    let now = Snapshot { step, ..now };
+    let past = (0..).zip(past).map(|(step, snapshot)| Snapshot { step, ..snapshot }).collect();
+    engine.game.resume(&instance, streams, now, past)?;
+    engine.instance = Some(instance);
+    Ok(())
+}

@@ -1,0 +1,207 @@
+"""Plays a script on one of the two packages and tells everything that a user of it would see.
+
+What comes back is built of plain tuples and strings, so that both sides can be compared by `==`. This file runs in
+either package's interpreter and imports neither.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import signal
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Described = tuple
+Outcome = dict[str, Any]
+
+TIME_LIMIT = 2.0
+GREEDY = 9
+
+_MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+
+
+class Timeout(BaseException):
+    """A call does not end; no Exception, so that no handler takes it for its own."""
+
+
+def _expire(*_: Any) -> None:
+    raise Timeout
+
+
+@dataclass
+class Package:
+    """What a script needs of a package."""
+
+    config_class: Any
+    make: Any
+    grid_class: Any
+    registry: Any
+
+
+def described(value: Any) -> Described:
+    """A value with its type, and all values in it with theirs."""
+    if isinstance(value, np.ndarray):
+        flags = (value.flags.c_contiguous, value.flags.writeable)
+        return ("array", value.dtype.str, value.shape, flags, value.tobytes())
+    if isinstance(value, np.generic):
+        return (type(value).__name__.rstrip("_"), repr(value.item()))
+    if isinstance(value, dict):
+        return ("dict", tuple((described(key), described(item)) for key, item in value.items()))
+    if isinstance(value, (list, tuple)):
+        return (type(value).__name__, tuple(described(item) for item in value))
+    if type(value).__name__ == "AgentState":
+        return ("AgentState", str(value), tuple(described(item) for item in vars(value).values()))
+    if type(value).__name__ == "Box":
+        return ("Box", described(value.low), described(value.high), value.dtype.str, value.shape)
+    if type(value).__name__ == "Discrete":
+        return ("Discrete", described(value.n), described(value.start), value.dtype.str)
+    if type(value).__name__ == "Dict":
+        return ("Dict", tuple((name, described(space)) for name, space in value.spaces.items()))
+    return (type(value).__name__, repr(value))
+
+
+class Player:
+    """One environment at work, and the script's calls on it."""
+
+    def __init__(self, package: Package) -> None:
+        self.package = package
+        self.env: Any = None
+        self.registered: list[str] = []
+
+    def play(self, script: list[tuple]) -> list[Outcome]:
+        """The outcome of each call; after one that does not end, no more."""
+        outcomes: list[Outcome] = []
+        signal.signal(signal.SIGALRM, _expire)
+        for call in script:
+            outcomes.append(self._outcome(call))
+            if "timeout" in outcomes[-1] or (call[0] == "make" and "error" in outcomes[-1]):
+                break
+        for name in self.registered:
+            del self.package.registry.GRID_STR_REGISTRY[name]
+        return outcomes
+
+    def _outcome(self, call: tuple) -> Outcome:
+        outcome: Outcome = {}
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                signal.setitimer(signal.ITIMER_REAL, TIME_LIMIT)
+                outcome["value"] = getattr(self, f"_{call[0]}")(*call[1:])
+            except Timeout:
+                outcome["timeout"] = True
+            except Exception as error:  # noqa: BLE001 - the errors are what is compared
+                outcome["error"] = ([kind.__name__ for kind in type(error).__mro__], str(error))
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+        outcome["warnings"] = [([kind.__name__ for kind in one.category.__mro__], str(one.message)) for one in caught]
+        return outcome
+
+    def _register(self, name: str, text: str) -> Described:
+        made = self.package.registry.RegisteredGrid(name, text)
+        self.registered.append(name)
+        return described([made.get_obstacles(), made.get_agents_xy(), made.get_targets_xy()])
+
+    def _grid(self, fields: dict[str, Any]) -> Described:
+        grid = self.package.grid_class(self.package.config_class(**copy.deepcopy(fields)))
+        return described([grid.get_obstacles(), grid.get_obstacles(True), grid.positions_xy, grid.finishes_xy])
+
+    def _config(self, fields: dict[str, Any]) -> Described:
+        return described(self.package.config_class(**copy.deepcopy(fields)).dict())
+
+    def _make(self, fields: dict[str, Any]) -> Described:
+        config = self.package.config_class(**copy.deepcopy(fields))
+        told = config.dict()
+        self.env = self.package.make(config)
+        return described([told, self.env.action_space, self.env.observation_space, self.env.get_num_agents()])
+
+    def _reset(self, seed: int | None) -> Described:
+        return described(self.env.reset() if seed is None else self.env.reset(seed=seed))
+
+    def _step(self, plan: list[Any], form: str) -> Described:
+        if any(isinstance(action, int) and action == GREEDY for action in plan):
+            wanted = self._greedy()
+            plan = [wanted[i] if action == GREEDY and i < len(wanted) else action for i, action in enumerate(plan)]
+        actions = contained(plan, form)
+        try:
+            return (described(self.env.step(actions)), self._has_vanished())
+        finally:
+            self.left = described(actions)
+
+    def _has_vanished(self) -> bool:
+        """Whether an agent that takes part is not marked where it stands."""
+        grid = self.env.unwrapped.grid
+        marks, active = grid.positions, grid.is_active
+        return any(active[agent] and not marks[cell] for agent, cell in enumerate(grid.positions_xy))
+
+    def _left(self) -> Described:
+        """What the last step made of the caller's actions."""
+        return self.left
+
+    def _greedy(self) -> list[int]:
+        base = self.env.unwrapped
+        actions, obstacles = [], base.get_obstacles()
+        for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
+            best = (abs(row - goal[0]) + abs(col - goal[1]), 0)
+            for action, (down, right) in enumerate(_MOVES):
+                if not obstacles[row + down, col + right]:
+                    best = min(best, (abs(row + down - goal[0]) + abs(col + right - goal[1]), action))
+            actions.append(int(best[1]))
+        return actions
+
+    def _sample(self) -> Described:
+        drawn = self.env.sample_actions()
+        told = described(drawn)
+        return (described(self.env.step(drawn)), self._has_vanished(), told)
+
+    def _back(self) -> Described:
+        return described(self.env.step_back())
+
+    def _elapsed(self, steps: int) -> Described:
+        return described(self.env.set_elapsed_steps(steps))
+
+    def _history(self) -> Described:
+        kept = self.env.get_history()
+        again = self.env.decompress_history(kept)
+        return described([kept, self.env.get_full_history(), again, kept[0][0] == kept[0][-1]])
+
+    def _seed(self, seed: int | None) -> Described:
+        self.env.unwrapped.grid_config.seed = seed
+        return described(self.env.grid_config.seed)
+
+    def _update(self, fields: dict[str, Any]) -> Described:
+        self.env.grid_config.update_config(**copy.deepcopy(fields))
+        return described(self.env.grid_config.dict())
+
+    def _replace(self, fields: dict[str, Any]) -> Described:
+        config = self.package.config_class(**copy.deepcopy(fields))
+        self.env.unwrapped.grid_config = config
+        return described(config.dict())
+
+    def _told(self) -> Described:
+        return described(self.env.grid_config.dict())
+
+    def _call(self, path: str, arguments: tuple, keywords: dict[str, Any]) -> Described:
+        target = self.env
+        for name in path.split("."):
+            target = getattr(target, name)
+        return described(target(*arguments, **keywords) if callable(target) else target)
+
+    def _render(self) -> Described:
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            result = self.env.render()
+        return described([result, out.getvalue()])
+
+
+def contained(plan: list[Any], form: str) -> Any:
+    """Actions in one of the containers that a caller may use."""
+    if form in ("int64", "int32", "uint8"):
+        return np.array(plan, dtype=form)
+    if form == "numbers":
+        return [np.int64(action) if type(action) is int else action for action in plan]
+    return tuple(plan) if form == "tuple" else list(plan)

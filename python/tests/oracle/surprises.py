@@ -1,0 +1,163 @@
+"""Where pogema_rs does otherwise than POGEMA 1.4.0 on purpose: a script each, with what each side must do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+_RESET = ("reset", None)
+_SMALL = {"map": "....\n....", "obs_radius": 2, "seed": 3, "num_agents": 2}
+_PAIR = {"map": "abAB", "obs_radius": 1}
+
+
+@dataclass(frozen=True)
+class Surprise:
+    """The last call of the script is the one that differs; an empty string is for a value, not an error.
+
+    What is a line `differences` names the table in docs/spec/differences.md that tells of it.
+    """
+
+    name: str
+    fields: dict[str, Any]
+    script: tuple
+    theirs: str
+    ours: str
+
+
+def _surprise(name: str, fields: dict[str, Any], *calls: tuple, theirs: str, ours: str) -> Surprise:
+    return Surprise(name, fields, (("make", fields), *calls), theirs, ours)
+
+
+SURPRISES = (
+    # differences, Starts and goals: two agents with one start.
+    _surprise(
+        "one start twice",
+        {**_SMALL, "agents_xy": [[0, 0], [0, 0]], "targets_xy": [[0, 1], [0, 2]]},
+        _RESET,
+        theirs="",
+        ours="InstanceError",
+    ),
+    # differences, Starts and goals: a start of a pool outside the map.
+    _surprise(
+        "pool start outside",
+        {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 5]], "possible_targets_xy": [[0, 1]]},
+        _RESET,
+        theirs="ValueError",
+        ours="InstanceError",
+    ),
+    # differences, Starts and goals: a goal of a pool outside the map.
+    _surprise(
+        "pool goal outside",
+        {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 9]]},
+        _RESET,
+        theirs="",
+        ours="InstanceError",
+    ),
+    # differences, Starts and goals: a pool of one goal that draws for ever.
+    _surprise(
+        "pool goal for ever",
+        {
+            **{"map": "....\n....", "num_agents": 1, "on_target": "restart", "obs_radius": 1, "seed": 1},
+            **{"possible_targets_xy": [[1, 1]]},
+        },
+        _RESET,
+        theirs="",
+        ours="InstanceError",
+    ),
+    # differences, Starts and goals: fewer sequences than agents.
+    _surprise(
+        "too few sequences",
+        {**_SMALL, "on_target": "restart", "targets_xy": [[[0, 0], [0, 1]]]},
+        _RESET,
+        theirs="",
+        ours="InstanceError",
+    ),
+    # differences, Config: letters with goals that are to follow each other.
+    _surprise("letters and restart", {**_PAIR, "on_target": "restart"}, theirs="", ours="ValidationError"),
+    # differences, Config: other MOVES.
+    _surprise("other moves", {**_SMALL, "MOVES": [[0, 0], [0, 1]]}, theirs="", ours="ValidationError"),
+    # differences, Config: max_episode_steps over 64 bits.
+    _surprise("endless episode", {**_SMALL, "max_episode_steps": 2**70}, theirs="", ours="ValidationError"),
+    # differences, Maps: cells that are neither 0 nor 1, and rows of unequal length.
+    _surprise("other cells", {"map": [[0, 2, 0, 0]]}, theirs="", ours="ValidationError"),
+    _surprise("ragged list", {"map": [[0, 0, 0], [0, 0]]}, theirs="", ours="ValidationError"),
+    # differences, Metrics and history: throughput over no steps.
+    _surprise(
+        "throughput over nothing",
+        {**_SMALL, "on_target": "restart", "max_episode_steps": 0},
+        theirs="",
+        ours="ValidationError",
+    ),
+    # POGEMA drops agent 0, or raises: docs/spec/defects.md, The Python package.
+    _surprise(
+        "only active agents", _SMALL, _RESET, ("call", "get_agents_xy", (), {"only_active": True}), theirs="", ours=""
+    ),
+    _surprise(
+        "state without border",
+        _SMALL,
+        _RESET,
+        ("call", "get_state", (), {"ignore_borders": True, "as_dict": True}),
+        theirs="",
+        ours="",
+    ),
+    # docs/spec/defects.md, The Python package: the text is thrown away.
+    _surprise("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
+    # A wrapped environment of 1.4.0 takes no return_info; its own classes do.
+    _surprise("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
+    # docs/spec/defects.md, Collisions: `soft` writes into the actions, which a tuple does not allow.
+    _surprise(
+        "soft and a tuple",
+        {**_PAIR, "collision_system": "soft"},
+        _RESET,
+        ("step", [4, 3], "tuple"),
+        theirs="TypeError",
+        ours="",
+    ),
+    _surprise(
+        "soft and a list",
+        {**_PAIR, "collision_system": "soft"},
+        _RESET,
+        ("step", [4, 3], "list"),
+        ("left",),
+        theirs="",
+        ours="",
+    ),
+    # differences, Metrics and history: steps back after agents have vanished.
+    _surprise(
+        "steps back after vanishing",
+        {"map": "ab...AB", "collision_system": "soft", "obs_radius": 1, "persistent": True},
+        _RESET,
+        ("step", [4, 4], "list"),
+        ("step", [4, 4], "list"),
+        ("back",),
+        ("back",),
+        theirs="KeyError",
+        ours="",
+    ),
+    # differences, Metrics and history: a step back onto an obstacle.
+    _surprise(
+        "step back onto an obstacle",
+        {
+            **{"map": "#..", "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 2]], "obs_radius": 1},
+            **{"seed": 1, "persistent": True},
+        },
+        _RESET,
+        ("step", [4], "list"),
+        ("back",),
+        theirs="ValueError",
+        ours="",
+    ),
+    # Coordinates are kept as plain numbers, whatever kind of number they came as; POGEMA refuses NumPy's.
+    _surprise(
+        "flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""
+    ),
+    _surprise(
+        "numpy coordinates", {"num_agents": 1, "agents_xy": [[np.int64(1), 1]]}, theirs="ValidationError", ours=""
+    ),
+    # A grid is a view of the environment: what it returns is not to be written to.
+    _surprise(
+        "write-protected grid", _SMALL, _RESET, ("call", "grid.hide_agent", (0,), {}), theirs="", ours="StateError"
+    ),
+)

@@ -1,0 +1,194 @@
+"""What one environment does with input that is wrong: a clear error, and nothing has changed."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+
+from pogema_rs import errors
+from pogema_rs.envs import _make_pogema
+from pogema_rs.grid_config import GridConfig
+
+CONFIG: dict[str, Any] = {"size": 6, "num_agents": 3, "obs_radius": 2, "density": 0.1, "seed": 3}
+SYSTEMS = ("priority", "block_both", "soft")
+
+
+def started(**fields: Any) -> Any:
+    """An environment after its reset."""
+    env = _make_pogema(GridConfig(**{**CONFIG, **fields}))
+    env.reset()
+    return env
+
+
+def state(env: Any) -> Any:
+    """Where everything is."""
+    return env.get_agents_xy(), env.get_targets_xy(), env.grid.is_active, env._engine.num_steps
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize(
+    ("actions", "classes", "text"),
+    [
+        ([0, 0], (AssertionError, ValueError), "actions has length 2, expected 3"),
+        ([0, 0, 0, 0], (AssertionError, ValueError), "actions has length 4, expected 3"),
+        ([], (AssertionError, ValueError), "actions has length 0"),
+        ([0, 5, 0], (IndexError, ValueError), "action of agent 1 is `5`"),
+        ([4, 4, -6], (IndexError, ValueError), "action of agent 2 is `-6`"),
+        ([10**30, 0, 0], (IndexError, ValueError), "action of agent 0"),
+        ([1, 1.0, 1], (TypeError,), ""),
+        ([1, None, 1], (TypeError,), ""),
+        ([1, "1", 1], (TypeError,), ""),
+        ([1, 1, float("nan")], (TypeError,), ""),
+        ([1, 1, [1]], (TypeError,), ""),
+        (np.array([1.0, 2.0, 3.0]), (TypeError,), ""),
+        (np.array([[1, 2, 3], [1, 2, 3], [1, 2, 3]]), (TypeError,), ""),
+        (3, (TypeError,), ""),
+        (None, (TypeError,), ""),
+    ],
+)
+def test_actions_that_are_none(actions: Any, classes: tuple, text: str, system: str) -> None:
+    """Wrong actions are refused before anybody moves."""
+    env, other = started(collision_system=system), started(collision_system=system)
+    before = state(env)
+    for kind in classes:
+        with pytest.raises(kind, match=text or None):
+            env.step(actions)
+    assert state(env) == before
+    assert np.array_equal(env.step([1, 2, 3])[0], other.step([1, 2, 3])[0])
+
+
+def test_the_action_of_an_agent_that_is_gone_is_not_looked_at() -> None:
+    """As in POGEMA, though the count still matters."""
+    env = _make_pogema(GridConfig(map="aA.\n.bB", obs_radius=1))
+    env.reset()
+    assert env.step([4, 0])[4][0] == {"is_active": False}
+    env.step([99, 0])
+    env.step([None, 4])
+
+
+def test_before_the_reset() -> None:
+    """Every call that needs an episode says that there is none."""
+    env = _make_pogema(GridConfig(**CONFIG))
+    calls = (env.render, env.get_agents_xy, env.get_obstacles, env.get_state, env.get_targets_xy_relative)
+    for call in (lambda: env.step([0, 0, 0]), *calls):
+        for kind in (ResetNeeded, AttributeError):
+            with pytest.raises(kind, match="not reset yet"):
+                call()
+    assert env.was_on_goal is None
+    assert env.get_num_agents() == 3
+
+
+def test_after_the_end_steps_go_on() -> None:
+    """Nothing resets by itself."""
+    env = started(max_episode_steps=2)
+    ends = [env.step([0, 0, 0])[3][0] for _ in range(5)]
+    assert ends == [False, True, True, True, True]
+
+
+def test_a_reset_that_fails_changes_nothing() -> None:
+    """The episode before it can be played on."""
+    env = started()
+    before = state(env)
+    env.grid_config.update_config(num_agents=30)
+    with pytest.raises(OverflowError, match="num_agents"):
+        env.reset()
+    env.grid_config.update_config(num_agents=3)
+    assert state(env) == before
+    env.step([0, 0, 0])
+
+
+def test_history_needs_to_be_kept() -> None:
+    """Each call says what it needs, as the two classes that POGEMA's users may catch."""
+    env = started()
+    for call in (env.step_back, env.get_history, env.get_full_history, lambda: env.set_elapsed_steps(1)):
+        for kind in (ValueError, AttributeError):
+            with pytest.raises(kind, match="persistent=True"):
+                call()
+    env = _make_pogema(GridConfig(**CONFIG, persistent=True))
+    for call in (env.step_back, env.get_history):
+        with pytest.raises(errors.NotResetError, match="not reset yet"):
+            call()
+    env.reset()
+    assert env.step_back() is False
+    for kind in (AssertionError, ValueError):
+        with pytest.raises(kind, match="expected 0 or more"):
+            env.set_elapsed_steps(-1)
+
+
+def test_the_time_limit_can_be_moved() -> None:
+    """A step back sets it to the steps that are left."""
+    env = started(persistent=True, max_episode_steps=10)
+    env.set_elapsed_steps(8)
+    assert [env.step([0, 0, 0])[3][0] for _ in range(2)] == [False, True]
+    env.step_back()
+    assert env.step([0, 0, 0])[3][0] is False
+
+
+def test_a_sequence_that_goes_round_is_warned_of() -> None:
+    """Once each time, and by the name of the agent."""
+    goals = [[[0, 1], [0, 0]], [[1, 2], [1, 1], [1, 0]]]
+    env = _make_pogema(
+        GridConfig(map="...\n...", agents_xy=[[0, 0], [1, 2]], targets_xy=goals, on_target="restart", obs_radius=1)
+    )
+    env.reset()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            env.step([4, 0])
+            env.step([3, 0])
+    texts = [str(one.message) for one in caught]
+    assert [one.category for one in caught] == [UserWarning] * 2
+    assert all("agent 0 has reached all 2 goals" in text for text in texts)
+    assert caught[0].filename == __file__
+
+
+def test_two_threads_on_one_environment() -> None:
+    """One of them is told; nothing breaks."""
+    env = _make_pogema(GridConfig(size=200, num_agents=4000, obs_radius=5, density=0.05, seed=1))
+    env.reset()
+    told: list[BaseException] = []
+    num_steps = [0, 0, 0]
+
+    def play(thread: int) -> None:
+        for _ in range(40):
+            try:
+                env.step(np.full(4000, thread + 1))
+                num_steps[thread] += 1
+            except Exception as error:  # noqa: BLE001 - the class is what is tested
+                told.append(error)
+
+    threads = [threading.Thread(target=play, args=(number,)) for number in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {type(error) for error in told} <= {errors.StateError}
+    assert all(
+        str(error) == "another thread is using this environment, expected one thread at a time" for error in told
+    )
+    assert all(isinstance(error, RuntimeError) for error in told)
+    assert env._engine.num_steps == sum(num_steps)
+    env.step(np.zeros(4000, dtype=int))
+
+
+def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
+    """The step that a warning is about is played in any case."""
+    fields = {"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[[0, 1], [0, 0]]], "on_target": "restart"}
+    env, other = (_make_pogema(GridConfig(**fields, obs_radius=1, max_episode_steps=3)) for _ in range(2))
+    for each, action in ((env, "error"), (other, "ignore")):
+        each.reset()
+        each.step([4])
+        with warnings.catch_warnings():
+            warnings.simplefilter(action)
+            if action == "error":
+                with pytest.raises(UserWarning, match="goes round"):
+                    each.step([3])
+            else:
+                each.step([3])
+    assert state(env) == state(other)
+    assert env.step([4])[4] == other.step([4])[4] == [{"is_active": True, "metrics": {"avg_throughput": 1.0}}]

@@ -1,0 +1,155 @@
+"""Environments that are pickled or copied in the middle of an episode, and go on as if nothing had been."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pogema_rs import _engine
+from pogema_rs.envs import _make_pogema
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+SMALL: dict[str, Any] = {"size": 6, "num_agents": 4, "obs_radius": 2, "density": 0.2, "max_episode_steps": 12}
+POOLS = {"map": "@.$@\n.$@.\n$..@", "num_agents": 3, "obs_radius": 1, "max_episode_steps": 9}
+SEQUENCES = {
+    **{"map": "....", "agents_xy": [[0, 0], [0, 3]], "obs_radius": 1, "on_target": "restart"},
+    "targets_xy": [[[0, 1], [0, 0]], [[0, 2], [0, 3], [0, 2]]],
+}
+CONFIGS = {
+    "seeded": {**SMALL, "seed": 5},
+    "unseeded": SMALL,
+    "lifelong": {**SMALL, "on_target": "restart"},
+    "lifelong with pools": {**POOLS, "on_target": "restart", "seed": 3},
+    "sequences": SEQUENCES,
+    "pools": {**POOLS, "seed": 8},
+    "one goal": {**SMALL, "on_target": "nothing", "observation_type": "MAPF", "empty_outside": False},
+    "persistent": {**SMALL, "on_target": "restart", "persistent": True, "collision_system": "soft"},
+    "persistent to the end": {**SMALL, "persistent": True, "seed": 1, "observation_type": "POMAPF"},
+    "one cell": {"width": 1, "height": 2, "density": 0.0, "seed": 2, "obs_radius": 1},
+}
+WAYS = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
+
+
+def plain(value: Any) -> Any:
+    """A value in a form that `==` compares as a whole."""
+    if isinstance(value, np.ndarray):
+        return (value.dtype.str, value.shape, value.tobytes())
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return (type(value).__name__, [plain(item) for item in value])
+    return (type(value).__name__, str(value))
+
+
+def future(env: Any, plans: np.ndarray) -> list[Any]:
+    """All that is to be seen of an environment from now on; what a reset draws without a seed is left out."""
+    seen = []
+    for plan in plans:
+        seen += [plain(env.step(plan[: env.get_num_agents()])), plain(env.was_on_goal), plain(env.sample_actions())]
+        seen += [plain(env.get_targets_xy()), plain(env.get_agents_xy_relative()), plain(env.grid.positions)]
+    if env.grid_config.on_target == "restart":
+        seen.append(plain(env.get_lifelong_targets_xy()))
+    if env.grid_config.persistent:
+        for _ in range(3):
+            seen += [env.step_back(), plain(env.get_history()), plain(env.get_targets_xy())]
+    if env.grid_config.seed is not None:
+        seen += [plain(env.reset()), plain(env.step(plans[0][: env.get_num_agents()]))]
+    return seen
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS)
+@pytest.mark.filterwarnings("ignore:agent")
+def test_the_future_is_the_same(fields: dict[str, Any], way: Any) -> None:
+    """A copy made after some steps plays on like the original, and neither disturbs the other."""
+    plans = np.random.default_rng(3).integers(5, size=(40, 6))
+    env = _make_pogema(GridConfig(**fields))
+    env.sample_actions()
+    env.reset()
+    for plan in plans[:7]:
+        env.step(plan[: env.get_num_agents()])
+    if fields.get("seed") is not None:
+        env.reset()
+        env.step(plans[0][: env.get_num_agents()])
+    other = way(env)
+    assert future(other, plans[7:30]) == future(env, plans[7:30])
+    third = way(other)
+    assert plain(third.get_agents_xy()) == plain(other.get_agents_xy())
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_before_the_reset(way: Any) -> None:
+    """A copy of an environment that was not reset yet is one."""
+    env = way(_make_pogema(GridConfig(**SMALL, seed=4)))
+    other = _make_pogema(GridConfig(**SMALL, seed=4))
+    assert plain(env.reset()) == plain(other.reset())
+
+
+def test_a_film_goes_on() -> None:
+    """The film of an episode is copied with it."""
+    env = _make_pogema(GridConfig(**SMALL, seed=4))
+    env._engine.film(True)
+    env.reset()
+    env.step([1, 2, 3, 4])
+    other = copy.deepcopy(env)
+    for each in (env, other):
+        each.step([4, 3, 2, 1])
+    assert other._engine.draw_svg() == env._engine.draw_svg()
+
+
+def test_a_registered_map_goes_on() -> None:
+    """A copy needs the registry only at the next reset."""
+    RegisteredGrid("pickled", "...#\n....")
+    try:
+        env = _make_pogema(GridConfig(map_name="pickled", num_agents=2, seed=1, obs_radius=2))
+        env.reset()
+        other = copy.deepcopy(env)
+        assert plain(other.step([1, 2])) == plain(env.step([1, 2]))
+        assert plain(other.reset()) == plain(env.reset())
+    finally:
+        del GRID_STR_REGISTRY["pickled"]
+
+
+def test_a_copied_grid_cannot_be_written_to() -> None:
+    """What an environment's grid returns is a view of it, in a copy too."""
+    env = _make_pogema(GridConfig(**SMALL, seed=4))
+    env.reset()
+    assert not env.grid.obstacles.flags.writeable
+    assert not copy.deepcopy(env).grid.obstacles.flags.writeable
+
+
+@pytest.mark.parametrize("change", ["", "{}", "[]", "nonsense", b"\xff", b"[" * 10000])
+def test_foreign_bytes_are_refused(change: Any) -> None:
+    """Only what was saved is restored."""
+    with pytest.raises(ValueError, match="no saved environment"):
+        _engine.restore_engine(change if isinstance(change, bytes) else change.encode())
+
+
+def test_spoiled_bytes_are_refused() -> None:
+    """A state whose parts do not fit each other is refused, and never ends in anything but a ValueError."""
+    env = _make_pogema(GridConfig(**SMALL, seed=4, on_target="restart"))
+    env.reset()
+    _, (saved,) = env._engine.__reduce__()
+    generator = np.random.default_rng(5)
+    refused = 0
+    for _ in range(300):
+        start = int(generator.integers(len(saved) - 4))
+        length = int(generator.integers(1, 4))
+        spoiled = (
+            saved[:start] + bytes(generator.integers(32, 127, size=length, dtype=np.uint8)) + saved[start + length :]
+        )
+        try:
+            engine = _engine.restore_engine(spoiled)
+            engine.step([0, 1, 2, 3])
+        except ValueError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 200
+    wrong = saved.replace(b'"version":1', b'"version":2')
+    with pytest.raises(ValueError, match="version 1"):
+        _engine.restore_engine(wrong)
