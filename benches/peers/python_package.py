@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 OURS = ROOT / "target/python/new/bin/python"
 PROGRAM = ROOT / "target/release/pogema"
-BATCH = "64 lanes of 64 agents, 32 x 32, MAPF, 2 threads"
+BATCH = "64 lanes of 64 agents"
 
 
 class Worker:

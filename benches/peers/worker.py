@@ -79,7 +79,7 @@ def vector(num_envs, num_agents, num_threads):
         "size": 32,
         "density": 0.3,
         "collision_system": "soft",
-        "on_target": "nothing",
+        "on_target": "restart",
         "max_episode_steps": 256,
     }
     env = package.VecEnv(package.GridConfig(**config), num_envs, num_threads=num_threads)

@@ -143,7 +143,7 @@ fn works() -> Vec<Work> {
     }
     let batch = |lanes, threads| Work { lanes: Some(lanes), threads, ..single(64, 32, true) };
     works.extend([1, 16, 256, 4096].map(|lanes| batch(lanes, 1)));
-    works.extend([16, 256, 4096].map(|lanes| batch(lanes, 2)));
+    works.extend([16, 64, 256, 4096].map(|lanes| batch(lanes, 2)));
     works
 }
 
