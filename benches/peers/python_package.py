@@ -42,15 +42,15 @@ class Worker:
         return json.loads(line)
 
 
-def imports_per_second(python, package):
-    """Imports in a process each, less what Python itself takes to start."""
+def imports_per_second(python, statement):
+    """Runs of an import in a process each, less what Python itself takes to start."""
 
     def seconds(code):
         began = time.perf_counter()
         subprocess.run([python, "-B", "-c", code], check=True)
         return time.perf_counter() - began
 
-    return 1 / (min(seconds(f"import {package}") for _ in range(5)) - min(seconds("pass") for _ in range(5)))
+    return 1 / (min(seconds(statement) for _ in range(5)) - min(seconds("pass") for _ in range(5)))
 
 
 def rust_batch():
@@ -72,7 +72,12 @@ def measure(peer, ours, pogema):
         ("reset with a new seed, 64 agents", peer.time("reset", 64), ours.time("reset", 64)),
         ("VecEnv of 64, 64 agents, 2 threads", step_64, 64 * vector),
         ("the same, beside the Rust batch", rust_batch(), vector),
-        ("import", imports_per_second(pogema, "pogema"), imports_per_second(OURS, "pogema_rs")),
+        ("import", imports_per_second(pogema, "import pogema"), imports_per_second(OURS, "import pogema_rs")),
+        (
+            "import of what an environment needs",
+            imports_per_second(pogema, "from pogema import GridConfig, pogema_v0"),
+            imports_per_second(OURS, "from pogema_rs import GridConfig, pogema_v0"),
+        ),
     ]
 
 

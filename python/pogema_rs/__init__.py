@@ -3,23 +3,27 @@
 Change one import and keep every number:
 
     from pogema_rs import GridConfig, pogema_v0
+
+What is named here is imported at its first use, so that importing the package alone costs nothing.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
-import gymnasium
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from pogema_rs._engine import __version__
-from pogema_rs.a_star_policy import AStarAgent, BatchAStarAgent
-from pogema_rs.grid_config import GridConfig
-from pogema_rs.install import install_as_pogema
-from pogema_rs.integrations.make_pogema import pogema_v0
-from pogema_rs.semantics import Semantics
-from pogema_rs.svg_animation.animation_drawer import SvgAnimation
-from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
-from pogema_rs.wrappers.forwarding import Wrapper
+
+if TYPE_CHECKING:
+    from pogema_rs.a_star_policy import AStarAgent, BatchAStarAgent
+    from pogema_rs.grid_config import GridConfig
+    from pogema_rs.install import install_as_pogema
+    from pogema_rs.integrations.make_pogema import pogema_v0
+    from pogema_rs.semantics import Semantics
+    from pogema_rs.svg_animation.animation_drawer import SvgAnimation
+    from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
+    from pogema_rs.vec_env import VecEnv
+    from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = [
     "AStarAgent",
@@ -36,17 +40,35 @@ __all__ = [
     "pogema_v0",
 ]
 
+_HOMES = {
+    "AStarAgent": "a_star_policy",
+    "AnimationConfig": "svg_animation.animation_wrapper",
+    "AnimationMonitor": "svg_animation.animation_wrapper",
+    "BatchAStarAgent": "a_star_policy",
+    "GridConfig": "grid_config",
+    "Semantics": "semantics",
+    "SvgAnimation": "svg_animation.animation_drawer",
+    "VecEnv": "vec_env",
+    "Wrapper": "wrappers.forwarding",
+    "install_as_pogema": "install",
+    "pogema_v0": "integrations.make_pogema",
+}
+# POGEMA's own import brings these with it.
+_MODULES = (
+    *("a_star_policy", "envs", "generator", "grid", "grid_config", "grid_registry", "integrations"),
+    *("svg_animation", "utils", "wrappers"),
+)
+
 
 def __getattr__(name: str) -> Any:
-    # What few programs need is imported at its first use.
-    if name == "VecEnv":
-        from pogema_rs.vec_env import VecEnv
+    if name in _MODULES:
+        return importlib.import_module(f"{__name__}.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
 
-        return VecEnv
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
-
-for _id in ("Pogema-v0", "pogema_rs/Pogema-v0"):
-    # With POGEMA itself imported the plain name stays its own.
-    if _id not in gymnasium.registry:
-        gymnasium.register(id=_id, entry_point="pogema_rs.integrations.make_pogema:make_single_agent_gym")
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, *_MODULES})

@@ -50,8 +50,9 @@ def test_gymnasium(num_agents):
     check_env(env, skip_render_check=True)
 
 
-def test_gymnasium_makes_it_by_name():
-    env = gymnasium.make("Pogema-v0", grid_config=GridConfig(size=8, seed=1))
+@pytest.mark.parametrize("name", ["Pogema-v0", "pogema_rs/Pogema-v0"])
+def test_gymnasium_makes_it_by_name(name):
+    env = gymnasium.make(name, grid_config=GridConfig(size=8, seed=1))
     observation, info = env.reset()
     assert env.observation_space.contains(observation)
     assert info == {"is_active": True}
@@ -101,9 +102,14 @@ def test_what_no_framework_has_is_refused(fields, theirs):
         pogema_v0(GridConfig(**fields))
 
 
-def test_importing_the_package_imports_no_framework():
+def test_importing_the_package_imports_nothing_else():
+    code = "import sys, pogema_rs; print([name for name in ('numpy', 'gymnasium', 'pydantic') if name in sys.modules])"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
+
+
+def test_the_names_of_the_package_import_no_framework():
     code = (
-        "import sys, pogema_rs; "
+        "import sys; from pogema_rs import *; "
         "print([name for name in ('pettingzoo', 'torch', 'ray', 'pufferlib', 'sample_factory', 'matplotlib') "
         "if name in sys.modules])"
     )

@@ -1,0 +1,27 @@
+"""Every example but the training runs, in a short mode; `./check training` runs that."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+SHORT = {
+    "custom_reward.py": ([], "step 5: rewards"),
+    "evaluate_policy.py": (["--seeds", "3"], "A*       ISR"),
+    "replay_html.py": (["--out", "page.html"], "'CSR': 1.0"),
+}
+
+
+def test_each_example_is_here():
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHORT, "train_ppo.py"}
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_an_example_runs(name, tmp_path):
+    arguments, shown = SHORT[name]
+    command = [sys.executable, "-B", str(EXAMPLES / name), *arguments]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert shown in run.stdout
