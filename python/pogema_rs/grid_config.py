@@ -40,14 +40,14 @@ class GridConfig(BaseModel):
     empty_outside: bool = True
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
-    width: Optional[int] = None
-    height: Optional[int] = None
+    width: int = 8
+    height: int = 8
     size: int = 8
     density: float = 0.3
     obs_radius: int = 5
     agents_xy: Optional[list] = None
     targets_xy: Optional[list] = None
-    num_agents: Optional[int] = None
+    num_agents: int = 1
     possible_agents_xy: Optional[list] = None
     possible_targets_xy: Optional[list] = None
     collision_system: Literal["block_both", "priority", "soft"] = "priority"
