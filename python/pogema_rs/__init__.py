@@ -4,13 +4,15 @@ Change one import and keep every number:
 
     from pogema_rs import GridConfig, pogema_v0
 
-What is named here is imported at its first use, so that importing the package alone costs nothing.
+What is named here is imported at its first use; importing the package imports gymnasium alone, which has to know it.
 """
 
 from __future__ import annotations
 
 import importlib
 from typing import TYPE_CHECKING, Any
+
+import gymnasium
 
 from pogema_rs._engine import __version__
 
@@ -72,3 +74,9 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES, *_MODULES})
+
+
+for _id in ("Pogema-v0", "pogema_rs/Pogema-v0"):
+    # With POGEMA itself imported the plain name stays its own.
+    if _id not in gymnasium.registry:
+        gymnasium.register(id=_id, entry_point="pogema_rs.integrations.make_pogema:make_single_agent_gym")
