@@ -36,7 +36,7 @@ class Engine:
     def on_goal(self) -> list[bool]: ...
     @property
     def size(self) -> tuple[int, int]: ...
-    # To be written alone.
+    # Can be written, not read.
     elapsed: int
     def __new__(
         cls, config: str, registered: Optional[str] = None, exact: bool = False, time_limit: Optional[int] = None

@@ -211,6 +211,7 @@ class Grid:
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
     def _refuse(self, *_: Any, **__: Any) -> None:
+        """Raises `StateError`: a grid is not changed by hand."""
         raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
 
     move = move_without_checks = move_agent_to_cell = hide_agent = show_agent = add_artificial_border = _refuse
