@@ -5,6 +5,17 @@ Change one import and keep every number:
     from pogema_rs import GridConfig, pogema_v0
 
 What is named here is imported at its first use; importing the package imports gymnasium alone, which has to know it.
+
+Modules under POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogema_rs.generator`, `pogema_rs.grid`,
+`pogema_rs.grid_config`, `pogema_rs.grid_registry`, `pogema_rs.utils`, `pogema_rs.svg_animation` with
+`pogema_rs.svg_animation.animation_drawer` and `pogema_rs.svg_animation.animation_wrapper`, and `pogema_rs.wrappers`
+with `pogema_rs.wrappers.metrics` and `pogema_rs.wrappers.persistence`.
+
+Modules of our own: `pogema_rs.vec_env`, `pogema_rs.semantics`, `pogema_rs.errors`, `pogema_rs.install` and
+`pogema_rs.wrappers.forwarding`.
+
+Frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
+`pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib` and `pogema_rs.integrations.sample_factory`.
 """
 
 from __future__ import annotations

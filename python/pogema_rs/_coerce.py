@@ -25,7 +25,7 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
 
     Errors: `RefusedConfigError` naming the field, its value and what was expected.
     """
-    result = {}
+    result: dict[str, Any] = {}
     for name, value in fields.items():
         if value is None:
             if name not in _MAY_BE_NONE:

@@ -6,6 +6,17 @@ from typing import Any, Optional, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "AStarAgent",
+    "Batch",
+    "Engine",
+    "__version__",
+    "derive_config",
+    "nearest_name",
+    "num_cores",
+    "restore_engine",
+]
+
 __version__: str
 
 _Pairs = list[tuple[int, int]]
@@ -13,12 +24,19 @@ _State = tuple[NDArray[Any], NDArray[np.bool_], Optional[NDArray[np.int8]]]
 
 @final
 class Engine:
-    active: list[bool]
-    is_drawn: list[bool]
-    is_free_outside: bool
-    num_steps: int
-    on_goal: list[bool]
-    size: tuple[int, int]
+    @property
+    def active(self) -> list[bool]: ...
+    @property
+    def is_drawn(self) -> list[bool]: ...
+    @property
+    def is_free_outside(self) -> bool: ...
+    @property
+    def num_steps(self) -> int: ...
+    @property
+    def on_goal(self) -> list[bool]: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    # Can be written, not read.
     elapsed: int
     def __new__(
         cls, config: str, registered: Optional[str] = None, exact: bool = False, time_limit: Optional[int] = None

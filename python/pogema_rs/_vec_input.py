@@ -11,7 +11,7 @@ try:
     from gymnasium.vector import AutoresetMode
 except ImportError:  # Gymnasium before 1.1 has no name for what it does.
 
-    class AutoresetMode(Enum):
+    class AutoresetMode(Enum):  # type: ignore[no-redef]
         """What follows the end of an episode."""
 
         NEXT_STEP = "NextStep"

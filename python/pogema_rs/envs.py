@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Optional, Union
+from typing import Any, Literal, Optional, Union, cast, overload
 
 import gymnasium
 import numpy as np
@@ -81,7 +81,7 @@ class Pogema(PogemaBase):
             self.semantics.occupancy_is_exact,
             None if limits_steps else 2**63 - 1,
         )
-        self.action_space = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
+        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self.observation_space = _observation_space(self.grid_config)
         self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
@@ -107,7 +107,7 @@ class Pogema(PogemaBase):
                 self._engine.reseed(self.grid_config.seed)
             noticed = self._engine.reset()
         else:
-            fixed = dict(self._fixed)
+            fixed: dict[str, Any] = dict(self._fixed)
             pools = self._engine.pools()
             if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
                 fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
@@ -117,6 +117,18 @@ class Pogema(PogemaBase):
         for text in noticed:
             warnings.warn(text, UserWarning, stacklevel=3)
         self.grid = self._grid_class._of(self._engine, self.grid_config)
+
+    # Gymnasium's types are those of one agent; here each is a list with an entry for every agent.
+
+    @overload  # type: ignore[override]
+    def reset(
+        self, seed: Optional[int] = None, return_info: Literal[True] = True, options: Optional[dict] = None
+    ) -> tuple[list, list]: ...
+
+    @overload
+    def reset(
+        self, seed: Optional[int] = None, *, return_info: Literal[False], options: Optional[dict] = None
+    ) -> list: ...
 
     def reset(
         self, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
@@ -138,7 +150,9 @@ class Pogema(PogemaBase):
         observations = self._engine.observe()
         return (observations, self._engine.infos()) if return_info else observations
 
-    def step(self, action: Sequence[int]) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
+    def step(  # type: ignore[override]
+        self, action: Sequence[int]
+    ) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
         """Plays one step: observations, rewards, terminated, truncated, infos, a list of each.
 
         `infos[0]["metrics"]` holds the figures of the episode in the step that ends it. The actions stay as they are,
@@ -162,8 +176,7 @@ class Pogema(PogemaBase):
 
     def render(self, mode: str = "human") -> Optional[str]:
         """Prints the map with its border in colours; with `mode="ansi"` returns it."""
-        self.check_reset()
-        return self.grid.render(mode=mode)
+        return self._started().render(mode=mode)
 
     def sample_actions(self) -> np.ndarray:
         """A random action for each agent, int64 `(agents,)`, from a generator that begins with the config's seed."""
@@ -175,7 +188,7 @@ class Pogema(PogemaBase):
 
     def _started(self) -> Grid:
         self.check_reset()
-        return self.grid
+        return cast(Grid, self.grid)
 
     def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
         """See `Grid.get_obstacles`."""

@@ -85,7 +85,8 @@ def generate_positions_and_targets_fast(
     num_agents = grid_config.num_agents
     starts: list[Cell] = []
     goals: list[Cell] = [(-1, -1)] * num_agents
-    room, waiting, num_goals = list(sizes), defaultdict(list), 0
+    room, num_goals = list(sizes), 0
+    waiting: dict[int, list[int]] = defaultdict(list)
     for cell in order:
         label = int(grid[cell])
         if waiting[label]:
@@ -108,7 +109,7 @@ def generate_from_possible_positions(grid_config: GridConfig) -> tuple[list, lis
 
     Rule: place/pools
     """
-    pools = (grid_config.possible_agents_xy, grid_config.possible_targets_xy)
+    pools: tuple[Any, Any] = (grid_config.possible_agents_xy, grid_config.possible_targets_xy)
     num_agents = grid_config.num_agents
     shortest = min(len(pool) for pool in pools)
     if shortest < num_agents:
@@ -163,6 +164,8 @@ def get_components(
     points: dict[int, list[Cell]] = defaultdict(list)
     labels: dict[Cell, int] = {}
     for cell in np.ndindex(*grid.shape):
-        points[grid[cell]].append(cell)
-        labels[cell] = grid[cell]
+        # A number of NumPy's type, as in POGEMA.
+        label: Any = grid[cell]
+        points[label].append(cell)
+        labels[cell] = label
     return points, labels

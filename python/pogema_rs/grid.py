@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from copy import deepcopy
-from typing import Any, Optional
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class Grid:
         return self._engine.cells(self.config.obs_radius)
 
     @property
-    def finishes_xy(self) -> list[tuple[int, int]]:
+    def finishes_xy(self) -> list[tuple[Union[int, np.int64], Union[int, np.int64]]]:
         """Where each agent wants to go; of NumPy's integers where a goal was drawn since the reset, as in POGEMA."""
         goals = self._engine.goals(self.config.obs_radius)
         is_drawn = self._engine.is_drawn
@@ -194,7 +194,8 @@ class Grid:
         radius = self.config.obs_radius
         (row, col), (goal_row, goal_col) = self.positions_xy[agent_id], self.finishes_xy[agent_id]
         window = np.zeros((2 * radius + 1, 2 * radius + 1), dtype=np.float32)
-        window[tuple(radius + np.clip((goal_row - row, goal_col - col), -radius, radius))] = 1
+        away = np.array((goal_row - row, goal_col - col))
+        window[tuple(radius + np.clip(away, -radius, radius))] = 1
         return window
 
     def has_obstacle(self, x: int, y: int) -> bool:
@@ -210,6 +211,7 @@ class Grid:
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
     def _refuse(self, *_: Any, **__: Any) -> None:
+        """Raises `StateError`: a grid is not changed by hand."""
         raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
 
     move = move_without_checks = move_agent_to_cell = hide_agent = show_agent = add_artificial_border = _refuse

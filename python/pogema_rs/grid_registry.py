@@ -78,7 +78,7 @@ def register_grid(rg: RegisteredGrid) -> None:
 
 def map_text(name: Optional[str]) -> Optional[str]:
     """The obstacles of a registered map as text; none if there is no such map."""
-    if not in_registry(name):
+    if name is None or not in_registry(name):
         return None
     rows = GRID_STR_REGISTRY[name].get_obstacles()
     return "\n".join("".join("#" if cell else "." for cell in row) for row in rows)

@@ -55,7 +55,7 @@ def install_as_pogema() -> None:
     if not any(isinstance(finder, _Alias) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Alias())
     if not hasattr(gymnasium.Wrapper, "__getattr__"):
-        gymnasium.Wrapper.__getattr__ = _forward
+        setattr(gymnasium.Wrapper, "__getattr__", _forward)
 
 
 def _forward(self: gymnasium.Wrapper, name: str) -> Any:

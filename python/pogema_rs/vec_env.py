@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NoReturn, Optional, Union
+from typing import Any, NoReturn, Optional, Union, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -19,18 +19,24 @@ from pogema_rs.semantics import Semantics
 __all__ = ["AutoresetMode", "VecEnv"]
 
 NUM_ACTIONS = 5
-_DTYPES = {"float32": np.dtype(np.float32), "uint8": np.dtype(np.uint8)}
+_DTYPES: dict[str, np.dtype] = {"float32": np.dtype(np.float32), "uint8": np.dtype(np.uint8)}
 
 
 def _config_texts(config: Any) -> tuple[str, Optional[str]]:
     """A config as the engine reads it, and the text of the map that it names."""
     if not isinstance(config, GridConfig):
-        dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
-        if dump is None and not isinstance(config, Mapping):
-            kind = type(config).__name__
-            raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
-        config = GridConfig(**(config if isinstance(config, Mapping) else dump()))
+        config = GridConfig(**_fields(config))
     return engine_json(config), grid_registry.map_text(config.map_name)
+
+
+def _fields(config: Any) -> Mapping[str, Any]:
+    if isinstance(config, Mapping):
+        return config
+    dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
+    if dump is None:
+        kind = type(config).__name__
+        raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
+    return dump()
 
 
 class VecEnv(VectorEnv):
@@ -100,7 +106,7 @@ class VecEnv(VectorEnv):
         self.num_agents, radius = self._batch.sizes()
         side = 2 * radius + 1
         self.metadata = {"autoreset_mode": self.autoreset_mode}
-        self.single_observation_space = spaces.Box(0, 1, (self.num_agents, 3, side, side), self._dtype.type)
+        self.single_observation_space: spaces.Box = spaces.Box(0, 1, (self.num_agents, 3, side, side), self._dtype.type)
         self.single_action_space = spaces.MultiDiscrete([NUM_ACTIONS] * self.num_agents)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._has_masks = bool(masks)
@@ -110,10 +116,11 @@ class VecEnv(VectorEnv):
         self._all.flags.writeable = False
         self.closed = False
 
+    # Gymnasium's is an attribute.
     @cached_property
-    def observation_space(self) -> spaces.Box:
+    def observation_space(self) -> spaces.Box:  # type: ignore[override]
         """The space of all observations; made when it is asked for, since it is larger than what it describes."""
-        return batch_space(self.single_observation_space, self.num_envs)
+        return cast(spaces.Box, batch_space(self.single_observation_space, self.num_envs))
 
     @property
     def episode_seeds(self) -> np.ndarray:

@@ -90,7 +90,8 @@ def make_pogema(
     if name == "PyMARL":
         from pogema_rs.integrations.pymarl import PyMarlPogema
 
-        return PyMarlPogema(config, *args, semantics=semantics, **kwargs)
+        kwargs["semantics"] = semantics
+        return PyMarlPogema(config, *args, **kwargs)
     if name == "PettingZoo":
         from pogema_rs.integrations.pettingzoo import parallel_env
 

@@ -83,7 +83,7 @@ class PogemaParallel(ParallelEnv):
             {name: values[agent] for name, agent in present} for values in result
         )
         is_over = all(result[2]) or all(result[3])
-        active = self.pogema.grid.is_active
+        active = self.pogema._started().is_active
         self.agents = [name for name, agent in present if active[agent] and not is_over]
         return observations, rewards, terminated, truncated, infos
 

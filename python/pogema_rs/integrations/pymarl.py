@@ -30,6 +30,7 @@ class PyMarlPogema:
     ) -> None:
         self.env = _make_pogema(grid_config, semantics)
         self._mh_distance = mh_distance
+        self._observations: list
         self._observations, _ = self.env.reset()
         self.max_episode_steps = self.episode_limit = grid_config.max_episode_steps
         self.n_agents = self.env.get_num_agents()

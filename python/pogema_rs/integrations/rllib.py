@@ -48,16 +48,15 @@ class PogemaMultiAgentEnv(MultiAgentEnv):
         """Plays one step; an agent without an action stays. What comes back is about those that took part before it."""
         result = self.pogema.step([action_dict.get(name, 0) for name in self.possible_agents])
         present = [(agent, name) for agent, name in enumerate(self.possible_agents) if name in self.agents]
-        observations, rewards, terminated, truncated, infos = (
-            {name: values[agent] for agent, name in present} for values in result
-        )
+        by_name: list[dict[str, Any]] = [{name: values[agent] for agent, name in present} for values in result]
+        observations, rewards, terminated, truncated, infos = by_name
         metrics = result[4][0].get("metrics")
         if metrics is not None:
             for info in infos.values():
                 info["metrics"] = metrics
         terminated["__all__"], truncated["__all__"] = all(result[2]), all(result[3])
         is_over = terminated["__all__"] or truncated["__all__"]
-        active = self.pogema.grid.is_active
+        active = self.pogema._started().is_active
         self.agents = [name for agent, name in present if active[agent] and not is_over]
         return observations, rewards, terminated, truncated, infos
 

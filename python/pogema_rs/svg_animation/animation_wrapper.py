@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 from os import PathLike
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw
 from pogema_rs.wrappers.forwarding import Wrapper
+
+if TYPE_CHECKING:
+    from pogema_rs._engine import Engine
 
 __all__ = ["AnimationConfig", "AnimationMonitor", "Filmed"]
 
 
 class Filmed:
     """What an environment offers to draw its episodes."""
+
+    _engine: Engine
 
     def enable_animation(self) -> None:
         """Films the episodes from the next reset on."""

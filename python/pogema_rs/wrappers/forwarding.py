@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
+
+if TYPE_CHECKING:
+    from pogema_rs.envs import Pogema
 
 __all__ = ["Wrapper"]
 
@@ -14,6 +17,13 @@ class Wrapper(gymnasium.Wrapper):
 
     Gymnasium's own wrappers did so before its release 1.0, and POGEMA's users rely on it.
     """
+
+    if TYPE_CHECKING:
+        # Gymnasium's types are those of one agent, and know nothing of what is inside.
+        env: Any
+
+        @property
+        def unwrapped(self) -> Pogema: ...
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
 from pogema_rs import _engine
 
 __all__ = ["AgentState", "PersistentWrapper"]
+
+# A goal that was drawn since the reset is of NumPy's type, as in POGEMA.
+_Whole = Union[int, np.int64]
 
 
 class AgentState:
@@ -20,7 +23,7 @@ class AgentState:
     Rule: history/changes
     """
 
-    def __init__(self, x: int, y: int, tx: int, ty: int, step: int, active: bool) -> None:
+    def __init__(self, x: int, y: int, tx: _Whole, ty: _Whole, step: int, active: bool) -> None:
         self.x = x
         self.y = y
         self.tx = tx
@@ -32,7 +35,7 @@ class AgentState:
         """Where the agent is."""
         return self.x, self.y
 
-    def get_target_xy(self) -> tuple[int, int]:
+    def get_target_xy(self) -> tuple[_Whole, _Whole]:
         """Where it wants to go."""
         return self.tx, self.ty
 
@@ -70,7 +73,7 @@ def kept(engine: _engine.Engine, shift: int) -> History:
 
 def _state(shift: int, row: int, col: int, goal_row: int, goal_col: int, *rest: Any) -> AgentState:
     step, active, is_drawn = rest
-    goal = (goal_row + shift, goal_col + shift)
+    goal: tuple[_Whole, _Whole] = (goal_row + shift, goal_col + shift)
     if is_drawn:
         goal = (np.int64(goal[0]), np.int64(goal[1]))
     return AgentState(row + shift, col + shift, *goal, step, active)

@@ -1,0 +1,65 @@
+"""Whatever is public in the package says in its first line, a whole sentence, what it is."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import pogema_rs
+
+# Read as text: a module whose framework is not installed is none the less public.
+ROOT = Path(pogema_rs.__file__).resolve().parent
+MODULES = {
+    ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in sorted(ROOT.rglob("*.py"))
+    if path.name == "__init__.py" or not path.name.startswith("_")
+}
+
+
+def is_overload(node):
+    return any(isinstance(mark, ast.Name) and mark.id == "overload" for mark in node.decorator_list)
+
+
+def public_names(body):
+    """The names that a module or class defines, and for a private function the public names that it is given."""
+    names = {}
+    for node in body:
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not is_overload(node):
+            names[node.name] = node
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Name) and node.value.id in names:
+            names.update({target.id: names[node.value.id] for target in node.targets if isinstance(target, ast.Name)})
+    return {name: node for name, node in names.items() if not name.startswith("_")}
+
+
+def documented(name, node):
+    """All that is public in a module or class, itself first."""
+    yield name, node
+    if not isinstance(node, ast.FunctionDef):
+        for inner, child in public_names(node.body).items():
+            yield from documented(f"{name}.{inner}", child)
+
+
+def test_the_modules_are_found():
+    assert {"pogema_rs", "pogema_rs.envs", "pogema_rs.vec_env", "pogema_rs.integrations.rllib"} <= MODULES.keys()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_public_names_have_docstrings(module):
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    wrong = [
+        name
+        for name, node in documented(module, tree)
+        if not (ast.get_docstring(node) or "").partition("\n")[0].endswith(".")
+    ]
+    assert wrong == []
+
+
+def test_aliases_of_private_functions_are_looked_at():
+    tree = ast.parse("class A:\n    '''A.'''\n    def _b(self): ...\n    c = _b\n")
+    assert [name for name, _ in documented("module", tree)] == ["module", "module.A", "module.A.c"]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_the_package_names_its_modules(module):
+    # The pages of the reference are reached from there.
+    assert module == "pogema_rs" or f"`{module}`" in pogema_rs.__doc__

@@ -1,0 +1,109 @@
+"""The package's types hold, those of its compiled part too, and a caller's type checker reads them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pogema_rs
+
+CONFIG = Path(__file__).resolve().parent.parent / "pyproject.toml"
+
+RIGHT = """
+import numpy as np
+
+from pogema_rs import AnimationConfig, AStarAgent, GridConfig, Semantics, VecEnv, Wrapper, pogema_v0
+from pogema_rs.envs import Pogema
+
+
+class FewerRewards(Wrapper):
+    def agents(self) -> int:
+        return self.unwrapped.get_num_agents()
+
+
+config = GridConfig(num_agents=4, size=8, seed=1, observation_type="POMAPF")
+env = pogema_v0(config, semantics=Semantics.DEVELOPED)
+observations, infos = env.reset(seed=1)
+observations, rewards, terminated, truncated, infos = env.step(env.sample_actions())
+
+own = Pogema(config, semantics="2.0")
+first, _ = own.reset()
+alone: list = own.reset(return_info=False)
+flags: list[bool] = own.step([0, 0, 0, 0])[2]
+places: list = own.get_agents_xy(only_active=True)
+action = int(AStarAgent(seed=1).act(first[0]))
+count: int = FewerRewards(own).agents()
+own.save_animation("episode.svg", AnimationConfig(egocentric_idx=0))
+
+envs = VecEnv([config, {"num_agents": 4}], num_threads=2, dtype="uint8", autoreset_mode="next_step", masks=True)
+buffer: np.ndarray = np.zeros(envs.observation_space.shape, dtype=np.uint8)
+batch, about = envs.reset(seed=[1, 2], out=buffer)
+batch, sums, ended, cut, about = envs.step(envs.sample_actions())
+solved = float(about["metrics"]["ISR"][0]) + float(sums.sum())
+"""
+
+WRONG = {
+    "config.num_agent": "attr-defined",
+    'config.width = "eight"': "assignment",
+    "pogema_v0(3)": "arg-type",
+    "pogema_v0(config, semantics=2.0)": "arg-type",
+    "Semantics.LATEST": "attr-defined",
+    "own.step(1)": "arg-type",
+    'own.reset(seed="one")': "call-overload",
+    "own.get_agents_xy(active=True)": "call-arg",
+    'FewerRewards(own).agents() + "agents"': "operator",
+    'VecEnv(config, num_envs="many")': "arg-type",
+    "VecEnv(config, threads=2)": "call-arg",
+    'envs.step(envs.sample_actions(), out="here")': "arg-type",
+    "envs.num_agents.size": "attr-defined",
+    "AnimationConfig(static=None)": "arg-type",
+}
+
+
+@pytest.fixture(scope="module")
+def check(tmp_path_factory):
+    """Runs a type checker away from the source folder, where it would find the package that is not installed."""
+    folder = tmp_path_factory.mktemp("types")
+
+    def run(module, *arguments):
+        command = [sys.executable, "-B", "-m", module, *arguments]
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def lines_with_errors(text):
+    """For each line of a program the codes of its errors."""
+    found = {}
+    for line in text.splitlines():
+        place, _, what = line.partition(": error: ")
+        if what:
+            found.setdefault(int(place.rpartition(":")[2]), set()).add(what.rpartition("[")[2].rstrip("]"))
+    return found
+
+
+def test_the_wheel_brings_its_types():
+    folder = Path(pogema_rs.__file__).parent
+    assert (folder / "py.typed").is_file() and (folder / "_engine.pyi").is_file()
+
+
+def test_the_package_checks(check):
+    run = check("mypy", "--config-file", str(CONFIG), "-p", "pogema_rs")
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+def test_the_types_of_the_compiled_part_are_its_own(check):
+    run = check("mypy.stubtest", "--mypy-config-file", str(CONFIG), "pogema_rs._engine")
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+def test_a_program_checks_and_its_mistakes_are_found(check, tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(RIGHT + "\n".join(WRONG) + "\n")
+    run = check("mypy", "--config-file", "", "--strict-equality", "--warn-unreachable", str(program))
+    assert run.returncode == 1, run.stdout + run.stderr
+    first = RIGHT.count("\n") + 1
+    assert lines_with_errors(run.stdout) == {
+        first + place: {code} for place, code in enumerate(WRONG.values())
+    }, run.stdout
