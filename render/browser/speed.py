@@ -1,0 +1,27 @@
+"""How fast the replay page draws; run only when named, and not part of any check: render/browser/run speed."""
+
+
+def test_thousand_agents(world):
+    """1,000 agents on 256 x 256: 30 frames a second leave 33 ms for a frame."""
+    with world.open("large") as page:
+        page.select_option("#speed", "8")
+        page.click("#play")
+        first, began = page.evaluate("[replay.numDraws, performance.now()]")
+        page.wait_for_timeout(3000)
+        last, ended, median = page.evaluate("[replay.numDraws, performance.now(), replay.medianDraw]")
+        rate = 1000 * (last - first) / (ended - began)
+        # Canvases are painted late; reading a pixel back makes the browser do it at once.
+        painting = page.evaluate(
+            """async () => {
+              const times = [];
+              const context = document.getElementById("actors").getContext("2d");
+              for (let frame = 0; frame < 20; frame += 1) {
+                await new Promise(requestAnimationFrame);
+                const begin = performance.now();
+                context.getImageData(0, 0, 1, 1);
+                times.push(performance.now() - begin);
+              }
+              return times.sort((one, other) => one - other)[10];
+            }"""
+        )
+        return f"draws take {median:.1f} ms and {painting:.1f} ms of painting, {rate:.0f} frames/s"
