@@ -1,7 +1,7 @@
 """Trains one policy for all agents by PPO, on 8 x 8 maps with 4 agents, and says how good it became.
 
     pip install torch matplotlib
-    python train_ppo.py --minutes 20 --plot learning.svg
+    python train_ppo.py --plot learning.svg
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
 network for every agent of every environment. An agent that has left takes no part in the loss. The policy is judged on
@@ -148,12 +148,14 @@ class Trainer:
         taking_part = rollout.is_active.flatten().nonzero().squeeze(-1)
         flat = {name: getattr(rollout, name).flatten(0, 1) for name in ("seen", "masks", "actions", "odds")}
         returns, advantages = (advantages + rollout.values).flatten(), advantages.flatten()
+        # Over the whole rollout: the last part of it may be a single step, which has no spread.
+        spread, mean = torch.std_mean(advantages[taking_part])
+        advantages = (advantages - mean) / (spread + 1e-8)
         for _ in range(params.num_epochs):
             order = taking_part[torch.randperm(len(taking_part))]
             for part in order.split(params.batch_size):
                 odds, values = self.policy(flat["seen"][part], flat["masks"][part])
                 gain = advantages[part]
-                gain = (gain - gain.mean()) / (gain.std() + 1e-8)
                 ratio = (odds.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
                 clipped = ratio.clamp(1 - params.clip, 1 + params.clip)
                 loss = -torch.min(ratio * gain, clipped * gain).mean()
@@ -215,7 +217,7 @@ def plot(curve: list[tuple[float, float]], peers: dict[str, float], path: str) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=20.0, help="how long to train")
+    parser.add_argument("--minutes", type=float, default=5.0, help="how long to train")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES")
