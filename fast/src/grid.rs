@@ -35,9 +35,9 @@ impl Strips {
         self.num_rows
     }
 
-    /// Number of words in all strips.
-    pub fn num_words(&self) -> usize {
-        self.words.len()
+    /// Bytes of all strips.
+    pub fn num_bytes(&self) -> usize {
+        num_bytes(&self.words)
     }
 
     /// The words of all strips.
@@ -177,6 +177,11 @@ impl Board {
         self.squares.len()
     }
 
+    /// Bytes of all squares.
+    pub fn num_bytes(&self) -> usize {
+        num_bytes(&self.squares)
+    }
+
     /// Where the square of a cell is.
     pub fn place(&self, cell: Cell) -> u32 {
         (u32::from(cell.row) + 1) * self.width + u32::from(cell.col) + 1
@@ -224,4 +229,9 @@ pub fn reserve<T>(number: Option<usize>, entry: impl FnMut() -> T) -> Result<Vec
         }
     }
     Ok(list)
+}
+
+/// Bytes that a list was given for its entries.
+pub fn num_bytes<T>(list: &Vec<T>) -> usize {
+    list.capacity() * size_of::<T>()
 }

@@ -6,7 +6,7 @@ use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance
 use pogema_core::{MapfOut, PomapfOut, Snapshot, StepOut};
 use rayon::ThreadPool;
 
-use crate::grid::{Board, FREE, Square, Strips};
+use crate::grid::{Board, FREE, Strips, num_bytes};
 use crate::simd::Path;
 
 /// One environment that plays by POGEMA 1.4.0's rules, on bits.
@@ -137,10 +137,20 @@ impl Engine {
     /// Bytes that the environment holds, apart from what its goal streams hold behind pointers and from kept
     /// steps.
     pub fn num_bytes(&self) -> usize {
-        let per_agent = 3 * size_of::<Cell>() + size_of::<GoalStream>() + 2 * size_of::<bool>() + 8;
-        let strips = 8 * (self.obstacles.num_words() + self.occupied.num_words());
-        let squares = size_of::<Square>() * self.board.num_squares();
-        size_of::<Self>() + self.config.num_agents * per_agent + strips + squares
+        let lists = [
+            self.obstacles.num_bytes(),
+            self.occupied.num_bytes(),
+            self.board.num_bytes(),
+            num_bytes(&self.starts),
+            num_bytes(&self.cells),
+            num_bytes(&self.goals),
+            num_bytes(&self.streams),
+            num_bytes(&self.active),
+            num_bytes(&self.on_goal),
+            num_bytes(&self.targets),
+            num_bytes(&self.ahead),
+        ];
+        size_of::<Self>() + lists.iter().sum::<usize>()
     }
 
     pub(crate) fn check_started(&self) -> Result<(), Error> {

@@ -1,4 +1,4 @@
-//! After a reset nothing is allocated.
+//! After a reset nothing is allocated, and what was is told.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -132,5 +132,25 @@ fn nothing_is_allocated_after_a_reset() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn the_bytes_told_are_the_bytes_held() {
+    for (num_agents, radius) in [(1, 1), (2, 1), (NUM_AGENTS, 1), (NUM_AGENTS, 17)] {
+        let config = Config { num_agents, radius, ..Config::default() };
+        let instance = {
+            let all = instance(1);
+            let (starts, goals) = (all.starts()[..num_agents].to_vec(), all.goals()[..num_agents].to_vec());
+            Instance::new(all.map().clone(), Outside::Free, starts, goals).unwrap()
+        };
+        let mut told = 0;
+        let mut engine = None;
+        let info = measure(|| {
+            let engine = engine.insert(Engine::with_path(config, Path::Scalar).unwrap());
+            engine.reset(&instance).unwrap();
+            told = engine.num_bytes();
+        });
+        assert_eq!(info.bytes_current, (told - size_of::<Engine>()) as i64, "{num_agents} {radius}");
     }
 }
