@@ -66,12 +66,11 @@ class Pogema(PogemaBase):
         grid_config: Optional[GridConfig] = None,
         *,
         semantics: Union[str, Semantics] = Semantics.RELEASED,
-        limits_steps: bool = True,
     ) -> None:
         self.grid_config = GridConfig(num_agents=2) if grid_config is None else grid_config
         self.semantics = Semantics(semantics)
         self.grid: Optional[Grid] = None
-        self._has_metrics = limits_steps and not self.grid_config.persistent
+        self._has_metrics = not self.grid_config.persistent
         # POGEMA's time limit and its choice of class are those of the config that the environment was made with.
         self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
         self._remember_config()
@@ -79,7 +78,6 @@ class Pogema(PogemaBase):
             engine_json(self.grid_config, **self._fixed),
             self._registered(),
             self.semantics.occupancy_is_exact,
-            None if limits_steps else 2**63 - 1,
         )
         self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self.observation_space = _observation_space(self.grid_config)

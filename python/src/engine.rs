@@ -41,19 +41,13 @@ pub struct Engine {
 
 #[pymethods]
 impl Engine {
-    /// An environment for a config in JSON; `registered` is the text of the map that its `map_name` names,
-    /// `exact` chooses exact occupancy, and `time_limit` is the config's `max_episode_steps` if it is left out.
+    /// An environment for a config in JSON; `registered` is the text of the map that its `map_name` names, and
+    /// `exact` chooses exact occupancy.
     #[new]
-    #[pyo3(signature = (config, registered=None, exact=false, time_limit=None))]
-    fn new(
-        py: Python<'_>,
-        config: &str,
-        registered: Option<&str>,
-        exact: bool,
-        time_limit: Option<i64>,
-    ) -> PyResult<Self> {
+    #[pyo3(signature = (config, registered=None, exact=false))]
+    fn new(py: Python<'_>, config: &str, registered: Option<&str>, exact: bool) -> PyResult<Self> {
         let source = config::source(config, registered).map_err(|error| errors::config(py, &error))?;
-        let time_limit = time_limit.unwrap_or(source.config().max_episode_steps);
+        let time_limit = source.config().max_episode_steps;
         Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
 
