@@ -1,4 +1,7 @@
-"""Every Python block of the README and the guide runs, all of a page in one process and in order."""
+"""Every Python block of the README and the guide runs, all of a page in one process and in order.
+
+Those that a comment marks as a framework's are run by `./check frameworks`.
+"""
 
 import re
 import subprocess
@@ -8,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^(<!-- framework: \w+ -->\n)?```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PAGES = [path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))] if BLOCK.search(path.read_text())]
 
 
@@ -18,6 +21,6 @@ def test_there_are_pages():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 def test_the_blocks_run(page, tmp_path):
-    code = "\n".join(BLOCK.findall(page.read_text()))
+    code = "\n".join(block for framework, block in BLOCK.findall(page.read_text()) if not framework)
     run = subprocess.run([sys.executable, "-B", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

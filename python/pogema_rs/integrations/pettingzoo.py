@@ -31,7 +31,7 @@ class PogemaParallel(ParallelEnv):
     """An environment as dictionaries by the agents' names.
 
     What a step returns is about the agents that took part before it. As in POGEMA the metrics are with `player_0`, and
-    lost if it has left before the end; `self.pogema` has them always.
+    lost if it has left before the end; `metrics` always holds those of the last step, or None.
 
     Source: POGEMA 1.4.0, `integrations/pettingzoo.py`
     """
@@ -49,6 +49,7 @@ class PogemaParallel(ParallelEnv):
         self.agent_name_mapping = {name: agent for agent, name in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         self.num_moves: Optional[int] = None
+        self.metrics: Optional[dict[str, float]] = None
 
     @functools.cached_property
     def observation_spaces(self) -> dict[str, gymnasium.Space]:
@@ -72,7 +73,7 @@ class PogemaParallel(ParallelEnv):
         """Begins an episode: observations and infos by name."""
         observations, infos = self.pogema.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
-        self.num_moves = 0
+        self.num_moves, self.metrics = 0, None
         return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
@@ -82,6 +83,7 @@ class PogemaParallel(ParallelEnv):
         observations, rewards, terminated, truncated, infos = (
             {name: values[agent] for name, agent in present} for values in result
         )
+        self.metrics = result[4][0].get("metrics")
         is_over = all(result[2]) or all(result[3])
         active = self.pogema._started().is_active
         self.agents = [name for name, agent in present if active[agent] and not is_over]

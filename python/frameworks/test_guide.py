@@ -1,0 +1,23 @@
+"""The blocks of the guide that need one of the frameworks run."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "guide" / "python.md"
+BLOCK = re.compile(r"^<!-- framework: (\w+) -->\n```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS = dict(BLOCK.findall(GUIDE.read_text()))
+
+
+def test_there_are_blocks():
+    assert set(BLOCKS) == {"pufferlib", "torchrl"}
+
+
+@pytest.mark.parametrize("framework", BLOCKS)
+def test_the_block_runs(framework, tmp_path):
+    code = [sys.executable, "-B", "-c", BLOCKS[framework]]
+    run = subprocess.run(code, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr

@@ -1,0 +1,109 @@
+"""Environments for PufferLib, written into its own buffers."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Union
+
+import numpy as np
+from gymnasium import spaces
+
+from pogema_rs.semantics import Semantics
+from pogema_rs.vec_env import NUM_ACTIONS, VecEnv
+
+try:
+    from pufferlib import PufferEnv
+except ImportError as missing:
+    raise ImportError("the PufferLib integration needs `pip install pufferlib`, 3.0 or later") from missing
+
+__all__ = ["PogemaPuffer"]
+
+
+class PogemaPuffer(PufferEnv):
+    """A `VecEnv` as a native environment of PufferLib: every agent of every environment is one row of its buffers.
+
+    Row `env * agents + agent` of `observations` `(num_agents, 3, side, side)`, `rewards`, `terminals` and
+    `truncations` is what the step brought that agent; `masks` is False from the step after the one in which it left,
+    until the next episode begins, which it does in the step that ends the last. `infos` holds the metrics of each
+    episode that ended.
+
+    Hand the class to `pufferlib.vector.make`, and config and numbers as `env_kwargs`. As it is it steps
+    `num_envs` environments on `num_threads`; several processes want `num_threads=1` each.
+    """
+
+    def __init__(
+        self,
+        grid_config: Any = None,
+        num_envs: Optional[int] = None,
+        *,
+        num_threads: Optional[int] = None,
+        dtype: Union[str, np.dtype, type] = "float32",
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
+        buf: Any = None,
+        seed: Optional[int] = None,
+    ) -> None:
+        """See `VecEnv`; `buf` is PufferLib's, and `seed` that of the first reset without one.
+
+        Errors: ValueError or TypeError naming what was expected.
+        """
+        self.envs = VecEnv(
+            {} if grid_config is None else grid_config,
+            num_envs,
+            num_threads=num_threads,
+            dtype=dtype,
+            semantics=semantics,
+        )
+        _, *shape = self.envs.single_observation_space.shape
+        self.single_observation_space = spaces.Box(0, 1, tuple(shape), self.envs.single_observation_space.dtype.type)
+        self.single_action_space = spaces.Discrete(NUM_ACTIONS)
+        self.num_agents = self.envs.num_envs * self.envs.num_agents
+        super().__init__(buf)
+        self._by_env = (self.envs.num_envs, self.envs.num_agents)
+        self._is_active = np.zeros(self.num_agents, dtype=np.bool_)
+        self._seed = seed
+
+    def reset(self, seed: Optional[int] = None) -> tuple[np.ndarray, list[dict[str, float]]]:
+        """Begins the first episodes of a seed, or the next ones: observations, and no infos."""
+        seed, self._seed = self._seed if seed is None else seed, None
+        _, infos = self.envs.reset(seed=seed, out=self._observations())
+        self.rewards[:] = 0
+        self.terminals[:] = False
+        self.truncations[:] = False
+        self._is_active = infos["is_active"].reshape(-1)
+        self.masks[:] = self._is_active
+        return self.observations, []
+
+    def step(
+        self, actions: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
+        """Plays one step: observations, rewards, terminals and truncations as they stand in the buffers, and infos.
+
+        Errors: those of `VecEnv.step`; nothing is played.
+        """
+        numbers = np.asarray(actions)
+        if numbers.shape != (self.num_agents,):
+            raise ValueError(f"actions have the shape {numbers.shape}, expected ({self.num_agents},), one per agent")
+        _, rewards, terminated, truncated, infos = self.envs.step(
+            numbers.reshape(self._by_env), out=self._observations()
+        )
+        self.rewards[:] = rewards.reshape(-1)
+        self.terminals[:] = terminated.reshape(-1)
+        self.truncations[:] = truncated.reshape(-1)
+        was_active, self._is_active = self._is_active, infos["is_active"].reshape(-1)
+        self.masks[:] = was_active | self._is_active
+        return self.observations, self.rewards, self.terminals, self.truncations, _episodes(infos)
+
+    def close(self) -> None:
+        """Lets go of environments and threads."""
+        self.envs.close()
+
+    def _observations(self) -> np.ndarray:
+        """PufferLib's buffer with the axes of a `VecEnv`."""
+        return self.observations.reshape(*self._by_env, *self.single_observation_space.shape)
+
+
+def _episodes(infos: dict[str, Any]) -> list[dict[str, float]]:
+    """The metrics of each episode that ended."""
+    if "metrics" not in infos:
+        return []
+    metrics = {name: values for name, values in infos["metrics"].items() if not name.startswith("_")}
+    return [{name: float(values[env]) for name, values in metrics.items()} for env in np.flatnonzero(infos["_metrics"])]
