@@ -1,0 +1,104 @@
+//! A map as planners walk it: its free cells, numbered, each with its free neighbours.
+
+use pogema_core::{Action, Cell, Error, Map};
+
+/// The number of a free cell, counted row by row.
+pub type Vertex = u32;
+
+/// The free cells of a map and the moves between them.
+///
+/// No move leads off the map: a wall surrounds it, whatever agents may see beyond.
+#[derive(Debug)]
+pub struct Graph {
+    width: usize,
+    cells: Vec<Cell>,
+    /// For each cell of the map, row by row, its vertex or `NO_VERTEX`.
+    vertices: Vec<Vertex>,
+    /// The neighbours of each vertex, up, down, left, right, then what is left of four.
+    neighbours: Vec<[Vertex; 4]>,
+    degrees: Vec<u8>,
+}
+
+/// The vertex of an obstacle.
+const NO_VERTEX: Vertex = Vertex::MAX;
+
+impl Graph {
+    /// The graph of a map.
+    pub fn new(map: &Map) -> Self {
+        let mut vertices = vec![NO_VERTEX; map.height() * map.width()];
+        let mut cells = Vec::with_capacity(map.num_free());
+        for (index, vertex) in vertices.iter_mut().enumerate() {
+            let cell = map.cell_at(index);
+            if !map.is_obstacle(cell) {
+                *vertex = cells.len() as Vertex;
+                cells.push(cell);
+            }
+        }
+        let mut graph =
+            Self { width: map.width(), cells, vertices, neighbours: Vec::new(), degrees: Vec::new() };
+        for &cell in &graph.cells {
+            let (mut around, mut degree) = ([NO_VERTEX; 4], 0);
+            for action in [Action::Up, Action::Down, Action::Left, Action::Right] {
+                if let Some(neighbour) = step_from(map, cell, action).and_then(|cell| graph.vertex(cell)) {
+                    around[degree] = neighbour;
+                    degree += 1;
+                }
+            }
+            graph.neighbours.push(around);
+            graph.degrees.push(degree as u8);
+        }
+        graph
+    }
+
+    /// Number of free cells.
+    pub fn num_vertices(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The vertex of a cell of the map, if it is free.
+    pub fn vertex(&self, cell: Cell) -> Option<Vertex> {
+        let index = usize::from(cell.row) * self.width + usize::from(cell.col);
+        self.vertices.get(index).copied().filter(|&vertex| vertex != NO_VERTEX)
+    }
+
+    /// The cell of a vertex.
+    pub fn cell(&self, vertex: Vertex) -> Cell {
+        self.cells[vertex as usize]
+    }
+
+    /// Where one step leads from a vertex, itself left out, in the order up, down, left, right.
+    pub fn neighbours(&self, vertex: Vertex) -> &[Vertex] {
+        &self.neighbours[vertex as usize][..usize::from(self.degrees[vertex as usize])]
+    }
+
+    /// The action that leads from a vertex to itself or to a neighbour.
+    pub fn action(&self, from: Vertex, to: Vertex) -> Action {
+        action_between(self.cell(from), self.cell(to)).unwrap_or(Action::Stay)
+    }
+
+    /// The vertices of agents' cells.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for a cell off the map or on an obstacle; `what` says what the cells are.
+    pub fn vertices_of(&self, what: &str, cells: &[Cell]) -> Result<Vec<Vertex>, Error> {
+        let vertex_of = |(agent, &cell): (usize, &Cell)| {
+            let inside = usize::from(cell.col) < self.width;
+            let vertex = self.vertex(cell).filter(|_| inside);
+            vertex.ok_or_else(|| Error::agent(agent, format!("{what} {cell} is no free cell of the map")))
+        };
+        cells.iter().enumerate().map(vertex_of).collect()
+    }
+}
+
+/// Where an action leads on a map, unless into the wall around it.
+pub(crate) fn step_from(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
+    let (row, col) = cell.toward(action);
+    let cell = Cell { row: u16::try_from(row).ok()?, col: u16::try_from(col).ok()? };
+    map.contains(cell).then_some(cell)
+}
+
+/// The action that leads from one cell to the other, if there is one.
+pub(crate) fn action_between(from: Cell, to: Cell) -> Option<Action> {
+    let place = (i32::from(to.row), i32::from(to.col));
+    Action::ALL.into_iter().find(|&action| from.toward(action) == place)
+}

@@ -1,0 +1,76 @@
+//! Plans: where each agent is after each step.
+
+use pogema_core::{Action, Cell, Error};
+
+use crate::graph::action_between;
+
+/// Where every agent is at the start and after each step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Shape: `[steps + 1, agents]`
+    cells: Vec<Vec<Cell>>,
+}
+
+impl Plan {
+    /// A plan from the cells of all agents, at the start and after each step.
+    ///
+    /// # Errors
+    /// [`Error::Instance`] for no cells at all, [`Error::Length`] unless every step has as many agents as the
+    /// start. Whether agents may walk so is left to [`crate::validate`].
+    pub fn new(cells: Vec<Vec<Cell>>) -> Result<Self, Error> {
+        let num_agents = cells.first().ok_or_else(|| Error::instance("the plan has no start"))?.len();
+        for step in &cells {
+            Error::check_length("cells of a step", num_agents, step.len())?;
+        }
+        Ok(Self { cells })
+    }
+
+    /// Where all agents are at the start and after each step.
+    pub fn cells(&self) -> &[Vec<Cell>] {
+        &self.cells
+    }
+
+    /// Number of agents.
+    pub fn num_agents(&self) -> usize {
+        self.cells[0].len()
+    }
+
+    /// Number of steps, which of a plan without idle steps at its end is the makespan.
+    pub fn num_steps(&self) -> usize {
+        self.cells.len() - 1
+    }
+
+    /// The step after which each agent stays where it ends.
+    pub fn arrivals(&self) -> Vec<usize> {
+        let arrival = |agent: usize| {
+            let end = self.cells[self.num_steps()][agent];
+            self.cells.iter().rposition(|step| step[agent] != end).map_or(0, |step| step + 1)
+        };
+        (0..self.num_agents()).map(arrival).collect()
+    }
+
+    /// The sum of costs: over all agents, the steps until they stay where they end.
+    pub fn sum_of_costs(&self) -> usize {
+        self.arrivals().into_iter().sum()
+    }
+
+    /// The last step after which an agent still moves.
+    pub fn makespan(&self) -> usize {
+        self.arrivals().into_iter().max().unwrap_or(0)
+    }
+
+    /// What each agent does in a step, counted from 0; after the last one all stay.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for an agent that no action takes to its next cell.
+    pub fn actions(&self, step: usize) -> Result<Vec<Action>, Error> {
+        let (Some(now), Some(next)) = (self.cells.get(step), self.cells.get(step + 1)) else {
+            return Ok(vec![Action::Stay; self.num_agents()]);
+        };
+        let action = |(agent, (&from, &to)): (usize, (&Cell, &Cell))| {
+            let jump = || Error::agent(agent, format!("{to} is not one step from {from}"));
+            action_between(from, to).ok_or_else(jump)
+        };
+        now.iter().zip(next).enumerate().map(action).collect()
+    }
+}

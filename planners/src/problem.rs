@@ -1,0 +1,232 @@
+//! What a planner is asked, how long it may think, and what it answers.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use pogema_core::{Cell, Error, Instance, Map};
+
+use crate::distances::{Distances, UNREACHABLE};
+use crate::graph::{Graph, Vertex};
+use crate::plan::Plan;
+
+/// Agents on a map, each to be brought from its start to its goal, where it stays: one-shot MAPF.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// The map.
+    pub graph: Arc<Graph>,
+    /// Where each agent starts.
+    pub starts: Vec<Vertex>,
+    /// Where each agent is to stay at the end.
+    pub goals: Vec<Vertex>,
+    /// Most steps that a plan may have.
+    pub most_steps: Option<usize>,
+}
+
+impl Problem {
+    /// A problem without a bound on its steps.
+    ///
+    /// # Errors
+    /// [`Error::Length`] unless each start has a goal; [`Error::Agent`] for a cell that is off the map or an
+    /// obstacle. Equal starts or goals are no error: they make it impossible.
+    pub fn new(map: &Map, starts: &[Cell], goals: &[Cell]) -> Result<Self, Error> {
+        Error::check_length("goals", starts.len(), goals.len())?;
+        let graph = Graph::new(map);
+        let starts = graph.vertices_of("start", starts)?;
+        let goals = graph.vertices_of("goal", goals)?;
+        Ok(Self { graph: Arc::new(graph), starts, goals, most_steps: None })
+    }
+
+    /// The problem that an instance begins with, its first goals.
+    ///
+    /// # Errors
+    /// As for [`Problem::new`].
+    pub fn of(instance: &Instance) -> Result<Self, Error> {
+        Self::new(instance.map(), instance.starts(), &instance.first_goals())
+    }
+
+    /// The same problem with a bound on the steps of a plan.
+    #[must_use]
+    pub fn within(mut self, most_steps: usize) -> Self {
+        self.most_steps = Some(most_steps);
+        self
+    }
+
+    /// Number of agents.
+    pub fn num_agents(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// The plan of vertices at the start and after each step.
+    ///
+    /// # Errors
+    /// As for [`Plan::new`].
+    pub fn plan(&self, steps: &[Vec<Vertex>]) -> Result<Plan, Error> {
+        let cells = |step: &Vec<Vertex>| step.iter().map(|&vertex| self.graph.cell(vertex)).collect();
+        Plan::new(steps.iter().map(cells).collect())
+    }
+
+    /// The least that the sum of costs can be: the way of each agent as if it were alone.
+    pub fn lower_bound(&self, distances: &mut Distances) -> u64 {
+        let cost = |(&start, &goal): (&Vertex, &Vertex)| u64::from(distances.to(goal)[start as usize]);
+        self.starts.iter().zip(&self.goals).map(cost).sum()
+    }
+
+    /// Why no plan can be, as far as one look at each agent tells.
+    pub fn obstruction(&self, distances: &mut Distances) -> Option<String> {
+        if let Some((first, second, cell)) = equal(&self.starts) {
+            let cell = self.graph.cell(cell);
+            return Some(format!("agents {first} and {second} both start at {cell}"));
+        }
+        if let Some((first, second, cell)) = equal(&self.goals) {
+            let cell = self.graph.cell(cell);
+            return Some(format!("agents {first} and {second} both want to stay at {cell}"));
+        }
+        for (agent, (&start, &goal)) in self.starts.iter().zip(&self.goals).enumerate() {
+            let cost = distances.to(goal)[start as usize];
+            let (from, to) = (self.graph.cell(start), self.graph.cell(goal));
+            if cost == UNREACHABLE {
+                return Some(format!("no path leads agent {agent} from {from} to {to}"));
+            }
+            if let Some(most) = self.most_steps.filter(|&most| cost as usize > most) {
+                return Some(format!("agent {agent} needs {cost} steps from {from} to {to}, of {most}"));
+            }
+        }
+        None
+    }
+}
+
+/// The first two agents of one vertex.
+fn equal(vertices: &[Vertex]) -> Option<(usize, usize, Vertex)> {
+    let mut seen = std::collections::HashMap::with_capacity(vertices.len());
+    vertices
+        .iter()
+        .enumerate()
+        .find_map(|(agent, &vertex)| seen.insert(vertex, agent).map(|first| (first, agent, vertex)))
+}
+
+/// What a planner found out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// A valid plan that brings all agents to their goals, and the least that any plan's sum of costs can be; if
+    /// the two are equal, it is optimal.
+    Solved {
+        /// The plan.
+        plan: Plan,
+        /// Units: steps, summed over all agents.
+        lower_bound: u64,
+    },
+    /// The budget was spent before. What was found by then is valid, but brings not all agents to their goals.
+    TimedOut {
+        /// The plan that came closest, if there is one.
+        best: Option<Plan>,
+    },
+    /// There is no plan.
+    Impossible {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl Outcome {
+    /// The plan that solves the problem.
+    pub fn solution(&self) -> Option<&Plan> {
+        match self {
+            Self::Solved { plan, .. } => Some(plan),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Solved { plan, lower_bound } => {
+                let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
+                write!(f, "solved: sum of costs {cost}, at least {lower_bound}; makespan {makespan}")
+            }
+            Self::TimedOut { .. } => write!(f, "timed out"),
+            Self::Impossible { reason } => write!(f, "impossible: {reason}"),
+        }
+    }
+}
+
+/// How long a planner may think; without any bound, until it is done.
+#[derive(Clone, Debug, Default)]
+pub struct Budget {
+    /// Wall-clock time.
+    pub time: Option<Duration>,
+    /// Nodes of the planner's search; what a node is, each planner says. The same number gives the same plan.
+    pub nodes: Option<u64>,
+    /// Set by anybody to make the planner stop soon.
+    pub cancelled: Option<Arc<AtomicBool>>,
+}
+
+impl Budget {
+    /// So much wall-clock time.
+    pub fn of_time(time: Duration) -> Self {
+        Self { time: Some(time), ..Self::default() }
+    }
+
+    /// So many nodes.
+    pub fn of_nodes(nodes: u64) -> Self {
+        Self { nodes: Some(nodes), ..Self::default() }
+    }
+
+    /// The budget from now on.
+    pub fn start(&self) -> Clock {
+        Clock { budget: self.clone(), began: Instant::now(), num_nodes: 0, is_spent: false }
+    }
+}
+
+/// A budget that is being spent.
+#[derive(Debug)]
+pub struct Clock {
+    budget: Budget,
+    began: Instant,
+    num_nodes: u64,
+    is_spent: bool,
+}
+
+impl Clock {
+    /// Nodes between two looks at the time.
+    const STRIDE: u64 = 16;
+
+    /// Counts a node; whether the budget is spent, and this node not to be worked on.
+    pub fn count_node(&mut self) -> bool {
+        if self.budget.nodes.is_some_and(|nodes| self.num_nodes >= nodes) {
+            self.is_spent = true;
+        }
+        let looks = self.num_nodes.is_multiple_of(Self::STRIDE);
+        self.num_nodes += 1;
+        self.is_spent || (looks && self.is_spent())
+    }
+
+    /// Whether the budget is spent.
+    pub fn is_spent(&mut self) -> bool {
+        let is_late = self.budget.time.is_some_and(|time| self.began.elapsed() >= time);
+        let is_cancelled = self.budget.cancelled.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
+        self.is_spent |= is_late || is_cancelled;
+        self.is_spent
+    }
+
+    /// Nodes counted so far.
+    pub fn num_nodes(&self) -> u64 {
+        self.num_nodes
+    }
+
+    /// Time since the start.
+    pub fn elapsed(&self) -> Duration {
+        self.began.elapsed()
+    }
+}
+
+/// Who makes plans for whole problems.
+pub trait Planner {
+    /// A short name, as the command line knows it.
+    fn name(&self) -> &'static str;
+
+    /// Makes a plan within a budget. It never panics, and stops soon after the budget is spent.
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome;
+}

@@ -1,0 +1,111 @@
+//! An independent check of plans: it reads map and cells, and shares no code with the planners.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use pogema_core::{Cell, Map};
+
+use crate::plan::Plan;
+
+/// The first thing wrong with a plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Conflict {
+    /// After which step, counted from 1; 0 is the start.
+    pub step: usize,
+    /// The agents that take part in it, the lowest first.
+    pub agents: Vec<usize>,
+    /// Where.
+    pub cell: Cell,
+    /// What it is.
+    pub kind: ConflictKind,
+}
+
+/// What can be wrong with a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConflictKind {
+    /// The agent is not at its start.
+    Start,
+    /// The agent is off the map.
+    Outside,
+    /// The agent is on an obstacle.
+    Obstacle,
+    /// The agent came from further than one step away.
+    Jump,
+    /// Two agents are in one cell.
+    Vertex,
+    /// Two agents exchanged their cells.
+    Edge,
+    /// The agent is not at its goal at the end.
+    Goal,
+}
+
+impl fmt::Display for Conflict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { step, agents, cell, kind } = self;
+        let first = agents.first().copied().unwrap_or(0);
+        let second = agents.get(1).copied().unwrap_or(first);
+        match kind {
+            ConflictKind::Start => write!(f, "agent {first} begins at {cell}, which is not its start"),
+            ConflictKind::Outside => write!(f, "step {step}: agent {first} leaves the map at {cell}"),
+            ConflictKind::Obstacle => write!(f, "step {step}: agent {first} is on an obstacle at {cell}"),
+            ConflictKind::Jump => write!(f, "step {step}: agent {first} jumps to {cell}"),
+            ConflictKind::Vertex => write!(f, "step {step}: agents {first} and {second} are both at {cell}"),
+            ConflictKind::Edge => write!(f, "step {step}: agents {first} and {second} swap at {cell}"),
+            ConflictKind::Goal => write!(f, "agent {first} ends at {cell}, which is not its goal"),
+        }
+    }
+}
+
+/// Passes if agents may walk as planned, from their starts to their goals; without goals they may end anywhere.
+///
+/// # Errors
+/// The first conflict, by step and then by agent. A number of agents other than the plan's counts as wrong starts
+/// or goals of those that are missing.
+pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan) -> Result<(), Conflict> {
+    let cells = plan.cells();
+    check_ends(ConflictKind::Start, 0, &cells[0], starts)?;
+    for (step, now) in cells.iter().enumerate() {
+        let before = &cells[step.saturating_sub(1)];
+        check_step(map, step, before, now)?;
+    }
+    goals.map_or(Ok(()), |goals| {
+        check_ends(ConflictKind::Goal, plan.num_steps(), &cells[plan.num_steps()], goals)
+    })
+}
+
+fn check_ends(kind: ConflictKind, step: usize, cells: &[Cell], wanted: &[Cell]) -> Result<(), Conflict> {
+    let num_agents = cells.len().max(wanted.len());
+    for agent in 0..num_agents {
+        if cells.get(agent) != wanted.get(agent) {
+            let cell = cells.get(agent).or(wanted.get(agent)).copied().unwrap_or(Cell { row: 0, col: 0 });
+            return Err(Conflict { step, agents: vec![agent], cell, kind });
+        }
+    }
+    Ok(())
+}
+
+fn check_step(map: &Map, step: usize, before: &[Cell], now: &[Cell]) -> Result<(), Conflict> {
+    let alone = |agent: usize, kind| Conflict { step, agents: vec![agent], cell: now[agent], kind };
+    let mut standing: HashMap<Cell, usize> = HashMap::with_capacity(now.len());
+    let mut moves: HashMap<(Cell, Cell), usize> = HashMap::with_capacity(now.len());
+    for (agent, (&from, &to)) in before.iter().zip(now).enumerate() {
+        if !map.contains(to) {
+            return Err(alone(agent, ConflictKind::Outside));
+        }
+        if map.is_obstacle(to) {
+            return Err(alone(agent, ConflictKind::Obstacle));
+        }
+        let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
+        if distance > 1 {
+            return Err(alone(agent, ConflictKind::Jump));
+        }
+        if let Some(other) = standing.insert(to, agent) {
+            return Err(Conflict { step, agents: vec![other, agent], cell: to, kind: ConflictKind::Vertex });
+        }
+        if let Some(&other) = moves.get(&(to, from)).filter(|_| from != to) {
+            return Err(Conflict { step, agents: vec![other, agent], cell: to, kind: ConflictKind::Edge });
+        }
+        moves.insert((from, to), agent);
+    }
+    Ok(())
+}

@@ -1,0 +1,177 @@
+//! Plans, their checks and the costs that planners count on.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use pogema_core::{Action, Cell, Map};
+use pogema_planners::{
+    AllPairs, Budget, ConflictKind, Distances, Graph, Plan, Problem, UNREACHABLE, validate,
+};
+
+fn cell((row, col): (u16, u16)) -> Cell {
+    Cell { row, col }
+}
+
+fn cells(places: &[(u16, u16)]) -> Vec<Cell> {
+    places.iter().copied().map(cell).collect()
+}
+
+fn plan(steps: &[&[(u16, u16)]]) -> Plan {
+    Plan::new(steps.iter().map(|step| cells(step)).collect()).unwrap()
+}
+
+fn map() -> Map {
+    Map::from_rows(&["...", ".#.", "..."]).unwrap()
+}
+
+#[test]
+fn agents_may_follow_each_other_round_in_a_circle() {
+    let around = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)];
+    let mut next = around;
+    next.rotate_left(1);
+    let plan = plan(&[&around, &next]);
+    assert_eq!(validate(&map(), &cells(&around), Some(&cells(&next)), &plan), Ok(()));
+    assert_eq!((plan.sum_of_costs(), plan.makespan(), plan.num_steps()), (8, 1, 1));
+    assert_eq!(plan.actions(0).unwrap()[..3], [Action::Right, Action::Right, Action::Down]);
+}
+
+#[test]
+fn each_conflict_is_told_with_its_step_and_agents() {
+    let check = |steps: &[&[(u16, u16)]], ends: &[(u16, u16)]| {
+        let plan = plan(steps);
+        let starts = cells(&[(0, 0), (0, 2)]);
+        validate(&map(), &starts, Some(&cells(ends)), &plan)
+            .map_err(|conflict| (conflict.kind, conflict.step, conflict.agents.clone(), conflict.to_string()))
+    };
+    let stay: &[(u16, u16)] = &[(0, 0), (0, 2)];
+    assert_eq!(check(&[stay], stay), Ok(()));
+    let of = |kind, step, agents: &[usize], text: &str| Err((kind, step, agents.to_vec(), text.to_owned()));
+    assert_eq!(
+        check(&[&[(0, 0), (1, 2)]], stay),
+        of(ConflictKind::Start, 0, &[1], "agent 1 begins at (1, 2), which is not its start")
+    );
+    assert_eq!(
+        check(&[stay, &[(0, 0), (0, 3)]], stay),
+        of(ConflictKind::Outside, 1, &[1], "step 1: agent 1 leaves the map at (0, 3)")
+    );
+    assert_eq!(
+        check(&[stay, &[(0, 1), (0, 2)], &[(1, 1), (0, 2)]], stay),
+        of(ConflictKind::Obstacle, 2, &[0], "step 2: agent 0 is on an obstacle at (1, 1)")
+    );
+    assert_eq!(
+        check(&[stay, stay, &[(0, 0), (2, 2)]], stay),
+        of(ConflictKind::Jump, 2, &[1], "step 2: agent 1 jumps to (2, 2)")
+    );
+    assert_eq!(
+        check(&[stay, &[(0, 1), (0, 1)]], stay),
+        of(ConflictKind::Vertex, 1, &[0, 1], "step 1: agents 0 and 1 are both at (0, 1)")
+    );
+    assert_eq!(
+        check(&[stay, &[(0, 1), (0, 2)], &[(0, 2), (0, 1)]], stay),
+        of(ConflictKind::Edge, 2, &[0, 1], "step 2: agents 0 and 1 swap at (0, 1)")
+    );
+    assert_eq!(
+        check(&[stay, &[(1, 0), (0, 2)]], &[(1, 0), (0, 1)]),
+        of(ConflictKind::Goal, 1, &[1], "agent 1 ends at (0, 2), which is not its goal")
+    );
+    assert_eq!(check(&[&[(0, 0)]], &[(0, 0)]).map_err(|told| told.0), Err(ConflictKind::Start));
+}
+
+#[test]
+fn costs_count_the_steps_until_an_agent_stays() {
+    let plan = plan(&[&[(0, 0), (2, 0)], &[(0, 1), (2, 0)], &[(0, 0), (2, 1)], &[(0, 0), (2, 1)]]);
+    assert_eq!(plan.arrivals(), [2, 2]);
+    assert_eq!((plan.sum_of_costs(), plan.makespan(), plan.num_steps()), (4, 2, 3));
+    assert_eq!(plan.actions(1).unwrap(), [Action::Left, Action::Right]);
+    assert_eq!(plan.actions(9).unwrap(), [Action::Stay, Action::Stay]);
+}
+
+#[test]
+fn a_plan_has_as_many_agents_in_every_step() {
+    let error = Plan::new(vec![cells(&[(0, 0), (0, 1)]), cells(&[(0, 0)])]).unwrap_err();
+    assert_eq!(error.to_string(), "cells of a step has length 1, expected 2");
+    assert_eq!(Plan::new(Vec::new()).unwrap_err().to_string(), "instance: the plan has no start");
+}
+
+#[test]
+fn costs_to_go_are_exact() {
+    let map = Map::from_rows(&["..#..", ".##.#", "....."]).unwrap();
+    let graph = Arc::new(Graph::new(&map));
+    let pairs = AllPairs::new(&graph).unwrap();
+    let mut distances = Distances::new(graph.clone(), 0);
+    let goal = graph.vertex(cell((0, 4))).unwrap();
+    for (place, cost) in [((0, 4), 0), ((0, 3), 1), ((2, 3), 3), ((2, 0), 6), ((0, 1), 9)] {
+        let vertex = graph.vertex(cell(place)).unwrap();
+        assert_eq!(distances.to(goal)[vertex as usize], cost);
+        assert_eq!(pairs.cost(vertex, goal), cost);
+        assert_eq!(pairs.cost(goal, vertex), cost);
+    }
+    assert_eq!(graph.vertex(cell((0, 2))), None);
+    let apart = Graph::new(&Map::from_rows(&[".#."]).unwrap());
+    assert_eq!(AllPairs::new(&apart).unwrap().cost(0, 1), UNREACHABLE);
+    assert_eq!(Distances::new(Arc::new(apart), 0).to(1)[0], UNREACHABLE);
+}
+
+#[test]
+fn only_so_many_costs_are_kept_but_none_that_is_held() {
+    let graph = Arc::new(Graph::new(&Map::new(4, 4, vec![false; 16]).unwrap()));
+    let mut distances = Distances::new(graph, 3 * 16 * size_of::<u32>());
+    let held = distances.to(0);
+    for goal in 1..16 {
+        assert_eq!(distances.to(goal)[goal as usize], 0);
+        assert!(distances.num_tables() <= 3);
+    }
+    assert!(Arc::ptr_eq(&held, &distances.to(0)));
+}
+
+#[test]
+fn what_makes_a_problem_impossible_is_told() {
+    let reason = |rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]| {
+        let map = Map::from_rows(rows).unwrap();
+        let problem = Problem::new(&map, &cells(starts), &cells(goals)).unwrap().within(3);
+        let mut distances = Distances::new(problem.graph.clone(), 0);
+        problem.obstruction(&mut distances)
+    };
+    assert_eq!(reason(&["...."], &[(0, 0)], &[(0, 3)]), None);
+    let told = |text: &str| Some(text.to_owned());
+    assert_eq!(
+        reason(&["..", ".."], &[(0, 0), (0, 0)], &[(0, 1), (1, 1)]),
+        told("agents 0 and 1 both start at (0, 0)")
+    );
+    assert_eq!(
+        reason(&["..", ".."], &[(0, 0), (0, 1)], &[(1, 1), (1, 1)]),
+        told("agents 0 and 1 both want to stay at (1, 1)")
+    );
+    assert_eq!(reason(&[".#."], &[(0, 0)], &[(0, 2)]), told("no path leads agent 0 from (0, 0) to (0, 2)"));
+    assert_eq!(
+        reason(&["....."], &[(0, 0)], &[(0, 4)]),
+        told("agent 0 needs 4 steps from (0, 0) to (0, 4), of 3")
+    );
+}
+
+#[test]
+fn problems_are_read_with_care() {
+    let map = Map::from_rows(&[".#", ".."]).unwrap();
+    let error = |starts: &[(u16, u16)], goals: &[(u16, u16)]| {
+        Problem::new(&map, &cells(starts), &cells(goals)).unwrap_err().to_string()
+    };
+    assert_eq!(error(&[(0, 0)], &[]), "goals has length 0, expected 1");
+    assert_eq!(error(&[(0, 1)], &[(0, 0)]), "instance: agent 0: start (0, 1) is no free cell of the map");
+    assert_eq!(error(&[(0, 0)], &[(0, 2)]), "instance: agent 0: goal (0, 2) is no free cell of the map");
+    assert_eq!(error(&[(0, 0)], &[(9, 9)]), "instance: agent 0: goal (9, 9) is no free cell of the map");
+}
+
+#[test]
+fn budgets_end() {
+    let mut clock = Budget::of_nodes(2).start();
+    assert_eq!([clock.count_node(), clock.count_node(), clock.count_node()], [false, false, true]);
+    assert!(Budget::of_nodes(0).start().count_node());
+    assert!(Budget::of_time(Duration::ZERO).start().count_node());
+    let flag = Arc::new(AtomicBool::new(true));
+    let mut clock = Budget { cancelled: Some(flag), ..Budget::default() }.start();
+    assert!(clock.count_node());
+    assert!(!Budget::default().start().count_node());
+}
