@@ -4,6 +4,7 @@ mod bench;
 mod conform;
 mod maps;
 mod output;
+mod plan;
 mod port;
 mod render;
 mod run;
@@ -25,6 +26,8 @@ struct Arguments {
 enum Command {
     /// Play one episode and print its metrics
     Run(run::Run),
+    /// Check anyone's plan: exit status 0 if it is valid
+    Validate(plan::Validate),
     /// Look at maps, make, convert and judge them
     Maps(maps::Maps),
     /// Draw a recorded episode
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
+        Command::Validate(validate) => validate.run(),
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),

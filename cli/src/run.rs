@@ -15,11 +15,12 @@ use crate::output::{check_writable, say};
 use crate::render::Pictures;
 use episode::Episode;
 use policy::{Policy, PolicyName};
+pub use settings::Settings;
 
 #[derive(Args, Debug)]
 pub struct Run {
     #[command(flatten)]
-    settings: settings::Settings,
+    settings: Settings,
     /// Who chooses the actions
     #[arg(long, value_enum, default_value_t = PolicyName::Random)]
     policy: PolicyName,

@@ -10,6 +10,7 @@ mod distances;
 mod graph;
 mod heap;
 mod plan;
+mod plan_text;
 mod problem;
 mod validate;
 
@@ -17,5 +18,6 @@ pub use astar::{AStarAgent, AStarTeam, View};
 pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
 pub use graph::{Graph, Vertex};
 pub use plan::Plan;
+pub use plan_text::{PlanText, write_plan, write_result};
 pub use problem::{Budget, Clock, Outcome, Planner, Problem};
 pub use validate::{Conflict, ConflictKind, validate};

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use pogema_core::Error;
+use pogema_core::{Error, Map};
 use pogema_maps::formats::{NamedMap, Scenario};
 use pogema_maps::numpy::{Generator, SeedSequence};
-use pogema_maps::{GridConfig, Library, MapText, Targets};
+use pogema_maps::{GridConfig, InstanceSource, Library, MapText, Targets};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::Sources;
@@ -78,8 +78,27 @@ impl Settings {
         })
     }
 
+    /// Whether a map is asked for.
+    pub fn has_map(&self) -> bool {
+        self.map.is_some() || self.config.is_some()
+    }
+
+    /// The map that is asked for, or drawn.
+    pub fn map(&self) -> Result<Map, Error> {
+        let config = self.config()?;
+        match config.map {
+            Some(map) => Ok(map),
+            None => Ok(InstanceSource::new(config, None)?.generate()?.instance.map().clone()),
+        }
+    }
+
     /// The config that file and flags make together.
     pub fn config(&self) -> Result<GridConfig, Error> {
+        self.config_for(None)
+    }
+
+    /// The same for so many agents, unless file or flags say another number.
+    pub fn config_for(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
         let mut fields = match &self.config {
             Some(path) => fields_of(path)?,
             None => Object::new(),
@@ -102,6 +121,9 @@ impl Settings {
                 .split_once('=')
                 .ok_or_else(|| Error::Syntax { reason: format!("`--set {other}`, expected FIELD=VALUE") })?;
             set(field, Some(value_of(value)));
+        }
+        if let Some(num_agents) = num_agents {
+            fields.entry("num_agents").or_insert(num_agents.into());
         }
         if self.size.is_some() {
             fields.remove("width");

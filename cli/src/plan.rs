@@ -1,0 +1,5 @@
+//! Plans for whole problems.
+
+mod validate;
+
+pub use validate::Validate;

@@ -1,0 +1,88 @@
+//! `pogema validate` on plans that are valid, and on those that are not.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::process::Command;
+
+/// Standard output and error of a run in a folder, and its exit status.
+fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
+    let program = env!("CARGO_BIN_EXE_pogema");
+    let output = Command::new(program).arg("validate").args(arguments).current_dir(folder).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
+    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+}
+
+/// A folder with a map, a scenario of two agents and what else is given.
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let map = "type octile\nheight 3\nwidth 3\nmap\n...\n.@.\n...\n";
+    let scenario = "agents_xy: [[0, 0], [0, 2]]\ntargets_xy: [[0, 1], [1, 2]]\n";
+    for (name, text) in [("three.map", map), ("two.yaml", scenario)].iter().chain(files) {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+const TASK: [&str; 5] = ["plan.txt", "--map", "three.map", "--scenario", "two.yaml"];
+
+#[test]
+fn a_valid_plan_is_told_with_its_costs() {
+    let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,0) (1,2)\n2: (0,1) (1,2)\n")]);
+    let (text, _, status) = run(folder.path(), &TASK);
+    assert_eq!((text.as_str(), status), ("valid: 2 agents, 2 steps; sum of costs 3, makespan 2", 0));
+}
+
+#[test]
+fn the_first_conflict_is_told_and_drawn() {
+    let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,1) (0,1)\n")]);
+    let (text, _, status) = run(folder.path(), &TASK);
+    let expected = "not valid: step 1: agents 0 and 1 are both at (0, 1)\n\n\
+        rows 0 to 2, columns 0 to 2; a is agent 0, b is agent 1\n\
+        before step 1:\n    a.b\n    .#.\n    ...\nafter it:\n    .X.\n    .#.\n    ...";
+    assert_eq!((text.as_str(), status), (expected, 1));
+    let json: serde_json::Value = {
+        let arguments = [TASK.as_slice(), &["--json"]].concat();
+        serde_json::from_str(&run(folder.path(), &arguments).0).unwrap()
+    };
+    assert_eq!(json["valid"], false);
+    assert_eq!(json["conflict"]["agents"], serde_json::json!([0, 1]));
+}
+
+#[test]
+fn agents_may_be_let_end_anywhere() {
+    let folder = folder(&[("plan.txt", "(0,0) (0,2)\n(0,0) (1,2)\n")]);
+    let (text, _, status) = run(folder.path(), &TASK);
+    assert!(text.starts_with("not valid: agent 0 ends at (0, 0), which is not its goal"), "{text}");
+    assert_eq!(status, 1);
+    assert_eq!(run(folder.path(), &[TASK.as_slice(), &["--any-end"]].concat()).2, 0);
+}
+
+#[test]
+fn a_result_names_its_own_map_and_agents() {
+    let result = "agents=2\nmap_file=maps/three.map\nstarts=(0,0),(2,0),\ngoals=(1,0),(2,1),\n\
+        solution=\n0:(0,0),(2,0),\n1:(1,0),(2,1),\n";
+    let folder = folder(&[("result.txt", result), ("lost.txt", &result.replace("three", "four"))]);
+    let (text, _, status) = run(folder.path(), &["result.txt"]);
+    assert_eq!((text.as_str(), status), ("valid: 2 agents, 1 steps; sum of costs 2, makespan 1", 0));
+    let (_, error, status) = run(folder.path(), &["lost.txt"]);
+    let expected =
+        "error: lost.txt: its map `maps/four.map` is not there, expected it beside the plan, or `--map FILE`";
+    assert_eq!((error.as_str(), status), (expected, 2));
+    assert_eq!(run(folder.path(), &["lost.txt", "--map", "three.map"]).2, 0);
+}
+
+#[test]
+fn what_is_no_plan_is_one_line() {
+    let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,1) 5\n"), ("short.txt", "0: (0,0)\n")]);
+    let told = |arguments: &[&str]| {
+        let (_, error, status) = run(folder.path(), arguments);
+        assert_eq!((status, error.lines().count()), (2, 1), "{error}");
+        error
+    };
+    assert_eq!(told(&TASK), "error: plan.txt: line 2: found `5`, expected a cell such as `(3,4)`");
+    assert!(told(&["none.txt", "--map", "three.map"]).starts_with("error: none.txt: "));
+    // A plan for the first of two agents is one for a scenario of the first.
+    let short = [&["short.txt"], &TASK[1..]].concat();
+    assert!(run(folder.path(), &short).0.starts_with("not valid: agent 0 ends at (0, 0)"));
+}
