@@ -3,21 +3,39 @@
 //! A [`Problem`] is agents on a map, each with a start and a goal; a [`Planner`] makes a [`Plan`] of it within a
 //! [`Budget`] and says what it found out, its [`Outcome`]. [`validate`] checks anyone's plan.
 //!
+//! [`sipp`] finds the way of one agent past others, [`pbs`], [`cbs`] and [`ecbs`] plan whole problems with it, and
+//! [`rhcr`] plans for agents that get a new goal whenever they reach one, as every [`Lifelong`] does.
+//!
 //! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; its random numbers come in from outside.
 
 mod astar;
+pub mod cbs;
+mod conflict;
 mod distances;
+pub mod ecbs;
 mod graph;
 mod heap;
+mod joint;
+mod lifelong;
+mod mdd;
+pub mod pbs;
 mod plan;
 mod plan_text;
 mod problem;
+mod push;
+mod reservations;
+pub mod rhcr;
+pub mod sipp;
+mod tree;
 mod validate;
+mod window;
 
 pub use astar::{AStarAgent, AStarTeam, View};
 pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
 pub use graph::{Graph, Vertex};
+pub use lifelong::Lifelong;
 pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
 pub use problem::{Budget, Clock, Outcome, Planner, Problem};
+pub use reservations::Reservations;
 pub use validate::{Conflict, ConflictKind, validate};

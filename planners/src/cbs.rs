@@ -1,0 +1,192 @@
+//! Conflict-based search: plans of least sum of costs, for few agents, to know the truth.
+//!
+//! Source: Sharon et al., "Conflict-based search for optimal multi-agent pathfinding", Artificial Intelligence 219,
+//! 2015; conflicts in an order and plans around them: Boyarski et al., "ICBS: Improved Conflict-Based Search
+//! Algorithm for Multi-Agent Pathfinding", IJCAI 2015; the bound from conflicts that cannot be avoided: Felner et
+//! al., "Adding Heuristics to Conflict-Based Search for Multi-Agent Path Finding", ICAPS 2018
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | N.constraints, N.solution | `Node::constraints`, `Node::paths` |
+//! | cardinal, semi-cardinal | how many of the two agents `must_meet` |
+//! | bypass | `around` |
+//! | h | `num_disjoint` |
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+
+use crate::conflict::{Meeting, Setting, all_conflicts, one_leg_each};
+use crate::distances::Distances;
+use crate::graph::Graph;
+use crate::mdd::Mdd;
+use crate::problem::{Budget, Outcome, Planner, Problem};
+use crate::sipp::Sipp;
+use crate::tree::{Aim, Doubt, Low, Node, split};
+
+/// How [`Cbs`] plans.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Params {
+    /// Chooses among what is equally good.
+    pub seed: u64,
+}
+
+/// Optimal planning. A node of its budget is a node of the constraint tree.
+///
+/// It proves that there is no plan where the problem is small or its steps are bounded; else it searches on for as
+/// long as the budget allows.
+#[derive(Clone, Debug, Default)]
+pub struct Cbs {
+    params: Params,
+}
+
+impl Cbs {
+    /// A planner with these settings.
+    pub fn new(params: Params) -> Self {
+        Self { params }
+    }
+}
+
+impl Planner for Cbs {
+    fn name(&self) -> &'static str {
+        "cbs"
+    }
+
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
+        if let Some(reason) = problem.obstruction(&mut distances) {
+            return Outcome::Impossible { reason };
+        }
+        if clock.count_node() {
+            return Outcome::TimedOut { best: None };
+        }
+        let legs = one_leg_each(problem, &mut distances);
+        let setting = Setting::one_shot(problem, &legs, self.params.seed);
+        let mut sipp = Sipp::new(problem.graph.clone());
+        let low = Low::new(&mut sipp, &problem.graph, &setting, Aim::Best);
+        let mut search =
+            Search { graph: &problem.graph, setting: &setting, low, open: BinaryHeap::new(), num_entries: 0 };
+        let Some(root) = search.low.root(&mut clock) else { return Outcome::TimedOut { best: None } };
+        let mut doubt = Doubt::default();
+        search.put(root, vec![None; problem.num_agents()]);
+        while let Some(entry) = search.open.pop() {
+            let Some(meeting) = entry.choice else { return entry.node.paths.outcome(problem, entry.bound) };
+            if clock.count_node() || clock.is_spent() {
+                return Outcome::TimedOut { best: None };
+            }
+            if let Some(reason) = doubt.count(problem, &mut clock) {
+                return Outcome::Impossible { reason };
+            }
+            search.expand(entry, &meeting);
+        }
+        Outcome::Impossible { reason: "no plan is as short as it has to be".to_owned() }
+    }
+}
+
+/// A node and what is known of it.
+struct Entry {
+    node: Node,
+    /// The best paths of each agent, where they were looked at.
+    mdds: Vec<Option<Arc<Mdd>>>,
+    bound: u64,
+    num_conflicts: usize,
+    /// The meeting to be kept from next.
+    choice: Option<Meeting>,
+    /// Counted as entries are made.
+    number: u64,
+}
+
+impl Entry {
+    /// The least is taken first; of equal ones the last made.
+    fn key(&self) -> (u64, usize, Reverse<u64>) {
+        (self.bound, self.num_conflicts, Reverse(self.number))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Entry {}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.key().cmp(&self.key())
+    }
+}
+
+struct Search<'a> {
+    graph: &'a Graph,
+    setting: &'a Setting<'a>,
+    low: Low<'a>,
+    open: BinaryHeap<Entry>,
+    num_entries: u64,
+}
+
+impl Search<'_> {
+    /// Puts a node in with its bound and the meeting that tells most about what plans cost.
+    fn put(&mut self, node: Node, mut mdds: Vec<Option<Arc<Mdd>>>) {
+        let meetings = all_conflicts(&node.paths);
+        let mut choice = None;
+        let (mut is_met, mut num_disjoint) = (vec![false; self.setting.starts.len()], 0);
+        for &meeting in &meetings {
+            let (one, other) = meeting.agents;
+            let num_forced = split(&meeting)
+                .into_iter()
+                .filter(|constraint| {
+                    let mdd = self.mdd(&node, constraint.agent, &mut mdds);
+                    mdd.must_meet(constraint.step, constraint.from, constraint.at)
+                })
+                .count();
+            // Of two agents that cannot but meet, one costs a step more; agents are counted once.
+            if num_forced == 2 && !is_met[one] && !is_met[other] {
+                (is_met[one], is_met[other]) = (true, true);
+                num_disjoint += 1;
+            }
+            let key = (Reverse(num_forced), meeting.step);
+            if choice.is_none_or(|(known, _)| key < known) {
+                choice = Some((key, meeting));
+            }
+        }
+        let bound = node.paths.total_cost() + num_disjoint;
+        let choice = choice.map(|(_, meeting)| meeting);
+        self.num_entries += 1;
+        let number = self.num_entries;
+        self.open.push(Entry { node, mdds, bound, num_conflicts: meetings.len(), choice, number });
+    }
+
+    fn mdd<'m>(&self, node: &Node, agent: usize, mdds: &'m mut [Option<Arc<Mdd>>]) -> &'m Mdd {
+        mdds[agent].get_or_insert_with(|| {
+            let kept: Vec<_> = node.constraints_of(agent).collect();
+            Arc::new(Mdd::new(self.graph, self.setting, agent, node.paths.cost(agent), &kept))
+        })
+    }
+
+    /// Puts in the two nodes that a meeting leads to, or the node itself with paths around it, if they cost as much.
+    fn expand(&mut self, entry: Entry, meeting: &Meeting) {
+        let mut children = Vec::with_capacity(2);
+        for constraint in split(meeting) {
+            let Some(child) = self.low.child(&entry.node, constraint) else { continue };
+            let costs_same = child.paths.total_cost() == entry.node.paths.total_cost();
+            if costs_same && all_conflicts(&child.paths).len() < entry.num_conflicts {
+                let node = Node { paths: child.paths, ..entry.node };
+                return self.put(node, entry.mdds);
+            }
+            children.push((constraint.agent, child));
+        }
+        for (agent, child) in children {
+            let mut mdds = entry.mdds.clone();
+            mdds[agent] = None;
+            self.put(child, mdds);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Conflict-based search for plans that cost at most so many times the least.
+//!
+//! Source: Barer et al., "Suboptimal Variants of the Conflict-Based Search Algorithm for the Multi-Agent Pathfinding
+//! Problem", Symposium on Combinatorial Search 2014
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | w | `Params::weight` |
+//! | LB | `lower_bound` |
+//! | OPEN, FOCAL | `open`, `focal`; what is in the first alone is in `dear` |
+//! | fmin(i) | `Node::least` |
+//!
+//! The low level looks for the least cost first and then, within the weight, for few conflicts, in the intervals of
+//! the second of the works that [`crate::sipp`] names.
+
+use std::collections::BTreeSet;
+
+use crate::conflict::{Meeting, Paths, Setting, all_conflicts, one_leg_each};
+use crate::distances::Distances;
+use crate::graph::Graph;
+use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
+use crate::sipp::Sipp;
+use crate::tree::{Aim, Doubt, Low, Node, split};
+
+/// How [`Ecbs`] plans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    /// How many times the least a plan may cost; 1 and less mean optimal plans.
+    pub weight: f64,
+    /// Chooses among what is equally good.
+    pub seed: u64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { weight: 1.2, seed: 0 }
+    }
+}
+
+/// Planning within a bound. A node of its budget is a node of the constraint tree.
+///
+/// It proves that there is no plan where [`crate::cbs::Cbs`] does.
+#[derive(Clone, Debug, Default)]
+pub struct Ecbs {
+    params: Params,
+}
+
+impl Ecbs {
+    /// A planner with these settings.
+    pub fn new(params: Params) -> Self {
+        Self { params }
+    }
+}
+
+impl Planner for Ecbs {
+    fn name(&self) -> &'static str {
+        "ecbs"
+    }
+
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
+        if let Some(reason) = problem.obstruction(&mut distances) {
+            return Outcome::Impossible { reason };
+        }
+        let legs = one_leg_each(problem, &mut distances);
+        let setting = Setting::one_shot(problem, &legs, self.params.seed);
+        let mut sipp = Sipp::new(problem.graph.clone());
+        let mut doubt = Doubt::default();
+        let give_up = |clock: &mut Clock| doubt.count(problem, clock);
+        match search(&mut sipp, &problem.graph, &setting, self.params.weight, &mut clock, give_up) {
+            Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
+            Found::Nothing => Outcome::TimedOut { best: None },
+            Found::Proof(reason) => Outcome::Impossible { reason },
+        }
+    }
+}
+
+/// What a search ends with.
+pub(crate) enum Found {
+    /// Paths without conflict.
+    Paths { paths: Paths, lower_bound: u64 },
+    /// Nothing before the time was up.
+    Nothing,
+    /// The reason why there are none.
+    Proof(String),
+}
+
+/// Paths without conflict that cost at most `weight` times the least; `give_up` is asked for a reason at every node.
+pub(crate) fn search(
+    sipp: &mut Sipp,
+    graph: &Graph,
+    setting: &Setting<'_>,
+    weight: f64,
+    clock: &mut Clock,
+    mut give_up: impl FnMut(&mut Clock) -> Option<String>,
+) -> Found {
+    // A weight that is no number is no weight.
+    let weight = weight.max(1.0);
+    let mut low = Low::new(sipp, graph, setting, Aim::Within(weight));
+    if clock.count_node() {
+        return Found::Nothing;
+    }
+    let Some(root) = low.root(clock) else { return Found::Nothing };
+    let mut queues = Queues::new(weight);
+    queues.put(root);
+    while let Some((entry, lower_bound)) = queues.take() {
+        let Some(meeting) = entry.meeting else {
+            return Found::Paths { paths: entry.node.paths, lower_bound };
+        };
+        if clock.count_node() || clock.is_spent() {
+            return Found::Nothing;
+        }
+        if let Some(reason) = give_up(clock) {
+            return Found::Proof(reason);
+        }
+        for constraint in split(&meeting) {
+            if let Some(child) = low.child(&entry.node, constraint) {
+                queues.put(child);
+            }
+        }
+    }
+    Found::Proof("no plan is as short as it has to be".to_owned())
+}
+
+/// A node and what is known of it.
+struct Entry {
+    node: Node,
+    num_conflicts: usize,
+    /// The first meeting.
+    meeting: Option<Meeting>,
+}
+
+/// The nodes that are still to be looked at, in two orders.
+struct Queues {
+    weight: f64,
+    entries: Vec<Option<Entry>>,
+    /// All, by lower bound.
+    open: BTreeSet<(u64, usize)>,
+    /// Those whose cost is within the weight, by conflicts, cost and lastly age, the youngest first.
+    focal: BTreeSet<(usize, u64, std::cmp::Reverse<usize>)>,
+    /// The rest, by cost.
+    dear: BTreeSet<(u64, usize)>,
+}
+
+impl Queues {
+    fn new(weight: f64) -> Self {
+        Self {
+            weight,
+            entries: Vec::new(),
+            open: BTreeSet::new(),
+            focal: BTreeSet::new(),
+            dear: BTreeSet::new(),
+        }
+    }
+
+    fn put(&mut self, node: Node) {
+        let meetings = all_conflicts(&node.paths);
+        let meeting = meetings.iter().min_by_key(|meeting| meeting.step).copied();
+        let number = self.entries.len();
+        self.open.insert((node.lower_bound(), number));
+        self.dear.insert((node.paths.total_cost(), number));
+        self.entries.push(Some(Entry { node, num_conflicts: meetings.len(), meeting }));
+    }
+
+    /// The node with the fewest conflicts of those within the weight, and the least that any plan costs.
+    fn take(&mut self) -> Option<(Entry, u64)> {
+        let &(lower_bound, _) = self.open.first()?;
+        let most = lower_bound as f64 * self.weight;
+        while let Some(&(cost, number)) = self.dear.first().filter(|&&(cost, _)| cost as f64 <= most) {
+            self.dear.pop_first();
+            let num_conflicts = self.entries[number].as_ref()?.num_conflicts;
+            self.focal.insert((num_conflicts, cost, std::cmp::Reverse(number)));
+        }
+        let (_, _, std::cmp::Reverse(number)) = self.focal.pop_first()?;
+        let entry = self.entries[number].take()?;
+        self.open.remove(&(entry.node.lower_bound(), number));
+        Some((entry, lower_bound))
+    }
+}

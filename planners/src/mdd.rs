@@ -1,0 +1,62 @@
+//! All best paths of one agent at once, step by step.
+
+use crate::conflict::Setting;
+use crate::graph::{Graph, Vertex};
+use crate::tree::Constraint;
+
+/// Where an agent can be after each step of its best paths.
+///
+/// Source: Sharon et al., "The increasing cost tree search for optimal multi-agent pathfinding", Artificial
+/// Intelligence 195, 2013
+#[derive(Debug)]
+pub(crate) struct Mdd {
+    levels: Vec<Vec<Vertex>>,
+}
+
+impl Mdd {
+    /// All paths of a cost that keep an agent's constraints.
+    pub(crate) fn new(
+        graph: &Graph,
+        setting: &Setting<'_>,
+        agent: usize,
+        cost: u32,
+        kept: &[Constraint],
+    ) -> Self {
+        let to_go = &setting.legs[agent][0].to_go;
+        let allows = |from: Vertex, to: Vertex, step: usize| {
+            let breaks = |constraint: &Constraint| {
+                constraint.step == step && constraint.at == to && constraint.from.is_none_or(|at| at == from)
+            };
+            !kept.iter().any(breaks)
+        };
+        let mut levels = vec![vec![setting.starts[agent]]];
+        for step in 1..=cost as usize {
+            let left = cost - step as u32;
+            let mut level = Vec::new();
+            for &from in &levels[step - 1] {
+                for &to in graph.neighbours(from).iter().chain([&from]) {
+                    if to_go[to as usize] <= left && !level.contains(&to) && allows(from, to, step) {
+                        level.push(to);
+                    }
+                }
+            }
+            levels.push(level);
+        }
+        for step in (0..cost as usize).rev() {
+            let (before, after) = levels.split_at_mut(step + 1);
+            let leads = |&from: &Vertex| {
+                let mut targets = graph.neighbours(from).iter().chain([&from]);
+                targets.any(|&to| after[0].contains(&to) && allows(from, to, step + 1))
+            };
+            before[step].retain(leads);
+        }
+        Self { levels }
+    }
+
+    /// Whether every best path is in a vertex after a step, or makes a move in it.
+    pub(crate) fn must_meet(&self, step: usize, from: Option<Vertex>, at: Vertex) -> bool {
+        let is_only =
+            |step: usize, vertex: Vertex| self.levels.get(step).is_none_or(|level| *level == [vertex]);
+        is_only(step, at) && from.is_none_or(|from| is_only(step - 1, from))
+    }
+}

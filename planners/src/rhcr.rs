@@ -1,0 +1,212 @@
+//! Planning for lifelong agents a few steps ahead, again and again.
+//!
+//! Source: Li et al., "Lifelong Multi-Agent Path Finding in Large-Scale Warehouses", AAAI 2021
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | h, simulation window | `Params::simulation_window` |
+//! | w, planning window | `Params::planning_window` |
+//! | MAPF solver | `Params::solver` |
+//!
+//! The paper's agents know their next goals. Here they do not, unless told by [`Rhcr::next_foreseeing`]; so agents
+//! plan to their present goals and then only keep out of the way, and plan again when one of them gets a new goal.
+//! Where the paper's solver fails, agents stand still or keep but part of their plans; here they go on with what is
+//! left of the last plan and push each other past its end, which never leads to a conflict.
+
+use std::sync::Arc;
+
+use pogema_core::Error;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::conflict::Setting;
+use crate::distances::{Distances, UNREACHABLE};
+use crate::ecbs::{self, Found};
+use crate::graph::{Graph, Vertex};
+use crate::lifelong::{Lifelong, check_agents};
+use crate::pbs;
+use crate::problem::{Budget, Clock};
+use crate::sipp::{Horizon, Leg, Sipp};
+use crate::window::Window;
+
+/// How [`Rhcr`] plans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    /// Steps between two plannings; new goals and surprises are planned for at once. Units: steps.
+    pub simulation_window: usize,
+    /// Steps that are free of conflicts. Units: steps.
+    pub planning_window: usize,
+    /// How a window is planned.
+    pub solver: Solver,
+    /// Searches for one agent that a planning may take, whatever the budget.
+    pub most_searches: u64,
+    /// Chooses among what is equally good.
+    pub seed: u64,
+}
+
+/// How a window is planned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// The last plan goes on, agents push each other past its end, and a large-neighbourhood search improves it.
+    Neighbourhoods,
+    /// Priority-based search, as in the paper.
+    Pbs,
+    /// Conflict-based search for windows that cost at most so many times the least.
+    Ecbs {
+        /// How many times.
+        weight: f64,
+    },
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            simulation_window: 1,
+            planning_window: 20,
+            solver: Solver::Neighbourhoods,
+            most_searches: 1000,
+            seed: 0,
+        }
+    }
+}
+
+/// Rolling-horizon planning. A node of its budget is one search for one agent, or with [`Solver::Ecbs`] one node of
+/// the constraint tree.
+#[derive(Debug)]
+pub struct Rhcr {
+    params: Params,
+    distances: Distances,
+    sipp: Sipp,
+    window: Window,
+    goals: Vec<Vertex>,
+    /// Steps since the last planning.
+    age: usize,
+    rng: Pcg64Mcg,
+}
+
+impl Rhcr {
+    /// A planner for a map.
+    pub fn new(graph: Arc<Graph>, params: Params) -> Self {
+        Self {
+            distances: Distances::new(graph.clone(), Distances::DEFAULT_BYTES),
+            sipp: Sipp::new(graph.clone()),
+            window: Window::new(graph, params.planning_window.max(1)),
+            goals: Vec::new(),
+            age: 0,
+            rng: Pcg64Mcg::seed_from_u64(params.seed),
+            params,
+        }
+    }
+
+    /// As [`Lifelong::next`], for agents that know which goals come after their present ones, as in the paper; each
+    /// agent's list begins with its present goal.
+    ///
+    /// # Errors
+    /// As for [`Lifelong::next`]; [`Error::Agent`] also for an agent without a goal.
+    pub fn next_foreseeing(
+        &mut self,
+        now: &[Vertex],
+        goals: &[Vec<Vertex>],
+        budget: &Budget,
+    ) -> Result<Vec<Vertex>, Error> {
+        let first = |(agent, goals): (usize, &Vec<Vertex>)| {
+            goals.first().copied().ok_or_else(|| Error::agent(agent, "it has no goal"))
+        };
+        let present = goals.iter().enumerate().map(first).collect::<Result<Vec<_>, _>>()?;
+        let num_vertices = self.distances.graph().num_vertices();
+        check_agents(num_vertices, now, &present)?;
+        for (agent, goals) in goals.iter().enumerate() {
+            if let Some(goal) = goals.iter().find(|&&goal| goal as usize >= num_vertices) {
+                return Err(Error::agent(agent, format!("goal {goal} is none of {num_vertices} vertices")));
+            }
+        }
+        let legs = now.iter().zip(goals).map(|(&at, goals)| self.legs(at, goals)).collect();
+        Ok(self.step(now, present, legs, budget))
+    }
+
+    /// As many goals as an agent may reach within the window; none that it cannot.
+    fn legs(&mut self, at: Vertex, goals: &[Vertex]) -> Vec<Leg> {
+        let (mut legs, mut lengths, mut from, mut total) = (Vec::new(), Vec::new(), at, 0);
+        for &goal in goals {
+            let to_go = self.distances.to(goal);
+            let length = to_go[from as usize];
+            if length == UNREACHABLE || total > self.params.planning_window {
+                break;
+            }
+            total += length as usize;
+            lengths.push(length);
+            legs.push(Leg::last(to_go));
+            from = goal;
+        }
+        for at in (1..legs.len()).rev() {
+            legs[at - 1].then = legs[at].then + lengths[at];
+        }
+        legs
+    }
+
+    fn step(
+        &mut self,
+        now: &[Vertex],
+        goals: Vec<Vertex>,
+        legs: Vec<Vec<Leg>>,
+        budget: &Budget,
+    ) -> Vec<Vertex> {
+        let mut budget = budget.clone();
+        budget.nodes = Some(budget.nodes.unwrap_or(u64::MAX).min(self.params.most_searches));
+        let mut clock = budget.start();
+        let is_new = |agent: &usize| self.goals.get(*agent) != Some(&goals[*agent]);
+        let changed: Vec<usize> = (0..goals.len()).filter(is_new).collect();
+        let is_as_planned = self.window.advance(now, &legs, &mut self.rng);
+        self.age += 1;
+        let is_due = self.age >= self.params.simulation_window || !is_as_planned || !changed.is_empty();
+        self.goals = goals;
+        if is_due {
+            self.age = 0;
+            match self.params.solver {
+                Solver::Neighbourhoods => self.window.improve(&legs, &changed, &mut clock, &mut self.rng),
+                Solver::Pbs | Solver::Ecbs { .. } => self.plan_anew(now, &legs, &mut clock),
+            }
+        }
+        self.window.after(1).collect()
+    }
+
+    /// Plans for the whole window, and keeps what is left of the last plan if that fails or costs more.
+    fn plan_anew(&mut self, now: &[Vertex], legs: &[Vec<Leg>], clock: &mut Clock) {
+        let horizon = Horizon::Window(self.params.planning_window.max(1) as u32);
+        let setting = Setting { starts: now, legs, horizon, salt: self.rng.next_u32() };
+        let graph = self.distances.graph().clone();
+        let found = match self.params.solver {
+            Solver::Ecbs { weight } => {
+                match ecbs::search(&mut self.sipp, &graph, &setting, weight, clock, |_| None) {
+                    Found::Paths { paths, .. } => Some(paths),
+                    Found::Nothing | Found::Proof(_) => None,
+                }
+            }
+            Solver::Pbs | Solver::Neighbourhoods => pbs::search(&mut self.sipp, &graph, &setting, clock),
+        };
+        if let Some(paths) = found.filter(|paths| paths.total_cost() <= self.window.total_cost()) {
+            let path = |agent| paths.path(agent).to_vec();
+            self.window.replace((0..now.len()).map(path).collect(), legs);
+        }
+    }
+}
+
+impl Lifelong for Rhcr {
+    fn name(&self) -> &'static str {
+        "rhcr"
+    }
+
+    fn reset(&mut self) {
+        let graph = self.distances.graph().clone();
+        self.window = Window::new(graph, self.params.planning_window.max(1));
+        self.goals.clear();
+        self.age = 0;
+        self.rng = Pcg64Mcg::seed_from_u64(self.params.seed);
+    }
+
+    fn next(&mut self, now: &[Vertex], goals: &[Vertex], budget: &Budget) -> Result<Vec<Vertex>, Error> {
+        check_agents(self.distances.graph().num_vertices(), now, goals)?;
+        let legs = now.iter().zip(goals).map(|(&at, &goal)| self.legs(at, &[goal])).collect();
+        Ok(self.step(now, goals.to_vec(), legs, budget))
+    }
+}

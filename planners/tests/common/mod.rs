@@ -1,0 +1,118 @@
+//! Small random problems, and what every outcome must be.
+
+#![allow(dead_code, reason = "not every test file needs all of it")]
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use pogema_core::{Cell, Map};
+use pogema_planners::{Budget, Outcome, Plan, Planner, Problem, validate};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// A map with starts and goals, all of them different.
+#[derive(Clone, Debug)]
+pub struct Case {
+    pub map: Map,
+    pub starts: Vec<Cell>,
+    pub goals: Vec<Cell>,
+}
+
+impl Case {
+    pub fn new(rows: &[&str], agents: &[[(u16, u16); 2]]) -> Self {
+        let cell = |(row, col): (u16, u16)| Cell { row, col };
+        Self {
+            map: Map::from_rows(rows).unwrap(),
+            starts: agents.iter().map(|agent| cell(agent[0])).collect(),
+            goals: agents.iter().map(|agent| cell(agent[1])).collect(),
+        }
+    }
+
+    /// A map of so many rows and columns, a fifth of it obstacles, and so many agents, or as many as have room.
+    pub fn random(rng: &mut Pcg64Mcg, height: usize, width: usize, num_agents: usize) -> Self {
+        let obstacles = (0..height * width).map(|_| rng.next_u32().is_multiple_of(5)).collect();
+        let map = Map::new(height, width, obstacles).unwrap();
+        let free = || (0..height * width).map(|at| map.cell_at(at)).filter(|&cell| !map.is_obstacle(cell));
+        let mut draw = || {
+            let mut cells: Vec<Cell> = free().collect();
+            for last in (1..cells.len()).rev() {
+                cells.swap(last, rng.next_u32() as usize % (last + 1));
+            }
+            cells.truncate(num_agents);
+            cells
+        };
+        let (starts, goals) = (draw(), draw());
+        Self { map, starts, goals }
+    }
+
+    pub fn problem(&self) -> Problem {
+        Problem::new(&self.map, &self.starts, &self.goals).unwrap()
+    }
+
+    /// The plan of an outcome, which must be valid and cost no less than its bound.
+    pub fn check<'a>(&self, outcome: &'a Outcome) -> Option<&'a Plan> {
+        let goals = outcome.solution().map(|_| &self.goals[..]);
+        let plan = match outcome {
+            Outcome::Solved { plan, lower_bound } => {
+                assert!(*lower_bound <= plan.sum_of_costs() as u64, "{outcome} in {self:?}");
+                Some(plan)
+            }
+            Outcome::TimedOut { best } => best.as_ref(),
+            Outcome::Impossible { .. } => None,
+        };
+        if let Some(plan) = plan {
+            assert_eq!(validate(&self.map, &self.starts, goals, plan), Ok(()), "{self:?}");
+        }
+        outcome.solution()
+    }
+}
+
+pub fn rng(seed: u64) -> Pcg64Mcg {
+    Pcg64Mcg::seed_from_u64(seed)
+}
+
+/// What every planner owes on problems that are none, or hardly.
+pub fn check_odd_problems(planner: &mut dyn Planner) {
+    let nobody = Case::new(&[".."], &[]);
+    assert_eq!(nobody.check(&planner.plan(&nobody.problem(), &Budget::default())).unwrap().sum_of_costs(), 0);
+    let at_home = Case::new(&[".."], &[[(0, 0), (0, 0)], [(0, 1), (0, 1)]]);
+    assert_eq!(at_home.check(&planner.plan(&at_home.problem(), &Budget::default())).unwrap().num_steps(), 0);
+    let apart = Case::new(&[".#."], &[[(0, 0), (0, 2)]]);
+    let same_goal = Case::new(&["..."], &[[(0, 0), (0, 1)], [(0, 2), (0, 1)]]);
+    let crowded = Case::new(&[".."], &[[(0, 0), (0, 1)], [(0, 1), (0, 0)], [(0, 0), (0, 0)]]);
+    for case in [&apart, &same_goal, &crowded] {
+        let outcome = planner.plan(&case.problem(), &Budget::default());
+        assert!(matches!(outcome, Outcome::Impossible { .. }), "{outcome} in {case:?}");
+    }
+    let late = Case::new(&["....."], &[[(0, 0), (0, 4)]]);
+    let outcome = planner.plan(&late.problem().within(3), &Budget::default());
+    assert!(matches!(outcome, Outcome::Impossible { .. }), "{outcome}");
+    assert!(planner.plan(&late.problem().within(4), &Budget::default()).solution().is_some());
+}
+
+/// What every planner owes when it may not think, or no longer.
+pub fn check_spent_budgets(planner: &mut dyn Planner) {
+    let case = Case::new(&["....", ".##.", "...."], &[[(0, 0), (2, 3)], [(2, 3), (0, 0)], [(0, 3), (2, 0)]]);
+    let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
+    for budget in [Budget::of_nodes(0), Budget::of_time(Duration::ZERO), cancelled] {
+        let outcome = planner.plan(&case.problem(), &budget);
+        assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome}");
+        case.check(&outcome);
+    }
+    // Nobody can pass here.
+    let stuck = Case::new(&["....."], &[[(0, 0), (0, 4)], [(0, 4), (0, 0)]]);
+    let outcome = planner.plan(&stuck.problem(), &Budget::of_nodes(2000));
+    assert!(outcome.solution().is_none(), "{outcome}");
+}
+
+/// Whether the same seed and budget give the same outcome.
+pub fn check_repeats(mut make: impl FnMut() -> Box<dyn Planner>) {
+    for seed in 0..20 {
+        let case = Case::random(&mut rng(seed), 6, 6, 6);
+        let one = make().plan(&case.problem(), &Budget::of_nodes(300));
+        let other = make().plan(&case.problem(), &Budget::of_nodes(300));
+        assert_eq!(one, other);
+        case.check(&one);
+    }
+}

@@ -1,0 +1,79 @@
+//! Plans within a bound, against a search through all joint places.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use pogema_core::OnGoal;
+use pogema_maps::{Verdict, search};
+use pogema_planners::ecbs::{Ecbs, Params};
+use pogema_planners::{Budget, Outcome, Planner};
+
+fn planner(weight: f64) -> Ecbs {
+    Ecbs::new(Params { weight, seed: 0 })
+}
+
+#[test]
+fn plans_keep_their_bounds() {
+    let mut num_late = 0;
+    for seed in 0..1200 {
+        let weight = [1.0, 1.1, 1.5, 3.0][(seed % 4) as usize];
+        let (height, width) = [(2, 3), (3, 3), (4, 3)][(seed / 4 % 3) as usize];
+        let case = Case::random(&mut rng(seed), height, width, 2 + (seed / 12 % 3) as usize);
+        let outcome = planner(weight).plan(&case.problem(), &Budget::of_nodes(2000));
+        let plan = case.check(&outcome);
+        match search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
+            Verdict::Solvable { sum_of_costs } => {
+                let Outcome::Solved { lower_bound, .. } = outcome else {
+                    assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome} in {case:?}");
+                    num_late += 1;
+                    continue;
+                };
+                let cost = plan.unwrap().sum_of_costs() as u64;
+                assert!(lower_bound <= sum_of_costs && sum_of_costs <= cost, "{case:?}");
+                assert!(cost as f64 <= weight * sum_of_costs as f64, "{cost} {weight} {case:?}");
+            }
+            _ => assert!(matches!(outcome, Outcome::Impossible { .. }), "{outcome} in {case:?}"),
+        }
+    }
+    assert!(num_late < 30, "{num_late}");
+}
+
+#[test]
+fn a_weight_lets_more_agents_plan() {
+    let num_solved = (0..10)
+        .filter(|&seed| {
+            let case = Case::random(&mut rng(seed), 16, 16, 20);
+            let outcome = planner(1.5).plan(&case.problem(), &Budget::of_nodes(3000));
+            let is_off = matches!(outcome, Outcome::Impossible { .. });
+            is_off || case.check(&outcome).is_some()
+        })
+        .count();
+    assert!(num_solved >= 8, "{num_solved}");
+}
+
+#[test]
+fn odd_weights_are_weights_of_one() {
+    let case = Case::new(&["...", "#.#"], &[[(0, 0), (0, 2)], [(0, 2), (0, 1)]]);
+    let best = planner(1.0).plan(&case.problem(), &Budget::default());
+    for weight in [f64::NAN, 0.0, -3.0] {
+        assert_eq!(planner(weight).plan(&case.problem(), &Budget::default()), best);
+    }
+    assert!(case.check(&planner(f64::INFINITY).plan(&case.problem(), &Budget::default())).is_some());
+}
+
+#[test]
+fn odd_problems_have_outcomes() {
+    check_odd_problems(&mut Ecbs::default());
+}
+
+#[test]
+fn spent_budgets_end_the_search() {
+    check_spent_budgets(&mut Ecbs::default());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_plan() {
+    check_repeats(|| Box::new(planner(1.2)));
+}

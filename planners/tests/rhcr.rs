@@ -1,0 +1,174 @@
+//! Lifelong planning: every step is one that agents may take, whatever happens to them.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use common::{Case, rng};
+use pogema_core::Map;
+use pogema_planners::rhcr::{Params, Rhcr, Solver};
+use pogema_planners::{Budget, Graph, Lifelong, Plan, Vertex, validate};
+use rand_core::Rng;
+use rand_pcg::Pcg64Mcg;
+
+const SOLVERS: [Solver; 3] = [Solver::Neighbourhoods, Solver::Pbs, Solver::Ecbs { weight: 1.5 }];
+
+/// Agents that get a random goal whenever they reach one.
+struct World {
+    map: Map,
+    graph: Arc<Graph>,
+    now: Vec<Vertex>,
+    /// For each agent all its goals, and how many it has reached.
+    goals: Vec<Vec<Vertex>>,
+    reached: Vec<usize>,
+}
+
+impl World {
+    fn new(seed: u64, side: usize, num_agents: usize) -> Self {
+        let mut rng = rng(seed);
+        let case = Case::random(&mut rng, side, side, num_agents);
+        let graph = Arc::new(Graph::new(&case.map));
+        let now = graph.vertices_of("start", &case.starts).unwrap();
+        let mut draw = || rng.next_u32() % graph.num_vertices() as u32;
+        let goals: Vec<Vec<Vertex>> = now.iter().map(|_| (0..200).map(|_| draw()).collect()).collect();
+        Self { map: case.map, reached: vec![0; now.len()], graph, now, goals }
+    }
+
+    fn present_goals(&self) -> Vec<Vertex> {
+        self.goals.iter().zip(&self.reached).map(|(goals, &reached)| goals[reached]).collect()
+    }
+
+    fn go(&mut self, next: Vec<Vertex>) {
+        let cells =
+            |places: &[Vertex]| places.iter().map(|&place| self.graph.cell(place)).collect::<Vec<_>>();
+        let plan = Plan::new(vec![cells(&self.now), cells(&next)]).unwrap();
+        assert_eq!(validate(&self.map, &cells(&self.now), None, &plan), Ok(()));
+        self.now = next;
+        for (agent, &at) in self.now.iter().enumerate() {
+            self.reached[agent] += usize::from(at == self.goals[agent][self.reached[agent]]);
+        }
+    }
+
+    fn num_reached(&self) -> usize {
+        self.reached.iter().sum()
+    }
+}
+
+fn params(solver: Solver) -> Params {
+    Params { solver, planning_window: 8, ..Params::default() }
+}
+
+fn displace(world: &mut World, rng: &mut Pcg64Mcg) {
+    let num_vertices = world.graph.num_vertices() as u32;
+    let (agent, to) = (rng.next_u32() as usize % world.now.len(), rng.next_u32() % num_vertices);
+    if !world.now.contains(&to) {
+        world.now[agent] = to;
+    }
+}
+
+#[test]
+fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
+    for (seed, solver) in (0..24).zip(SOLVERS.into_iter().cycle()) {
+        let mut world = World::new(seed, 7, 4 + (seed % 12) as usize);
+        let mut planner = Rhcr::new(world.graph.clone(), params(solver));
+        let mut rng = rng(seed);
+        for step in 0..60 {
+            let goals = world.present_goals();
+            let next = planner.next(&world.now, &goals, &Budget::of_nodes(100)).unwrap();
+            world.go(next);
+            if step % 7 == 6 {
+                displace(&mut world, &mut rng);
+            }
+        }
+    }
+}
+
+#[test]
+fn agents_reach_goals_again_and_again() {
+    for solver in SOLVERS {
+        let mut world = World::new(5, 10, 20);
+        let mut planner = Rhcr::new(world.graph.clone(), params(solver));
+        for _ in 0..100 {
+            let goals = world.present_goals();
+            let next = planner.next(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
+            world.go(next);
+        }
+        assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());
+    }
+}
+
+#[test]
+fn agents_that_know_their_next_goals_need_not_plan_every_step() {
+    for solver in SOLVERS {
+        let mut world = World::new(5, 10, 20);
+        let mut planner = Rhcr::new(world.graph.clone(), Params { simulation_window: 5, ..params(solver) });
+        for _ in 0..100 {
+            let ahead = |(goals, &reached): (&Vec<Vertex>, &usize)| goals[reached..].to_vec();
+            let goals: Vec<Vec<Vertex>> = world.goals.iter().zip(&world.reached).map(ahead).collect();
+            let next = planner.next_foreseeing(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
+            world.go(next);
+        }
+        assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_steps_after_a_reset_too() {
+    for solver in SOLVERS {
+        let run = |planner: &mut Rhcr| {
+            let mut world = World::new(3, 8, 12);
+            for _ in 0..40 {
+                let goals = world.present_goals();
+                let next = planner.next(&world.now, &goals, &Budget::of_nodes(60)).unwrap();
+                world.go(next);
+            }
+            world.now
+        };
+        let graph = World::new(3, 8, 12).graph;
+        let mut planner = Rhcr::new(graph.clone(), params(solver));
+        let first = run(&mut planner);
+        planner.reset();
+        assert_eq!(run(&mut planner), first);
+        assert_eq!(run(&mut Rhcr::new(graph, params(solver))), first);
+    }
+}
+
+#[test]
+fn without_a_budget_agents_still_step_in_turn() {
+    for solver in SOLVERS {
+        let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
+        for budget in [Budget::of_nodes(0), Budget::of_time(Duration::ZERO), cancelled] {
+            let mut world = World::new(4, 8, 12);
+            let mut planner = Rhcr::new(world.graph.clone(), params(solver));
+            for _ in 0..40 {
+                let goals = world.present_goals();
+                let next = planner.next(&world.now, &goals, &budget).unwrap();
+                world.go(next);
+            }
+            assert!(world.num_reached() > 10, "{solver:?}: {}", world.num_reached());
+        }
+    }
+}
+
+#[test]
+fn odd_worlds_have_steps_too() {
+    for solver in SOLVERS {
+        let graph = |rows: &[&str]| Arc::new(Graph::new(&Case::new(rows, &[]).map));
+        let next = |rows: &[&str], now: &[Vertex], goals: &[Vertex]| {
+            Rhcr::new(graph(rows), params(solver)).next(now, goals, &Budget::default())
+        };
+        assert!(next(&[".."], &[], &[]).unwrap().is_empty());
+        assert_eq!(next(&[".#."], &[0], &[1]).unwrap(), [0]);
+        assert_eq!(next(&[".."], &[0, 1], &[1, 0]).unwrap(), [0, 1]);
+        assert_eq!(next(&["..."], &[0, 2], &[2, 2]).unwrap()[1], 2);
+        let text = |now: &[Vertex], goals: &[Vertex]| next(&[".."], now, goals).unwrap_err().to_string();
+        assert_eq!(text(&[0], &[]), "goals has length 0, expected 1");
+        assert_eq!(text(&[0, 0], &[1, 1]), "instance: agent 1: it is where agent 0 is, at vertex 0");
+        assert_eq!(text(&[2], &[0]), "instance: agent 0: place 2 is none of 2 vertices");
+        assert_eq!(text(&[0], &[2]), "instance: agent 0: goal 2 is none of 2 vertices");
+    }
+}
