@@ -33,8 +33,8 @@ def drawn(*shape):
     return np.random.default_rng(0).integers(0, 5, (ACTIONS, *shape))
 
 
-def environment(num_agents):
-    config = package.GridConfig(
+def config(num_agents):
+    return package.GridConfig(
         num_agents=num_agents,
         size=32,
         density=0.3,
@@ -44,7 +44,10 @@ def environment(num_agents):
         on_target="nothing",
         max_episode_steps=10**9,
     )
-    env = package.pogema_v0(grid_config=config)
+
+
+def environment(num_agents):
+    env = package.pogema_v0(grid_config=config(num_agents))
     env.reset()
     return env
 
@@ -74,15 +77,7 @@ def reset(num_agents):
 
 def vector(num_envs, num_agents, num_threads):
     """Steps of all environments with observations."""
-    config = {
-        "num_agents": num_agents,
-        "size": 32,
-        "density": 0.3,
-        "collision_system": "soft",
-        "on_target": "restart",
-        "max_episode_steps": 256,
-    }
-    env = package.VecEnv(package.GridConfig(**config), num_envs, num_threads=num_threads)
+    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads)
     env.reset(seed=0)
     actions, at = drawn(num_envs, num_agents), 0
 

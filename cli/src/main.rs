@@ -26,6 +26,8 @@ struct Arguments {
 enum Command {
     /// Play one episode and print its metrics
     Run(run::Run),
+    /// Make a plan that brings every agent of an instance to its goal
+    Plan(plan::MakePlan),
     /// Check anyone's plan: exit status 0 if it is valid
     Validate(plan::Validate),
     /// Look at maps, make, convert and judge them
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
+        Command::Plan(plan) => plan.run(),
         Command::Validate(validate) => validate.run(),
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),

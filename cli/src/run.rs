@@ -12,10 +12,11 @@ use pogema_render::Film;
 use serde_json::json;
 
 use crate::output::{check_writable, say};
+use crate::plan::Thinking;
 use crate::render::Pictures;
 use episode::Episode;
 use policy::{Policy, PolicyName};
-pub use settings::Settings;
+pub use settings::{Settings, put_map};
 
 #[derive(Args, Debug)]
 pub struct Run {
@@ -27,6 +28,8 @@ pub struct Run {
     /// The actions for `--policy file`: a trace, or a JSON list of action numbers per line
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
+    #[command(flatten)]
+    thinking: Thinking,
     /// Draw every step in the terminal
     #[arg(long)]
     render: bool,
@@ -45,7 +48,7 @@ impl Run {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
-        let mut policy = Policy::new(self.policy, self.actions.as_deref(), &config)?;
+        let mut policy = Policy::new(self.policy, self.actions.as_deref(), &self.thinking, &config)?;
         let mut episode = Episode::start(config, self.trace.is_some() || self.pictures.are_wanted())?;
         for warning in episode.warnings() {
             eprintln!("warning: {warning}");

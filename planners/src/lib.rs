@@ -6,6 +6,9 @@
 //! [`sipp`] finds the way of one agent past others, [`pbs`], [`cbs`] and [`ecbs`] plan whole problems with it, and
 //! [`rhcr`] plans for agents that get a new goal whenever they reach one, as every [`Lifelong`] does.
 //!
+//! [`planner()`] and [`lifelong()`] make a planner by its name; [`PlannerPolicy`] and [`LifelongPolicy`] let one drive any
+//! environment.
+//!
 //! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; its random numbers come in from outside.
 
 mod astar;
@@ -19,10 +22,12 @@ mod joint;
 mod lacam;
 mod lifelong;
 mod mdd;
+mod names;
 pub mod pbs;
 mod pibt;
 mod plan;
 mod plan_text;
+mod policy;
 mod problem;
 mod push;
 mod refine;
@@ -39,9 +44,11 @@ pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
 pub use graph::{Graph, Vertex};
 pub use lacam::{Lacam, LacamParams};
 pub use lifelong::Lifelong;
+pub use names::{Choice, LIFELONG, PLANNERS, lifelong, planner};
 pub use pibt::PibtRules;
 pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
+pub use policy::{LifelongPolicy, PlannerPolicy};
 pub use problem::{Budget, Clock, Outcome, Planner, Problem};
 pub use reservations::Reservations;
 pub use validate::{Conflict, ConflictKind, validate};

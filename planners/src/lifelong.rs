@@ -9,7 +9,7 @@ use crate::problem::Budget;
 ///
 /// It knows of each agent the goal that it has now and no later one. Agents may be anywhere at the next call, and
 /// have any goals: what was planned before is then given up as far as it no longer fits.
-pub trait Lifelong {
+pub trait Lifelong: Send {
     /// A short name, as the command line knows it.
     fn name(&self) -> &'static str;
 

@@ -223,7 +223,7 @@ impl Clock {
 }
 
 /// Who makes plans for whole problems.
-pub trait Planner {
+pub trait Planner: Send {
     /// A short name, as the command line knows it.
     fn name(&self) -> &'static str;
 

@@ -8,6 +8,7 @@ mod errors;
 mod film;
 mod lists;
 mod observe;
+mod planners;
 mod seeds;
 mod state;
 mod vec;

@@ -1,6 +1,7 @@
 //! `pogema bench`: how fast this machine steps and observes, beside the filling of memory and POGEMA.
 
 mod bars;
+mod planners;
 mod show;
 mod timing;
 mod work;
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::{files, find_oracle_python};
 use pogema_core::Error;
@@ -23,7 +24,10 @@ use bars::{Bar, bars};
 use work::{Speed, Work};
 
 #[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Bench {
+    #[command(subcommand)]
+    other: Option<Other>,
     /// Time POGEMA 1.4.0 in the same run too; needs Python 3.11
     #[arg(long)]
     peers: bool,
@@ -42,6 +46,13 @@ pub struct Bench {
     /// Write all figures to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+}
+
+/// What else can be measured.
+#[derive(Debug, Subcommand)]
+enum Other {
+    /// Solve the paper's instances, and put ours beside the published figures
+    Planners(planners::Planners),
 }
 
 /// One row of the table.
@@ -92,6 +103,9 @@ const MOST_AGENTS_OF_POGEMA: usize = 10_000;
 
 impl Bench {
     pub fn run(&self) -> Result<ExitCode, Error> {
+        if let Some(Other::Planners(planners)) = &self.other {
+            return planners.run().map(|()| ExitCode::SUCCESS);
+        }
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let budget = Duration::try_from_secs_f64(self.seconds).ok().filter(|budget| !budget.is_zero());
         let budget = budget.ok_or_else(|| Error::config("seconds", self.seconds, "a time above 0"))?;

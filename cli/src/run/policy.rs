@@ -8,7 +8,9 @@ use pogema_conformance::{files, pogema_team, sample};
 use pogema_core::{Action, Error, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_maps::numpy::{Generator, SeedSequence};
-use pogema_planners::AStarTeam;
+use pogema_planners::{AStarTeam, LifelongPolicy, PlannerPolicy, planner};
+
+use crate::plan::Thinking;
 
 use super::episode::Episode;
 
@@ -20,6 +22,16 @@ pub enum PolicyName {
     Astar,
     /// Nobody moves
     Stay,
+    /// LaCAM*, which plans for all agents at once
+    Lacam,
+    /// Priority-based search, for all agents at once
+    Pbs,
+    /// Bounded-suboptimal conflict-based search, for all agents at once
+    Ecbs,
+    /// Optimal conflict-based search, for all agents at once
+    Cbs,
+    /// Rolling-horizon planning, for agents that get goal after goal
+    Rhcr,
     /// Actions from a file
     File,
 }
@@ -36,11 +48,18 @@ pub enum Policy {
     Random(Box<Generator>),
     Astar(AStarTeam),
     Stay,
+    Planner(Box<PlannerPolicy>),
+    Lifelong(Box<LifelongPolicy>),
     File(std::vec::IntoIter<Vec<Action>>),
 }
 
 impl Policy {
-    pub fn new(name: PolicyName, file: Option<&Path>, config: &GridConfig) -> Result<Self, Error> {
+    pub fn new(
+        name: PolicyName,
+        file: Option<&Path>,
+        thinking: &Thinking,
+        config: &GridConfig,
+    ) -> Result<Self, Error> {
         match (name, file) {
             (PolicyName::File, Some(path)) => {
                 Ok(Self::File(read_actions(path, config.num_agents)?.into_iter()))
@@ -52,6 +71,15 @@ impl Policy {
             (PolicyName::Random, None) => Ok(Self::Random(Box::new(generator(config)?))),
             (PolicyName::Astar, None) => Ok(Self::Astar(pogema_team())),
             (PolicyName::Stay, None) => Ok(Self::Stay),
+            (PolicyName::Rhcr, None) => {
+                let policy = LifelongPolicy::new(&name.to_string(), thinking.choice(), thinking.budget()?)?;
+                Ok(Self::Lifelong(Box::new(policy)))
+            }
+            (PolicyName::Lacam | PolicyName::Pbs | PolicyName::Ecbs | PolicyName::Cbs, None) => {
+                let planner = planner(&name.to_string(), thinking.choice())?;
+                let most_steps = u64::try_from(config.max_episode_steps).ok();
+                Ok(Self::Planner(Box::new(PlannerPolicy::new(planner, thinking.budget()?, most_steps))))
+            }
         }
     }
 
@@ -62,6 +90,8 @@ impl Policy {
             Self::Random(generator) => Some(sample(generator, num_agents)),
             Self::Astar(team) => Some(episode.ask(team)?),
             Self::Stay => Some(vec![Action::Stay; num_agents]),
+            Self::Planner(policy) => Some(policy.act(episode.ground().map, &episode.snapshot())?),
+            Self::Lifelong(policy) => Some(policy.act(episode.ground().map, &episode.snapshot())?),
             Self::File(steps) => steps.next(),
         })
     }

@@ -83,6 +83,13 @@ impl Settings {
         self.map.is_some() || self.config.is_some()
     }
 
+    /// Most steps of an episode, if flags or file say so.
+    pub fn most_steps(&self) -> Result<Option<i64>, Error> {
+        let fields = self.config.as_deref().map(fields_of).transpose()?;
+        let told = fields.and_then(|fields| fields.get("max_episode_steps").and_then(Value::as_i64));
+        Ok(self.steps.or(told))
+    }
+
     /// The map that is asked for, or drawn.
     pub fn map(&self) -> Result<Map, Error> {
         let config = self.config()?;
@@ -189,7 +196,8 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     library.map(names[index as usize]).cloned()
 }
 
-fn put_map(text: &MapText, fields: &mut Object<String, Value>) -> Result<(), Error> {
+/// Puts a map in the place of whatever a config has.
+pub fn put_map(text: &MapText, fields: &mut Object<String, Value>) -> Result<(), Error> {
     for derived in ["width", "height", "size"] {
         fields.remove(derived);
     }

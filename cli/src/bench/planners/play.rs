@@ -1,0 +1,91 @@
+//! One episode of a set, planned, checked and played on the reference engine.
+
+use std::time::{Duration, Instant};
+
+use pogema_core::{Action, CollisionMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot, StepOut};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_planners::{LifelongPolicy, Outcome, PlannerPolicy, planner, validate};
+use pogema_reference::Reference;
+
+use crate::plan::Thinking;
+
+/// What came of an episode.
+pub struct Played {
+    pub metrics: Metrics,
+    /// Time that was spent on planning.
+    pub runtime: Duration,
+    /// Moves that the engine took back; a valid plan has none.
+    pub num_reverted: u64,
+}
+
+/// Plays an episode to its end.
+pub fn play(
+    config: &GridConfig,
+    mut act: impl FnMut(&Instance, &Snapshot) -> Result<Vec<Action>, Error>,
+) -> Result<Played, Error> {
+    let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
+    let rules = config.rules();
+    let mut environment = Reference::new(rules)?;
+    environment.reset(&instance)?;
+    let (mut meter, mut collisions) = (EpisodeMeter::new(&rules), CollisionMeter::default());
+    let num_agents = rules.num_agents;
+    let (mut rewards, mut terminated, mut truncated) =
+        (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+    let mut runtime = Duration::ZERO;
+    let mut now = environment.snapshot();
+    loop {
+        let began = Instant::now();
+        let actions = act(&instance, &now)?;
+        runtime += began.elapsed();
+        let out =
+            StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&actions, out)?;
+        let next = environment.snapshot();
+        collisions.feed(instance.map(), &now.cells, &now.active, &actions, &next.cells);
+        now = next;
+        if let Some(metrics) = meter.feed(&now.on_goal, &terminated, &truncated) {
+            let num_reverted = collisions.with_agents + collisions.with_obstacles;
+            return Ok(Played { metrics, runtime, num_reverted });
+        }
+    }
+}
+
+/// Plays an episode of one goal for each agent; its plan, if it is whole, has to be valid and to come true. Also
+/// returns why there is none, if that was proved.
+pub fn play_once(
+    config: &GridConfig,
+    name: &str,
+    thinking: &Thinking,
+) -> Result<(Played, Option<String>), Error> {
+    let most_steps = u64::try_from(config.max_episode_steps).ok();
+    let mut policy = PlannerPolicy::new(planner(name, thinking.choice())?, thinking.budget()?, most_steps);
+    let mut task = None;
+    let played = play(config, |instance, now| {
+        task.get_or_insert_with(|| (instance.map().clone(), now.cells.clone(), now.goals.clone()));
+        policy.act(instance.map(), now)
+    })?;
+    let outcome = policy.outcomes().first();
+    if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, .. })) = (task, outcome) {
+        let wrong = |reason: String| Error::State { reason: format!("a plan is wrong: {reason}") };
+        validate(&map, &starts, Some(&goals), plan).map_err(|conflict| wrong(conflict.to_string()))?;
+        if played.num_reverted > 0 || policy.outcomes().len() > 1 {
+            return Err(wrong(format!("the engine took {} moves back", played.num_reverted)));
+        }
+    }
+    let reason = match outcome {
+        Some(Outcome::Impossible { reason }) => Some(reason.clone()),
+        _ => None,
+    };
+    Ok((played, reason))
+}
+
+/// Plays an episode of goal after goal; no move of it may be taken back.
+pub fn play_on(config: &GridConfig, name: &str, thinking: &Thinking) -> Result<Played, Error> {
+    let mut policy = LifelongPolicy::new(name, thinking.choice(), thinking.budget()?)?;
+    let played = play(config, |instance, now| policy.act(instance.map(), now))?;
+    if played.num_reverted > 0 {
+        let reason = format!("a plan is wrong: the engine took {} moves back", played.num_reverted);
+        return Err(Error::State { reason });
+    }
+    Ok(played)
+}

@@ -1,0 +1,143 @@
+//! `pogema plan`: makes a plan for all agents of an instance.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use pogema_conformance::files;
+use pogema_core::{Environment, Error, Instance, StepOut, Trace, TraceHeader, TraceStart, TraceStep};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_planners::{Outcome, PLANNERS, Plan, Problem, planner, validate, write_plan, write_result};
+use pogema_reference::Reference;
+use pogema_render::Film;
+use serde_json::json;
+
+use crate::output::{check_writable, say};
+use crate::render::Pictures;
+use crate::run::Settings;
+
+use super::who::{Thinking, names};
+
+#[derive(Args, Debug)]
+pub struct MakePlan {
+    #[command(flatten)]
+    settings: Settings,
+    /// Who plans
+    #[arg(long, value_name = "NAME", default_value = "lacam", value_parser = names(&PLANNERS))]
+    planner: String,
+    #[command(flatten)]
+    thinking: Thinking,
+    /// Write the plan to this file, a line of cells for each step
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write a result file as the LaCAM programs do
+    #[arg(long, value_name = "FILE")]
+    result: Option<PathBuf>,
+    /// Write the episode to this file, as JSON lines; compressed if it ends in `.zst`
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Print what was found out as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    pictures: Pictures,
+}
+
+impl MakePlan {
+    /// The exit status is 0 for a plan that solves the instance, 1 if there is none or time ran out.
+    pub fn run(&self) -> Result<ExitCode, Error> {
+        let config = self.settings.config()?;
+        for path in [&self.out, &self.result, &self.trace].into_iter().flatten() {
+            check_writable(path)?;
+        }
+        self.pictures.check(config.num_agents)?;
+        let budget = self.thinking.budget()?;
+        let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
+        let problem = Problem::of(&instance)?;
+        let problem = match self.settings.most_steps()?.map(usize::try_from) {
+            Some(Ok(most)) => problem.within(most),
+            _ => problem,
+        };
+        let began = Instant::now();
+        let outcome = planner(&self.planner, self.thinking.choice())?.plan(&problem, &budget);
+        let seconds = began.elapsed().as_secs_f64();
+        if let Outcome::Solved { plan, .. } = &outcome {
+            let goals = instance.first_goals();
+            validate(instance.map(), instance.starts(), Some(&goals), plan)
+                .map_err(|conflict| Error::State { reason: format!("the plan is wrong: {conflict}") })?;
+            self.keep(&config, &instance, plan)?;
+        }
+        if let Some(path) = &self.result {
+            let map = self.settings.what().unwrap_or_default();
+            let text = write_result(&map, &self.planner, &problem, &outcome);
+            files::write(path, text.as_bytes())?;
+        }
+        say(&if self.json { as_json(&outcome, seconds) } else { format!("{outcome}; {seconds:.3} s") })?;
+        Ok(if outcome.solution().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+
+    fn keep(&self, config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<(), Error> {
+        if let Some(path) = &self.out {
+            files::write(path, write_plan(plan).as_bytes())?;
+        }
+        if self.trace.is_none() && !self.pictures.are_wanted() {
+            return Ok(());
+        }
+        let trace = replay(config, instance, plan)?;
+        if let Some(path) = &self.trace {
+            let mut text = Vec::new();
+            trace.write(&mut text)?;
+            files::write(path, &text)?;
+        }
+        if !self.pictures.are_wanted() {
+            return Ok(());
+        }
+        let what = self.settings.what().unwrap_or_else(|| "a drawn map".into());
+        self.pictures.draw(&Film::of(&trace), &format!("{what}, planned by {}", self.planner))
+    }
+}
+
+/// The episode in which the reference engine plays a plan.
+fn replay(config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<Trace, Error> {
+    let rules = pogema_core::Config {
+        collision: pogema_core::Collision::Soft,
+        on_goal: pogema_core::OnGoal::Nothing,
+        max_steps: plan.num_steps() as i64,
+        ..config.rules()
+    };
+    let mut environment = Reference::new(rules)?;
+    environment.reset(instance)?;
+    let header = TraceHeader::new(rules, instance, plan.num_steps() + 1);
+    let start = TraceStart { state: environment.snapshot(), observations: None };
+    let mut steps = Vec::with_capacity(plan.num_steps());
+    for step in 0..plan.num_steps() {
+        let actions = plan.actions(step)?;
+        let num_agents = actions.len();
+        let (mut rewards, mut terminated, mut truncated) =
+            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&actions, out)?;
+        let state = environment.snapshot();
+        let observations = None;
+        steps.push(TraceStep { actions, state, rewards, terminated, truncated, observations, metrics: None });
+    }
+    Ok(Trace { header, start, steps })
+}
+
+fn as_json(outcome: &Outcome, seconds: f64) -> String {
+    let told = match outcome {
+        Outcome::Solved { plan, lower_bound } => json!({
+            "outcome": "solved",
+            "sum_of_costs": plan.sum_of_costs(),
+            "lower_bound": lower_bound,
+            "makespan": plan.makespan(),
+            "seconds": seconds,
+        }),
+        Outcome::TimedOut { .. } => json!({"outcome": "timed_out", "seconds": seconds}),
+        Outcome::Impossible { reason } => {
+            json!({"outcome": "impossible", "reason": reason, "seconds": seconds})
+        }
+    };
+    told.to_string()
+}

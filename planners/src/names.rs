@@ -1,0 +1,69 @@
+//! Planners by the names under which the command line and Python know them.
+
+use std::sync::Arc;
+
+use pogema_core::Error;
+
+use crate::graph::Graph;
+use crate::lacam::{Lacam, LacamParams};
+use crate::lifelong::Lifelong;
+use crate::problem::Planner;
+use crate::{cbs, ecbs, pbs, rhcr};
+
+/// What is chosen of a planner from outside, whichever it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// Seed of all that it draws.
+    pub seed: u64,
+    /// Threads that it may use; one that can use fewer does.
+    pub threads: usize,
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Self { seed: 0, threads: 1 }
+    }
+}
+
+/// The planners of problems with one goal for each agent, and what each is good for.
+pub const PLANNERS: [(&str, &str); 4] = [
+    ("lacam", "quick plans for any number of agents, made better until time is up"),
+    ("pbs", "good plans for some dozens of agents"),
+    ("ecbs", "plans that cost at most 1.2 times the least, for few agents"),
+    ("cbs", "the best plans, for very few agents"),
+];
+
+/// The planners of agents that get goal after goal, and what each is good for.
+pub const LIFELONG: [(&str, &str); 1] = [("rhcr", "plans some steps ahead, again and again")];
+
+/// A planner of problems with one goal for each agent.
+///
+/// # Errors
+/// [`Error::Config`] for a name that is not in [`PLANNERS`].
+pub fn planner(name: &str, choice: Choice) -> Result<Box<dyn Planner>, Error> {
+    let Choice { seed, threads } = choice;
+    Ok(match name {
+        "lacam" => Box::new(Lacam::new(LacamParams { seed, threads, ..LacamParams::default() })),
+        "pbs" => Box::new(pbs::Pbs::new(pbs::Params { seed })),
+        "ecbs" => Box::new(ecbs::Ecbs::new(ecbs::Params { seed, ..ecbs::Params::default() })),
+        "cbs" => Box::new(cbs::Cbs::new(cbs::Params { seed })),
+        _ => return Err(unknown(name, &PLANNERS)),
+    })
+}
+
+/// A planner of agents that get goal after goal on a map.
+///
+/// # Errors
+/// [`Error::Config`] for a name that is not in [`LIFELONG`].
+pub fn lifelong(name: &str, graph: Arc<Graph>, choice: Choice) -> Result<Box<dyn Lifelong>, Error> {
+    let seed = choice.seed;
+    Ok(match name {
+        "rhcr" => Box::new(rhcr::Rhcr::new(graph, rhcr::Params { seed, ..rhcr::Params::default() })),
+        _ => return Err(unknown(name, &LIFELONG)),
+    })
+}
+
+fn unknown(name: &str, known: &[(&str, &str)]) -> Error {
+    let names: Vec<String> = known.iter().map(|(name, _)| format!("`{name}`")).collect();
+    Error::config("planner", name, names.join(", "))
+}

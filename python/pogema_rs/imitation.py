@@ -1,0 +1,116 @@
+"""Expert episodes for imitation learning: what agents saw, and what a planner let them do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.integrations.make_pogema import pogema_v0
+from pogema_rs.planners import plan
+from pogema_rs.semantics import Semantics
+
+__all__ = ["collect", "episode_seed"]
+
+
+def collect(
+    grid_config: GridConfig,
+    folder: Union[str, os.PathLike[str]],
+    num_episodes: int,
+    *,
+    planner: str = "lacam",
+    seconds: Optional[float] = None,
+    nodes: Optional[int] = None,
+    seed: int = 0,
+    episodes_per_file: int = 32,
+    num_workers: int = 2,
+    semantics: Union[str, Semantics] = Semantics.DEVELOPED,
+) -> Iterator[Path]:
+    """Plays episodes by a planner and writes them into a folder, yielding each file once it is there.
+
+    File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends on `seed` and
+    its number alone, so that a call which was broken off is taken up by the same call: files that are there stay.
+    With a budget of `nodes` the same call writes the same episodes anywhere; with one of `seconds`, 1 unless nodes
+    are given, plans depend on the machine. Episodes that the planner cannot solve are left out.
+
+    Shape: with s the steps of all episodes of a file one after the other, `observations` `(s, agents, 3, side, side)`,
+    uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where an action is of no agent that
+    takes part; `episode` `(s,)`, int64, the number of the episode; `seeds` `(episodes,)`, int64, those of POGEMA.
+
+    Errors: ValueError for numbers below 1, and whatever the config raises.
+    """
+    for name, value in (
+        ("num_episodes", num_episodes),
+        ("episodes_per_file", episodes_per_file),
+        ("num_workers", num_workers),
+    ):
+        if value < 1:
+            raise ValueError(f"{name} is {value}, expected at least 1")
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    thinking = {"planner": planner, "seconds": seconds, "nodes": nodes}
+    starts = range(0, num_episodes, episodes_per_file)
+
+    def write(first: int) -> Path:
+        path = target / f"episodes-{first // episodes_per_file:06}.npz"
+        if not path.exists():
+            numbers = range(first, min(first + episodes_per_file, num_episodes))
+            _write(path, [_play(grid_config, seed, number, semantics, thinking) for number in numbers])
+        return path
+
+    with ThreadPoolExecutor(num_workers) as workers:
+        yield from workers.map(write, starts)
+
+
+def episode_seed(seed: int, episode: int) -> int:
+    """POGEMA's seed of an episode of a seed, as `VecEnv` has it for the first episode of an environment."""
+    state = np.random.SeedSequence(seed, spawn_key=(episode, 0)).generate_state(1, np.uint64)
+    return int(state[0]) % (2**63 - 1)
+
+
+def _play(
+    grid_config: GridConfig, seed: int, number: int, semantics: Union[str, Semantics], thinking: dict[str, Any]
+) -> dict[str, Any]:
+    """One episode, its plan followed from the first step to the last."""
+    config = grid_config.model_copy(update={"seed": episode_seed(seed, number), "observation_type": "default"})
+    env = pogema_v0(config, semantics=semantics)
+    observations, infos = env.reset()
+    obstacles = env.get_obstacles(ignore_borders=True)
+    positions, goals = env.get_agents_xy(ignore_borders=True), env.get_targets_xy(ignore_borders=True)
+    found = plan(
+        obstacles, positions, goals, most_steps=config.max_episode_steps, seed=number % 2**63, **thinking
+    )
+    steps: dict[str, Any] = {"observations": [], "actions": [], "is_active": []}
+    if found.is_solved and found.actions is not None:
+        for actions in found.actions:
+            steps["observations"].append(np.stack(observations).astype(np.uint8))
+            steps["actions"].append(actions.astype(np.int8))
+            steps["is_active"].append([info["is_active"] for info in infos])
+            observations, _, terminated, truncated, infos = env.step(actions.tolist())
+            if all(terminated) or all(truncated):
+                break
+    return {**steps, "number": number, "seed": config.seed}
+
+
+def _write(path: Path, episodes: list[dict[str, Any]]) -> None:
+    """Writes a file as a whole or not at all."""
+    solved = [episode for episode in episodes if episode["actions"]]
+    arrays = {
+        name: np.concatenate([np.asarray(episode[name]) for episode in solved]) if solved else np.empty(0)
+        for name in ("observations", "actions", "is_active")
+    }
+    numbers = [episode["number"] for episode in solved for _ in episode["actions"]]
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez_compressed(
+            file,
+            **arrays,
+            episode=np.asarray(numbers, dtype=np.int64),
+            seeds=np.asarray([episode["seed"] for episode in solved], dtype=np.int64),
+        )
+    part.replace(path)

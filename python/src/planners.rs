@@ -1,0 +1,216 @@
+//! Plans for all agents at once, and policies that follow them.
+
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use numpy::{
+    AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2, PyArrayLike3, PyArrayMethods,
+    PyUntypedArrayMethods,
+};
+use pogema_core::{Action, Cell, Error, Map, Snapshot};
+use pogema_planners::{Budget, Choice, Distances, Graph, Outcome, Plan, Planner, PlannerPolicy, Problem};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors;
+
+type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
+type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
+
+/// Makes a plan: a dictionary of what was found out.
+#[pyfunction]
+#[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed))]
+#[expect(clippy::too_many_arguments, reason = "the Python side names them")]
+pub fn make_plan<'py>(
+    py: Python<'py>,
+    obstacles: Obstacles<'_>,
+    starts: Cells<'_>,
+    goals: Cells<'_>,
+    planner: &str,
+    budget: (Option<f64>, Option<u64>),
+    most_steps: Option<usize>,
+    num_threads: usize,
+    seed: u64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let asked = || {
+        let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
+        let choice = Choice { seed, threads: num_threads };
+        Ok((Problem { most_steps, ..problem }, pogema_planners::planner(planner, choice)?, read_budget(budget)?))
+    };
+    let (problem, mut planner, budget) = asked().map_err(|error: Error| errors::plan(&error))?;
+    let began = Instant::now();
+    let outcome = py.detach(|| planner.plan(&problem, &budget));
+    let told = PyDict::new(py);
+    told.set_item("seconds", began.elapsed().as_secs_f64())?;
+    match &outcome {
+        Outcome::Solved { plan, lower_bound } => {
+            told.set_item("outcome", "solved")?;
+            told.set_item("lower_bound", lower_bound)?;
+            tell(&told, plan)?;
+        }
+        Outcome::TimedOut { best } => {
+            told.set_item("outcome", "timed_out")?;
+            best.as_ref().map_or(Ok(()), |plan| tell(&told, plan))?;
+        }
+        Outcome::Impossible { reason } => {
+            told.set_item("outcome", "impossible")?;
+            told.set_item("reason", reason)?;
+        }
+    }
+    Ok(told)
+}
+
+/// Adds a plan's cells, actions and costs.
+fn tell(told: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
+    let py = told.py();
+    let (num_steps, num_agents) = (plan.num_steps(), plan.num_agents());
+    let places: Vec<i32> = plan.cells().iter().flatten().flat_map(|cell| [cell.row.into(), cell.col.into()]).collect();
+    let places = PyArray1::from_vec(py, places).reshape([num_steps + 1, num_agents, 2])?;
+    let mut actions: Vec<i64> = Vec::with_capacity(num_steps * num_agents);
+    for step in 0..num_steps {
+        let step = plan.actions(step).map_err(|error| errors::plan(&error))?;
+        actions.extend(step.into_iter().map(|action| i64::from(u8::from(action))));
+    }
+    told.set_item("cells", places)?;
+    told.set_item("actions", PyArray1::from_vec(py, actions).reshape([num_steps, num_agents])?)?;
+    told.set_item("sum_of_costs", plan.sum_of_costs())?;
+    told.set_item("makespan", plan.makespan())
+}
+
+/// The first thing wrong with a plan, if there is one.
+#[pyfunction]
+pub fn check_plan(
+    py: Python<'_>,
+    obstacles: Obstacles<'_>,
+    starts: Cells<'_>,
+    goals: Option<Cells<'_>>,
+    steps: PyArrayLike3<'_, i64, AllowTypeChange>,
+) -> PyResult<Option<String>> {
+    let asked = || {
+        let goals = goals.as_ref().map(|goals| cells("goals", goals)).transpose()?;
+        Ok((map(&obstacles)?, cells("starts", &starts)?, goals, read_plan(&steps)?))
+    };
+    let (map, starts, goals, plan) = asked().map_err(|error: Error| errors::plan(&error))?;
+    let verdict = py.detach(|| pogema_planners::validate(&map, &starts, goals.as_deref(), &plan));
+    Ok(verdict.err().map(|conflict| conflict.to_string()))
+}
+
+/// Steps to a goal from every cell, -1 from where no path leads there.
+#[pyfunction]
+pub fn cost_to_go<'py>(
+    py: Python<'py>,
+    obstacles: Obstacles<'_>,
+    goal: (i64, i64),
+) -> PyResult<Bound<'py, PyArray2<i32>>> {
+    let searched = || {
+        let map = map(&obstacles)?;
+        let graph = std::sync::Arc::new(Graph::new(&map));
+        let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1])?])?[0];
+        let costs = Distances::new(graph.clone(), 0).to(goal);
+        let mut grid = vec![-1; map.height() * map.width()];
+        for (vertex, &cost) in (0..).zip(costs.iter()) {
+            grid[map.index(graph.cell(vertex))] = i32::try_from(cost).unwrap_or(-1);
+        }
+        Ok((map, grid))
+    };
+    let (map, grid) = searched().map_err(|error: Error| errors::plan(&error))?;
+    PyArray1::from_vec(py, grid).reshape([map.height(), map.width()])
+}
+
+/// A planner that drives an environment.
+///
+/// The lock is never waited for: it only makes the planner one thread's at a time.
+#[pyclass(frozen, module = "pogema_rs._engine")]
+pub struct PlanFollower {
+    inner: Mutex<Follower>,
+}
+
+struct Follower {
+    policy: PlannerPolicy,
+    step: u64,
+}
+
+#[pymethods]
+impl PlanFollower {
+    #[new]
+    fn new(
+        planner: &str,
+        budget: (Option<f64>, Option<u64>),
+        most_steps: Option<u64>,
+        num_threads: usize,
+        seed: u64,
+    ) -> PyResult<Self> {
+        let made = || {
+            let planner = pogema_planners::planner(planner, Choice { seed, threads: num_threads })?;
+            Ok(PlannerPolicy::new(planner, read_budget(budget)?, most_steps))
+        };
+        let policy = made().map_err(|error: Error| errors::plan(&error))?;
+        Ok(Self { inner: Mutex::new(Follower { policy, step: 0 }) })
+    }
+
+    /// Chooses all actions of a step.
+    fn act(
+        &self,
+        py: Python<'_>,
+        obstacles: Obstacles<'_>,
+        positions: Cells<'_>,
+        goals: Cells<'_>,
+    ) -> PyResult<Vec<u8>> {
+        let seen = || Ok((map(&obstacles)?, cells("positions", &positions)?, cells("goals", &goals)?));
+        let (map, cells, goals) = seen().map_err(|error: Error| errors::plan(&error))?;
+        let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
+        let active = vec![true; cells.len()];
+        let now = Snapshot { step: inner.step, cells, goals, active, ..Snapshot::default() };
+        let actions = py.detach(|| inner.policy.act(&map, &now)).map_err(|error| errors::plan(&error))?;
+        inner.step += 1;
+        Ok(actions.into_iter().map(u8::from).collect())
+    }
+
+    /// Forgets the last episode.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
+        inner.policy.reset();
+        inner.step = 0;
+        Ok(())
+    }
+}
+
+fn read_budget((seconds, nodes): (Option<f64>, Option<u64>)) -> Result<Budget, Error> {
+    let time = |seconds: f64| {
+        Duration::try_from_secs_f64(seconds)
+            .map_err(|_| Error::config("seconds", seconds, "a time of 0 or more"))
+    };
+    Ok(Budget { time: seconds.map(time).transpose()?, nodes, cancelled: None })
+}
+
+fn map(obstacles: &Obstacles<'_>) -> Result<Map, Error> {
+    let [height, width] = [obstacles.shape()[0], obstacles.shape()[1]];
+    Map::new(height, width, obstacles.as_array().iter().map(|&value| value != 0.0).collect())
+}
+
+fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
+    let [_, numbers] = [places.shape()[0], places.shape()[1]];
+    if numbers != 2 {
+        return Err(Error::config(what, format!("of {numbers} columns"), "rows and columns, of the shape (agents, 2)"));
+    }
+    let rows = places.as_array();
+    (0..).zip(rows.outer_iter()).map(|(agent, place)| cell(what, agent, [place[0], place[1]])).collect()
+}
+
+fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
+    let outside = || Error::agent(agent, format!("({row}, {col}) of {what} is not on the map"));
+    Ok(Cell { row: u16::try_from(row).map_err(|_| outside())?, col: u16::try_from(col).map_err(|_| outside())? })
+}
+
+fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
+    let shape = steps.shape();
+    if shape[2] != 2 {
+        let found = format!("of the shape ({}, {}, {})", shape[0], shape[1], shape[2]);
+        return Err(Error::config("cells", found, "the shape (steps + 1, agents, 2)"));
+    }
+    let steps = steps.as_array();
+    let step = |places: numpy::ndarray::ArrayView2<'_, i64>| {
+        (0..).zip(places.outer_iter()).map(|(agent, place)| cell("cells", agent, [place[0], place[1]])).collect()
+    };
+    Plan::new(steps.outer_iter().map(step).collect::<Result<_, Error>>()?)
+}
