@@ -10,8 +10,12 @@ __all__ = [
     "AStarAgent",
     "Batch",
     "Engine",
+    "PlanFollower",
     "__version__",
+    "check_plan",
+    "cost_to_go",
     "derive_config",
+    "make_plan",
     "nearest_name",
     "num_cores",
     "restore_engine",
@@ -108,6 +112,31 @@ class AStarAgent:
     ) -> tuple[int, bool]: ...
     def clear_state(self, /) -> None: ...
 
+@final
+class PlanFollower:
+    def __new__(
+        cls,
+        planner: str,
+        budget: tuple[Optional[float], Optional[int]],
+        most_steps: Optional[int],
+        num_threads: int,
+        seed: int,
+    ) -> PlanFollower: ...
+    def act(self, /, obstacles: Any, positions: Any, goals: Any) -> list[int]: ...
+    def reset(self, /) -> None: ...
+
+def make_plan(
+    obstacles: Any,
+    starts: Any,
+    goals: Any,
+    planner: str,
+    budget: tuple[Optional[float], Optional[int]],
+    most_steps: Optional[int],
+    num_threads: int,
+    seed: int,
+) -> dict[str, Any]: ...
+def check_plan(obstacles: Any, starts: Any, goals: Any, steps: Any) -> Optional[str]: ...
+def cost_to_go(obstacles: Any, goal: tuple[int, int]) -> NDArray[np.int32]: ...
 def derive_config(config: str) -> str: ...
 def nearest_name(name: str, known: list[str]) -> str: ...
 def num_cores() -> int: ...

@@ -1,6 +1,7 @@
 //! Errors as the Python classes that POGEMA's users catch.
 
 use pogema_core::Error;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -64,4 +65,9 @@ pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
 /// What a number raises that is no action of one environment of many.
 pub fn action(py: Python<'_>, text: String) -> PyErr {
     of_class(py, "ActionError", text)
+}
+
+/// What a planner's caller did wrong.
+pub fn plan(error: &Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }

@@ -20,9 +20,13 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<engine::Engine>()?;
     module.add_class::<vec::Batch>()?;
     module.add_class::<astar::AStarAgent>()?;
+    module.add_class::<planners::PlanFollower>()?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
+    module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
     module.add_function(wrap_pyfunction!(state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -4,11 +4,10 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use numpy::{
-    AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2, PyArrayLike3, PyArrayMethods,
-    PyUntypedArrayMethods,
+    AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Cell, Error, Map, Snapshot};
-use pogema_planners::{Budget, Choice, Distances, Graph, Outcome, Plan, Planner, PlannerPolicy, Problem};
+use pogema_core::{Cell, Error, Map, Snapshot};
+use pogema_planners::{Budget, Choice, Distances, Graph, Outcome, Plan, PlannerPolicy, Problem};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -35,7 +34,11 @@ pub fn make_plan<'py>(
     let asked = || {
         let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
         let choice = Choice { seed, threads: num_threads };
-        Ok((Problem { most_steps, ..problem }, pogema_planners::planner(planner, choice)?, read_budget(budget)?))
+        Ok((
+            Problem { most_steps, ..problem },
+            pogema_planners::planner(planner, choice)?,
+            read_budget(budget)?,
+        ))
     };
     let (problem, mut planner, budget) = asked().map_err(|error: Error| errors::plan(&error))?;
     let began = Instant::now();
@@ -64,7 +67,8 @@ pub fn make_plan<'py>(
 fn tell(told: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
     let py = told.py();
     let (num_steps, num_agents) = (plan.num_steps(), plan.num_agents());
-    let places: Vec<i32> = plan.cells().iter().flatten().flat_map(|cell| [cell.row.into(), cell.col.into()]).collect();
+    let places: Vec<i32> =
+        plan.cells().iter().flatten().flat_map(|cell| [cell.row.into(), cell.col.into()]).collect();
     let places = PyArray1::from_vec(py, places).reshape([num_steps + 1, num_agents, 2])?;
     let mut actions: Vec<i64> = Vec::with_capacity(num_steps * num_agents);
     for step in 0..num_steps {
@@ -161,8 +165,9 @@ impl PlanFollower {
         let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
         let active = vec![true; cells.len()];
         let now = Snapshot { step: inner.step, cells, goals, active, ..Snapshot::default() };
-        let actions = py.detach(|| inner.policy.act(&map, &now)).map_err(|error| errors::plan(&error))?;
-        inner.step += 1;
+        let follower = &mut *inner;
+        let actions = py.detach(|| follower.policy.act(&map, &now)).map_err(|error| errors::plan(&error))?;
+        follower.step += 1;
         Ok(actions.into_iter().map(u8::from).collect())
     }
 
@@ -191,7 +196,11 @@ fn map(obstacles: &Obstacles<'_>) -> Result<Map, Error> {
 fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
     let [_, numbers] = [places.shape()[0], places.shape()[1]];
     if numbers != 2 {
-        return Err(Error::config(what, format!("of {numbers} columns"), "rows and columns, of the shape (agents, 2)"));
+        return Err(Error::config(
+            what,
+            format!("of {numbers} columns"),
+            "rows and columns, of the shape (agents, 2)",
+        ));
     }
     let rows = places.as_array();
     (0..).zip(rows.outer_iter()).map(|(agent, place)| cell(what, agent, [place[0], place[1]])).collect()
@@ -199,7 +208,10 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
 
 fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
     let outside = || Error::agent(agent, format!("({row}, {col}) of {what} is not on the map"));
-    Ok(Cell { row: u16::try_from(row).map_err(|_| outside())?, col: u16::try_from(col).map_err(|_| outside())? })
+    Ok(Cell {
+        row: u16::try_from(row).map_err(|_| outside())?,
+        col: u16::try_from(col).map_err(|_| outside())?,
+    })
 }
 
 fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
@@ -210,7 +222,10 @@ fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Err
     }
     let steps = steps.as_array();
     let step = |places: numpy::ndarray::ArrayView2<'_, i64>| {
-        (0..).zip(places.outer_iter()).map(|(agent, place)| cell("cells", agent, [place[0], place[1]])).collect()
+        (0..)
+            .zip(places.outer_iter())
+            .map(|(agent, place)| cell("cells", agent, [place[0], place[1]]))
+            .collect()
     };
     Plan::new(steps.outer_iter().map(step).collect::<Result<_, Error>>()?)
 }

@@ -10,6 +10,7 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SHORT = {
     "custom_reward.py": ([], "step 5: rewards"),
     "evaluate_policy.py": (["--seeds", "3"], "A*       ISR"),
+    "imitation_data.py": (["--episodes", "8"], "steps of 8 agents"),
     "replay_html.py": (["--out", "page.html"], "'CSR': 1.0"),
 }
 

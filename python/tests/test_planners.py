@@ -1,0 +1,163 @@
+"""Planners, the agents that follow them, and the episodes that are collected from them."""
+
+import threading
+
+import numpy as np
+import pytest
+from pogema_rs import GridConfig, pogema_v0
+from pogema_rs.imitation import collect, episode_seed
+from pogema_rs.planners import PlannerAgents, cost_to_go, plan, validate
+
+OBSTACLES = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]])
+STARTS, GOALS = [[0, 0], [0, 2]], [[0, 2], [0, 0]]
+
+
+@pytest.mark.parametrize("planner", ["lacam", "pbs", "ecbs", "cbs"])
+def test_a_plan_is_found_and_valid(planner):
+    found = plan(OBSTACLES, STARTS, GOALS, planner, nodes=2000)
+    assert found.is_solved
+    assert found.cells.shape == (found.makespan + 1, 2, 2) and found.cells.dtype == np.int32
+    assert found.actions.shape == (found.makespan, 2) and found.actions.dtype == np.int64
+    assert found.lower_bound <= found.sum_of_costs <= 12
+    assert validate(OBSTACLES, STARTS, GOALS, found.cells) is None
+    moves = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]])
+    assert np.array_equal(np.diff(found.cells, axis=0), moves[found.actions])
+
+
+def test_the_least_cost_is_found():
+    assert plan(OBSTACLES, STARTS, GOALS, "cbs").sum_of_costs == 8
+
+
+def test_the_same_nodes_give_the_same_plan():
+    rng = np.random.default_rng(0)
+    free = np.argwhere(rng.random((16, 16)) >= 0.2)
+    obstacles = np.ones((16, 16), dtype=bool)
+    obstacles[tuple(free.T)] = False
+    picks = rng.permutation(len(free))
+    asked = (obstacles, free[picks[:12]], free[picks[-12:]])
+    first, second = (plan(*asked, nodes=500, seed=3) for _ in range(2))
+    assert first.outcome == second.outcome
+    assert first.reason == second.reason
+    assert np.array_equal(first.cells, second.cells)
+
+
+def test_what_cannot_be_is_an_outcome():
+    corridor = [[0, 0, 0]]
+    found = plan(corridor, [[0, 0], [0, 2]], [[0, 2], [0, 0]])
+    assert found.outcome == "impossible" and found.reason
+    assert found.cells is None
+    assert "both want to stay" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
+    assert plan(corridor, [[0, 0]], [[0, 2]], most_steps=1).outcome == "impossible"
+    assert plan(OBSTACLES, STARTS, GOALS, nodes=0).outcome == "timed_out"
+    assert plan(OBSTACLES, np.empty((0, 2)), np.empty((0, 2))).is_solved
+
+
+@pytest.mark.parametrize(
+    ("asked", "text"),
+    [
+        ({"planner": "none"}, "config: `planner` is `none`, expected `lacam`, `pbs`, `ecbs`, `cbs`"),
+        ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is no free cell"),
+        ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
+        ({"goals": [[0, 2, 1], [0, 0, 1]]}, "of 3 columns"),
+        ({"goals": [[0, -1], [0, 0]]}, "agent 0: .* is not on the map"),
+        ({"seconds": float("nan")}, "seconds"),
+        ({"obstacles": np.empty((0, 3))}, "the map has no cells"),
+    ],
+)
+def test_wrong_input_is_one_line(asked, text):
+    with pytest.raises(ValueError, match=text) as raised:
+        plan(**{"obstacles": OBSTACLES, "starts": STARTS, "goals": GOALS, **asked})
+    assert "\n" not in str(raised.value)
+
+
+def test_conflicts_are_told():
+    cells = [STARTS, [[0, 1], [0, 1]]]
+    assert validate(OBSTACLES, STARTS, GOALS, cells) == "step 1: agents 0 and 1 are both at (0, 1)"
+    assert validate(OBSTACLES, STARTS, None, [STARTS]) is None
+    with pytest.raises(ValueError, match="expected the shape"):
+        validate(OBSTACLES, STARTS, None, [[[0], [1]]])
+
+
+def test_costs_to_go():
+    costs = cost_to_go([[0, 0, 1], [1, 0, 1], [0, 1, 0]], (0, 0))
+    assert costs.dtype == np.int32
+    assert costs.tolist() == [[0, 1, -1], [-1, 2, -1], [-1, -1, -1]]
+    with pytest.raises(ValueError, match="free cell"):
+        cost_to_go(OBSTACLES, (1, 1))
+
+
+def test_python_goes_on_while_a_planner_thinks():
+    began, done = threading.Event(), []
+
+    def think():
+        began.set()
+        # Far too many agents in a small room: it searches until the time is up.
+        cells = [[row, col] for row in range(5) for col in range(5)]
+        done.append(plan(np.zeros((5, 5)), cells[:24], cells[:24][::-1], "cbs", seconds=1.0))
+
+    thread = threading.Thread(target=think)
+    thread.start()
+    began.wait()
+    count = 0
+    while thread.is_alive():
+        count += 1
+    assert count > 1000
+    assert done[0].outcome == "timed_out"
+
+
+@pytest.mark.parametrize("on_target", ["nothing", "finish"])
+def test_agents_follow_a_plan_to_their_goals(on_target):
+    config = GridConfig(
+        num_agents=8, size=12, seed=2, density=0.2, on_target=on_target, observation_type="MAPF", collision_system="soft"
+    )
+    env, agents = pogema_v0(config), PlannerAgents(nodes=2000, most_steps=config.max_episode_steps)
+    for _ in range(2):
+        agents.reset_states()
+        observations, _ = env.reset()
+        terminated = truncated = [False]
+        while not (all(terminated) or all(truncated)):
+            observations, _, terminated, truncated, infos = env.step(agents.act(observations))
+        assert infos[0]["metrics"]["CSR"] == 1.0
+
+
+def test_agents_want_to_see_everything():
+    env = pogema_v0(GridConfig(num_agents=2, seed=1))
+    with pytest.raises(TypeError, match="observation_type='MAPF'"):
+        PlannerAgents().act(env.reset()[0])
+
+
+def test_episodes_are_collected_and_a_broken_off_call_goes_on(tmp_path):
+    config = GridConfig(num_agents=4, size=8, density=0.2, on_target="nothing", collision_system="soft")
+    asked = {"num_episodes": 5, "episodes_per_file": 2, "nodes": 200, "seed": 7}
+    paths = list(collect(config, tmp_path / "data", **asked))
+    assert [path.name for path in paths] == [f"episodes-00000{number}.npz" for number in range(3)]
+    whole = [path.read_bytes() for path in paths]
+    paths[1].unlink()
+    stamps = [path.stat().st_mtime_ns for path in (paths[0], paths[2])]
+    assert list(collect(config, tmp_path / "data", **asked)) == paths
+    assert [path.stat().st_mtime_ns for path in (paths[0], paths[2])] == stamps
+    assert np.array_equal(np.load(paths[1])["actions"], np.load(_written(tmp_path, whole[1]))["actions"])
+    data = np.load(paths[1])
+    num_steps = len(data["episode"])
+    assert data["observations"].shape == (num_steps, 4, 3, 11, 11) and data["observations"].dtype == np.uint8
+    assert data["actions"].shape == data["is_active"].shape == (num_steps, 4)
+    assert set(data["episode"]) <= {2, 3}
+    first = int(data["episode"][0])
+    env = pogema_v0(config.model_copy(update={"seed": episode_seed(7, first)}), semantics="2.0")
+    observations, _ = env.reset()
+    for seen, actions in zip(data["observations"][data["episode"] == first], data["actions"]):
+        assert np.array_equal(seen, np.stack(observations))
+        observations, _, terminated, _, infos = env.step(actions.tolist())
+    assert all(terminated)
+    assert infos[0]["metrics"]["CSR"] == 1.0
+
+
+def _written(folder, contents):
+    path = folder / "kept.npz"
+    path.write_bytes(contents)
+    return path
+
+
+def test_collecting_wants_whole_numbers(tmp_path):
+    with pytest.raises(ValueError, match="num_workers is 0, expected at least 1"):
+        list(collect(GridConfig(), tmp_path, 1, num_workers=0))
