@@ -110,7 +110,13 @@ impl Planners {
                 let mean = published.as_ref();
                 let mean =
                     mean.and_then(|all| all.mean(self.setting, set.name, algorithm, num_agents)).cloned();
-                crowds.push(table::Crowd { set: set.name, num_agents, records, mean, solved: solved.clone() });
+                crowds.push(table::Crowd {
+                    set: set.name,
+                    num_agents,
+                    records,
+                    mean,
+                    solved: solved.clone(),
+                });
             }
         }
         say(&table::tell(self.setting, self.planner(), &self.thinking, &crowds))
@@ -152,11 +158,16 @@ impl Planners {
     fn play(&self, set: &Set, maps: &[NamedMap], task: &Task) -> Result<Record, Error> {
         let config = set.config(self.setting, task, maps)?;
         let in_task = |error: Error| Error::State {
-            reason: format!("{} {} seed {}, {} agents: {error}", task.set, task.map, task.seed, task.num_agents),
+            reason: format!(
+                "{} {} seed {}, {} agents: {error}",
+                task.set, task.map, task.seed, task.num_agents
+            ),
         };
         let (played, impossible) = match self.setting {
             Setting::Mapf => play::play_once(&config, self.planner(), &self.thinking).map_err(in_task)?,
-            Setting::Lmapf => (play::play_on(&config, self.planner(), &self.thinking).map_err(in_task)?, None),
+            Setting::Lmapf => {
+                (play::play_on(&config, self.planner(), &self.thinking).map_err(in_task)?, None)
+            }
         };
         Ok(Record {
             setting: self.setting.name().to_owned(),

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use pogema_core::{Action, CollisionMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot, StepOut};
+use pogema_core::{
+    Action, CollisionMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot, StepOut,
+};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_planners::{LifelongPolicy, Outcome, PlannerPolicy, planner, validate};
 use pogema_reference::Reference;
@@ -37,8 +39,7 @@ pub fn play(
         let began = Instant::now();
         let actions = act(&instance, &now)?;
         runtime += began.elapsed();
-        let out =
-            StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
         environment.step(&actions, out)?;
         let next = environment.snapshot();
         collisions.feed(instance.map(), &now.cells, &now.active, &actions, &next.cells);

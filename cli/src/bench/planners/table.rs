@@ -57,7 +57,8 @@ pub fn tell(setting: Setting, planner: &str, thinking: &Thinking, crowds: &[Crow
         Setting::Mapf => mapf(crowds),
         Setting::Lmapf => lmapf(crowds),
     };
-    let mut text = format!("{}, {planner}, {thinking}; every plan validated and replayed\n\n{table}", setting.name());
+    let mut text =
+        format!("{}, {planner}, {thinking}; every plan validated and replayed\n\n{table}", setting.name());
     let impossible = crowds.iter().flat_map(|crowd| &crowd.records).filter_map(|record| {
         let reason = record.impossible.as_ref()?;
         Some(format!("{} with {} agents, seed {}: {reason}", record.map, record.num_agents, record.seed))

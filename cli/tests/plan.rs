@@ -1,0 +1,101 @@
+//! `pogema plan`, and planners as policies of `pogema run`.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
+    let program = env!("CARGO_BIN_EXE_pogema");
+    let output = Command::new(program).args(arguments).current_dir(folder).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
+    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+}
+
+const TASK: [&str; 6] = ["--map", "four-rooms", "--num-agents", "4", "--seed", "1"];
+
+#[test]
+fn every_planner_writes_plans_that_are_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    for planner in ["lacam", "pbs", "ecbs", "cbs"] {
+        let plan = ["plan", "--planner", planner, "--nodes", "300", "--json", "--out", "plan.txt"];
+        let files = ["--result", "result.txt", "--trace", "plan.jsonl"];
+        let (text, error, status) = run(folder.path(), &[&plan, files.as_slice(), &TASK].concat());
+        assert_eq!((error.as_str(), status), ("", 0), "{planner}");
+        let told: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(told["outcome"], "solved", "{planner}");
+        assert!(told["sum_of_costs"].as_u64() >= told["lower_bound"].as_u64(), "{told}");
+        for arguments in [
+            [&["validate", "plan.txt"], TASK.as_slice()].concat(),
+            vec!["validate", "result.txt", "--map", "four-rooms"],
+        ] {
+            let (text, error, status) = run(folder.path(), &arguments);
+            let costs = format!("sum of costs {}, makespan {}", told["sum_of_costs"], told["makespan"]);
+            assert!(
+                text.starts_with("valid: 4 agents") && text.ends_with(&costs),
+                "{planner}: {text}{error}"
+            );
+            assert_eq!(status, 0);
+        }
+        // The trace is an episode of every engine.
+        let (_, error, status) = run(folder.path(), &["conform", "--trace", "plan.jsonl"]);
+        assert_eq!((error.as_str(), status), ("", 0), "{planner}");
+    }
+}
+
+#[test]
+fn without_a_plan_the_status_is_one_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("row.txt"), "...\n").unwrap();
+    std::fs::write(folder.path().join("swap.yaml"), "agents_xy: [[0,0],[0,2]]\ntargets_xy: [[0,2],[0,0]]\n")
+        .unwrap();
+    let task = ["--map", "row.txt", "--scenario", "swap.yaml"];
+    let (text, _, status) = run(folder.path(), &[&["plan", "--out", "plan.txt"], task.as_slice()].concat());
+    assert!(text.starts_with("impossible: "), "{text}");
+    assert_eq!(status, 1);
+    assert!(!folder.path().join("plan.txt").exists());
+    let (text, _, status) = run(folder.path(), &[&["plan", "--nodes", "0"], TASK.as_slice()].concat());
+    assert!(text.starts_with("timed out"), "{text}");
+    assert_eq!(status, 1);
+}
+
+#[test]
+fn planners_play_whole_episodes() {
+    let folder = tempfile::tempdir().unwrap();
+    for policy in ["lacam", "pbs", "ecbs", "cbs"] {
+        let arguments = ["run", "--policy", policy, "--nodes", "300", "--json", "--set", "on_target=nothing"];
+        let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
+        let (text, error, status) = run(folder.path(), &arguments);
+        assert_eq!((error.as_str(), status), ("", 0), "{policy}");
+        let told: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(told["metrics"]["CSR"], 1.0, "{policy}: {told}");
+        assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
+    }
+    let arguments = ["run", "--policy", "rhcr", "--nodes", "300", "--json", "--on-target", "restart"];
+    let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
+    let (text, error, status) = run(folder.path(), &arguments);
+    assert_eq!((error.as_str(), status), ("", 0));
+    let told: Value = serde_json::from_str(&text).unwrap();
+    assert!(told["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{told}");
+    assert_eq!(told["metrics"]["a_collisions"], 0.0, "{told}");
+}
+
+#[test]
+fn wrong_calls_are_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, part) in [
+        (vec!["plan", "--planner", "none"], "invalid value 'none' for '--planner <NAME>'"),
+        (vec!["plan", "--seconds", "-1"], "-1"),
+        (vec!["plan", "--seconds=-1"], "config: `seconds` is `-1`, expected a time of 0 or more"),
+        (vec!["plan", "--threads", "3"], "3 is not in 1..=2"),
+        (vec!["plan", "--out", "no/such/folder"], "no/such"),
+        (vec!["bench", "planners", "--suite", "nowhere"], "nowhere/01-random.yaml"),
+        (vec!["bench", "planners", "--suite", ".", "--sets", "cities"], "a part of a set's name"),
+    ] {
+        let (_, error, status) = run(folder.path(), &arguments);
+        assert_eq!((status, error.lines().count()), (2, 1), "{arguments:?}: {error}");
+        assert!(error.contains(part), "{arguments:?}: {error}");
+    }
+}
