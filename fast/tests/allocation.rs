@@ -154,3 +154,14 @@ fn the_bytes_told_are_the_bytes_held() {
         assert_eq!(info.bytes_current, (told - size_of::<Engine>()) as i64, "{num_agents} {radius}");
     }
 }
+
+#[test]
+fn a_cell_takes_ten_bytes_at_most() {
+    let (side, radius) = (700, 17);
+    let map = Map::new(side, side, vec![false; side * side]).unwrap();
+    let (start, goal) = (map.cell_at(0), map.cell_at(1));
+    let instance = Instance::new(map, Outside::Free, vec![start], vec![GoalStream::single(goal)]).unwrap();
+    let mut engine = Engine::new(Config { num_agents: 1, radius, ..Config::default() }).unwrap();
+    engine.reset(&instance).unwrap();
+    assert!(engine.num_bytes() < 10 * (side + 2 * radius) * (side + 2 * radius));
+}
