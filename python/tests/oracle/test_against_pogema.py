@@ -21,7 +21,7 @@ from surprises import SURPRISES
 from pogema_rs import generator
 from pogema_rs.grid_config import GridConfig
 
-NUM_CASES = int(os.environ.get("POGEMA_ORACLE_CASES", "1500"))
+NUM_CASES = int(os.environ.get("POGEMA_ORACLE_CASES", "1000"))
 SEED = int(os.environ.get("POGEMA_ORACLE_SEED", "1"))
 
 KINDS = (
