@@ -84,6 +84,13 @@ struct Record {
     impossible: Option<String>,
 }
 
+impl Record {
+    /// The sum of costs of an episode that was solved.
+    fn solved_soc(&self) -> Option<f64> {
+        self.soc.filter(|_| self.csr == Some(1.0))
+    }
+}
+
 impl Planners {
     pub fn run(&self) -> Result<(), Error> {
         let every = if self.quick { 64 } else { self.every as usize };

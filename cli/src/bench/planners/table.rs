@@ -25,16 +25,15 @@ impl Crowd {
     fn both(&self) -> Option<(f64, f64)> {
         let Some(solved) = &self.solved else {
             let published = self.mean.as_ref().filter(|mean| mean.csr == Some(1.0))?.soc?;
-            let ours = self.mean_of(|record| record.soc.filter(|_| record.csr == Some(1.0)))?;
+            let ours = self.mean_of(Record::solved_soc)?;
             return self.records.iter().all(|record| record.csr == Some(1.0)).then_some((ours, published));
         };
         let pairs: Vec<(f64, f64)> = self
             .records
             .iter()
-            .filter(|record| record.csr == Some(1.0))
             .filter_map(|record| {
                 let place = (record.num_agents, record.map.clone(), record.seed);
-                Some((record.soc?, *solved.get(&place)?))
+                Some((record.solved_soc()?, *solved.get(&place)?))
             })
             .collect();
         let ours = mean(pairs.iter().map(|pair| pair.0))?;
@@ -57,16 +56,13 @@ pub fn tell(setting: Setting, planner: &str, thinking: &Thinking, crowds: &[Crow
         Setting::Mapf => mapf(crowds),
         Setting::Lmapf => lmapf(crowds),
     };
-    let mut text =
-        format!("{}, {planner}, {thinking}; every plan validated and replayed\n\n{table}", setting.name());
+    let head = format!("{}, {planner}, {thinking}; every plan validated and replayed", setting.name());
     let impossible = crowds.iter().flat_map(|crowd| &crowd.records).filter_map(|record| {
         let reason = record.impossible.as_ref()?;
         Some(format!("{} with {} agents, seed {}: {reason}", record.map, record.num_agents, record.seed))
     });
-    for line in impossible {
-        text += &format!("\nimpossible: {line}");
-    }
-    text
+    let impossible = impossible.map(|line| format!("\nimpossible: {line}"));
+    format!("{head}\n\n{table}{}", impossible.collect::<Vec<_>>().concat())
 }
 
 fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
@@ -76,7 +72,8 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
         "episodes",
         "CSR",
         "published",
-        "SoC where both solve",
+        "SoC if solved",
+        "where both solve",
         "published",
         "times",
         "makespan",
@@ -93,6 +90,7 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
             crowd.records.len().to_string(),
             figure(crowd.mean_of(|record| record.csr), 4),
             figure(published(|mean| mean.csr), 4),
+            figure(crowd.mean_of(Record::solved_soc), 2),
             figure(both.map(|pair| pair.0), 2),
             figure(both.map(|pair| pair.1), 2),
             figure(both.map(|(ours, theirs)| ours / theirs), 4),
