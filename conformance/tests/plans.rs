@@ -1,0 +1,150 @@
+//! Plans of every planner, checked and played on the reference engine: no move is taken back.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_core::{Collision, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, StepOut};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_planners::{
+    Budget, Choice, ConflictKind, LIFELONG, LifelongPolicy, Outcome, PLANNERS, Plan, PlannerPolicy, Problem,
+    planner, validate,
+};
+use pogema_reference::Reference;
+use serde_json::json;
+
+fn drawn(seed: u64, size: u64, num_agents: u64, on_target: &str) -> (GridConfig, Instance) {
+    let fields = json!({
+        "seed": seed, "size": size, "num_agents": num_agents, "density": 0.25, "on_target": on_target,
+        "collision_system": "soft", "max_episode_steps": 64,
+    });
+    let config = GridConfig::from_value(&fields).unwrap();
+    let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
+    (config, instance)
+}
+
+/// Plays a plan; says in which step the engine did anything else.
+fn surprise(config: &Config, instance: &Instance, plan: &Plan) -> Option<usize> {
+    let mut environment = Reference::new(*config).unwrap();
+    environment.reset(instance).unwrap();
+    let num_agents = plan.num_agents();
+    (0..plan.num_steps()).find(|&step| {
+        let (mut rewards, mut terminated, mut truncated) =
+            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&plan.actions(step).unwrap(), out).unwrap();
+        environment.snapshot().cells != plan.cells()[step + 1]
+    })
+}
+
+#[test]
+fn the_reference_plays_plans_as_they_are() {
+    for (name, _) in PLANNERS {
+        let mut num_solved = 0;
+        for seed in 0..30 {
+            let num_agents = if matches!(name, "cbs" | "ecbs") { 4 } else { 10 };
+            let (config, instance) = drawn(seed, 10, num_agents, "nothing");
+            let problem = Problem::of(&instance).unwrap();
+            let outcome =
+                planner(name, Choice { seed, threads: 1 }).unwrap().plan(&problem, &Budget::of_nodes(300));
+            let (Outcome::Solved { plan, .. } | Outcome::TimedOut { best: Some(plan) }) = &outcome else {
+                continue;
+            };
+            let goals = instance.first_goals();
+            let goals = outcome.solution().map(|_| goals.as_slice());
+            assert_eq!(
+                validate(instance.map(), instance.starts(), goals, plan),
+                Ok(()),
+                "{name}, seed {seed}"
+            );
+            let rules = Config { max_steps: plan.num_steps() as i64 + 1, ..config.rules() };
+            assert_eq!(surprise(&rules, &instance, plan), None, "{name}, seed {seed}");
+            num_solved += usize::from(outcome.solution().is_some());
+        }
+        assert!(num_solved >= 24, "{name} solved {num_solved} of 30");
+    }
+}
+
+#[test]
+fn the_engine_notices_a_plan_that_is_wrong() {
+    let map = Map::from_rows(&[".."]).unwrap();
+    let ends = [map.cell_at(0), map.cell_at(1)];
+    let goals = vec![GoalStream::single(ends[1]), GoalStream::single(ends[0])];
+    let instance = Instance::new(map, Outside::Free, ends.to_vec(), goals).unwrap();
+    let swap = Plan::new(vec![ends.to_vec(), vec![ends[1], ends[0]]]).unwrap();
+    let config = Config { num_agents: 2, collision: Collision::Soft, ..Config::default() };
+    assert_eq!(surprise(&config, &instance, &swap), Some(0));
+    let conflict = validate(instance.map(), instance.starts(), None, &swap).unwrap_err();
+    assert_eq!(conflict.kind, ConflictKind::Edge);
+}
+
+/// Plays an episode by a policy; returns how many goals were reached and how many moves were taken back.
+fn play(
+    config: &Config,
+    instance: &Instance,
+    mut act: impl FnMut(&Reference) -> Vec<pogema_core::Action>,
+) -> (f32, u64) {
+    let mut environment = Reference::new(*config).unwrap();
+    environment.reset(instance).unwrap();
+    let num_agents = config.num_agents;
+    let (mut num_reached, mut collisions) = (0.0, pogema_core::CollisionMeter::default());
+    for _ in 0..config.max_steps {
+        let (mut rewards, mut terminated, mut truncated) =
+            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+        let before = environment.snapshot();
+        let actions = act(&environment);
+        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+        environment.step(&actions, out).unwrap();
+        let after = environment.snapshot().cells;
+        collisions.feed(instance.map(), &before.cells, &before.active, &actions, &after);
+        num_reached += rewards.iter().sum::<f32>();
+    }
+    (num_reached, collisions.with_agents + collisions.with_obstacles)
+}
+
+#[test]
+fn agents_go_from_goal_to_goal_without_a_collision() {
+    for (name, _) in LIFELONG {
+        for seed in 0..4 {
+            let (config, instance) = drawn(seed, 12, 12, "restart");
+            let mut policy =
+                LifelongPolicy::new(name, Choice { seed, threads: 1 }, Budget::of_nodes(200)).unwrap();
+            let (num_reached, num_reverted) = play(&config.rules(), &instance, |environment| {
+                policy.act(instance.map(), &environment.snapshot()).unwrap()
+            });
+            assert_eq!(num_reverted, 0, "{name}, seed {seed}");
+            assert!(num_reached > 40.0, "{name}, seed {seed}: {num_reached} goals");
+        }
+    }
+}
+
+#[test]
+fn agents_that_finish_leave_and_the_others_go_on() {
+    for seed in 0..8 {
+        let (config, instance) = drawn(seed, 8, 8, "finish");
+        let planner = planner("lacam", Choice::default()).unwrap();
+        let mut policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(64));
+        let (num_reached, _) = play(&config.rules(), &instance, |environment| {
+            policy.act(instance.map(), &environment.snapshot()).unwrap()
+        });
+        let is_solved = policy.outcomes()[0].solution().is_some();
+        assert!(!is_solved || num_reached == 8.0, "seed {seed}: {num_reached} of 8");
+        assert!(!is_solved || policy.outcomes().len() == 1, "seed {seed}: planned anew");
+    }
+}
+
+#[test]
+fn a_policy_plans_anew_when_the_world_is_another() {
+    let (config, instance) = drawn(3, 8, 4, "nothing");
+    let rules = Config { collision: Collision::Priority, on_goal: OnGoal::Nothing, ..config.rules() };
+    let mut policy =
+        PlannerPolicy::new(planner("lacam", Choice::default()).unwrap(), Budget::of_nodes(300), Some(64));
+    let mut count = 0;
+    play(&rules, &instance, |environment| {
+        count += 1;
+        let actions = policy.act(instance.map(), &environment.snapshot()).unwrap();
+        // Somebody else moves everyone in the fifth step.
+        if count == 5 { vec![pogema_core::Action::Up; 4] } else { actions }
+    });
+    assert!(policy.outcomes().len() > 1);
+    policy.reset();
+    assert!(policy.outcomes().is_empty());
+}
