@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::distances::{CostToGo, Distances};
 use crate::graph::Vertex;
-use crate::pibt::PibtRules;
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::refine::{self, Refiner, Shared};
 use crate::search::{Loss, Progress, Search, SearchRules};
+use crate::stepper::PibtRules;
 
 /// How LaCAM goes about it.
 #[derive(Clone, Debug)]

@@ -8,6 +8,7 @@
 mod astar;
 mod distances;
 mod graph;
+mod guide;
 mod heap;
 mod lacam;
 mod pibt;
@@ -15,13 +16,16 @@ mod plan;
 mod problem;
 mod refine;
 mod search;
+mod stepper;
 mod validate;
 
 pub use astar::{AStarAgent, AStarTeam, View};
 pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
 pub use graph::{Graph, Vertex};
+pub use guide::GuideParams;
 pub use lacam::{Lacam, LacamParams};
-pub use pibt::PibtRules;
+pub use pibt::{Pibt, PibtLifelong, PibtParams};
 pub use plan::Plan;
 pub use problem::{Budget, Clock, Outcome, Planner, Problem};
+pub use stepper::PibtRules;
 pub use validate::{Conflict, ConflictKind, validate};

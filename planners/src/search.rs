@@ -21,8 +21,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
-use crate::pibt::{Agent, PibtRules, Scene, Stepper};
 use crate::problem::Problem;
+use crate::stepper::{Agent, PibtRules, Scene, Stepper, patience_after, patience_by, sort_by_patience};
 
 /// No node, or no edge.
 const NONE: u32 = u32::MAX;
@@ -102,7 +102,6 @@ pub(crate) struct Search<'a> {
     /// For all nodes one after the other, an entry for each agent.
     configurations: Vec<Vertex>,
     orders: Vec<Agent>,
-    /// For how many steps an agent has not been at its goal, and below that who was farther from it at the start.
     patience: Vec<u32>,
     known: HashMap<u64, u32>,
     open: Vec<u32>,
@@ -336,14 +335,8 @@ impl<'a> Search<'a> {
 
     fn add_root(&mut self) {
         let starts = self.problem.starts.clone();
-        let cost = |agent: usize| self.costs[agent][starts[agent] as usize];
-        let mut ranks: Vec<Agent> = (0..self.num_agents() as Agent).collect();
-        ranks.sort_by_key(|&agent| (cost(agent as usize), agent));
-        let mut patience = vec![0; self.num_agents()];
-        for (rank, &agent) in ranks.iter().enumerate() {
-            patience[agent as usize] = rank as u32;
-        }
-        self.patience.extend_from_slice(&patience);
+        let cost = |agent: Agent| self.costs[agent as usize][starts[agent as usize] as usize];
+        self.patience = patience_by(self.num_agents(), cost);
         let root = self.add_node(hash(&starts), &starts, NONE, 0);
         self.open.push(root);
     }
@@ -353,7 +346,7 @@ impl<'a> Search<'a> {
         for (agent, &place) in configuration.iter().enumerate() {
             let patience = self.patience[start + agent];
             let is_there = place == self.problem.goals[agent];
-            self.patience.push(if is_there { patience & RANK } else { patience.saturating_add(RANK + 1) });
+            self.patience.push(patience_after(patience, is_there));
         }
         self.add_node(hash, configuration, parent, paid)
     }
@@ -365,8 +358,7 @@ impl<'a> Search<'a> {
         self.configurations.extend_from_slice(configuration);
         let start = self.orders.len();
         self.orders.extend(0..configuration.len() as Agent);
-        let patience = &self.patience[start..];
-        self.orders[start..].sort_unstable_by_key(|&agent| std::cmp::Reverse(patience[agent as usize]));
+        sort_by_patience(&mut self.orders[start..], &self.patience[start..]);
         let twin = self.known.insert(hash, node).unwrap_or(NONE);
         let constraints = Some(Constraints::default());
         self.nodes.push(Node { parent, paid, ahead, constraints, edges: NONE, twin });
@@ -418,9 +410,6 @@ impl<'a> Search<'a> {
         }
     }
 }
-
-/// The part of an agent's patience that never changes, so that no two agents are equal.
-const RANK: u32 = 0xf_ffff;
 
 /// The loss of a step.
 fn lost(loss: Loss, from: &[Vertex], to: &[Vertex], goals: &[Vertex]) -> u64 {

@@ -21,8 +21,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
-use crate::pibt::Agent;
 use crate::problem::Problem;
+use crate::stepper::Agent;
 use choice::{Choice, below};
 use detour::{Detours, Trip};
 use reservations::{Path, Reservations};

@@ -1,7 +1,7 @@
 //! Who is where and when: the paths that a new one has to keep clear of.
 
 use crate::graph::Vertex;
-use crate::pibt::Agent;
+use crate::stepper::Agent;
 
 /// Where an agent is at each time until it stays; it then stays for good.
 pub(crate) type Path = Vec<Vertex>;
