@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::distances::{CostToGo, Distances};
 use crate::graph::Vertex;
+use crate::parts::{Part, small_parts};
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::refine::{self, Refiner, Shared};
 use crate::search::{Loss, Progress, Search, SearchRules};
@@ -111,6 +112,9 @@ impl<'a> Work<'a> {
     }
 
     fn run(mut self) -> Outcome {
+        if let Some(reason) = self.impossible_part() {
+            return Outcome::Impossible { reason };
+        }
         let mut found = self.find_first();
         if let Found::Plan(steps) = found {
             found = self.better(steps);
@@ -122,6 +126,17 @@ impl<'a> Work<'a> {
                 Outcome::TimedOut { best: self.problem.plan(&self.within_cap(self.search.closest())).ok() }
             }
         }
+    }
+
+    /// Which agents cannot do it in their small part of the map, as far as that is soon found out.
+    fn impossible_part(&mut self) -> Option<String> {
+        for Part { agents, problem, costs } in small_parts(self.problem, self.costs) {
+            let mut search = Search::new(&problem, &costs, rules(self.params, 0, Loss::Sum));
+            if let Advance::Found(Found::Impossible) = advance(&mut search, &mut self.clock, PART_NODES) {
+                return Some(format!("all that agents {agents:?} can do in their part of the map was tried"));
+            }
+        }
+        None
     }
 
     fn answer(&self, steps: Steps) -> Outcome {
@@ -259,6 +274,9 @@ impl<'a> Work<'a> {
 
 /// Attempts to refine between two looks at further configurations.
 const ATTEMPTS: usize = 32;
+
+/// Nodes for one small part of the map.
+const PART_NODES: usize = 20_000;
 
 fn impossible() -> Outcome {
     Outcome::Impossible { reason: "all that the agents can do was tried".to_owned() }

@@ -6,11 +6,13 @@
 //! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; its random numbers come in from outside.
 
 mod astar;
+mod constraints;
 mod distances;
 mod graph;
 mod guide;
 mod heap;
 mod lacam;
+mod parts;
 mod pibt;
 mod plan;
 mod problem;

@@ -19,6 +19,7 @@ use std::collections::{HashMap, VecDeque};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::constraints::Constraints;
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
 use crate::problem::Problem;
@@ -77,16 +78,6 @@ struct Node {
 struct Edge {
     to: u32,
     next: u32,
-}
-
-/// A place in the tree of constraints, counted through level by level: as many agents as the depth, the first in order,
-/// are forced, and the digits of a number in mixed radix say where to.
-#[derive(Clone, Copy, Debug, Default)]
-struct Constraints {
-    depth: u32,
-    number: u64,
-    /// How many numbers the depth has.
-    width: u64,
 }
 
 /// A search, which may be stopped after any node and taken up again.
@@ -182,8 +173,13 @@ impl<'a> Search<'a> {
                 return Progress::Going;
             }
         };
-        self.read_constraints(top, constraints);
-        self.nodes[top as usize].constraints = self.after(top, constraints);
+        let mut forced = std::mem::take(&mut self.forced);
+        let (graph, now, order) = (&self.problem.graph, self.configuration(top), self.order(top));
+        // Spread, so that equal digits lead different nodes to different places.
+        let turn = u64::from(top).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        constraints.read(graph, now, order, turn, &mut forced);
+        self.nodes[top as usize].constraints = constraints.after(graph, now, order);
+        self.forced = forced;
         if self.bytes() > self.rules.most_bytes {
             return Progress::Full;
         }
@@ -223,50 +219,6 @@ impl<'a> Search<'a> {
         way.reverse();
         way
     }
-
-    // The tree of constraints.
-
-    /// Where the agent at a depth may go: its place and those around.
-    fn num_choices(&self, node: u32, depth: u32) -> u64 {
-        let agent = self.order(node)[depth as usize];
-        let place = self.configuration(node)[agent as usize];
-        self.problem.graph.neighbours(place).len() as u64 + 1
-    }
-
-    /// The constraints that come after others, if any do.
-    fn after(&self, node: u32, mut constraints: Constraints) -> Option<Constraints> {
-        constraints.number += 1;
-        if constraints.number >= constraints.width.max(1) {
-            if constraints.depth as usize == self.num_agents() {
-                return None;
-            }
-            let choices = self.num_choices(node, constraints.depth);
-            constraints.width = constraints.width.max(1).saturating_mul(choices);
-            constraints.depth += 1;
-            constraints.number = 0;
-        }
-        Some(constraints)
-    }
-
-    /// Who must go where; which digit means which place differs from node to node.
-    fn read_constraints(&mut self, node: u32, constraints: Constraints) {
-        let mut forced = std::mem::take(&mut self.forced);
-        forced.clear();
-        let mut number = constraints.number;
-        let turn = u64::from(node).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        for depth in (0..constraints.depth).rev() {
-            let agent = self.order(node)[depth as usize];
-            let place = self.configuration(node)[agent as usize];
-            let around = self.problem.graph.neighbours(place);
-            let choices = around.len() as u64 + 1;
-            let digit = (number % choices + turn + u64::from(depth)) % choices;
-            number /= choices;
-            forced.push((agent, around.get(digit as usize).copied().unwrap_or(place)));
-        }
-        self.forced = forced;
-    }
-
-    // Configurations.
 
     /// Puts the best of some configurations after a node into `best`; whether there is one.
     fn generate(&mut self, node: u32) -> bool {
