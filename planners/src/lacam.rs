@@ -189,6 +189,8 @@ impl<'a> Work<'a> {
         let (problem, costs, seed) = (self.problem, self.costs, self.params.seed);
         let shared = Shared::new(threads == 1);
         let is_done = AtomicBool::new(false);
+        let mut refiner = Refiner::new(problem, costs, &first, &shared, seed);
+        refiner.begin(|| self.clock.is_spent());
         std::thread::scope(|scope| {
             for thread in 1..threads {
                 let (first, shared, is_done) = (&first, &shared, &is_done);
@@ -200,7 +202,6 @@ impl<'a> Work<'a> {
                     }
                 });
             }
-            let mut refiner = Refiner::new(problem, costs, &first, &shared, seed);
             let is_possible = self.refine_and_search(&mut refiner);
             is_done.store(true, Ordering::Relaxed);
             if is_possible { Found::Plan(refiner.plan()) } else { Found::Impossible }
