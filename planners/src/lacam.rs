@@ -234,7 +234,8 @@ impl<'a> Work<'a> {
             if let Some(cost) = refiner.cost().filter(|_| self.search.minimises() == Loss::Sum) {
                 self.search.set_bound(cost);
             }
-            let most = (idle / 16).clamp(8, 256);
+            let is_late = refiner.cost().is_none();
+            let most = if is_late { 64 } else { (idle / 16).clamp(8, 256) };
             if self.is_searching && !self.look_further(refiner, most) {
                 return false;
             }
@@ -285,7 +286,7 @@ fn impossible() -> Outcome {
 
 fn rules(params: &LacamParams, attempt: u64, loss: Loss) -> SearchRules {
     let seed = params.seed.wrapping_add(attempt.wrapping_mul(0x9e37_79b9));
-    SearchRules { loss, pibt: params.pibt, tries: 1, most_bytes: params.most_bytes, seed }
+    SearchRules { loss, pibt: params.pibt, most_bytes: params.most_bytes, seed }
 }
 
 /// What came of some more nodes.

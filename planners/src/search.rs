@@ -42,8 +42,6 @@ pub(crate) enum Loss {
 pub(crate) struct SearchRules {
     pub loss: Loss,
     pub pibt: PibtRules,
-    /// Configurations generated where one is needed; the one of least loss is taken.
-    pub tries: usize,
     /// Most bytes that nodes may take.
     pub most_bytes: usize,
     pub seed: u64,
@@ -101,7 +99,7 @@ pub(crate) struct Search<'a> {
     /// Nodes that lead to no less are left.
     bound: u64,
     forced: Vec<(Agent, Vertex)>,
-    best: Vec<Vertex>,
+    next: Vec<Vertex>,
 }
 
 impl<'a> Search<'a> {
@@ -124,7 +122,7 @@ impl<'a> Search<'a> {
             closest: 0,
             bound: u64::MAX,
             forced: Vec::new(),
-            best: Vec::new(),
+            next: Vec::new(),
         };
         search.add_root();
         search
@@ -186,9 +184,9 @@ impl<'a> Search<'a> {
         if !self.generate(top) {
             return Progress::Going;
         }
-        let next = std::mem::take(&mut self.best);
+        let next = std::mem::take(&mut self.next);
         let progress = self.reach(top, &next);
-        self.best = next;
+        self.next = next;
         progress
     }
 
@@ -220,31 +218,18 @@ impl<'a> Search<'a> {
         way
     }
 
-    /// Puts the best of some configurations after a node into `best`; whether there is one.
+    /// Puts a configuration after a node into `next`; whether there is one.
     fn generate(&mut self, node: u32) -> bool {
         let (graph, goals): (&Graph, _) = (&self.problem.graph, &self.problem.goals[..]);
-        let costs = self.costs;
         let range = node as usize * goals.len()..(node as usize + 1) * goals.len();
         let (now, order) = (&self.configurations[range.clone()], &self.orders[range]);
-        let scene = Scene { graph, now, goals, costs, order };
-        let tries = if self.forced.len() < goals.len() { self.rules.tries } else { 1 };
-        let mut least = None;
-        for _ in 0..tries {
-            let Some(next) = self.stepper.step(&scene, &self.forced) else {
-                continue;
-            };
-            let loss = if tries == 1 {
-                0
-            } else {
-                ahead(Loss::Sum, costs, next) + lost(Loss::Sum, now, next, goals)
-            };
-            if least.is_none_or(|least| loss < least) {
-                least = Some(loss);
-                self.best.clear();
-                self.best.extend_from_slice(next);
-            }
+        let scene = Scene { graph, now, goals, costs: self.costs, order };
+        let next = self.stepper.step(&scene, &self.forced);
+        if let Some(next) = next {
+            self.next.clear();
+            self.next.extend_from_slice(next);
         }
-        least.is_some()
+        next.is_some()
     }
 
     /// Enters a configuration that is one step after a node.
