@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::distances::{CostToGo, Distances};
 use crate::graph::Vertex;
-use crate::pibt::PibtRules;
+use crate::parts::{Part, small_parts};
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::refine::{self, Refiner, Shared};
 use crate::search::{Loss, Progress, Search, SearchRules};
+use crate::stepper::PibtRules;
 
 /// How LaCAM goes about it.
 #[derive(Clone, Debug)]
@@ -111,6 +112,9 @@ impl<'a> Work<'a> {
     }
 
     fn run(mut self) -> Outcome {
+        if let Some(reason) = self.impossible_part() {
+            return Outcome::Impossible { reason };
+        }
         let mut found = self.find_first();
         if let Found::Plan(steps) = found {
             found = self.better(steps);
@@ -122,6 +126,17 @@ impl<'a> Work<'a> {
                 Outcome::TimedOut { best: self.problem.plan(&self.within_cap(self.search.closest())).ok() }
             }
         }
+    }
+
+    /// Which agents cannot do it in their small part of the map, as far as that is soon found out.
+    fn impossible_part(&mut self) -> Option<String> {
+        for Part { agents, problem, costs } in small_parts(self.problem, self.costs) {
+            let mut search = Search::new(&problem, &costs, rules(self.params, 0, Loss::Sum));
+            if let Advance::Found(Found::Impossible) = advance(&mut search, &mut self.clock, PART_NODES) {
+                return Some(format!("all that agents {agents:?} can do in their part of the map was tried"));
+            }
+        }
+        None
     }
 
     fn answer(&self, steps: Steps) -> Outcome {
@@ -174,6 +189,8 @@ impl<'a> Work<'a> {
         let (problem, costs, seed) = (self.problem, self.costs, self.params.seed);
         let shared = Shared::new(threads == 1);
         let is_done = AtomicBool::new(false);
+        let mut refiner = Refiner::new(problem, costs, &first, &shared, seed);
+        refiner.begin(|| self.clock.is_spent());
         std::thread::scope(|scope| {
             for thread in 1..threads {
                 let (first, shared, is_done) = (&first, &shared, &is_done);
@@ -185,7 +202,6 @@ impl<'a> Work<'a> {
                     }
                 });
             }
-            let mut refiner = Refiner::new(problem, costs, &first, &shared, seed);
             let is_possible = self.refine_and_search(&mut refiner);
             is_done.store(true, Ordering::Relaxed);
             if is_possible { Found::Plan(refiner.plan()) } else { Found::Impossible }
@@ -218,7 +234,8 @@ impl<'a> Work<'a> {
             if let Some(cost) = refiner.cost().filter(|_| self.search.minimises() == Loss::Sum) {
                 self.search.set_bound(cost);
             }
-            let most = (idle / 16).clamp(8, 256);
+            let is_late = refiner.cost().is_none();
+            let most = if is_late { 64 } else { (idle / 16).clamp(8, 256) };
             if self.is_searching && !self.look_further(refiner, most) {
                 return false;
             }
@@ -260,13 +277,16 @@ impl<'a> Work<'a> {
 /// Attempts to refine between two looks at further configurations.
 const ATTEMPTS: usize = 32;
 
+/// Nodes for one small part of the map.
+const PART_NODES: usize = 20_000;
+
 fn impossible() -> Outcome {
     Outcome::Impossible { reason: "all that the agents can do was tried".to_owned() }
 }
 
 fn rules(params: &LacamParams, attempt: u64, loss: Loss) -> SearchRules {
     let seed = params.seed.wrapping_add(attempt.wrapping_mul(0x9e37_79b9));
-    SearchRules { loss, pibt: params.pibt, tries: 1, most_bytes: params.most_bytes, seed }
+    SearchRules { loss, pibt: params.pibt, most_bytes: params.most_bytes, seed }
 }
 
 /// What came of some more nodes.

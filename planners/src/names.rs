@@ -5,8 +5,10 @@ use std::sync::Arc;
 use pogema_core::Error;
 
 use crate::graph::Graph;
+use crate::guide::GuideParams;
 use crate::lacam::{Lacam, LacamParams};
 use crate::lifelong::Lifelong;
+use crate::pibt::{Pibt, PibtLifelong, PibtParams};
 use crate::problem::Planner;
 use crate::{cbs, ecbs, pbs, rhcr};
 
@@ -26,15 +28,20 @@ impl Default for Choice {
 }
 
 /// The planners of problems with one goal for each agent, and what each is good for.
-pub const PLANNERS: [(&str, &str); 4] = [
+pub const PLANNERS: [(&str, &str); 5] = [
     ("lacam", "quick plans for any number of agents, made better until time is up"),
+    ("pibt", "a plan of any quality at once, or none"),
     ("pbs", "good plans for some dozens of agents"),
     ("ecbs", "plans that cost at most 1.2 times the least, for few agents"),
     ("cbs", "the best plans, for very few agents"),
 ];
 
 /// The planners of agents that get goal after goal, and what each is good for.
-pub const LIFELONG: [(&str, &str); 1] = [("rhcr", "plans some steps ahead, again and again")];
+pub const LIFELONG: [(&str, &str); 3] = [
+    ("rhcr", "plans some steps ahead, again and again"),
+    ("pibt", "millions of steps a second"),
+    ("guided-pibt", "around the traffic: for crowds in warehouses"),
+];
 
 /// A planner of problems with one goal for each agent.
 ///
@@ -44,6 +51,7 @@ pub fn planner(name: &str, choice: Choice) -> Result<Box<dyn Planner>, Error> {
     let Choice { seed, threads } = choice;
     Ok(match name {
         "lacam" => Box::new(Lacam::new(LacamParams { seed, threads, ..LacamParams::default() })),
+        "pibt" => Box::new(Pibt::new(PibtParams { seed, ..PibtParams::default() })),
         "pbs" => Box::new(pbs::Pbs::new(pbs::Params { seed })),
         "ecbs" => Box::new(ecbs::Ecbs::new(ecbs::Params { seed, ..ecbs::Params::default() })),
         "cbs" => Box::new(cbs::Cbs::new(cbs::Params { seed })),
@@ -59,6 +67,11 @@ pub fn lifelong(name: &str, graph: Arc<Graph>, choice: Choice) -> Result<Box<dyn
     let seed = choice.seed;
     Ok(match name {
         "rhcr" => Box::new(rhcr::Rhcr::new(graph, rhcr::Params { seed, ..rhcr::Params::default() })),
+        "pibt" => Box::new(PibtLifelong::new(graph, 0, PibtParams { seed, ..PibtParams::default() })),
+        "guided-pibt" => {
+            let guide = Some(GuideParams::default());
+            Box::new(PibtLifelong::new(graph, 0, PibtParams { seed, guide, ..PibtParams::default() }))
+        }
         _ => return Err(unknown(name, &LIFELONG)),
     })
 }

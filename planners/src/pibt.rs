@@ -1,347 +1,238 @@
-//! PIBT: one step for everybody, decided agent by agent, each pushing away who stands where it wants to go.
+//! PIBT as a planner: for one goal each, and for goals without end.
 //!
-//! Papers: Okumura, Machida, Défago, Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent Path
-//! Finding", AIJ 2022; the swap of agents in a corridor: Okumura, "Improving LaCAM for Scalable Eventually Optimal
-//! Multi-Agent Pathfinding", IJCAI 2023; ties by who would be hindered: Okumura, Nagai, "Lightweight and Effective
-//! Preference Construction in PIBT", 2025.
+//! Paper: Okumura, Machida, Défago, Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent Path
+//! Finding", AIJ 2022; the step itself is in `stepper`, the guidance of lifelong agents in `guide`.
 //!
 //! | here | there |
 //! | --- | --- |
-//! | `now`, `next` | Q from, Q to: the configuration before and after the step |
-//! | `Frame::places` | C: where an agent would go, best first |
-//! | `costs` | dist: steps to the goal, others left out |
-//! | `pusher`, `puller` | the agents of a swap: who wants to pass, and who must come along to where there is room |
+//! | `patience` | p: the priorities, which grow until an agent is at its goal |
+//! | `now`, `next` | the configurations before and after a step |
 
-use rand_core::{Rng, SeedableRng};
-use rand_pcg::Pcg64Mcg;
+use std::sync::Arc;
 
+use pogema_core::Error;
+
+use crate::distances::{CostToGo, Distances};
 use crate::graph::{Graph, Vertex};
+use crate::guide::{Guide, GuideParams};
+use crate::lifelong::Lifelong;
+use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
+use crate::stepper::{Agent, PibtRules, Scene, Stepper, patience_after, patience_by, sort_by_patience};
 
-/// The number of an agent.
-pub(crate) type Agent = u32;
-
-/// No agent, or no vertex yet.
-const NONE: u32 = u32::MAX;
-
-/// How PIBT chooses among the places an agent may go to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PibtRules {
-    /// Whether two agents that block each other in a corridor go to where they can pass.
-    pub swap: bool,
-    /// Whether an agent prefers, among equally good places, the one that fewer others want.
-    pub hindrance: bool,
+/// How PIBT goes about it.
+#[derive(Clone, Debug, Default)]
+pub struct PibtParams {
+    /// Seed of ties.
+    pub seed: u64,
+    /// How single steps are decided.
+    pub rules: PibtRules,
+    /// How lifelong agents keep out of each other's way from afar, if they do.
+    pub guide: Option<GuideParams>,
 }
 
-impl Default for PibtRules {
-    fn default() -> Self {
-        Self { swap: true, hindrance: true }
-    }
+/// The planner PIBT, quick and without any promise; a node of its budget is a step.
+#[derive(Clone, Debug, Default)]
+pub struct Pibt {
+    params: PibtParams,
 }
 
-/// What a step is decided from: configuration, goals, costs to go and who chooses first.
-#[derive(Debug)]
-pub(crate) struct Scene<'a, C> {
-    pub graph: &'a Graph,
-    pub now: &'a [Vertex],
-    pub goals: &'a [Vertex],
-    pub costs: &'a [C],
-    /// All agents, the first choosing first.
-    pub order: &'a [Agent],
-}
-
-impl<C: AsRef<[u32]>> Scene<'_, C> {
-    fn cost(&self, agent: Agent, vertex: Vertex) -> u32 {
-        self.costs[agent as usize].as_ref()[vertex as usize]
+impl Pibt {
+    /// The planner of these parameters.
+    pub fn new(params: PibtParams) -> Self {
+        Self { params }
     }
 
-    fn place(&self, agent: Agent) -> Vertex {
-        self.now[agent as usize]
-    }
-}
-
-/// An agent whose place is being decided.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    agent: Agent,
-    places: [Vertex; 5],
-    num_places: u8,
-    tried: u8,
-    /// Who is to follow into the place left behind.
-    follower: Agent,
-}
-
-/// Decides steps, and keeps the room that takes; it allocates nothing once it has seen as many agents.
-#[derive(Debug)]
-pub(crate) struct Stepper {
-    rules: PibtRules,
-    random: Pcg64Mcg,
-    /// For each vertex, who is there before and after the step.
-    standing: Vec<Agent>,
-    taken: Vec<Agent>,
-    next: Vec<Vertex>,
-    stack: Vec<Frame>,
-}
-
-impl Stepper {
-    /// For a graph, with ties broken by a seed.
-    pub fn new(graph: &Graph, rules: PibtRules, seed: u64) -> Self {
-        let nobody = vec![NONE; graph.num_vertices()];
-        let random = Pcg64Mcg::seed_from_u64(seed);
-        Self { rules, random, standing: nobody.clone(), taken: nobody, next: Vec::new(), stack: Vec::new() }
+    /// Steps after which it gives up if neither problem nor budget say: far more than agents need that do not walk in
+    /// circles.
+    fn most_steps(problem: &Problem) -> usize {
+        problem.most_steps.unwrap_or(10 * problem.graph.num_vertices() + 100)
     }
 
-    /// The configuration after the step, in which forced agents are where they have to be; none if PIBT finds none,
-    /// which happens only if somebody is forced.
-    pub fn step<C: AsRef<[u32]>>(
-        &mut self,
-        scene: &Scene<'_, C>,
-        forced: &[(Agent, Vertex)],
-    ) -> Option<&[Vertex]> {
-        self.next.clear();
-        self.next.resize(scene.now.len(), NONE);
-        for (agent, &vertex) in scene.now.iter().enumerate() {
-            self.standing[vertex as usize] = agent as Agent;
-        }
-        let found = forced.iter().all(|&(agent, vertex)| self.force(scene, agent, vertex))
-            && scene.order.iter().all(|&agent| self.is_decided(agent) || self.decide(scene, agent));
-        // Whoever stepped aside for nothing is where it was; places taken on the way are all next ones or old ones.
-        for (&before, &after) in scene.now.iter().zip(&self.next) {
-            self.standing[before as usize] = NONE;
-            self.taken[before as usize] = NONE;
-            if after != NONE {
-                self.taken[after as usize] = NONE;
-            }
-        }
-        found.then_some(&self.next[..])
-    }
-
-    fn is_decided(&self, agent: Agent) -> bool {
-        self.next[agent as usize] != NONE
-    }
-
-    fn force<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
-        let is_free = self.taken[vertex as usize] == NONE && !self.would_exchange(scene, agent, vertex);
-        if is_free {
-            self.take(agent, vertex);
-        }
-        is_free
-    }
-
-    fn take(&mut self, agent: Agent, vertex: Vertex) {
-        self.taken[vertex as usize] = agent;
-        self.next[agent as usize] = vertex;
-    }
-
-    /// Whether who stands at a vertex goes to where the agent is.
-    fn would_exchange<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
-        let other = self.standing[vertex as usize];
-        other != NONE && other != agent && self.next[other as usize] == scene.place(agent)
-    }
-
-    /// Decides where an agent goes, and all whom it pushes; whether that was possible.
-    fn decide<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> bool {
-        let first = self.frame(scene, agent);
-        self.stack.clear();
-        self.stack.push(first);
-        // What became of the last pushed agent: whether it got away.
-        let mut answer = None;
-        while let Some(mut frame) = self.stack.pop() {
-            if answer == Some(true) {
-                self.pull(scene, &frame);
-                continue;
-            }
-            answer = match self.try_next(scene, &mut frame) {
-                Try::Moved => {
-                    self.pull(scene, &frame);
-                    Some(true)
-                }
-                Try::Pushed(other) => {
-                    self.stack.push(frame);
-                    let pushed = self.frame(scene, other);
-                    self.stack.push(pushed);
-                    None
-                }
-                Try::Stuck => {
-                    self.take(frame.agent, scene.place(frame.agent));
-                    Some(false)
-                }
-            };
-        }
-        answer == Some(true)
-    }
-
-    /// Takes the next place that is free.
-    fn try_next<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, frame: &mut Frame) -> Try {
-        while frame.tried < frame.num_places {
-            let vertex = frame.places[usize::from(frame.tried)];
-            frame.tried += 1;
-            if self.taken[vertex as usize] != NONE || self.would_exchange(scene, frame.agent, vertex) {
-                continue;
-            }
-            self.take(frame.agent, vertex);
-            let other = self.standing[vertex as usize];
-            if other != NONE && other != frame.agent && !self.is_decided(other) {
-                return Try::Pushed(other);
-            }
-            return Try::Moved;
-        }
-        Try::Stuck
-    }
-
-    /// Lets the follower of an agent that got its best place follow.
-    fn pull<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, frame: &Frame) {
-        let left = scene.place(frame.agent);
-        if frame.follower != NONE
-            && frame.tried == 1
-            && !self.is_decided(frame.follower)
-            && self.taken[left as usize] == NONE
-        {
-            self.take(frame.follower, left);
-        }
-    }
-
-    /// Where an agent would go, best first.
-    fn frame<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> Frame {
-        let here = scene.place(agent);
-        let around = scene.graph.neighbours(here);
-        let mut dice = self.random.next_u64();
-        let mut keyed = [(u64::MAX, here); 5];
-        for (slot, &vertex) in keyed.iter_mut().zip(around.iter().chain([&here])) {
-            dice >>= 8;
-            let hindered = if self.rules.hindrance {
-                self.hindered(scene, agent, vertex)
-            } else {
-                u64::from(vertex == here)
-            };
-            let cost = u64::from(scene.cost(agent, vertex));
-            *slot = (cost << 16 | hindered << 8 | dice & 0xff, vertex);
-        }
-        let num_places = around.len() + 1;
-        sort_few(&mut keyed[..num_places]);
-        let mut places = keyed.map(|(_, vertex)| vertex);
-        let follower = if self.rules.swap { self.partner(scene, agent, places[0]) } else { NONE };
-        if follower != NONE {
-            places[..num_places].reverse();
-        }
-        Frame { agent, places, num_places: num_places as u8, tried: 0, follower }
-    }
-
-    /// How many others around a vertex want to go there.
-    fn hindered<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> u64 {
-        let wants = |&&place: &&Vertex| {
-            let other = self.standing[place as usize];
-            other != NONE && other != agent && scene.cost(other, vertex) < scene.cost(other, place)
-        };
-        scene.graph.neighbours(vertex).iter().filter(wants).count() as u64
-    }
-
-    /// Who has to be led away, the agent going first, so that the two can pass each other.
-    fn partner<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
-        let here = scene.place(agent);
-        if best == here {
-            return NONE;
-        }
-        let ahead = self.standing[best as usize];
-        if ahead != NONE
-            && !self.is_decided(ahead)
-            && self.must_swap(scene, agent, ahead, here, best)
-            && self.can_swap(scene, best, here)
-        {
-            return ahead;
-        }
-        self.pusher_behind(scene, agent, best)
-    }
-
-    /// Who stands beside the agent and can pass it only once the agent has made room.
-    fn pusher_behind<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
-        let here = scene.place(agent);
-        let is_pusher = |&place: &Vertex| {
-            let other = self.standing[place as usize];
-            other != NONE
-                && place != best
-                && self.must_swap(scene, other, agent, here, best)
-                && self.can_swap(scene, best, here)
-        };
-        let found = scene.graph.neighbours(here).iter().copied().find(is_pusher);
-        found.map_or(NONE, |place| self.standing[place as usize])
-    }
-
-    /// Whether the pusher, going on behind the puller, meets no place to pass before one of them must turn.
-    fn must_swap<C: AsRef<[u32]>>(
+    /// Steps until all are at their goals, or patience or budget are at their end.
+    fn walk(
         &self,
-        scene: &Scene<'_, C>,
-        pusher: Agent,
-        puller: Agent,
-        mut behind: Vertex,
-        mut ahead: Vertex,
-    ) -> bool {
-        while scene.cost(pusher, ahead) < scene.cost(pusher, behind) {
-            match self.way_on(scene, behind, ahead) {
-                Way::Fork => return false,
-                Way::End => break,
-                Way::Only(next) => (behind, ahead) = (ahead, next),
+        problem: &Problem,
+        costs: &[CostToGo],
+        mut queue: Queue,
+        clock: &mut Clock,
+    ) -> Vec<Vec<Vertex>> {
+        let (graph, goals) = (&problem.graph, &problem.goals[..]);
+        let mut stepper = Stepper::new(graph, self.params.rules, self.params.seed);
+        let mut steps = vec![problem.starts.clone()];
+        for _ in 0..Self::most_steps(problem) {
+            let now = &steps[steps.len() - 1];
+            if now == goals || clock.count_node() {
+                break;
             }
+            let scene = Scene { graph, now, goals, costs, order: queue.order() };
+            let Some(next) = stepper.step(&scene, &[]).map(<[Vertex]>::to_vec) else {
+                break;
+            };
+            queue.wait(|agent| next[agent] == goals[agent]);
+            steps.push(next);
         }
-        scene.cost(puller, behind) < scene.cost(puller, ahead)
-            && (scene.cost(pusher, behind) == 0 || scene.cost(pusher, ahead) < scene.cost(pusher, behind))
+        steps
+    }
+}
+
+impl Planner for Pibt {
+    fn name(&self) -> &'static str {
+        "pibt"
     }
 
-    /// Whether the puller, walking away from the pusher, comes to a fork.
-    fn can_swap<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, pusher: Vertex, puller: Vertex) -> bool {
-        let (mut behind, mut ahead) = (pusher, puller);
-        loop {
-            match self.way_on(scene, behind, ahead) {
-                Way::Fork => return true,
-                Way::End => return false,
-                Way::Only(next) => (behind, ahead) = (ahead, next),
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
+        if let Some(reason) = problem.obstruction(&mut distances) {
+            return Outcome::Impossible { reason };
+        }
+        let costs = distances.to_all(&problem.goals);
+        let least = |agent: Agent| costs[agent as usize][problem.starts[agent as usize] as usize];
+        let lower_bound = (0..problem.num_agents() as Agent).map(|agent| u64::from(least(agent))).sum();
+        let queue = Queue::new(patience_by(problem.num_agents(), least));
+        let steps = self.walk(problem, &costs, queue, &mut clock);
+        let is_solved = steps.last() == Some(&problem.goals);
+        match problem.plan(&steps).ok() {
+            Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
+            best => Outcome::TimedOut { best },
+        }
+    }
+}
+
+/// Who chooses before whom.
+#[derive(Debug)]
+struct Queue {
+    patience: Vec<u32>,
+    order: Vec<Agent>,
+}
+
+impl Queue {
+    fn new(patience: Vec<u32>) -> Self {
+        let order = (0..patience.len() as Agent).collect();
+        Self { patience, order }
+    }
+
+    fn order(&mut self) -> &[Agent] {
+        sort_by_patience(&mut self.order, &self.patience);
+        &self.order
+    }
+
+    fn wait(&mut self, is_there: impl Fn(usize) -> bool) {
+        for (agent, patience) in self.patience.iter_mut().enumerate() {
+            *patience = patience_after(*patience, is_there(agent));
+        }
+    }
+}
+
+/// PIBT for agents that get a new goal whenever they reach one: decides one step after the other.
+#[derive(Debug)]
+pub struct PibtLifelong {
+    graph: Arc<Graph>,
+    params: PibtParams,
+    stepper: Stepper,
+    queue: Queue,
+    goals: Vec<Vertex>,
+    ways: Ways,
+}
+
+/// Where agents are led.
+#[derive(Debug)]
+enum Ways {
+    /// Along the shortest ways.
+    Shortest { distances: Distances, costs: Vec<CostToGo> },
+    /// Around the traffic.
+    Guided { guide: Guide, costs: Vec<Vec<u32>> },
+}
+
+impl PibtLifelong {
+    /// For so many agents on a map.
+    pub fn new(graph: Arc<Graph>, num_agents: usize, params: PibtParams) -> Self {
+        let ways = match params.guide {
+            Some(guide) => Ways::Guided {
+                guide: Guide::new(graph.clone(), num_agents, guide),
+                costs: vec![Vec::new(); num_agents],
+            },
+            None => Ways::Shortest {
+                distances: Distances::new(graph.clone(), Distances::DEFAULT_BYTES),
+                costs: Vec::new(),
+            },
+        };
+        let stepper = Stepper::new(&graph, params.rules, params.seed);
+        let queue = Queue::new(patience_by(num_agents, |_| 0));
+        Self { graph, params, stepper, queue, goals: vec![Vertex::MAX; num_agents], ways }
+    }
+
+    /// Where agents go next that are now here and have these goals, which may be equal and out of reach.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of agents, [`Error::Agent`] for a vertex that is none or two agents in one.
+    pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
+        self.check(now, goals)?;
+        self.lead(now, goals);
+        let graph = &self.graph;
+        let order = self.queue.order();
+        let next = match &self.ways {
+            Ways::Shortest { costs, .. } => {
+                self.stepper.step(&Scene { graph, now, goals, costs, order }, &[])
             }
-            if ahead == pusher {
-                return false;
+            Ways::Guided { costs, .. } => self.stepper.step(&Scene { graph, now, goals, costs, order }, &[]),
+        };
+        let next = next.ok_or_else(|| Error::instance("two agents are in one cell"))?;
+        self.queue.wait(|agent| next[agent] == goals[agent]);
+        Ok(next)
+    }
+
+    fn check(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
+        Error::check_length("agents", self.goals.len(), now.len())?;
+        Error::check_length("goals", self.goals.len(), goals.len())?;
+        let num_vertices = self.graph.num_vertices() as Vertex;
+        for (agent, (&place, &goal)) in now.iter().zip(goals).enumerate() {
+            if place.max(goal) >= num_vertices {
+                return Err(Error::agent(agent, format!("the map has {num_vertices} free cells")));
             }
+        }
+        match self.stepper.shared_place(now) {
+            Some(agent) => Err(Error::agent(agent, "it is in one cell with another")),
+            None => Ok(()),
         }
     }
 
-    /// How a corridor goes on; a dead end whose agent has arrived there does not count.
-    fn way_on<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, behind: Vertex, ahead: Vertex) -> Way {
-        let mut way = Way::End;
-        for &vertex in scene.graph.neighbours(ahead) {
-            let agent = self.standing[vertex as usize];
-            let is_closed = scene.graph.neighbours(vertex).len() == 1
-                && agent != NONE
-                && scene.goals[agent as usize] == vertex;
-            if vertex == behind || is_closed {
+    /// Makes the costs to go of new goals.
+    fn lead(&mut self, now: &[Vertex], goals: &[Vertex]) {
+        if let Ways::Shortest { distances, costs } = &mut self.ways
+            && costs.is_empty()
+        {
+            *costs = distances.to_all(goals);
+        }
+        for (agent, &goal) in goals.iter().enumerate() {
+            if self.goals[agent] == goal {
                 continue;
             }
-            match way {
-                Way::End => way = Way::Only(vertex),
-                _ => return Way::Fork,
+            match &mut self.ways {
+                Ways::Shortest { distances, costs } => costs[agent] = distances.to(goal),
+                Ways::Guided { guide, costs } => {
+                    guide.plan(agent as Agent, now[agent], goal, &mut costs[agent]);
+                }
             }
         }
-        way
+        self.goals.copy_from_slice(goals);
     }
 }
 
-/// What came of trying a place.
-enum Try {
-    Moved,
-    Pushed(Agent),
-    Stuck,
-}
+impl Lifelong for PibtLifelong {
+    fn name(&self) -> &'static str {
+        if self.params.guide.is_some() { "guided-pibt" } else { "pibt" }
+    }
 
-/// How a corridor goes on.
-enum Way {
-    End,
-    Only(Vertex),
-    Fork,
-}
+    fn reset(&mut self) {
+        *self = Self::new(self.graph.clone(), self.goals.len(), self.params.clone());
+    }
 
-/// Sorts at most five by insertion.
-fn sort_few(keyed: &mut [(u64, Vertex)]) {
-    for end in 1..keyed.len() {
-        let mut at = end;
-        while at > 0 && keyed[at - 1].0 > keyed[at].0 {
-            keyed.swap(at - 1, at);
-            at -= 1;
+    /// It takes no longer than it takes, whatever the budget.
+    fn next(&mut self, now: &[Vertex], goals: &[Vertex], _: &Budget) -> Result<Vec<Vertex>, Error> {
+        if now.len() != self.goals.len() {
+            *self = Self::new(self.graph.clone(), now.len(), self.params.clone());
         }
+        self.step(now, goals).map(<[Vertex]>::to_vec)
     }
 }

@@ -19,10 +19,11 @@ use std::collections::{HashMap, VecDeque};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::constraints::Constraints;
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
-use crate::pibt::{Agent, PibtRules, Scene, Stepper};
 use crate::problem::Problem;
+use crate::stepper::{Agent, PibtRules, Scene, Stepper, patience_after, patience_by, sort_by_patience};
 
 /// No node, or no edge.
 const NONE: u32 = u32::MAX;
@@ -41,8 +42,6 @@ pub(crate) enum Loss {
 pub(crate) struct SearchRules {
     pub loss: Loss,
     pub pibt: PibtRules,
-    /// Configurations generated where one is needed; the one of least loss is taken.
-    pub tries: usize,
     /// Most bytes that nodes may take.
     pub most_bytes: usize,
     pub seed: u64,
@@ -79,16 +78,6 @@ struct Edge {
     next: u32,
 }
 
-/// A place in the tree of constraints, counted through level by level: as many agents as the depth, the first in order,
-/// are forced, and the digits of a number in mixed radix say where to.
-#[derive(Clone, Copy, Debug, Default)]
-struct Constraints {
-    depth: u32,
-    number: u64,
-    /// How many numbers the depth has.
-    width: u64,
-}
-
 /// A search, which may be stopped after any node and taken up again.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
@@ -102,7 +91,6 @@ pub(crate) struct Search<'a> {
     /// For all nodes one after the other, an entry for each agent.
     configurations: Vec<Vertex>,
     orders: Vec<Agent>,
-    /// For how many steps an agent has not been at its goal, and below that who was farther from it at the start.
     patience: Vec<u32>,
     known: HashMap<u64, u32>,
     open: Vec<u32>,
@@ -111,7 +99,7 @@ pub(crate) struct Search<'a> {
     /// Nodes that lead to no less are left.
     bound: u64,
     forced: Vec<(Agent, Vertex)>,
-    best: Vec<Vertex>,
+    next: Vec<Vertex>,
 }
 
 impl<'a> Search<'a> {
@@ -134,7 +122,7 @@ impl<'a> Search<'a> {
             closest: 0,
             bound: u64::MAX,
             forced: Vec::new(),
-            best: Vec::new(),
+            next: Vec::new(),
         };
         search.add_root();
         search
@@ -183,17 +171,22 @@ impl<'a> Search<'a> {
                 return Progress::Going;
             }
         };
-        self.read_constraints(top, constraints);
-        self.nodes[top as usize].constraints = self.after(top, constraints);
+        let mut forced = std::mem::take(&mut self.forced);
+        let (graph, now, order) = (&self.problem.graph, self.configuration(top), self.order(top));
+        // Spread, so that equal digits lead different nodes to different places.
+        let turn = u64::from(top).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        constraints.read(graph, now, order, turn, &mut forced);
+        self.nodes[top as usize].constraints = constraints.after(graph, now, order);
+        self.forced = forced;
         if self.bytes() > self.rules.most_bytes {
             return Progress::Full;
         }
         if !self.generate(top) {
             return Progress::Going;
         }
-        let next = std::mem::take(&mut self.best);
+        let next = std::mem::take(&mut self.next);
         let progress = self.reach(top, &next);
-        self.best = next;
+        self.next = next;
         progress
     }
 
@@ -225,75 +218,18 @@ impl<'a> Search<'a> {
         way
     }
 
-    // The tree of constraints.
-
-    /// Where the agent at a depth may go: its place and those around.
-    fn num_choices(&self, node: u32, depth: u32) -> u64 {
-        let agent = self.order(node)[depth as usize];
-        let place = self.configuration(node)[agent as usize];
-        self.problem.graph.neighbours(place).len() as u64 + 1
-    }
-
-    /// The constraints that come after others, if any do.
-    fn after(&self, node: u32, mut constraints: Constraints) -> Option<Constraints> {
-        constraints.number += 1;
-        if constraints.number >= constraints.width.max(1) {
-            if constraints.depth as usize == self.num_agents() {
-                return None;
-            }
-            let choices = self.num_choices(node, constraints.depth);
-            constraints.width = constraints.width.max(1).saturating_mul(choices);
-            constraints.depth += 1;
-            constraints.number = 0;
-        }
-        Some(constraints)
-    }
-
-    /// Who must go where; which digit means which place differs from node to node.
-    fn read_constraints(&mut self, node: u32, constraints: Constraints) {
-        let mut forced = std::mem::take(&mut self.forced);
-        forced.clear();
-        let mut number = constraints.number;
-        let turn = u64::from(node).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        for depth in (0..constraints.depth).rev() {
-            let agent = self.order(node)[depth as usize];
-            let place = self.configuration(node)[agent as usize];
-            let around = self.problem.graph.neighbours(place);
-            let choices = around.len() as u64 + 1;
-            let digit = (number % choices + turn + u64::from(depth)) % choices;
-            number /= choices;
-            forced.push((agent, around.get(digit as usize).copied().unwrap_or(place)));
-        }
-        self.forced = forced;
-    }
-
-    // Configurations.
-
-    /// Puts the best of some configurations after a node into `best`; whether there is one.
+    /// Puts a configuration after a node into `next`; whether there is one.
     fn generate(&mut self, node: u32) -> bool {
         let (graph, goals): (&Graph, _) = (&self.problem.graph, &self.problem.goals[..]);
-        let costs = self.costs;
         let range = node as usize * goals.len()..(node as usize + 1) * goals.len();
         let (now, order) = (&self.configurations[range.clone()], &self.orders[range]);
-        let scene = Scene { graph, now, goals, costs, order };
-        let tries = if self.forced.len() < goals.len() { self.rules.tries } else { 1 };
-        let mut least = None;
-        for _ in 0..tries {
-            let Some(next) = self.stepper.step(&scene, &self.forced) else {
-                continue;
-            };
-            let loss = if tries == 1 {
-                0
-            } else {
-                ahead(Loss::Sum, costs, next) + lost(Loss::Sum, now, next, goals)
-            };
-            if least.is_none_or(|least| loss < least) {
-                least = Some(loss);
-                self.best.clear();
-                self.best.extend_from_slice(next);
-            }
+        let scene = Scene { graph, now, goals, costs: self.costs, order };
+        let next = self.stepper.step(&scene, &self.forced);
+        if let Some(next) = next {
+            self.next.clear();
+            self.next.extend_from_slice(next);
         }
-        least.is_some()
+        next.is_some()
     }
 
     /// Enters a configuration that is one step after a node.
@@ -336,14 +272,8 @@ impl<'a> Search<'a> {
 
     fn add_root(&mut self) {
         let starts = self.problem.starts.clone();
-        let cost = |agent: usize| self.costs[agent][starts[agent] as usize];
-        let mut ranks: Vec<Agent> = (0..self.num_agents() as Agent).collect();
-        ranks.sort_by_key(|&agent| (cost(agent as usize), agent));
-        let mut patience = vec![0; self.num_agents()];
-        for (rank, &agent) in ranks.iter().enumerate() {
-            patience[agent as usize] = rank as u32;
-        }
-        self.patience.extend_from_slice(&patience);
+        let cost = |agent: Agent| self.costs[agent as usize][starts[agent as usize] as usize];
+        self.patience = patience_by(self.num_agents(), cost);
         let root = self.add_node(hash(&starts), &starts, NONE, 0);
         self.open.push(root);
     }
@@ -353,7 +283,7 @@ impl<'a> Search<'a> {
         for (agent, &place) in configuration.iter().enumerate() {
             let patience = self.patience[start + agent];
             let is_there = place == self.problem.goals[agent];
-            self.patience.push(if is_there { patience & RANK } else { patience.saturating_add(RANK + 1) });
+            self.patience.push(patience_after(patience, is_there));
         }
         self.add_node(hash, configuration, parent, paid)
     }
@@ -365,8 +295,7 @@ impl<'a> Search<'a> {
         self.configurations.extend_from_slice(configuration);
         let start = self.orders.len();
         self.orders.extend(0..configuration.len() as Agent);
-        let patience = &self.patience[start..];
-        self.orders[start..].sort_unstable_by_key(|&agent| std::cmp::Reverse(patience[agent as usize]));
+        sort_by_patience(&mut self.orders[start..], &self.patience[start..]);
         let twin = self.known.insert(hash, node).unwrap_or(NONE);
         let constraints = Some(Constraints::default());
         self.nodes.push(Node { parent, paid, ahead, constraints, edges: NONE, twin });
@@ -418,9 +347,6 @@ impl<'a> Search<'a> {
         }
     }
 }
-
-/// The part of an agent's patience that never changes, so that no two agents are equal.
-const RANK: u32 = 0xf_ffff;
 
 /// The loss of a step.
 fn lost(loss: Loss, from: &[Vertex], to: &[Vertex], goals: &[Vertex]) -> u64 {

@@ -235,6 +235,19 @@ fn bad_input_has_an_answer() {
 }
 
 #[test]
+fn who_is_stuck_in_a_part_of_the_map_is_found_among_many() {
+    let rows = ["..#.......", "##........", ".........."];
+    let starts: Vec<(u16, u16)> = (3..10).map(|col| (1, col)).chain([(0, 0), (0, 1)]).collect();
+    let mut goals: Vec<(u16, u16)> = (3..10).map(|col| (2, 12 - col)).chain([(0, 1), (0, 0)]).collect();
+    assert_eq!(
+        lacam(0).plan(&problem(&rows, &starts, &goals), &Budget::default()).to_string(),
+        "impossible: all that agents [7, 8] can do in their part of the map was tried"
+    );
+    goals.swap(7, 8);
+    assert!(lacam(0).plan(&problem(&rows, &starts, &goals), &Budget::default()).solution().is_some());
+}
+
+#[test]
 fn a_budget_of_nothing_is_timed_out_with_a_valid_beginning() {
     let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
     let map = Map::from_rows(&["....", "...."]).unwrap();

@@ -8,8 +8,8 @@ use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
 use crate::graph::Vertex;
-use crate::pibt::Agent;
 use crate::refine::team::Team;
+use crate::stepper::Agent;
 
 /// How agents are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -40,7 +40,8 @@ pub(crate) struct Detours {
     labels: Vec<Label>,
     /// Labels by the arrival they promise, counted from that of the start.
     buckets: Vec<Vec<u32>>,
-    /// For each vertex and start of an interval, the best time there, counted down from `epoch`.
+    num_vertices: usize,
+    /// For each start of an interval and vertex, the best time there, counted down from `epoch`.
     best: Vec<u32>,
     epoch: u32,
     num_expanded: u64,
@@ -55,7 +56,7 @@ impl Detours {
     /// For so many vertices and times.
     pub fn new(num_vertices: usize, span: u32) -> Self {
         let best = vec![0; num_vertices * span as usize];
-        Self { labels: Vec::new(), buckets: Vec::new(), best, epoch: 0, num_expanded: 0 }
+        Self { labels: Vec::new(), buckets: Vec::new(), num_vertices, best, epoch: 0, num_expanded: 0 }
     }
 
     /// Labels expanded so far.
@@ -112,26 +113,23 @@ impl Detours {
         let label = self.labels[index as usize];
         let around = graph.neighbours(label.vertex);
         let turn = trip.dice.rotate_left(index % 32) as usize;
-        for slot in 0..around.len() {
-            let vertex = around[(slot + turn) % around.len()];
-            self.reach(taken, trip, (index, label), vertex);
+        for slot in 0..4 {
+            if let Some(&vertex) = around.get((slot + turn) % 4) {
+                self.reach(taken, trip, (index, label), vertex);
+            }
         }
     }
 
     /// Makes a label for each safe interval of a neighbour that can be reached.
+    #[inline]
     fn reach(&mut self, taken: &Reservations, trip: Trip<'_>, (parent, label): (u32, Label), vertex: Vertex) {
         let span = taken.span();
         let ahead = trip.costs[vertex as usize];
         let latest = trip.latest.min(span - 1);
-        let mut since = label.time + 1;
-        if since >= span {
+        if label.time + 1 + ahead > latest {
             return;
         }
-        since = if taken.is_busy(vertex, since) {
-            taken.next_free(vertex, since)
-        } else {
-            taken.free_since(vertex, since)
-        };
+        let mut since = taken.free_since_or_next(vertex, label.time + 1);
         while since <= label.until + 1 && since < span {
             let time = since.max(label.time + 1);
             if time + ahead > latest {
@@ -139,7 +137,7 @@ impl Detours {
             }
             let end = taken.next_busy(vertex, time);
             let is_met = time == since && taken.is_met(label.vertex, vertex, time);
-            let best = &mut self.best[(vertex * span + since) as usize];
+            let best = &mut self.best[since as usize * self.num_vertices + vertex as usize];
             let rank = self.epoch + (span - 1 - time);
             if !is_met && *best < rank {
                 *best = rank;

@@ -21,8 +21,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
-use crate::pibt::Agent;
 use crate::problem::Problem;
+use crate::stepper::Agent;
 use choice::{Choice, below};
 use detour::{Detours, Trip};
 use reservations::{Path, Reservations};
@@ -61,6 +61,9 @@ pub(crate) fn bytes(problem: &Problem, num_steps: usize) -> usize {
 pub(crate) fn fits(problem: &Problem) -> bool {
     (1..Reservations::MOST_AGENTS).contains(&problem.num_agents())
 }
+
+/// Orders in which all agents are planned anew at the beginning.
+const ORDERS: usize = 4;
 
 impl<'a> Refiner<'a> {
     /// Begins with a valid plan that all refiners have in common.
@@ -122,6 +125,27 @@ impl<'a> Refiner<'a> {
         self.exchange(&paths);
     }
 
+    /// Attempts to plan all agents anew, in some orders, unless it is told to stop.
+    pub fn begin(&mut self, mut stop: impl FnMut() -> bool) {
+        for order in 0..ORDERS {
+            if self.team.total_delay() == 0 || stop() {
+                return;
+            }
+            self.agents.clear();
+            self.agents.extend(0..self.team.num_agents() as Agent);
+            shuffle(&mut self.agents, &mut self.random);
+            let team = &self.team;
+            match order {
+                0 => self.agents.sort_by_key(|&agent| std::cmp::Reverse(team.least(agent))),
+                1 => self.agents.sort_by_key(|&agent| std::cmp::Reverse(team.delay(agent))),
+                _ => {}
+            }
+            if self.repair(&mut stop) {
+                self.publish();
+            }
+        }
+    }
+
     /// One attempt to make the plan better; whether it did.
     pub fn improve(&mut self) -> bool {
         self.take_over();
@@ -134,7 +158,7 @@ impl<'a> Refiner<'a> {
         self.agents.extend_from_slice(chosen);
         shuffle(&mut self.agents, &mut self.random);
         let before = self.team.total_delay();
-        let is_changed = self.repair() && self.publish();
+        let is_changed = self.repair(|| false) && self.publish();
         let gain = before.saturating_sub(self.team.total_delay()) as f64;
         let work = (self.detours.num_expanded() - work + 100) as f64;
         self.choice.reward(if is_changed { gain.min(64.0) * 1000.0 / work } else { 0.0 });
@@ -142,7 +166,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Plans the agents anew in their order, with no more delay in sum; if that fails, they keep their paths.
-    fn repair(&mut self) -> bool {
+    fn repair(&mut self, mut stop: impl FnMut() -> bool) -> bool {
         let mut left: u64 = self.agents.iter().map(|&agent| self.team.delay(agent)).sum();
         if left == 0 {
             return false;
@@ -152,7 +176,7 @@ impl<'a> Refiner<'a> {
         self.new.resize_with(self.agents.len().max(self.new.len()), Path::new);
         for index in 0..self.agents.len() {
             let agent = self.agents[index];
-            if !self.find(agent, left, index) {
+            if stop() || !self.find(agent, left, index) {
                 self.agents[..index].iter().for_each(|&agent| self.team.lift(agent));
                 for (&agent, path) in self.agents.iter().zip(&self.old) {
                     self.team.put(agent, path);

@@ -1,7 +1,7 @@
 //! Who is where and when: the paths that a new one has to keep clear of.
 
 use crate::graph::Vertex;
-use crate::pibt::Agent;
+use crate::stepper::Agent;
 
 /// Where an agent is at each time until it stays; it then stays for good.
 pub(crate) type Path = Vec<Vertex>;
@@ -94,20 +94,24 @@ impl Reservations {
     }
 
     /// Whether somebody is at a vertex at a time.
+    #[inline]
     pub fn is_busy(&self, vertex: Vertex, time: u32) -> bool {
         self.busy[vertex as usize * self.words + time as usize / 64] >> (time % 64) & 1 == 1
     }
 
     /// The first time from one on at which a vertex is taken, or the span.
+    #[inline]
     pub fn next_busy(&self, vertex: Vertex, from: u32) -> u32 {
         self.next(vertex, from, 0)
     }
 
     /// The first time from one on at which a vertex is free, or the span.
+    #[inline]
     pub fn next_free(&self, vertex: Vertex, from: u32) -> u32 {
         self.next(vertex, from, u64::MAX)
     }
 
+    #[inline]
     fn next(&self, vertex: Vertex, from: u32, flip: u64) -> u32 {
         let row = &self.busy[vertex as usize * self.words..][..self.words];
         let first = from as usize / 64;
@@ -122,8 +126,14 @@ impl Reservations {
         self.span()
     }
 
-    /// Since when a vertex has been free that is free at a time.
-    pub fn free_since(&self, vertex: Vertex, time: u32) -> u32 {
+    /// Since when a vertex has been free that is free at a time, or else when it is next, or the span.
+    #[inline]
+    pub fn free_since_or_next(&self, vertex: Vertex, time: u32) -> u32 {
+        if self.is_busy(vertex, time) { self.next_free(vertex, time) } else { self.free_since(vertex, time) }
+    }
+
+    #[inline]
+    fn free_since(&self, vertex: Vertex, time: u32) -> u32 {
         let row = &self.busy[vertex as usize * self.words..][..self.words];
         let mut mask = u64::MAX >> (63 - time % 64);
         for index in (0..=time as usize / 64).rev() {
@@ -137,6 +147,7 @@ impl Reservations {
     }
 
     /// Whether somebody comes the other way as an agent goes, to be there at a time.
+    #[inline]
     pub fn is_met(&self, from: Vertex, to: Vertex, time: u32) -> bool {
         let before = self.who[to as usize * self.span + time as usize - 1];
         before != NOBODY && before == self.who[from as usize * self.span + time as usize]

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::pibt::Agent;
 use crate::refine::reservations::Path;
+use crate::stepper::Agent;
 
 /// New paths of some agents.
 #[derive(Debug)]

@@ -2,9 +2,9 @@
 
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
-use crate::pibt::Agent;
 use crate::problem::Problem;
 use crate::refine::reservations::{Path, Reservations};
+use crate::stepper::Agent;
 
 /// What a step after the cap costs, so that coming in time goes before all else.
 const LATE: u64 = 1 << 20;
