@@ -34,7 +34,7 @@ use crate::window::Window;
 pub struct Params {
     /// Steps between two plannings; new goals and surprises are planned for at once. Units: steps.
     pub simulation_window: usize,
-    /// Steps that are free of conflicts. Units: steps.
+    /// Steps that are free of conflicts, from 1 to [`Rhcr::LONGEST_WINDOW`]. Units: steps.
     pub planning_window: usize,
     /// How a window is planned.
     pub solver: Solver,
@@ -64,7 +64,7 @@ impl Default for Params {
             simulation_window: 1,
             planning_window: 20,
             solver: Solver::Neighbourhoods,
-            most_searches: 1000,
+            most_searches: 500,
             seed: 0,
         }
     }
@@ -85,12 +85,16 @@ pub struct Rhcr {
 }
 
 impl Rhcr {
+    /// Most steps that are planned for.
+    pub const LONGEST_WINDOW: usize = 1000;
+
     /// A planner for a map.
-    pub fn new(graph: Arc<Graph>, params: Params) -> Self {
+    pub fn new(graph: Arc<Graph>, mut params: Params) -> Self {
+        params.planning_window = params.planning_window.clamp(1, Self::LONGEST_WINDOW);
         Self {
             distances: Distances::new(graph.clone(), Distances::DEFAULT_BYTES),
             sipp: Sipp::new(graph.clone()),
-            window: Window::new(graph, params.planning_window.max(1)),
+            window: Window::new(graph, params.planning_window),
             goals: Vec::new(),
             age: 0,
             rng: Pcg64Mcg::seed_from_u64(params.seed),
@@ -172,7 +176,7 @@ impl Rhcr {
 
     /// Plans for the whole window, and keeps what is left of the last plan if that fails or costs more.
     fn plan_anew(&mut self, now: &[Vertex], legs: &[Vec<Leg>], clock: &mut Clock) {
-        let horizon = Horizon::Window(self.params.planning_window.max(1) as u32);
+        let horizon = Horizon::Window(self.params.planning_window as u32);
         let setting = Setting { starts: now, legs, horizon, salt: self.rng.next_u32() };
         let graph = self.distances.graph().clone();
         let found = match self.params.solver {
@@ -198,7 +202,7 @@ impl Lifelong for Rhcr {
 
     fn reset(&mut self) {
         let graph = self.distances.graph().clone();
-        self.window = Window::new(graph, self.params.planning_window.max(1));
+        self.window = Window::new(graph, self.params.planning_window);
         self.goals.clear();
         self.age = 0;
         self.rng = Pcg64Mcg::seed_from_u64(self.params.seed);

@@ -34,6 +34,8 @@ pub(crate) struct Window {
     paths: Vec<Vec<Vertex>>,
     costs: Vec<u32>,
     reserved: Reservations,
+    /// The old paths of those that are taken out and not yet put back.
+    left: Reservations,
     sipp: Sipp,
     push: Push,
 }
@@ -47,6 +49,7 @@ impl Window {
             paths: Vec::new(),
             costs: Vec::new(),
             reserved: Reservations::new(num_vertices),
+            left: Reservations::new(num_vertices),
             sipp: Sipp::new(graph.clone()),
             push: Push::new(num_vertices),
             graph,
@@ -129,7 +132,7 @@ impl Window {
         rng: &mut Pcg64Mcg,
     ) {
         for &agent in changed {
-            if clock.count_node() {
+            if clock.is_spent() {
                 return;
             }
             self.replan(&[agent], legs, clock, rng);
@@ -137,9 +140,6 @@ impl Window {
         while !clock.is_spent() {
             let Some(seed) = self.choose_late(legs, rng) else { return };
             let group = self.group(seed, legs, rng);
-            if clock.count_node() {
-                return;
-            }
             self.replan(&group, legs, clock, rng);
         }
     }
@@ -205,39 +205,57 @@ impl Window {
     }
 
     /// Puts some agents on new ways in a random order, if that is no worse.
-    fn replan(&mut self, group: &[usize], legs: &[Vec<Leg>], clock: &mut Clock, rng: &mut Pcg64Mcg) -> bool {
+    fn replan(&mut self, group: &[usize], legs: &[Vec<Leg>], clock: &mut Clock, rng: &mut Pcg64Mcg) {
         let mut order = group.to_vec();
         shuffle(&mut order, rng);
         for &agent in &order {
             self.reserved.remove(agent, &self.paths[agent], false);
+            self.left.add(agent, &self.paths[agent], false);
         }
-        let most: u64 = order.iter().map(|&agent| u64::from(self.costs[agent])).sum();
-        let (mut found, mut total) = (Vec::with_capacity(order.len()), 0);
-        for &agent in &order {
-            clock.count_node();
-            let Some(way) = self.find(agent, legs, rng.next_u32()) else { break };
-            total += u64::from(way.1);
-            if total > most {
-                break;
-            }
-            self.reserved.add(agent, &way.0, false);
-            found.push(way);
+        let found = self.find_all(&order, legs, clock, rng);
+        for &agent in order.iter().skip(found.len()) {
+            self.left.remove(agent, &self.paths[agent], false);
         }
-        let is_better = found.len() == order.len();
-        if is_better {
+        if found.len() == order.len() {
             for (&agent, (path, cost)) in order.iter().zip(found) {
                 self.paths[agent] = path;
                 self.costs[agent] = cost;
             }
-        } else {
-            for (&agent, (path, _)) in order.iter().zip(&found) {
-                self.reserved.remove(agent, path, false);
-            }
-            for &agent in &order {
-                self.reserved.add(agent, &self.paths[agent], false);
-            }
+            return;
         }
-        is_better
+        for (&agent, (path, _)) in order.iter().zip(&found) {
+            self.reserved.remove(agent, path, false);
+        }
+        for &agent in &order {
+            self.reserved.add(agent, &self.paths[agent], false);
+        }
+    }
+
+    /// The new ways of those first in the order, as far as there are some that are no worse than the old ones.
+    fn find_all(
+        &mut self,
+        order: &[usize],
+        legs: &[Vec<Leg>],
+        clock: &mut Clock,
+        rng: &mut Pcg64Mcg,
+    ) -> Vec<(Vec<Vertex>, u32)> {
+        let most: u64 = order.iter().map(|&agent| u64::from(self.costs[agent])).sum();
+        let (mut found, mut total) = (Vec::with_capacity(order.len()), 0);
+        for &agent in order {
+            if clock.count_node() {
+                break;
+            }
+            self.left.remove(agent, &self.paths[agent], false);
+            let way = self.find(agent, legs, rng.next_u32());
+            total += way.as_ref().map_or(0, |way| u64::from(way.1));
+            let Some(way) = way.filter(|_| total <= most) else {
+                self.left.add(agent, &self.paths[agent], false);
+                break;
+            };
+            self.reserved.add(agent, &way.0, false);
+            found.push(way);
+        }
+        found
     }
 
     fn find(&mut self, agent: usize, legs: &[Vec<Leg>], salt: u32) -> Option<(Vec<Vertex>, u32)> {
@@ -245,7 +263,7 @@ impl Window {
             start: self.paths[agent][0],
             legs: &legs[agent],
             reserved: &self.reserved,
-            avoided: None,
+            avoided: Some(&self.left),
             banned: &[],
             horizon: Horizon::Window(self.num_steps as u32),
             order: Order::Cost,

@@ -74,7 +74,9 @@ fn displace(world: &mut World, rng: &mut Pcg64Mcg) {
 fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
     for (seed, solver) in (0..24).zip(SOLVERS.into_iter().cycle()) {
         let mut world = World::new(seed, 7, 4 + (seed % 12) as usize);
-        let mut planner = Rhcr::new(world.graph.clone(), params(solver));
+        let planning_window = [0, 1, 3, 8, 20][(seed % 5) as usize];
+        let params = Params { planning_window, ..params(solver) };
+        let mut planner = Rhcr::new(world.graph.clone(), params);
         let mut rng = rng(seed);
         for step in 0..60 {
             let goals = world.present_goals();
