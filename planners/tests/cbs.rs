@@ -7,8 +7,7 @@ mod common;
 use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_maps::{Verdict, search};
-use pogema_planners::cbs::{Cbs, Params};
-use pogema_planners::{Budget, Outcome, Planner};
+use pogema_planners::{Budget, Cbs, CbsParams, Outcome, Planner};
 
 #[test]
 fn no_plan_costs_less() {
@@ -70,5 +69,5 @@ fn spent_budgets_end_the_search() {
 
 #[test]
 fn the_same_seed_gives_the_same_plan() {
-    check_repeats(|| Box::new(Cbs::new(Params { seed: 7 })));
+    check_repeats(|| Box::new(Cbs::new(CbsParams { seed: 7 })));
 }
