@@ -41,6 +41,9 @@ pub(crate) struct Window {
 }
 
 impl Window {
+    /// Neighbourhoods tried in vain for each agent that loses time, before it is left at that.
+    const PATIENCE: usize = 16;
+
     /// A window of so many steps, with nobody in it.
     pub(crate) fn new(graph: Arc<Graph>, num_steps: usize) -> Self {
         let num_vertices = graph.num_vertices();
@@ -137,25 +140,33 @@ impl Window {
             }
             self.replan(&[agent], legs, clock, rng);
         }
+        let mut num_in_vain = 0;
         while !clock.is_spent() {
-            let Some(seed) = self.choose_late(legs, rng) else { return };
+            let Some((seed, num_late)) = self.choose_late(legs, rng) else { return };
+            if num_in_vain > Self::PATIENCE * (1 + num_late) {
+                return;
+            }
             let group = self.group(seed, legs, rng);
+            let before = self.total_cost();
             self.replan(&group, legs, clock, rng);
+            num_in_vain = if self.total_cost() < before { 0 } else { num_in_vain + 1 };
         }
     }
 
-    /// An agent that loses time, the more likely the more it loses.
-    fn choose_late(&self, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> Option<usize> {
+    /// An agent that loses time, the more likely the more it loses, and how many there are.
+    fn choose_late(&self, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> Option<(usize, usize)> {
         let delay = |agent: usize| {
             u64::from(self.costs[agent].saturating_sub(least(&self.paths[agent], &legs[agent])))
         };
+        let num_late = (0..self.paths.len()).filter(|&agent| delay(agent) > 0).count();
         let total: u64 = (0..self.paths.len()).map(delay).sum();
         let mut at = u64::from(rng.next_u32()).checked_rem(total)?;
-        (0..self.paths.len()).find(|&agent| {
+        let seed = (0..self.paths.len()).find(|&agent| {
             let found = at < delay(agent);
             at = at.saturating_sub(delay(agent));
             found
-        })
+        });
+        seed.map(|seed| (seed, num_late))
     }
 
     /// The agent and those that keep it from going straight on.
