@@ -16,7 +16,7 @@ fn no_plan_costs_less() {
         let num_agents = 2 + (seed % 3) as usize;
         let (height, width) = [(2, 3), (3, 3), (2, 5), (4, 3)][(seed / 3 % 4) as usize];
         let case = Case::random(&mut rng(seed), height, width, num_agents);
-        let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(5000));
+        let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(1500));
         let plan = case.check(&outcome);
         match search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
             Verdict::Solvable { sum_of_costs } => {
@@ -36,7 +36,7 @@ fn no_plan_costs_less() {
             }
         }
     }
-    assert!(counts[0] > 500 && counts[1] > 500 && counts[2] < 50, "{counts:?}");
+    assert!(counts[0] > 500 && counts[1] > 500 && counts[2] < 100, "{counts:?}");
 }
 
 #[test]
