@@ -26,7 +26,7 @@ use crate::tree::{Aim, Doubt, Low, Node, split};
 
 /// How [`Cbs`] plans.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Params {
+pub struct CbsParams {
     /// Chooses among what is equally good.
     pub seed: u64,
 }
@@ -37,12 +37,12 @@ pub struct Params {
 /// long as the budget allows.
 #[derive(Clone, Debug, Default)]
 pub struct Cbs {
-    params: Params,
+    params: CbsParams,
 }
 
 impl Cbs {
     /// A planner with these settings.
-    pub fn new(params: Params) -> Self {
+    pub fn new(params: CbsParams) -> Self {
         Self { params }
     }
 }

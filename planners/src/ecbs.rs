@@ -5,7 +5,7 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | w | `Params::weight` |
+//! | w | `EcbsParams::weight` |
 //! | LB | `lower_bound` |
 //! | OPEN, FOCAL | `open`, `focal`; what is in the first alone is in `dear` |
 //! | fmin(i) | `Node::least` |
@@ -24,14 +24,14 @@ use crate::tree::{Aim, Doubt, Low, Node, split};
 
 /// How [`Ecbs`] plans.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Params {
+pub struct EcbsParams {
     /// How many times the least a plan may cost; 1 and less mean optimal plans.
     pub weight: f64,
     /// Chooses among what is equally good.
     pub seed: u64,
 }
 
-impl Default for Params {
+impl Default for EcbsParams {
     fn default() -> Self {
         Self { weight: 1.2, seed: 0 }
     }
@@ -39,15 +39,15 @@ impl Default for Params {
 
 /// Planning within a bound. A node of its budget is a node of the constraint tree.
 ///
-/// It proves that there is no plan where [`crate::cbs::Cbs`] does.
+/// It proves that there is no plan where [`crate::Cbs`] does.
 #[derive(Clone, Debug, Default)]
 pub struct Ecbs {
-    params: Params,
+    params: EcbsParams,
 }
 
 impl Ecbs {
     /// A planner with these settings.
-    pub fn new(params: Params) -> Self {
+    pub fn new(params: EcbsParams) -> Self {
         Self { params }
     }
 }

@@ -3,8 +3,8 @@
 //! A [`Problem`] is agents on a map, each with a start and a goal; a [`Planner`] makes a [`Plan`] of it within a
 //! [`Budget`] and says what it found out, its [`Outcome`]. [`validate`] checks anyone's plan.
 //!
-//! [`sipp`] finds the way of one agent past others, [`pbs`], [`cbs`] and [`ecbs`] plan whole problems with it, and
-//! [`rhcr`] plans for agents that get a new goal whenever they reach one, as every [`Lifelong`] does.
+//! [`sipp`] finds the way of one agent past others, [`Pbs`], [`Cbs`] and [`Ecbs`] plan whole problems with it, and
+//! [`Rhcr`] plans for agents that get a new goal whenever they reach one, as every [`Lifelong`] does.
 //!
 //! [`planner()`] and [`lifelong()`] make a planner by its name; [`PlannerPolicy`] and [`LifelongPolicy`] let one drive any
 //! environment.
@@ -12,11 +12,11 @@
 //! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; its random numbers come in from outside.
 
 mod astar;
-pub mod cbs;
+mod cbs;
 mod conflict;
 mod constraints;
 mod distances;
-pub mod ecbs;
+mod ecbs;
 mod graph;
 mod guide;
 mod heap;
@@ -26,7 +26,7 @@ mod lifelong;
 mod mdd;
 mod names;
 mod parts;
-pub mod pbs;
+mod pbs;
 mod pibt;
 mod plan;
 mod plan_text;
@@ -35,7 +35,7 @@ mod problem;
 mod push;
 mod refine;
 mod reservations;
-pub mod rhcr;
+mod rhcr;
 mod search;
 pub mod sipp;
 mod stepper;
@@ -44,17 +44,21 @@ mod validate;
 mod window;
 
 pub use astar::{AStarAgent, AStarTeam, View};
+pub use cbs::{Cbs, CbsParams};
 pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
+pub use ecbs::{Ecbs, EcbsParams};
 pub use graph::{Graph, Vertex};
 pub use guide::GuideParams;
 pub use lacam::{Lacam, LacamParams};
 pub use lifelong::Lifelong;
 pub use names::{Choice, LIFELONG, PLANNERS, lifelong, planner};
+pub use pbs::{Pbs, PbsParams};
 pub use pibt::{Pibt, PibtLifelong, PibtParams};
 pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
 pub use policy::{LifelongPolicy, PlannerPolicy};
 pub use problem::{Budget, Clock, Outcome, Planner, Problem};
 pub use reservations::Reservations;
+pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub use stepper::PibtRules;
 pub use validate::{Conflict, ConflictKind, validate};

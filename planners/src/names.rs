@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use pogema_core::Error;
 
+use crate::cbs::{Cbs, CbsParams};
+use crate::ecbs::{Ecbs, EcbsParams};
 use crate::graph::Graph;
 use crate::guide::GuideParams;
 use crate::lacam::{Lacam, LacamParams};
 use crate::lifelong::Lifelong;
+use crate::pbs::{Pbs, PbsParams};
 use crate::pibt::{Pibt, PibtLifelong, PibtParams};
 use crate::problem::Planner;
-use crate::{cbs, ecbs, pbs, rhcr};
+use crate::rhcr::{Rhcr, RhcrParams};
 
 /// What is chosen of a planner from outside, whichever it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,9 +55,9 @@ pub fn planner(name: &str, choice: Choice) -> Result<Box<dyn Planner>, Error> {
     Ok(match name {
         "lacam" => Box::new(Lacam::new(LacamParams { seed, threads, ..LacamParams::default() })),
         "pibt" => Box::new(Pibt::new(PibtParams { seed, ..PibtParams::default() })),
-        "pbs" => Box::new(pbs::Pbs::new(pbs::Params { seed })),
-        "ecbs" => Box::new(ecbs::Ecbs::new(ecbs::Params { seed, ..ecbs::Params::default() })),
-        "cbs" => Box::new(cbs::Cbs::new(cbs::Params { seed })),
+        "pbs" => Box::new(Pbs::new(PbsParams { seed })),
+        "ecbs" => Box::new(Ecbs::new(EcbsParams { seed, ..EcbsParams::default() })),
+        "cbs" => Box::new(Cbs::new(CbsParams { seed })),
         _ => return Err(unknown(name, &PLANNERS)),
     })
 }
@@ -66,7 +69,7 @@ pub fn planner(name: &str, choice: Choice) -> Result<Box<dyn Planner>, Error> {
 pub fn lifelong(name: &str, graph: Arc<Graph>, choice: Choice) -> Result<Box<dyn Lifelong>, Error> {
     let seed = choice.seed;
     Ok(match name {
-        "rhcr" => Box::new(rhcr::Rhcr::new(graph, rhcr::Params { seed, ..rhcr::Params::default() })),
+        "rhcr" => Box::new(Rhcr::new(graph, RhcrParams { seed, ..RhcrParams::default() })),
         "pibt" => Box::new(PibtLifelong::new(graph, 0, PibtParams { seed, ..PibtParams::default() })),
         "guided-pibt" => {
             let guide = Some(GuideParams::default());

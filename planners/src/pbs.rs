@@ -19,7 +19,7 @@ use crate::sipp::{Order, Sipp, Task};
 
 /// How [`Pbs`] plans.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Params {
+pub struct PbsParams {
     /// Chooses among what is equally good.
     pub seed: u64,
 }
@@ -30,12 +30,12 @@ pub struct Params {
 /// A node of its budget is one search for one agent.
 #[derive(Clone, Debug, Default)]
 pub struct Pbs {
-    params: Params,
+    params: PbsParams,
 }
 
 impl Pbs {
     /// A planner with these settings.
-    pub fn new(params: Params) -> Self {
+    pub fn new(params: PbsParams) -> Self {
         Self { params }
     }
 }

@@ -4,9 +4,9 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | h, simulation window | `Params::simulation_window` |
-//! | w, planning window | `Params::planning_window` |
-//! | MAPF solver | `Params::solver` |
+//! | h, simulation window | `RhcrParams::simulation_window` |
+//! | w, planning window | `RhcrParams::planning_window` |
+//! | MAPF solver | `RhcrParams::solver` |
 //!
 //! The paper's agents know their next goals. Here they do not, unless told by [`Rhcr::next_foreseeing`]; so agents
 //! plan to their present goals and then only keep out of the way, and plan again when one of them gets a new goal.
@@ -31,13 +31,13 @@ use crate::window::Window;
 
 /// How [`Rhcr`] plans.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Params {
+pub struct RhcrParams {
     /// Steps between two plannings; new goals and surprises are planned for at once. Units: steps.
     pub simulation_window: usize,
-    /// Steps that are free of conflicts. Units: steps.
+    /// Steps that are free of conflicts, from 1 to [`Rhcr::LONGEST_WINDOW`]. Units: steps.
     pub planning_window: usize,
     /// How a window is planned.
-    pub solver: Solver,
+    pub solver: WindowSolver,
     /// Searches for one agent that a planning may take, whatever the budget.
     pub most_searches: u64,
     /// Chooses among what is equally good.
@@ -46,7 +46,7 @@ pub struct Params {
 
 /// How a window is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Solver {
+pub enum WindowSolver {
     /// The last plan goes on, agents push each other past its end, and a large-neighbourhood search improves it.
     Neighbourhoods,
     /// Priority-based search, as in the paper.
@@ -58,23 +58,23 @@ pub enum Solver {
     },
 }
 
-impl Default for Params {
+impl Default for RhcrParams {
     fn default() -> Self {
         Self {
             simulation_window: 1,
             planning_window: 20,
-            solver: Solver::Neighbourhoods,
-            most_searches: 1000,
+            solver: WindowSolver::Neighbourhoods,
+            most_searches: 500,
             seed: 0,
         }
     }
 }
 
-/// Rolling-horizon planning. A node of its budget is one search for one agent, or with [`Solver::Ecbs`] one node of
+/// Rolling-horizon planning. A node of its budget is one search for one agent, or with [`WindowSolver::Ecbs`] one node of
 /// the constraint tree.
 #[derive(Debug)]
 pub struct Rhcr {
-    params: Params,
+    params: RhcrParams,
     distances: Distances,
     sipp: Sipp,
     window: Window,
@@ -85,12 +85,16 @@ pub struct Rhcr {
 }
 
 impl Rhcr {
+    /// Most steps that are planned for.
+    pub const LONGEST_WINDOW: usize = 1000;
+
     /// A planner for a map.
-    pub fn new(graph: Arc<Graph>, params: Params) -> Self {
+    pub fn new(graph: Arc<Graph>, mut params: RhcrParams) -> Self {
+        params.planning_window = params.planning_window.clamp(1, Self::LONGEST_WINDOW);
         Self {
             distances: Distances::new(graph.clone(), Distances::DEFAULT_BYTES),
             sipp: Sipp::new(graph.clone()),
-            window: Window::new(graph, params.planning_window.max(1)),
+            window: Window::new(graph, params.planning_window),
             goals: Vec::new(),
             age: 0,
             rng: Pcg64Mcg::seed_from_u64(params.seed),
@@ -163,8 +167,10 @@ impl Rhcr {
         if is_due {
             self.age = 0;
             match self.params.solver {
-                Solver::Neighbourhoods => self.window.improve(&legs, &changed, &mut clock, &mut self.rng),
-                Solver::Pbs | Solver::Ecbs { .. } => self.plan_anew(now, &legs, &mut clock),
+                WindowSolver::Neighbourhoods => {
+                    self.window.improve(&legs, &changed, &mut clock, &mut self.rng);
+                }
+                WindowSolver::Pbs | WindowSolver::Ecbs { .. } => self.plan_anew(now, &legs, &mut clock),
             }
         }
         self.window.after(1).collect()
@@ -172,17 +178,19 @@ impl Rhcr {
 
     /// Plans for the whole window, and keeps what is left of the last plan if that fails or costs more.
     fn plan_anew(&mut self, now: &[Vertex], legs: &[Vec<Leg>], clock: &mut Clock) {
-        let horizon = Horizon::Window(self.params.planning_window.max(1) as u32);
+        let horizon = Horizon::Window(self.params.planning_window as u32);
         let setting = Setting { starts: now, legs, horizon, salt: self.rng.next_u32() };
         let graph = self.distances.graph().clone();
         let found = match self.params.solver {
-            Solver::Ecbs { weight } => {
+            WindowSolver::Ecbs { weight } => {
                 match ecbs::search(&mut self.sipp, &graph, &setting, weight, clock, |_| None) {
                     Found::Paths { paths, .. } => Some(paths),
                     Found::Nothing | Found::Proof(_) => None,
                 }
             }
-            Solver::Pbs | Solver::Neighbourhoods => pbs::search(&mut self.sipp, &graph, &setting, clock),
+            WindowSolver::Pbs | WindowSolver::Neighbourhoods => {
+                pbs::search(&mut self.sipp, &graph, &setting, clock)
+            }
         };
         if let Some(paths) = found.filter(|paths| paths.total_cost() <= self.window.total_cost()) {
             let path = |agent| paths.path(agent).to_vec();
@@ -198,7 +206,7 @@ impl Lifelong for Rhcr {
 
     fn reset(&mut self) {
         let graph = self.distances.graph().clone();
-        self.window = Window::new(graph, self.params.planning_window.max(1));
+        self.window = Window::new(graph, self.params.planning_window);
         self.goals.clear();
         self.age = 0;
         self.rng = Pcg64Mcg::seed_from_u64(self.params.seed);

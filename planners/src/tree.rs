@@ -167,9 +167,9 @@ pub(crate) struct Doubt {
 
 impl Doubt {
     /// Nodes after which the doubt arises.
-    const AFTER: u64 = 500;
+    const AFTER: u64 = 100;
     /// Most joint places that are looked at.
-    const MOST_PLACES: usize = 300_000;
+    const MOST_PLACES: usize = 100_000;
 
     /// Counts a node; the reason why there is no plan, once it is found.
     pub(crate) fn count(&mut self, problem: &Problem, clock: &mut Clock) -> Option<String> {

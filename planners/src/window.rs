@@ -34,11 +34,16 @@ pub(crate) struct Window {
     paths: Vec<Vec<Vertex>>,
     costs: Vec<u32>,
     reserved: Reservations,
+    /// The old paths of those that are taken out and not yet put back.
+    left: Reservations,
     sipp: Sipp,
     push: Push,
 }
 
 impl Window {
+    /// Neighbourhoods tried in vain for each agent that loses time, before it is left at that.
+    const PATIENCE: usize = 16;
+
     /// A window of so many steps, with nobody in it.
     pub(crate) fn new(graph: Arc<Graph>, num_steps: usize) -> Self {
         let num_vertices = graph.num_vertices();
@@ -47,6 +52,7 @@ impl Window {
             paths: Vec::new(),
             costs: Vec::new(),
             reserved: Reservations::new(num_vertices),
+            left: Reservations::new(num_vertices),
             sipp: Sipp::new(graph.clone()),
             push: Push::new(num_vertices),
             graph,
@@ -129,33 +135,38 @@ impl Window {
         rng: &mut Pcg64Mcg,
     ) {
         for &agent in changed {
-            if clock.count_node() {
+            if clock.is_spent() {
                 return;
             }
             self.replan(&[agent], legs, clock, rng);
         }
+        let mut num_in_vain = 0;
         while !clock.is_spent() {
-            let Some(seed) = self.choose_late(legs, rng) else { return };
-            let group = self.group(seed, legs, rng);
-            if clock.count_node() {
+            let Some((seed, num_late)) = self.choose_late(legs, rng) else { return };
+            if num_in_vain > Self::PATIENCE * (1 + num_late) {
                 return;
             }
+            let group = self.group(seed, legs, rng);
+            let before = self.total_cost();
             self.replan(&group, legs, clock, rng);
+            num_in_vain = if self.total_cost() < before { 0 } else { num_in_vain + 1 };
         }
     }
 
-    /// An agent that loses time, the more likely the more it loses.
-    fn choose_late(&self, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> Option<usize> {
+    /// An agent that loses time, the more likely the more it loses, and how many there are.
+    fn choose_late(&self, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> Option<(usize, usize)> {
         let delay = |agent: usize| {
             u64::from(self.costs[agent].saturating_sub(least(&self.paths[agent], &legs[agent])))
         };
+        let num_late = (0..self.paths.len()).filter(|&agent| delay(agent) > 0).count();
         let total: u64 = (0..self.paths.len()).map(delay).sum();
         let mut at = u64::from(rng.next_u32()).checked_rem(total)?;
-        (0..self.paths.len()).find(|&agent| {
+        let seed = (0..self.paths.len()).find(|&agent| {
             let found = at < delay(agent);
             at = at.saturating_sub(delay(agent));
             found
-        })
+        });
+        seed.map(|seed| (seed, num_late))
     }
 
     /// The agent and those that keep it from going straight on.
@@ -205,39 +216,57 @@ impl Window {
     }
 
     /// Puts some agents on new ways in a random order, if that is no worse.
-    fn replan(&mut self, group: &[usize], legs: &[Vec<Leg>], clock: &mut Clock, rng: &mut Pcg64Mcg) -> bool {
+    fn replan(&mut self, group: &[usize], legs: &[Vec<Leg>], clock: &mut Clock, rng: &mut Pcg64Mcg) {
         let mut order = group.to_vec();
         shuffle(&mut order, rng);
         for &agent in &order {
             self.reserved.remove(agent, &self.paths[agent], false);
+            self.left.add(agent, &self.paths[agent], false);
         }
-        let most: u64 = order.iter().map(|&agent| u64::from(self.costs[agent])).sum();
-        let (mut found, mut total) = (Vec::with_capacity(order.len()), 0);
-        for &agent in &order {
-            clock.count_node();
-            let Some(way) = self.find(agent, legs, rng.next_u32()) else { break };
-            total += u64::from(way.1);
-            if total > most {
-                break;
-            }
-            self.reserved.add(agent, &way.0, false);
-            found.push(way);
+        let found = self.find_all(&order, legs, clock, rng);
+        for &agent in order.iter().skip(found.len()) {
+            self.left.remove(agent, &self.paths[agent], false);
         }
-        let is_better = found.len() == order.len();
-        if is_better {
+        if found.len() == order.len() {
             for (&agent, (path, cost)) in order.iter().zip(found) {
                 self.paths[agent] = path;
                 self.costs[agent] = cost;
             }
-        } else {
-            for (&agent, (path, _)) in order.iter().zip(&found) {
-                self.reserved.remove(agent, path, false);
-            }
-            for &agent in &order {
-                self.reserved.add(agent, &self.paths[agent], false);
-            }
+            return;
         }
-        is_better
+        for (&agent, (path, _)) in order.iter().zip(&found) {
+            self.reserved.remove(agent, path, false);
+        }
+        for &agent in &order {
+            self.reserved.add(agent, &self.paths[agent], false);
+        }
+    }
+
+    /// The new ways of those first in the order, as far as there are some that are no worse than the old ones.
+    fn find_all(
+        &mut self,
+        order: &[usize],
+        legs: &[Vec<Leg>],
+        clock: &mut Clock,
+        rng: &mut Pcg64Mcg,
+    ) -> Vec<(Vec<Vertex>, u32)> {
+        let most: u64 = order.iter().map(|&agent| u64::from(self.costs[agent])).sum();
+        let (mut found, mut total) = (Vec::with_capacity(order.len()), 0);
+        for &agent in order {
+            if clock.count_node() {
+                break;
+            }
+            self.left.remove(agent, &self.paths[agent], false);
+            let way = self.find(agent, legs, rng.next_u32());
+            total += way.as_ref().map_or(0, |way| u64::from(way.1));
+            let Some(way) = way.filter(|_| total <= most) else {
+                self.left.add(agent, &self.paths[agent], false);
+                break;
+            };
+            self.reserved.add(agent, &way.0, false);
+            found.push(way);
+        }
+        found
     }
 
     fn find(&mut self, agent: usize, legs: &[Vec<Leg>], salt: u32) -> Option<(Vec<Vertex>, u32)> {
@@ -245,7 +274,7 @@ impl Window {
             start: self.paths[agent][0],
             legs: &legs[agent],
             reserved: &self.reserved,
-            avoided: None,
+            avoided: Some(&self.left),
             banned: &[],
             horizon: Horizon::Window(self.num_steps as u32),
             order: Order::Cost,

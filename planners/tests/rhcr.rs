@@ -10,12 +10,12 @@ use std::time::Duration;
 
 use common::{Case, rng};
 use pogema_core::Map;
-use pogema_planners::rhcr::{Params, Rhcr, Solver};
-use pogema_planners::{Budget, Graph, Lifelong, Plan, Vertex, validate};
+use pogema_planners::{Budget, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, WindowSolver, validate};
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
-const SOLVERS: [Solver; 3] = [Solver::Neighbourhoods, Solver::Pbs, Solver::Ecbs { weight: 1.5 }];
+const SOLVERS: [WindowSolver; 3] =
+    [WindowSolver::Neighbourhoods, WindowSolver::Pbs, WindowSolver::Ecbs { weight: 1.5 }];
 
 /// Agents that get a random goal whenever they reach one.
 struct World {
@@ -58,8 +58,8 @@ impl World {
     }
 }
 
-fn params(solver: Solver) -> Params {
-    Params { solver, planning_window: 8, ..Params::default() }
+fn params(solver: WindowSolver) -> RhcrParams {
+    RhcrParams { solver, planning_window: 8, ..RhcrParams::default() }
 }
 
 fn displace(world: &mut World, rng: &mut Pcg64Mcg) {
@@ -74,7 +74,9 @@ fn displace(world: &mut World, rng: &mut Pcg64Mcg) {
 fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
     for (seed, solver) in (0..24).zip(SOLVERS.into_iter().cycle()) {
         let mut world = World::new(seed, 7, 4 + (seed % 12) as usize);
-        let mut planner = Rhcr::new(world.graph.clone(), params(solver));
+        let planning_window = [0, 1, 3, 8, 20][(seed % 5) as usize];
+        let params = RhcrParams { planning_window, ..params(solver) };
+        let mut planner = Rhcr::new(world.graph.clone(), params);
         let mut rng = rng(seed);
         for step in 0..60 {
             let goals = world.present_goals();
@@ -105,7 +107,8 @@ fn agents_reach_goals_again_and_again() {
 fn agents_that_know_their_next_goals_need_not_plan_every_step() {
     for solver in SOLVERS {
         let mut world = World::new(5, 10, 20);
-        let mut planner = Rhcr::new(world.graph.clone(), Params { simulation_window: 5, ..params(solver) });
+        let mut planner =
+            Rhcr::new(world.graph.clone(), RhcrParams { simulation_window: 5, ..params(solver) });
         for _ in 0..100 {
             let ahead = |(goals, &reached): (&Vec<Vertex>, &usize)| goals[reached..].to_vec();
             let goals: Vec<Vec<Vertex>> = world.goals.iter().zip(&world.reached).map(ahead).collect();
