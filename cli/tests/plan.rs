@@ -19,7 +19,7 @@ const TASK: [&str; 6] = ["--map", "four-rooms", "--num-agents", "4", "--seed", "
 #[test]
 fn every_planner_writes_plans_that_are_valid() {
     let folder = tempfile::tempdir().unwrap();
-    for planner in ["lacam", "pbs", "ecbs", "cbs"] {
+    for planner in ["lacam", "pibt", "pbs", "ecbs", "cbs"] {
         let plan = ["plan", "--planner", planner, "--nodes", "300", "--json", "--out", "plan.txt"];
         let files = ["--result", "result.txt", "--trace", "plan.jsonl"];
         let (text, error, status) = run(folder.path(), &[&plan, files.as_slice(), &TASK].concat());
@@ -64,7 +64,7 @@ fn without_a_plan_the_status_is_one_and_nothing_is_written() {
 #[test]
 fn planners_play_whole_episodes() {
     let folder = tempfile::tempdir().unwrap();
-    for policy in ["lacam", "pbs", "ecbs", "cbs"] {
+    for policy in ["lacam", "pibt", "pbs", "ecbs", "cbs"] {
         let arguments = ["run", "--policy", policy, "--nodes", "300", "--json", "--set", "on_target=nothing"];
         let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
         let (text, error, status) = run(folder.path(), &arguments);
@@ -73,13 +73,15 @@ fn planners_play_whole_episodes() {
         assert_eq!(told["metrics"]["CSR"], 1.0, "{policy}: {told}");
         assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
     }
-    let arguments = ["run", "--policy", "rhcr", "--nodes", "300", "--json", "--on-target", "restart"];
-    let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
-    let (text, error, status) = run(folder.path(), &arguments);
-    assert_eq!((error.as_str(), status), ("", 0));
-    let told: Value = serde_json::from_str(&text).unwrap();
-    assert!(told["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{told}");
-    assert_eq!(told["metrics"]["a_collisions"], 0.0, "{told}");
+    for policy in ["rhcr", "pibt", "guided-pibt"] {
+        let arguments = ["run", "--policy", policy, "--nodes", "300", "--json", "--on-target", "restart"];
+        let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
+        let (text, error, status) = run(folder.path(), &arguments);
+        assert_eq!((error.as_str(), status), ("", 0), "{policy}");
+        let told: Value = serde_json::from_str(&text).unwrap();
+        assert!(told["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{policy}: {told}");
+        assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ OBSTACLES = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0]])
 STARTS, GOALS = [[0, 0], [0, 2]], [[0, 2], [0, 0]]
 
 
-@pytest.mark.parametrize("planner", ["lacam", "pbs", "ecbs", "cbs"])
+@pytest.mark.parametrize("planner", ["lacam", "pibt", "pbs", "ecbs", "cbs"])
 def test_a_plan_is_found_and_valid(planner):
     found = plan(OBSTACLES, STARTS, GOALS, planner, nodes=2000)
     assert found.is_solved
@@ -55,7 +55,7 @@ def test_what_cannot_be_is_an_outcome():
 @pytest.mark.parametrize(
     ("asked", "text"),
     [
-        ({"planner": "none"}, "config: `planner` is `none`, expected `lacam`, `pbs`, `ecbs`, `cbs`"),
+        ({"planner": "none"}, "config: `planner` is `none`, expected `lacam`, `pibt`, `pbs`, `ecbs`, `cbs`"),
         ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is no free cell"),
         ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "of 3 columns"),

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use pogema_conformance::{files, pogema_team, sample};
-use pogema_core::{Action, Error, Trace, shorten};
+use pogema_core::{Action, Error, OnGoal, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_maps::numpy::{Generator, SeedSequence};
-use pogema_planners::{AStarTeam, LifelongPolicy, PlannerPolicy, planner};
+use pogema_planners::{AStarTeam, LIFELONG, LifelongPolicy, PLANNERS, PlannerPolicy, planner};
 
 use crate::plan::Thinking;
 
@@ -24,6 +24,10 @@ pub enum PolicyName {
     Stay,
     /// LaCAM*, which plans for all agents at once
     Lacam,
+    /// PIBT, which decides step by step and promises nothing
+    Pibt,
+    /// PIBT around the traffic, for agents that get goal after goal
+    GuidedPibt,
     /// Priority-based search, for all agents at once
     Pbs,
     /// Bounded-suboptimal conflict-based search, for all agents at once
@@ -71,16 +75,21 @@ impl Policy {
             (PolicyName::Random, None) => Ok(Self::Random(Box::new(generator(config)?))),
             (PolicyName::Astar, None) => Ok(Self::Astar(pogema_team())),
             (PolicyName::Stay, None) => Ok(Self::Stay),
-            (PolicyName::Rhcr, None) => {
-                let policy = LifelongPolicy::new(&name.to_string(), thinking.choice(), thinking.budget()?)?;
-                Ok(Self::Lifelong(Box::new(policy)))
-            }
-            (PolicyName::Lacam | PolicyName::Pbs | PolicyName::Ecbs | PolicyName::Cbs, None) => {
-                let planner = planner(&name.to_string(), thinking.choice())?;
-                let most_steps = u64::try_from(config.max_episode_steps).ok();
-                Ok(Self::Planner(Box::new(PlannerPolicy::new(planner, thinking.budget()?, most_steps))))
-            }
+            (_, None) => Self::planned(&name.to_string(), thinking, config),
         }
+    }
+
+    /// A planner: one for agents that get goal after goal if they do, or if there is no other of the name.
+    fn planned(name: &str, thinking: &Thinking, config: &GridConfig) -> Result<Self, Error> {
+        let has = |known: &[(&str, &str)]| known.iter().any(|(known, _)| *known == name);
+        let is_lifelong = config.rules().on_goal == OnGoal::Restart;
+        if has(&LIFELONG) && (is_lifelong || !has(&PLANNERS)) {
+            let policy = LifelongPolicy::new(name, thinking.choice(), thinking.budget()?)?;
+            return Ok(Self::Lifelong(Box::new(policy)));
+        }
+        let planner = planner(name, thinking.choice())?;
+        let most_steps = u64::try_from(config.max_episode_steps).ok();
+        Ok(Self::Planner(Box::new(PlannerPolicy::new(planner, thinking.budget()?, most_steps))))
     }
 
     /// The actions of the next step; none when a file has no more.
