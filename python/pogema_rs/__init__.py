@@ -11,11 +11,12 @@ Modules under POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `poge
 `pogema_rs.svg_animation.animation_drawer` and `pogema_rs.svg_animation.animation_wrapper`, and `pogema_rs.wrappers`
 with `pogema_rs.wrappers.metrics` and `pogema_rs.wrappers.persistence`.
 
-Modules of our own: `pogema_rs.vec_env`, `pogema_rs.semantics`, `pogema_rs.errors`, `pogema_rs.install` and
-`pogema_rs.wrappers.forwarding`.
+Modules of our own: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
+`pogema_rs.errors`, `pogema_rs.install` and `pogema_rs.wrappers.forwarding`.
 
 Frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
-`pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib` and `pogema_rs.integrations.sample_factory`.
+`pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib`,
+`pogema_rs.integrations.sample_factory` and `pogema_rs.integrations.torchrl`.
 """
 
 from __future__ import annotations

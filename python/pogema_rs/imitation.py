@@ -100,16 +100,18 @@ def _play(
 def _write(path: Path, episodes: list[dict[str, Any]]) -> None:
     """Writes a file as a whole or not at all."""
     solved = [episode for episode in episodes if episode["actions"]]
-    arrays = {
-        name: np.concatenate([np.asarray(episode[name]) for episode in solved]) if solved else np.empty(0)
-        for name in ("observations", "actions", "is_active")
-    }
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([np.asarray(episode[name]) for episode in solved]) if solved else np.empty(0)
+
     numbers = [episode["number"] for episode in solved for _ in episode["actions"]]
     part = path.with_suffix(".part")
     with part.open("wb") as file:
         np.savez_compressed(
             file,
-            **arrays,
+            observations=joined("observations"),
+            actions=joined("actions"),
+            is_active=joined("is_active"),
             episode=np.asarray(numbers, dtype=np.int64),
             seeds=np.asarray([episode["seed"] for episode in solved], dtype=np.int64),
         )
