@@ -1,14 +1,10 @@
 //! Lifelong planning: every step is one that agents may take, whatever happens to them.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use common::{Case, rng};
+use crate::common::{Case, rng};
 use pogema_core::Map;
 use pogema_planners::{Budget, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, WindowSolver, validate};
 use rand_core::Rng;

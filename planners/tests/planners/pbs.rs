@@ -1,10 +1,6 @@
 //! Plans of priority-based search.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
-use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_maps::{Verdict, search};
 use pogema_planners::{Budget, Outcome, Pbs, PbsParams, Planner};
 

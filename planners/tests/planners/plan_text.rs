@@ -1,7 +1,5 @@
 //! Plans as text, written and read.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use pogema_core::{Cell, Map};
 use pogema_planners::{Outcome, Plan, PlanText, Problem, write_plan, write_result};
 

@@ -1,7 +1,5 @@
 //! Plans, their checks and the costs that planners count on.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

@@ -1,7 +1,5 @@
 //! LaCAM* against brute force, against bad input and against its own seed.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

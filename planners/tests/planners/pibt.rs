@@ -1,7 +1,5 @@
 //! PIBT: valid steps whatever happens, for one goal each and for goals without end.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 

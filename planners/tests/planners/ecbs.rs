@@ -1,10 +1,6 @@
 //! Plans within a bound, against a search through all joint places.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
-use common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_maps::{Verdict, search};
 use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner};

@@ -1,13 +1,9 @@
 //! The best way of one agent past others, against a search through all cells and steps.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use common::{Case, rng};
+use crate::common::{Case, rng};
 use pogema_planners::sipp::{Horizon, Leg, Order, Sipp, Task};
 use pogema_planners::{Distances, Graph, Reservations, UNREACHABLE, Vertex};
 use rand_core::Rng;

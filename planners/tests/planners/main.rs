@@ -1,0 +1,14 @@
+//! Tests of the planners, in one program, which is soon linked.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod cbs;
+mod common;
+mod ecbs;
+mod lacam;
+mod pbs;
+mod pibt;
+mod plan_text;
+mod plans;
+mod rhcr;
+mod sipp;
