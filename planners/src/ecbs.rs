@@ -166,8 +166,8 @@ impl Queues {
     /// The node with the fewest conflicts of those within the weight, and the least that any plan costs.
     fn take(&mut self) -> Option<(Entry, u64)> {
         let &(lower_bound, _) = self.open.first()?;
-        let most = lower_bound as f64 * self.weight;
-        while let Some(&(cost, number)) = self.dear.first().filter(|&&(cost, _)| cost as f64 <= most) {
+        let is_within = |cost: u64| is_within(cost, lower_bound, self.weight);
+        while let Some(&(cost, number)) = self.dear.first().filter(|&&(cost, _)| is_within(cost)) {
             self.dear.pop_first();
             let num_conflicts = self.entries[number].as_ref()?.num_conflicts;
             self.focal.insert((num_conflicts, cost, std::cmp::Reverse(number)));
@@ -176,5 +176,24 @@ impl Queues {
         let entry = self.entries[number].take()?;
         self.open.remove(&(entry.node.lower_bound(), number));
         Some((entry, lower_bound))
+    }
+}
+
+/// Whether a cost is at most so many times the least. What rounding takes off is allowed for: the costs of single
+/// agents are rounded one by one, and a sum that then seemed too dear would leave no node at all.
+fn is_within(cost: u64, least: u64, weight: f64) -> bool {
+    cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_within;
+
+    #[test]
+    fn what_is_just_so_many_times_the_least_is_within() {
+        // Nine agents whose paths cost 7 in place of 5; 45 times 1.4 is a little under 63 in floating point.
+        assert!(is_within(63, 45, 1.4));
+        assert!(!is_within(64, 45, 1.4));
+        assert!(is_within(6, 5, 1.2) && !is_within(7, 5, 1.2));
     }
 }
