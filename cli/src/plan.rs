@@ -1,9 +1,9 @@
 //! Plans for whole problems.
 
 mod make;
+mod thinking;
 mod validate;
-mod who;
 
 pub use make::MakePlan;
+pub use thinking::Thinking;
 pub use validate::Validate;
-pub use who::Thinking;

@@ -17,7 +17,7 @@ use crate::output::{check_writable, say};
 use crate::render::Pictures;
 use crate::run::Settings;
 
-use super::who::{Thinking, names};
+use super::thinking::{Thinking, names};
 
 #[derive(Args, Debug)]
 pub struct MakePlan {
@@ -69,7 +69,7 @@ impl MakePlan {
             self.keep(&config, &instance, plan)?;
         }
         if let Some(path) = &self.result {
-            let map = self.settings.what().unwrap_or_default();
+            let map = self.settings.map_word().unwrap_or_default();
             let text = write_result(&map, &self.planner, &problem, &outcome);
             files::write(path, text.as_bytes())?;
         }

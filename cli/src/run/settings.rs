@@ -69,13 +69,17 @@ enum CollisionSystem {
 }
 
 impl Settings {
-    /// The map or config that was asked for.
+    /// The map or config that was asked for, and the seed.
     pub fn what(&self) -> Option<String> {
-        let config = self.config.as_ref().map(|path| path.display().to_string());
-        self.map.clone().or(config).map(|name| match self.seed {
+        self.map_word().map(|name| match self.seed {
             Some(seed) => format!("{name}, seed {seed}"),
             None => name,
         })
+    }
+
+    /// The map or config that was asked for, as it was written.
+    pub fn map_word(&self) -> Option<String> {
+        self.map.clone().or_else(|| self.config.as_ref().map(|path| path.display().to_string()))
     }
 
     /// Whether a map is asked for.
