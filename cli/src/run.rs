@@ -30,6 +30,9 @@ pub struct Run {
     actions: Option<PathBuf>,
     #[command(flatten)]
     thinking: Thinking,
+    /// Tell `--policy rhcr` also of the goals that are still to come
+    #[arg(long)]
+    future_goals: bool,
     /// Draw every step in the terminal
     #[arg(long)]
     render: bool,
@@ -52,6 +55,9 @@ impl Run {
         let mut episode = Episode::start(config, self.trace.is_some() || self.pictures.are_wanted())?;
         for warning in episode.warnings() {
             eprintln!("warning: {warning}");
+        }
+        if self.future_goals {
+            policy.foresee(episode.instance())?;
         }
         let mut screen = self.render.then(|| self.pictures.screen());
         loop {

@@ -117,6 +117,47 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
 }
 
 #[test]
+fn a_policy_may_be_told_of_the_goals_to_come() {
+    let (mut num_known, mut num_unknown) = (0.0, 0.0);
+    for seed in 0..6 {
+        let (config, instance) = drawn(seed, 12, 16, "restart");
+        for is_told in [false, true] {
+            let mut policy =
+                LifelongPolicy::new("rhcr", Choice { seed, threads: 1 }, Budget::of_nodes(200)).unwrap();
+            if is_told {
+                policy.foresee(&instance).unwrap();
+            }
+            // That a goal is another than the one foretold would be an error.
+            let (num_reached, num_reverted) = play(&config.rules(), &instance, |environment| {
+                policy.act(instance.map(), &environment.snapshot()).unwrap()
+            });
+            assert_eq!(num_reverted, 0, "seed {seed}");
+            *(if is_told { &mut num_known } else { &mut num_unknown }) += num_reached;
+        }
+    }
+    assert!(num_known > num_unknown, "{num_known} goals by knowing, {num_unknown} without");
+}
+
+#[test]
+fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
+    let (config, instance) = drawn(1, 12, 16, "restart");
+    let new = |name| LifelongPolicy::new(name, Choice::default(), Budget::of_nodes(50)).unwrap();
+    assert!(new("pibt").foresee(&instance).is_err());
+    let mut policy = new("rhcr");
+    policy.foresee(&instance).unwrap();
+    let mut environment = Reference::new(config.rules()).unwrap();
+    environment.reset(&drawn(2, 12, 16, "restart").1).unwrap();
+    let other = environment.snapshot();
+    assert!(policy.act(instance.map(), &other).unwrap_err().to_string().contains("was not to come"));
+    policy.reset();
+    environment.reset(&instance).unwrap();
+    policy.foresee(&instance).unwrap();
+    policy.act(instance.map(), &environment.snapshot()).unwrap();
+    let again = policy.act(instance.map(), &environment.snapshot()).unwrap_err().to_string();
+    assert_eq!(again, "the goals to come are known for step 1, not for 0");
+}
+
+#[test]
 fn agents_that_finish_leave_and_the_others_go_on() {
     for seed in 0..8 {
         let (config, instance) = drawn(seed, 8, 8, "finish");

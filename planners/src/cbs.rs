@@ -17,18 +17,25 @@ use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 use crate::conflict::{Meeting, Setting, all_conflicts, one_leg_each};
-use crate::distances::Distances;
 use crate::graph::Graph;
 use crate::mdd::Mdd;
 use crate::problem::{Budget, Outcome, Planner, Problem};
 use crate::sipp::Sipp;
-use crate::tree::{Aim, Doubt, Low, Node, split};
+use crate::tree::{Aim, Doubt, Low, Node, Room, split};
 
 /// How [`Cbs`] plans.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CbsParams {
     /// Chooses among what is equally good.
     pub seed: u64,
+    /// Most bytes that the tree may take; once it does, the budget is spent.
+    pub most_bytes: usize,
+}
+
+impl Default for CbsParams {
+    fn default() -> Self {
+        Self { seed: 0, most_bytes: Room::DEFAULT_BYTES }
+    }
 }
 
 /// Optimal planning. A node of its budget is a node of the constraint tree.
@@ -54,27 +61,34 @@ impl Planner for Cbs {
 
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
-        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
-        if let Some(reason) = problem.obstruction(&mut distances) {
-            return Outcome::Impossible { reason };
-        }
+        let costs = match problem.survey(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
         if clock.count_node() {
             return Outcome::TimedOut { best: None };
         }
-        let legs = one_leg_each(problem, &mut distances);
+        let legs = one_leg_each(&costs);
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
         let low = Low::new(&mut sipp, &problem.graph, &setting, Aim::Best);
-        let mut search =
-            Search { graph: &problem.graph, setting: &setting, low, open: BinaryHeap::new(), num_entries: 0 };
+        let mut search = Search {
+            graph: &problem.graph,
+            setting: &setting,
+            low,
+            open: BinaryHeap::new(),
+            num_entries: 0,
+            room: Room::new(self.params.most_bytes),
+        };
         let Some(root) = search.low.root(&mut clock) else { return Outcome::TimedOut { best: None } };
         let mut doubt = Doubt::default();
         search.put(root, vec![None; problem.num_agents()]);
         while let Some(entry) = search.open.pop() {
             let Some(meeting) = entry.choice else { return entry.node.paths.outcome(problem, entry.bound) };
-            if clock.count_node() || clock.is_spent() {
+            if clock.count_node() || clock.is_spent() || search.room.is_full() {
                 return Outcome::TimedOut { best: None };
             }
+            search.room.remove_node(&entry.node);
             if let Some(reason) = doubt.count(problem, &mut clock) {
                 return Outcome::Impossible { reason };
             }
@@ -130,12 +144,13 @@ struct Search<'a> {
     low: Low<'a>,
     open: BinaryHeap<Entry>,
     num_entries: u64,
+    room: Room,
 }
 
 impl Search<'_> {
     /// Puts a node in with its bound and the meeting that tells most about what plans cost.
     fn put(&mut self, node: Node, mut mdds: Vec<Option<Arc<Mdd>>>) {
-        let meetings = all_conflicts(&node.paths);
+        let meetings = all_conflicts(&node.paths, self.graph.num_vertices());
         let mut choice = None;
         let (mut is_met, mut num_disjoint) = (vec![false; self.setting.starts.len()], 0);
         for &meeting in &meetings {
@@ -160,24 +175,28 @@ impl Search<'_> {
         let bound = node.paths.total_cost() + num_disjoint;
         let choice = choice.map(|(_, meeting)| meeting);
         self.num_entries += 1;
+        self.room.add_node(&node);
         let number = self.num_entries;
         self.open.push(Entry { node, mdds, bound, num_conflicts: meetings.len(), choice, number });
     }
 
-    fn mdd<'m>(&self, node: &Node, agent: usize, mdds: &'m mut [Option<Arc<Mdd>>]) -> &'m Mdd {
+    fn mdd<'m>(&mut self, node: &Node, agent: usize, mdds: &'m mut [Option<Arc<Mdd>>]) -> &'m Mdd {
         mdds[agent].get_or_insert_with(|| {
             let kept: Vec<_> = node.constraints_of(agent).collect();
-            Arc::new(Mdd::new(self.graph, self.setting, agent, node.paths.cost(agent), &kept))
+            let mdd = Mdd::new(self.graph, self.setting, agent, node.paths.cost(agent), &kept);
+            self.room.add(mdd.num_bytes());
+            Arc::new(mdd)
         })
     }
 
     /// Puts in the two nodes that a meeting leads to, or the node itself with paths around it, if they cost as much.
     fn expand(&mut self, entry: Entry, meeting: &Meeting) {
+        let num_vertices = self.graph.num_vertices();
         let mut children = Vec::with_capacity(2);
         for constraint in split(meeting) {
             let Some(child) = self.low.child(&entry.node, constraint) else { continue };
             let costs_same = child.paths.total_cost() == entry.node.paths.total_cost();
-            if costs_same && all_conflicts(&child.paths).len() < entry.num_conflicts {
+            if costs_same && all_conflicts(&child.paths, num_vertices).len() < entry.num_conflicts {
                 let node = Node { paths: child.paths, ..entry.node };
                 return self.put(node, entry.mdds);
             }

@@ -1,8 +1,9 @@
 //! The paths of all agents, and where two of them meet.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::distances::Distances;
+use crate::distances::CostToGo;
 use crate::graph::Vertex;
 use crate::problem::{Outcome, Problem};
 use crate::sipp::{Horizon, Leg};
@@ -29,8 +30,8 @@ impl<'a> Setting<'a> {
 }
 
 /// The goals of a problem's agents, who have one each.
-pub(crate) fn one_leg_each(problem: &Problem, distances: &mut Distances) -> Vec<Vec<Leg>> {
-    problem.goals.iter().map(|&goal| vec![Leg::last(distances.to(goal))]).collect()
+pub(crate) fn one_leg_each(costs: &[CostToGo]) -> Vec<Vec<Leg>> {
+    costs.iter().map(|to_go| vec![Leg::last(to_go.clone())]).collect()
 }
 
 /// A path for each agent; nodes of a search share those that they have in common.
@@ -128,35 +129,83 @@ impl Paths {
     }
 }
 
-/// All meetings of all agents.
-pub(crate) fn all_conflicts(paths: &Paths) -> Vec<Meeting> {
-    let agents = 0..paths.num_agents();
-    let pairs = agents.clone().flat_map(|one| agents.clone().skip(one + 1).map(move |other| (one, other)));
-    let steps = 0..=paths.num_steps();
-    pairs.flat_map(|pair| steps.clone().filter_map(move |step| paths.meeting_at(pair, step))).collect()
+/// All meetings of all agents, the earliest first.
+pub(crate) fn all_conflicts(paths: &Paths, num_vertices: usize) -> Vec<Meeting> {
+    let mut found = Vec::new();
+    let _ = for_each_meeting(paths, num_vertices, |meeting| {
+        found.push(meeting);
+        ControlFlow::Continue(())
+    });
+    found
 }
 
 /// The earliest meeting of all agents.
 pub(crate) fn first_conflict(paths: &Paths, num_vertices: usize) -> Option<Meeting> {
-    const NOBODY: u32 = u32::MAX;
-    let mut before = vec![NOBODY; num_vertices];
-    let mut now = vec![NOBODY; num_vertices];
+    for_each_meeting(paths, num_vertices, ControlFlow::Break).break_value()
+}
+
+/// Goes through the meetings step by step until it is told to stop.
+fn for_each_meeting(
+    paths: &Paths,
+    num_vertices: usize,
+    mut visit: impl FnMut(Meeting) -> ControlFlow<Meeting>,
+) -> ControlFlow<Meeting> {
+    let agents = 0..paths.num_agents();
+    let (mut before, mut now) =
+        (Crowd::new(num_vertices, agents.len()), Crowd::new(num_vertices, agents.len()));
     for step in 0..=paths.num_steps() {
-        for agent in 0..paths.num_agents() {
+        for agent in agents.clone() {
             let Some(at) = paths.at(agent, step) else { continue };
-            let holder = std::mem::replace(&mut now[at as usize], agent as u32);
-            let left = before[at as usize];
-            for other in
-                [holder, left].into_iter().filter(|&other| other != NOBODY && other as usize != agent)
-            {
-                let other = other as usize;
-                if let Some(meeting) = paths.meeting_at((agent.min(other), agent.max(other)), step) {
-                    return Some(meeting);
+            for other in now.at(at) {
+                visit(Meeting { agents: (other, agent), step, from: None, at })?;
+            }
+            now.enter(agent, at);
+            let Some(from) = step.checked_sub(1).and_then(|before| paths.at(agent, before)) else { continue };
+            // Of those that leave for where this one comes from, the lower ones are known by now.
+            for other in before.at(at).filter(|&other| other < agent && from != at) {
+                if paths.at(other, step) == Some(from) {
+                    visit(Meeting { agents: (other, agent), step, from: Some(at), at: from })?;
                 }
             }
         }
         std::mem::swap(&mut before, &mut now);
-        now.fill(NOBODY);
+        now.clear();
     }
-    None
+    ControlFlow::Continue(())
+}
+
+/// Who is in each vertex at a step.
+struct Crowd {
+    /// For each vertex, who entered last.
+    last: Vec<u32>,
+    /// For each agent, who entered the same vertex before.
+    earlier: Vec<u32>,
+    taken: Vec<Vertex>,
+}
+
+impl Crowd {
+    const NOBODY: u32 = u32::MAX;
+
+    fn new(num_vertices: usize, num_agents: usize) -> Self {
+        let nobody = |count| vec![Self::NOBODY; count];
+        Self { last: nobody(num_vertices), earlier: nobody(num_agents), taken: Vec::new() }
+    }
+
+    fn enter(&mut self, agent: usize, at: Vertex) {
+        self.earlier[agent] = std::mem::replace(&mut self.last[at as usize], agent as u32);
+        self.taken.push(at);
+    }
+
+    fn at(&self, vertex: Vertex) -> impl Iterator<Item = usize> + '_ {
+        let somebody = |agent: u32| (agent != Self::NOBODY).then_some(agent as usize);
+        std::iter::successors(somebody(self.last[vertex as usize]), move |&agent| {
+            somebody(self.earlier[agent])
+        })
+    }
+
+    fn clear(&mut self) {
+        for vertex in self.taken.drain(..) {
+            self.last[vertex as usize] = Self::NOBODY;
+        }
+    }
 }

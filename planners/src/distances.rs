@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use crate::flood::Flood;
 use crate::graph::{Graph, Vertex};
 
 /// The cost from where no path leads to the goal.
@@ -18,6 +19,7 @@ pub type CostToGo = Arc<[u32]>;
 #[derive(Debug)]
 pub struct Distances {
     graph: Arc<Graph>,
+    flood: Flood,
     tables: HashMap<Vertex, (CostToGo, u64)>,
     most_tables: usize,
     now: u64,
@@ -30,7 +32,8 @@ impl Distances {
     /// No costs yet, and room for tables of so many bytes, but for one at least.
     pub fn new(graph: Arc<Graph>, num_bytes: usize) -> Self {
         let table = size_of::<u32>() * graph.num_vertices().max(1);
-        Self { graph, tables: HashMap::new(), most_tables: (num_bytes / table).max(1), now: 0 }
+        let (flood, most_tables) = (Flood::new(&graph), (num_bytes / table).max(1));
+        Self { graph, flood, tables: HashMap::new(), most_tables, now: 0 }
     }
 
     /// The graph that is searched.
@@ -48,7 +51,7 @@ impl Distances {
         if self.tables.len() >= self.most_tables {
             self.drop_oldest();
         }
-        let table: CostToGo = costs_to_go(&self.graph, goal).into();
+        let table: CostToGo = self.flood.costs_to_go(goal).collect();
         self.tables.insert(goal, (table.clone(), self.now));
         table
     }
@@ -75,26 +78,6 @@ impl Distances {
     }
 }
 
-/// Breadth first from the goal.
-fn costs_to_go(graph: &Graph, goal: Vertex) -> Vec<u32> {
-    let mut costs = vec![UNREACHABLE; graph.num_vertices()];
-    let mut queue = Vec::with_capacity(graph.num_vertices());
-    costs[goal as usize] = 0;
-    queue.push(goal);
-    let mut next = 0;
-    while let Some(&vertex) = queue.get(next) {
-        next += 1;
-        let cost = costs[vertex as usize] + 1;
-        for &neighbour in graph.neighbours(vertex) {
-            if costs[neighbour as usize] == UNREACHABLE {
-                costs[neighbour as usize] = cost;
-                queue.push(neighbour);
-            }
-        }
-    }
-    costs
-}
-
 /// The costs between all pairs of vertices, for small maps.
 #[derive(Debug)]
 pub struct AllPairs {
@@ -114,8 +97,11 @@ impl AllPairs {
             return None;
         }
         let narrow = |cost: u32| u16::try_from(cost).unwrap_or(u16::MAX);
-        let goals = 0..num_vertices as Vertex;
-        let costs = goals.flat_map(|goal| costs_to_go(graph, goal).into_iter().map(narrow)).collect();
+        let mut flood = Flood::new(graph);
+        let mut costs = Vec::with_capacity(num_vertices * num_vertices);
+        for goal in 0..num_vertices as Vertex {
+            costs.extend(flood.costs_to_go(goal).map(narrow));
+        }
         Some(Self { num_vertices, costs })
     }
 

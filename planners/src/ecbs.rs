@@ -16,11 +16,10 @@
 use std::collections::BTreeSet;
 
 use crate::conflict::{Meeting, Paths, Setting, all_conflicts, one_leg_each};
-use crate::distances::Distances;
 use crate::graph::Graph;
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::sipp::Sipp;
-use crate::tree::{Aim, Doubt, Low, Node, split};
+use crate::tree::{Aim, Doubt, Low, Node, Room, split};
 
 /// How [`Ecbs`] plans.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,11 +28,13 @@ pub struct EcbsParams {
     pub weight: f64,
     /// Chooses among what is equally good.
     pub seed: u64,
+    /// Most bytes that the tree may take; once it does, the budget is spent.
+    pub most_bytes: usize,
 }
 
 impl Default for EcbsParams {
     fn default() -> Self {
-        Self { weight: 1.2, seed: 0 }
+        Self { weight: 1.2, seed: 0, most_bytes: Room::DEFAULT_BYTES }
     }
 }
 
@@ -59,16 +60,16 @@ impl Planner for Ecbs {
 
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
-        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
-        if let Some(reason) = problem.obstruction(&mut distances) {
-            return Outcome::Impossible { reason };
-        }
-        let legs = one_leg_each(problem, &mut distances);
+        let costs = match problem.survey(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        let legs = one_leg_each(&costs);
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
         let mut doubt = Doubt::default();
         let give_up = |clock: &mut Clock| doubt.count(problem, clock);
-        match search(&mut sipp, &problem.graph, &setting, self.params.weight, &mut clock, give_up) {
+        match search(&mut sipp, &problem.graph, &setting, &self.params, &mut clock, give_up) {
             Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
             Found::Nothing => Outcome::TimedOut { best: None },
             Found::Proof(reason) => Outcome::Impossible { reason },
@@ -86,29 +87,29 @@ pub(crate) enum Found {
     Proof(String),
 }
 
-/// Paths without conflict that cost at most `weight` times the least; `give_up` is asked for a reason at every node.
+/// Paths without conflict within the bound; `give_up` is asked for a reason at every node.
 pub(crate) fn search(
     sipp: &mut Sipp,
     graph: &Graph,
     setting: &Setting<'_>,
-    weight: f64,
+    params: &EcbsParams,
     clock: &mut Clock,
     mut give_up: impl FnMut(&mut Clock) -> Option<String>,
 ) -> Found {
     // A weight that is no number is no weight.
-    let weight = weight.max(1.0);
+    let weight = params.weight.max(1.0);
     let mut low = Low::new(sipp, graph, setting, Aim::Within(weight));
     if clock.count_node() {
         return Found::Nothing;
     }
     let Some(root) = low.root(clock) else { return Found::Nothing };
-    let mut queues = Queues::new(weight);
+    let mut queues = Queues::new(weight, graph.num_vertices(), Room::new(params.most_bytes));
     queues.put(root);
     while let Some((entry, lower_bound)) = queues.take() {
         let Some(meeting) = entry.meeting else {
             return Found::Paths { paths: entry.node.paths, lower_bound };
         };
-        if clock.count_node() || clock.is_spent() {
+        if clock.count_node() || clock.is_spent() || queues.room.is_full() {
             return Found::Nothing;
         }
         if let Some(reason) = give_up(clock) {
@@ -134,6 +135,8 @@ struct Entry {
 /// The nodes that are still to be looked at, in two orders.
 struct Queues {
     weight: f64,
+    num_vertices: usize,
+    room: Room,
     entries: Vec<Option<Entry>>,
     /// All, by lower bound.
     open: BTreeSet<(u64, usize)>,
@@ -144,9 +147,11 @@ struct Queues {
 }
 
 impl Queues {
-    fn new(weight: f64) -> Self {
+    fn new(weight: f64, num_vertices: usize, room: Room) -> Self {
         Self {
             weight,
+            num_vertices,
+            room,
             entries: Vec::new(),
             open: BTreeSet::new(),
             focal: BTreeSet::new(),
@@ -155,9 +160,11 @@ impl Queues {
     }
 
     fn put(&mut self, node: Node) {
-        let meetings = all_conflicts(&node.paths);
-        let meeting = meetings.iter().min_by_key(|meeting| meeting.step).copied();
+        let meetings = all_conflicts(&node.paths, self.num_vertices);
+        let meeting = meetings.first().copied();
         let number = self.entries.len();
+        self.room.add_node(&node);
+        self.room.add(size_of::<Option<Entry>>());
         self.open.insert((node.lower_bound(), number));
         self.dear.insert((node.paths.total_cost(), number));
         self.entries.push(Some(Entry { node, num_conflicts: meetings.len(), meeting }));
@@ -175,6 +182,7 @@ impl Queues {
         let (_, _, std::cmp::Reverse(number)) = self.focal.pop_first()?;
         let entry = self.entries[number].take()?;
         self.open.remove(&(entry.node.lower_bound(), number));
+        self.room.remove_node(&entry.node);
         Some((entry, lower_bound))
     }
 }

@@ -5,11 +5,12 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::distances::{CostToGo, Distances};
+use crate::distances::CostToGo;
 use crate::graph::Vertex;
 use crate::parts::{Part, small_parts};
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::refine::{self, Refiner, Shared};
+use crate::scatter::scatter;
 use crate::search::{Loss, Progress, Search, SearchRules};
 use crate::stepper::PibtRules;
 
@@ -24,6 +25,9 @@ pub struct LacamParams {
     pub threads: usize,
     /// Whether plans are made better once there is one.
     pub refine: bool,
+    /// Whether a second plan, for agents that keep apart from afar, is made before the better one is refined; of use
+    /// where there is no time to refine, since after a second of that the two are equally good.
+    pub scatter: bool,
     /// Attempts to make a plan better, one after the other in vain, after which a planner without a bound on its time
     /// and nodes is done.
     pub patience: u64,
@@ -38,6 +42,7 @@ impl Default for LacamParams {
             pibt: PibtRules::default(),
             threads: 1,
             refine: true,
+            scatter: false,
             patience: 20_000,
             most_bytes: 256 << 20,
         }
@@ -63,12 +68,11 @@ impl Planner for Lacam {
     }
 
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let clock = budget.start();
-        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
-        if let Some(reason) = problem.obstruction(&mut distances) {
-            return Outcome::Impossible { reason };
-        }
-        let costs = distances.to_all(&problem.goals);
+        let mut clock = budget.start();
+        let costs = match problem.survey(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
         Work::new(&self.params, problem, &costs, budget, clock).run()
     }
 }
@@ -104,8 +108,7 @@ impl<'a> Work<'a> {
         budget: &Budget,
         clock: Clock,
     ) -> Self {
-        let least = |(costs, &start): (&CostToGo, &Vertex)| u64::from(costs[start as usize]);
-        let lower_bound = costs.iter().zip(&problem.starts).map(least).sum();
+        let lower_bound = problem.lower_bound(costs);
         let search = Search::new(problem, costs, rules(params, 0, Loss::Sum));
         let is_bounded = budget.time.is_some() || budget.nodes.is_some();
         Self { params, problem, costs, clock, is_bounded, search, is_searching: true, lower_bound }
@@ -182,6 +185,7 @@ impl<'a> Work<'a> {
             self.search = Search::new(self.problem, self.costs, rules(self.params, 0, Loss::Steps));
             self.search.set_bound(self.problem.most_steps.map_or(u64::MAX, |most| most as u64 + 1));
         }
+        let first = if self.params.scatter { self.scattered(first) } else { first };
         let threads = self.threads(first.len());
         if threads == 0 {
             return Found::Plan(first);
@@ -206,6 +210,17 @@ impl<'a> Work<'a> {
             is_done.store(true, Ordering::Relaxed);
             if is_possible { Found::Plan(refiner.plan()) } else { Found::Impossible }
         })
+    }
+
+    /// The better of a plan and one for agents that keep apart.
+    fn scattered(&mut self, first: Steps) -> Steps {
+        let hints = scatter(self.problem, self.costs, &mut self.clock);
+        let search = Search::new(self.problem, self.costs, rules(self.params, 0, Loss::Sum));
+        let mut search = search.following(hints);
+        match advance(&mut search, &mut self.clock, 2 * first.len()) {
+            Advance::Found(Found::Plan(second)) if total(&second) < total(&first) => second,
+            _ => first,
+        }
     }
 
     /// Number of threads that may refine; each has its own tables.
@@ -272,6 +287,11 @@ impl<'a> Work<'a> {
         }
         true
     }
+}
+
+/// The steps of all agents until they stay.
+fn total(steps: &Steps) -> usize {
+    refine::paths_of(steps).iter().map(|path| path.len() - 1).sum()
 }
 
 /// Attempts to refine between two looks at further configurations.

@@ -53,6 +53,12 @@ impl Mdd {
         Self { levels }
     }
 
+    /// Bytes that it takes.
+    pub(crate) fn num_bytes(&self) -> usize {
+        let level = |level: &Vec<Vertex>| size_of_val(level) + size_of_val(level.as_slice());
+        self.levels.iter().map(level).sum()
+    }
+
     /// Whether every best path is in a vertex after a step, or makes a move in it.
     pub(crate) fn must_meet(&self, step: usize, from: Option<Vertex>, at: Vertex) -> bool {
         let is_only =

@@ -57,7 +57,7 @@ pub fn planner(name: &str, choice: Choice) -> Result<Box<dyn Planner>, Error> {
         "pibt" => Box::new(Pibt::new(PibtParams { seed, ..PibtParams::default() })),
         "pbs" => Box::new(Pbs::new(PbsParams { seed })),
         "ecbs" => Box::new(Ecbs::new(EcbsParams { seed, ..EcbsParams::default() })),
-        "cbs" => Box::new(Cbs::new(CbsParams { seed })),
+        "cbs" => Box::new(Cbs::new(CbsParams { seed, ..CbsParams::default() })),
         _ => return Err(unknown(name, &PLANNERS)),
     })
 }

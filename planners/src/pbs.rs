@@ -11,7 +11,6 @@
 use std::sync::Arc;
 
 use crate::conflict::{Paths, Setting, first_conflict, one_leg_each};
-use crate::distances::Distances;
 use crate::graph::Graph;
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
 use crate::reservations::Reservations;
@@ -47,17 +46,17 @@ impl Planner for Pbs {
 
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
-        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
-        if let Some(reason) = problem.obstruction(&mut distances) {
-            return Outcome::Impossible { reason };
-        }
-        let legs = one_leg_each(problem, &mut distances);
+        let costs = match problem.survey(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        let legs = one_leg_each(&costs);
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
         let Some(paths) = search(&mut sipp, &problem.graph, &setting, &mut clock) else {
             return Outcome::TimedOut { best: None };
         };
-        paths.outcome(problem, problem.lower_bound(&mut distances))
+        paths.outcome(problem, problem.lower_bound(&costs))
     }
 }
 

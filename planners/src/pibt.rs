@@ -17,6 +17,7 @@ use crate::graph::{Graph, Vertex};
 use crate::guide::{Guide, GuideParams};
 use crate::lifelong::Lifelong;
 use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
+use crate::scatter::Hints;
 use crate::stepper::{Agent, PibtRules, Scene, Stepper, patience_after, patience_by, sort_by_patience};
 
 /// How PIBT goes about it.
@@ -58,13 +59,14 @@ impl Pibt {
     ) -> Vec<Vec<Vertex>> {
         let (graph, goals) = (&problem.graph, &problem.goals[..]);
         let mut stepper = Stepper::new(graph, self.params.rules, self.params.seed);
+        let hints = Hints::default();
         let mut steps = vec![problem.starts.clone()];
         for _ in 0..Self::most_steps(problem) {
             let now = &steps[steps.len() - 1];
             if now == goals || clock.count_node() {
                 break;
             }
-            let scene = Scene { graph, now, goals, costs, order: queue.order() };
+            let scene = Scene { graph, now, goals, costs, order: queue.order(), hints: &hints };
             let Some(next) = stepper.step(&scene, &[]).map(<[Vertex]>::to_vec) else {
                 break;
             };
@@ -82,13 +84,12 @@ impl Planner for Pibt {
 
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
-        let mut distances = Distances::new(problem.graph.clone(), Distances::DEFAULT_BYTES);
-        if let Some(reason) = problem.obstruction(&mut distances) {
-            return Outcome::Impossible { reason };
-        }
-        let costs = distances.to_all(&problem.goals);
+        let costs = match problem.survey(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
         let least = |agent: Agent| costs[agent as usize][problem.starts[agent as usize] as usize];
-        let lower_bound = (0..problem.num_agents() as Agent).map(|agent| u64::from(least(agent))).sum();
+        let lower_bound = problem.lower_bound(&costs);
         let queue = Queue::new(patience_by(problem.num_agents(), least));
         let steps = self.walk(problem, &costs, queue, &mut clock);
         let is_solved = steps.last() == Some(&problem.goals);
@@ -170,12 +171,14 @@ impl PibtLifelong {
         self.check(now, goals)?;
         self.lead(now, goals);
         let graph = &self.graph;
-        let order = self.queue.order();
+        let (order, hints) = (self.queue.order(), &Hints::default());
         let next = match &self.ways {
             Ways::Shortest { costs, .. } => {
-                self.stepper.step(&Scene { graph, now, goals, costs, order }, &[])
+                self.stepper.step(&Scene { graph, now, goals, costs, order, hints }, &[])
             }
-            Ways::Guided { costs, .. } => self.stepper.step(&Scene { graph, now, goals, costs, order }, &[]),
+            Ways::Guided { costs, .. } => {
+                self.stepper.step(&Scene { graph, now, goals, costs, order, hints }, &[])
+            }
         };
         let next = next.ok_or_else(|| Error::instance("two agents are in one cell"))?;
         self.queue.wait(|agent| next[agent] == goals[agent]);

@@ -1,10 +1,11 @@
 //! Planners as policies: they drive any environment by their plans, and are told of the world the map and its state,
-//! thus no goal that is still to come.
+//! thus no goal that is still to come unless that is asked for.
 
 use std::sync::Arc;
 
-use pogema_core::{Action, Cell, Error, Map, Snapshot};
+use pogema_core::{Action, Cell, Error, Instance, Map, Snapshot};
 
+use crate::foresight::Foresight;
 use crate::graph::Graph;
 use crate::lifelong::Lifelong;
 use crate::names::{self, Choice};
@@ -132,6 +133,7 @@ pub struct LifelongPolicy {
     choice: Choice,
     budget: Budget,
     planner: Option<(Map, Arc<Graph>, Box<dyn Lifelong>)>,
+    foresight: Option<Foresight>,
 }
 
 impl LifelongPolicy {
@@ -142,21 +144,63 @@ impl LifelongPolicy {
     pub fn new(name: &str, choice: Choice, budget: Budget) -> Result<Self, Error> {
         let nowhere = Map::new(1, 1, vec![true])?;
         names::lifelong(name, Arc::new(Graph::new(&nowhere)), choice)?;
-        Ok(Self { name: name.to_owned(), choice, budget, planner: None })
+        Ok(Self { name: name.to_owned(), choice, budget, planner: None, foresight: None })
     }
 
-    /// Forgets the last episode.
+    /// Forgets the last episode, and the goals that were to come in it.
     pub fn reset(&mut self) {
+        self.foresight = None;
         if let Some((_, _, planner)) = &mut self.planner {
             planner.reset();
         }
     }
 
+    /// Tells the planner, in the episode that begins, also of the goals that are still to come, as the paper's RHCR
+    /// knows them. It then has to be asked in every step.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a planner that makes no use of them.
+    pub fn foresee(&mut self, instance: &Instance) -> Result<(), Error> {
+        let (_, planner) = self.planner_on(instance.map())?;
+        if !planner.foresees() {
+            return Err(Error::config("planner", &self.name, "`rhcr`, to make use of goals still to come"));
+        }
+        self.foresight = Some(Foresight::new(instance));
+        Ok(())
+    }
+
     /// Chooses what all agents do; those that take no part stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent or goal that is not on a free cell of the map.
+    /// [`Error::Agent`] for an agent or goal that is not on a free cell of the map; [`Error::State`] if the goals to
+    /// come are known and the state is not the next one of their episode.
     pub fn act(&mut self, map: &Map, now: &Snapshot) -> Result<Vec<Action>, Error> {
+        let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
+        let to_come = self.foresight.as_mut().map(|foresight| {
+            foresight.follow(now)?;
+            Ok(agents.iter().map(|&agent| foresight.goals(agent).to_vec()).collect::<Vec<Vec<Cell>>>())
+        });
+        let to_come = to_come.transpose()?;
+        let budget = self.budget.clone();
+        let (graph, planner) = self.planner_on(map)?;
+        let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
+        let cells = graph.vertices_of("the agent's cell", &of(&now.cells))?;
+        let next = if let Some(goals) = to_come {
+            let vertices = |goals: &Vec<Cell>| graph.vertices_of("goal", goals);
+            let goals = goals.iter().map(vertices).collect::<Result<Vec<_>, _>>()?;
+            planner.next_foreseeing(&cells, &goals, &budget)?
+        } else {
+            planner.next(&cells, &graph.vertices_of("goal", &of(&now.goals))?, &budget)?
+        };
+        let mut actions = vec![Action::Stay; now.cells.len()];
+        for (&agent, (&from, &to)) in agents.iter().zip(cells.iter().zip(&next)) {
+            actions[agent] = graph.action(from, to);
+        }
+        Ok(actions)
+    }
+
+    /// The planner of a map, made once for it.
+    fn planner_on(&mut self, map: &Map) -> Result<(Arc<Graph>, &mut dyn Lifelong), Error> {
         let (_, graph, planner) = match self.planner.take() {
             Some(made) if made.0 == *map => self.planner.insert(made),
             _ => {
@@ -165,15 +209,6 @@ impl LifelongPolicy {
                 self.planner.insert((map.clone(), graph, planner))
             }
         };
-        let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
-        let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
-        let cells = graph.vertices_of("the agent's cell", &of(&now.cells))?;
-        let goals = graph.vertices_of("goal", &of(&now.goals))?;
-        let next = planner.next(&cells, &goals, &self.budget)?;
-        let mut actions = vec![Action::Stay; now.cells.len()];
-        for (&agent, (&from, &to)) in agents.iter().zip(cells.iter().zip(&next)) {
-            actions[agent] = graph.action(from, to);
-        }
-        Ok(actions)
+        Ok((graph.clone(), planner.as_mut()))
     }
 }

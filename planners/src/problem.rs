@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use pogema_core::{Cell, Error, Instance, Map};
 
-use crate::distances::{Distances, UNREACHABLE};
+use crate::distances::{CostToGo, UNREACHABLE};
+use crate::flood::Flood;
 use crate::graph::{Graph, Vertex};
 use crate::plan::Plan;
 
@@ -67,33 +68,46 @@ impl Problem {
         Plan::new(steps.iter().map(cells).collect())
     }
 
-    /// The least that the sum of costs can be: the way of each agent as if it were alone.
-    pub fn lower_bound(&self, distances: &mut Distances) -> u64 {
-        let cost = |(&start, &goal): (&Vertex, &Vertex)| u64::from(distances.to(goal)[start as usize]);
-        self.starts.iter().zip(&self.goals).map(cost).sum()
+    /// The costs to go of each agent, unless one look at each of them tells already that there is no plan, or takes
+    /// all the time there is.
+    pub(crate) fn survey(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
+        for (what, vertices) in [("start at", &self.starts), ("want to stay at", &self.goals)] {
+            if let Some((first, second, vertex)) = equal(vertices) {
+                let cell = self.graph.cell(vertex);
+                let reason = format!("agents {first} and {second} both {what} {cell}");
+                return Err(Outcome::Impossible { reason });
+            }
+        }
+        let mut flood = Flood::new(&self.graph);
+        let mut costs = Vec::with_capacity(self.num_agents());
+        for (agent, &goal) in self.goals.iter().enumerate() {
+            if clock.is_spent() {
+                return Err(Outcome::TimedOut { best: self.plan(std::slice::from_ref(&self.starts)).ok() });
+            }
+            let own: CostToGo = flood.costs_to_go(goal).collect();
+            if let Some(reason) = self.obstruction(agent, &own) {
+                return Err(Outcome::Impossible { reason });
+            }
+            costs.push(own);
+        }
+        Ok(costs)
     }
 
-    /// Why no plan can be, as far as one look at each agent tells.
-    pub fn obstruction(&self, distances: &mut Distances) -> Option<String> {
-        if let Some((first, second, cell)) = equal(&self.starts) {
-            let cell = self.graph.cell(cell);
-            return Some(format!("agents {first} and {second} both start at {cell}"));
+    /// Why an agent cannot be brought to its goal, even alone.
+    fn obstruction(&self, agent: usize, costs: &CostToGo) -> Option<String> {
+        let cost = costs[self.starts[agent] as usize];
+        let (from, to) = (self.graph.cell(self.starts[agent]), self.graph.cell(self.goals[agent]));
+        if cost == UNREACHABLE {
+            return Some(format!("no path leads agent {agent} from {from} to {to}"));
         }
-        if let Some((first, second, cell)) = equal(&self.goals) {
-            let cell = self.graph.cell(cell);
-            return Some(format!("agents {first} and {second} both want to stay at {cell}"));
-        }
-        for (agent, (&start, &goal)) in self.starts.iter().zip(&self.goals).enumerate() {
-            let cost = distances.to(goal)[start as usize];
-            let (from, to) = (self.graph.cell(start), self.graph.cell(goal));
-            if cost == UNREACHABLE {
-                return Some(format!("no path leads agent {agent} from {from} to {to}"));
-            }
-            if let Some(most) = self.most_steps.filter(|&most| cost as usize > most) {
-                return Some(format!("agent {agent} needs {cost} steps from {from} to {to}, of {most}"));
-            }
-        }
-        None
+        let most = self.most_steps.filter(|&most| cost as usize > most)?;
+        Some(format!("agent {agent} needs {cost} steps from {from} to {to}, of {most}"))
+    }
+
+    /// The least that the sum of costs can be: the way of each agent as if it were alone.
+    pub(crate) fn lower_bound(&self, costs: &[CostToGo]) -> u64 {
+        let cost = |(&start, costs): (&Vertex, &CostToGo)| u64::from(costs[start as usize]);
+        self.starts.iter().zip(costs).map(cost).sum()
     }
 }
 

@@ -8,7 +8,7 @@
 //! | w, planning window | `RhcrParams::planning_window` |
 //! | MAPF solver | `RhcrParams::solver` |
 //!
-//! The paper's agents know their next goals. Here they do not, unless told by [`Rhcr::next_foreseeing`]; so agents
+//! The paper's agents know their next goals. Here they do not, unless told by [`Lifelong::next_foreseeing`]; so agents
 //! plan to their present goals and then only keep out of the way, and plan again when one of them gets a new goal.
 //! Where the paper's solver fails, agents stand still or keep but part of their plans; here they go on with what is
 //! left of the last plan and push each other past its end, which never leads to a conflict.
@@ -21,9 +21,9 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::conflict::Setting;
 use crate::distances::{Distances, UNREACHABLE};
-use crate::ecbs::{self, Found};
+use crate::ecbs::{self, EcbsParams, Found};
 use crate::graph::{Graph, Vertex};
-use crate::lifelong::{Lifelong, check_agents};
+use crate::lifelong::{Lifelong, check_agents, present_goals};
 use crate::pbs;
 use crate::problem::{Budget, Clock};
 use crate::sipp::{Horizon, Leg, Sipp};
@@ -102,32 +102,6 @@ impl Rhcr {
         }
     }
 
-    /// As [`Lifelong::next`], for agents that know which goals come after their present ones, as in the paper; each
-    /// agent's list begins with its present goal.
-    ///
-    /// # Errors
-    /// As for [`Lifelong::next`]; [`Error::Agent`] also for an agent without a goal.
-    pub fn next_foreseeing(
-        &mut self,
-        now: &[Vertex],
-        goals: &[Vec<Vertex>],
-        budget: &Budget,
-    ) -> Result<Vec<Vertex>, Error> {
-        let first = |(agent, goals): (usize, &Vec<Vertex>)| {
-            goals.first().copied().ok_or_else(|| Error::agent(agent, "it has no goal"))
-        };
-        let present = goals.iter().enumerate().map(first).collect::<Result<Vec<_>, _>>()?;
-        let num_vertices = self.distances.graph().num_vertices();
-        check_agents(num_vertices, now, &present)?;
-        for (agent, goals) in goals.iter().enumerate() {
-            if let Some(goal) = goals.iter().find(|&&goal| goal as usize >= num_vertices) {
-                return Err(Error::agent(agent, format!("goal {goal} is none of {num_vertices} vertices")));
-            }
-        }
-        let legs = now.iter().zip(goals).map(|(&at, goals)| self.legs(at, goals)).collect();
-        Ok(self.step(now, present, legs, budget))
-    }
-
     /// As many goals as an agent may reach within the window; none that it cannot.
     fn legs(&mut self, at: Vertex, goals: &[Vertex]) -> Vec<Leg> {
         let (mut legs, mut lengths, mut from, mut total) = (Vec::new(), Vec::new(), at, 0);
@@ -183,7 +157,8 @@ impl Rhcr {
         let graph = self.distances.graph().clone();
         let found = match self.params.solver {
             WindowSolver::Ecbs { weight } => {
-                match ecbs::search(&mut self.sipp, &graph, &setting, weight, clock, |_| None) {
+                let params = EcbsParams { weight, ..EcbsParams::default() };
+                match ecbs::search(&mut self.sipp, &graph, &setting, &params, clock, |_| None) {
                     Found::Paths { paths, .. } => Some(paths),
                     Found::Nothing | Found::Proof(_) => None,
                 }
@@ -216,5 +191,27 @@ impl Lifelong for Rhcr {
         check_agents(self.distances.graph().num_vertices(), now, goals)?;
         let legs = now.iter().zip(goals).map(|(&at, &goal)| self.legs(at, &[goal])).collect();
         Ok(self.step(now, goals.to_vec(), legs, budget))
+    }
+
+    fn foresees(&self) -> bool {
+        true
+    }
+
+    fn next_foreseeing(
+        &mut self,
+        now: &[Vertex],
+        goals: &[Vec<Vertex>],
+        budget: &Budget,
+    ) -> Result<Vec<Vertex>, Error> {
+        let present = present_goals(goals)?;
+        let num_vertices = self.distances.graph().num_vertices();
+        check_agents(num_vertices, now, &present)?;
+        for (agent, goals) in goals.iter().enumerate() {
+            if let Some(goal) = goals.iter().find(|&&goal| goal as usize >= num_vertices) {
+                return Err(Error::agent(agent, format!("goal {goal} is none of {num_vertices} vertices")));
+            }
+        }
+        let legs = now.iter().zip(goals).map(|(&at, goals)| self.legs(at, goals)).collect();
+        Ok(self.step(now, present, legs, budget))
     }
 }

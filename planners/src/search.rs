@@ -23,6 +23,7 @@ use crate::constraints::Constraints;
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
 use crate::problem::Problem;
+use crate::scatter::Hints;
 use crate::stepper::{Agent, PibtRules, Scene, Stepper, patience_after, patience_by, sort_by_patience};
 
 /// No node, or no edge.
@@ -84,6 +85,7 @@ pub(crate) struct Search<'a> {
     problem: &'a Problem,
     costs: &'a [CostToGo],
     rules: SearchRules,
+    hints: Hints,
     stepper: Stepper,
     random: Pcg64Mcg,
     nodes: Vec<Node>,
@@ -103,12 +105,13 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search of a problem without [`Problem::obstruction`].
+    /// A search of a problem that passed its survey.
     pub fn new(problem: &'a Problem, costs: &'a [CostToGo], rules: SearchRules) -> Self {
         let mut search = Self {
             problem,
             costs,
             rules,
+            hints: Hints::default(),
             stepper: Stepper::new(&problem.graph, rules.pibt, rules.seed),
             random: Pcg64Mcg::seed_from_u64(rules.seed ^ 0x5eed),
             nodes: Vec::new(),
@@ -126,6 +129,12 @@ impl<'a> Search<'a> {
         };
         search.add_root();
         search
+    }
+
+    /// The same search, in which agents follow hints as long as they can.
+    pub fn following(mut self, hints: Hints) -> Self {
+        self.hints = hints;
+        self
     }
 
     /// Leaves everything from now on that leads to a loss of so much or more.
@@ -223,7 +232,7 @@ impl<'a> Search<'a> {
         let (graph, goals): (&Graph, _) = (&self.problem.graph, &self.problem.goals[..]);
         let range = node as usize * goals.len()..(node as usize + 1) * goals.len();
         let (now, order) = (&self.configurations[range.clone()], &self.orders[range]);
-        let scene = Scene { graph, now, goals, costs: self.costs, order };
+        let scene = Scene { graph, now, goals, costs: self.costs, order, hints: &self.hints };
         let next = self.stepper.step(&scene, &self.forced);
         if let Some(next) = next {
             self.next.clear();

@@ -16,6 +16,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::graph::{Graph, Vertex};
+use crate::scatter::Hints;
 
 /// The number of an agent.
 pub(crate) type Agent = u32;
@@ -72,6 +73,8 @@ pub(crate) struct Scene<'a, C> {
     pub costs: &'a [C],
     /// All agents, the first choosing first.
     pub order: &'a [Agent],
+    /// Where agents go rather than where it costs least.
+    pub hints: &'a Hints,
 }
 
 impl<C: AsRef<[u32]>> Scene<'_, C> {
@@ -241,6 +244,7 @@ impl Stepper {
     fn frame<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> Frame {
         let here = scene.place(agent);
         let around = scene.graph.neighbours(here);
+        let hint = scene.hints.next(agent, here);
         let mut dice = self.random.next_u64();
         let mut keyed = [(u64::MAX, here); 5];
         for (slot, &vertex) in keyed.iter_mut().zip(around.iter().chain([&here])) {
@@ -250,7 +254,7 @@ impl Stepper {
             } else {
                 u64::from(vertex == here)
             };
-            let cost = u64::from(scene.cost(agent, vertex));
+            let cost = if hint == Some(vertex) { 0 } else { u64::from(scene.cost(agent, vertex)) + 1 };
             *slot = (cost << 16 | hindered << 8 | dice & 0xff, vertex);
         }
         let num_places = around.len() + 1;

@@ -62,6 +62,52 @@ pub(crate) fn split(meeting: &Meeting) -> [Constraint; 2] {
     ]
 }
 
+/// How much the nodes of a tree may take, counted rather too high: a path counts for as long as the search goes on.
+#[derive(Debug)]
+pub(crate) struct Room {
+    most_bytes: usize,
+    num_bytes: usize,
+}
+
+impl Room {
+    /// Bytes that a tree takes unless another number is chosen.
+    pub(crate) const DEFAULT_BYTES: usize = 1 << 30;
+
+    pub(crate) fn new(most_bytes: usize) -> Self {
+        Self { most_bytes, num_bytes: 0 }
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.num_bytes > self.most_bytes
+    }
+
+    /// Counts what is kept besides nodes.
+    pub(crate) fn add(&mut self, num_bytes: usize) {
+        self.num_bytes += num_bytes;
+    }
+
+    /// Counts a node, and the paths that it does not share with the one it comes from.
+    pub(crate) fn add_node(&mut self, node: &Node) {
+        let length = |agent: usize| node.paths.path(agent).len();
+        let new = match &node.constraints {
+            Some(chain) => length(chain.constraint.agent),
+            None => (0..node.paths.num_agents()).map(length).sum(),
+        };
+        self.add(Self::lasting(node) + new * size_of::<Vertex>());
+    }
+
+    /// A node is gone, but not what others have in common with it.
+    pub(crate) fn remove_node(&mut self, node: &Node) {
+        self.num_bytes -= Self::lasting(node);
+    }
+
+    /// Bytes of a node itself, with what searches keep beside it.
+    fn lasting(node: &Node) -> usize {
+        const BESIDE: usize = 256;
+        BESIDE + node.paths.num_agents() * 4 * size_of::<usize>()
+    }
+}
+
 /// How paths are found for a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Aim {

@@ -107,6 +107,10 @@ impl Episode {
         Ground { map: self.instance.map(), outside: self.instance.outside(), radius }
     }
 
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
     pub fn config(&self) -> &GridConfig {
         &self.config
     }

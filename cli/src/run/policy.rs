@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use pogema_conformance::{files, pogema_team, sample};
-use pogema_core::{Action, Error, OnGoal, Trace, shorten};
+use pogema_core::{Action, Error, Instance, OnGoal, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_maps::numpy::{Generator, SeedSequence};
 use pogema_planners::{AStarTeam, LIFELONG, LifelongPolicy, PLANNERS, PlannerPolicy, planner};
@@ -90,6 +90,16 @@ impl Policy {
         let planner = planner(name, thinking.choice())?;
         let most_steps = u64::try_from(config.max_episode_steps).ok();
         Ok(Self::Planner(Box::new(PlannerPolicy::new(planner, thinking.budget()?, most_steps))))
+    }
+
+    /// Tells a planner also of the goals that are still to come.
+    pub fn foresee(&mut self, instance: &Instance) -> Result<(), Error> {
+        match self {
+            Self::Lifelong(policy) => policy.foresee(instance),
+            _ => Err(Error::State {
+                reason: "`--future-goals` needs `--policy rhcr` and agents that get goal after goal".into(),
+            }),
+        }
     }
 
     /// The actions of the next step; none when a file has no more.

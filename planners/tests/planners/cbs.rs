@@ -54,6 +54,14 @@ fn open_maps_with_more_agents_are_solved() {
 }
 
 #[test]
+fn the_tree_takes_no_more_than_it_may() {
+    let case = Case::random(&mut rng(1), 12, 12, 40);
+    let params = CbsParams { most_bytes: 200_000, ..CbsParams::default() };
+    let outcome = Cbs::new(params).plan(&case.problem(), &Budget::default());
+    assert_eq!(outcome, Outcome::TimedOut { best: None });
+}
+
+#[test]
 fn odd_problems_have_outcomes() {
     check_odd_problems(&mut Cbs::default());
 }
@@ -65,5 +73,5 @@ fn spent_budgets_end_the_search() {
 
 #[test]
 fn the_same_seed_gives_the_same_plan() {
-    check_repeats(|| Box::new(Cbs::new(CbsParams { seed: 7 })));
+    check_repeats(|| Box::new(Cbs::new(CbsParams { seed: 7, ..CbsParams::default() })));
 }

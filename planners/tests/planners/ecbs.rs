@@ -6,7 +6,7 @@ use pogema_maps::{Verdict, search};
 use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner};
 
 fn planner(weight: f64) -> Ecbs {
-    Ecbs::new(EcbsParams { weight, seed: 0 })
+    Ecbs::new(EcbsParams { weight, ..EcbsParams::default() })
 }
 
 #[test]
@@ -56,6 +56,14 @@ fn odd_weights_are_weights_of_one() {
         assert_eq!(planner(weight).plan(&case.problem(), &Budget::default()), best);
     }
     assert!(case.check(&planner(f64::INFINITY).plan(&case.problem(), &Budget::default())).is_some());
+}
+
+#[test]
+fn the_tree_takes_no_more_than_it_may() {
+    let case = Case::random(&mut rng(1), 12, 12, 40);
+    let params = EcbsParams { weight: 1.0, most_bytes: 200_000, ..EcbsParams::default() };
+    let outcome = Ecbs::new(params).plan(&case.problem(), &Budget::default());
+    assert_eq!(outcome, Outcome::TimedOut { best: None });
 }
 
 #[test]

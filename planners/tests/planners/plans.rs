@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use pogema_core::{Action, Cell, Map};
 use pogema_planners::{
-    AllPairs, Budget, ConflictKind, Distances, Graph, Plan, Problem, UNREACHABLE, validate,
+    AllPairs, Budget, Choice, ConflictKind, Distances, Graph, Outcome, PLANNERS, Plan, Problem, UNREACHABLE,
+    planner, validate,
 };
 
 fn cell((row, col): (u16, u16)) -> Cell {
@@ -127,27 +128,21 @@ fn only_so_many_costs_are_kept_but_none_that_is_held() {
 
 #[test]
 fn what_makes_a_problem_impossible_is_told() {
-    let reason = |rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]| {
-        let map = Map::from_rows(rows).unwrap();
-        let problem = Problem::new(&map, &cells(starts), &cells(goals)).unwrap().within(3);
-        let mut distances = Distances::new(problem.graph.clone(), 0);
-        problem.obstruction(&mut distances)
-    };
-    assert_eq!(reason(&["...."], &[(0, 0)], &[(0, 3)]), None);
-    let told = |text: &str| Some(text.to_owned());
-    assert_eq!(
-        reason(&["..", ".."], &[(0, 0), (0, 0)], &[(0, 1), (1, 1)]),
-        told("agents 0 and 1 both start at (0, 0)")
-    );
-    assert_eq!(
-        reason(&["..", ".."], &[(0, 0), (0, 1)], &[(1, 1), (1, 1)]),
-        told("agents 0 and 1 both want to stay at (1, 1)")
-    );
-    assert_eq!(reason(&[".#."], &[(0, 0)], &[(0, 2)]), told("no path leads agent 0 from (0, 0) to (0, 2)"));
-    assert_eq!(
-        reason(&["....."], &[(0, 0)], &[(0, 4)]),
-        told("agent 0 needs 4 steps from (0, 0) to (0, 4), of 3")
-    );
+    type Case<'a> = (&'a [&'a str], [&'a [(u16, u16)]; 2], &'a str);
+    let cases: [Case<'_>; 4] = [
+        (&["..", ".."], [&[(0, 0), (0, 0)], &[(0, 1), (1, 1)]], "agents 0 and 1 both start at (0, 0)"),
+        (&["..", ".."], [&[(0, 0), (0, 1)], &[(1, 1), (1, 1)]], "agents 0 and 1 both want to stay at (1, 1)"),
+        (&[".#."], [&[(0, 0)], &[(0, 2)]], "no path leads agent 0 from (0, 0) to (0, 2)"),
+        (&["....."], [&[(0, 0)], &[(0, 4)]], "agent 0 needs 4 steps from (0, 0) to (0, 4), of 3"),
+    ];
+    for (name, _) in PLANNERS {
+        for (rows, [starts, goals], reason) in cases {
+            let map = Map::from_rows(rows).unwrap();
+            let problem = Problem::new(&map, &cells(starts), &cells(goals)).unwrap().within(3);
+            let outcome = planner(name, Choice::default()).unwrap().plan(&problem, &Budget::default());
+            assert_eq!(outcome, Outcome::Impossible { reason: reason.to_owned() }, "{name}");
+        }
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod play;
 mod published;
+mod speed;
 mod suite;
 mod table;
 
@@ -36,6 +37,9 @@ pub struct Planners {
     planner: Option<String>,
     #[command(flatten)]
     thinking: Thinking,
+    /// Tell the planner also of the goals that are still to come
+    #[arg(long)]
+    future_goals: bool,
     /// Only the sets whose names contain this
     #[arg(long, value_name = "TEXT", default_value = "")]
     sets: String,
@@ -48,6 +52,9 @@ pub struct Planners {
     /// A look only: each 64th episode
     #[arg(long, conflicts_with = "every")]
     quick: bool,
+    /// Measure instead how long a first plan takes, and how many steps PIBT makes
+    #[arg(long, conflicts_with_all = ["setting", "planner", "sets", "num_agents", "records", "published", "episodes"])]
+    speed: bool,
     /// The published means, a table with commas
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
@@ -65,6 +72,8 @@ struct Record {
     setting: String,
     planner: String,
     thinking: Thinking,
+    #[serde(default)]
+    future_goals: bool,
     set: String,
     num_agents: usize,
     map: String,
@@ -93,7 +102,13 @@ impl Record {
 
 impl Planners {
     pub fn run(&self) -> Result<(), Error> {
+        if self.future_goals && self.setting == Setting::Mapf {
+            return Err(Error::config("future-goals", "true", "`--setting lmapf`"));
+        }
         let every = if self.quick { 64 } else { self.every as usize };
+        if self.speed {
+            return self.tell_speed(every);
+        }
         let published = self.published.as_deref().map(Published::read).transpose()?;
         let mut known = self.known()?;
         let sets: Vec<&Set> = SETS.iter().filter(|set| set.name.contains(&self.sets)).collect();
@@ -126,7 +141,19 @@ impl Planners {
                 });
             }
         }
-        say(&table::tell(self.setting, self.planner(), &self.thinking, &crowds))
+        let mut planner = self.planner().to_owned();
+        if self.future_goals {
+            planner.push_str(" told of future goals");
+        }
+        say(&table::tell(self.setting, &planner, &self.thinking, &crowds))
+    }
+
+    fn tell_speed(&self, every: usize) -> Result<(), Error> {
+        let crowds = |index: usize, num_agents: usize| {
+            let set: &Set = &SETS[index];
+            Ok(speed::Crowds { set, maps: set.maps(&self.suite)?, num_agents })
+        };
+        say(&speed::table(&crowds(3, 256)?, &crowds(5, 1000)?, &crowds(2, 192)?, every)?.to_string())
     }
 
     fn planner(&self) -> &str {
@@ -172,14 +199,16 @@ impl Planners {
         };
         let (played, impossible) = match self.setting {
             Setting::Mapf => play::play_once(&config, self.planner(), &self.thinking).map_err(in_task)?,
-            Setting::Lmapf => {
-                (play::play_on(&config, self.planner(), &self.thinking).map_err(in_task)?, None)
-            }
+            Setting::Lmapf => (
+                play::play_on(&config, self.planner(), &self.thinking, self.future_goals).map_err(in_task)?,
+                None,
+            ),
         };
         Ok(Record {
             setting: self.setting.name().to_owned(),
             planner: self.planner().to_owned(),
             thinking: self.thinking.clone(),
+            future_goals: self.future_goals,
             set: set.name.to_owned(),
             num_agents: task.num_agents,
             map: task.map.clone(),
@@ -211,7 +240,8 @@ impl Planners {
             let record: Record = serde_json::from_str(line).map_err(|error| Error::io(path, error))?;
             let is_same = record.setting == self.setting.name()
                 && record.planner == self.planner()
-                && record.thinking == self.thinking;
+                && record.thinking == self.thinking
+                && record.future_goals == self.future_goals;
             let set = SETS.iter().find(|set| set.name == record.set);
             if let Some(set) = set.filter(|_| is_same) {
                 let (num_agents, map, seed) = (record.num_agents, record.map.clone(), record.seed);

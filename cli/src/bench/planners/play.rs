@@ -80,10 +80,21 @@ pub fn play_once(
     Ok((played, reason))
 }
 
-/// Plays an episode of goal after goal; no move of it may be taken back.
-pub fn play_on(config: &GridConfig, name: &str, thinking: &Thinking) -> Result<Played, Error> {
+/// Plays an episode of goal after goal, all of which the planner may be told of from the beginning; no move of it may
+/// be taken back.
+pub fn play_on(
+    config: &GridConfig,
+    name: &str,
+    thinking: &Thinking,
+    future_goals: bool,
+) -> Result<Played, Error> {
     let mut policy = LifelongPolicy::new(name, thinking.choice(), thinking.budget()?)?;
-    let played = play(config, |instance, now| policy.act(instance.map(), now))?;
+    let played = play(config, |instance, now| {
+        if future_goals && now.step == 0 {
+            policy.foresee(instance)?;
+        }
+        policy.act(instance.map(), now)
+    })?;
     if played.num_reverted > 0 {
         let reason = format!("a plan is wrong: the engine took {} moves back", played.num_reverted);
         return Err(Error::State { reason });
