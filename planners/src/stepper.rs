@@ -64,6 +64,18 @@ impl Default for PibtRules {
     }
 }
 
+/// What it costs an agent to be somewhere.
+pub(crate) trait Costs {
+    /// What it costs to go on from a vertex.
+    fn cost(&self, vertex: Vertex) -> u32;
+}
+
+impl<T: AsRef<[u32]>> Costs for T {
+    fn cost(&self, vertex: Vertex) -> u32 {
+        self.as_ref()[vertex as usize]
+    }
+}
+
 /// What a step is decided from: configuration, goals, costs to go and who chooses first.
 #[derive(Debug)]
 pub(crate) struct Scene<'a, C> {
@@ -77,9 +89,9 @@ pub(crate) struct Scene<'a, C> {
     pub hints: &'a Hints,
 }
 
-impl<C: AsRef<[u32]>> Scene<'_, C> {
+impl<C: Costs> Scene<'_, C> {
     fn cost(&self, agent: Agent, vertex: Vertex) -> u32 {
-        self.costs[agent as usize].as_ref()[vertex as usize]
+        self.costs[agent as usize].cost(vertex)
     }
 
     fn place(&self, agent: Agent) -> Vertex {
@@ -120,11 +132,7 @@ impl Stepper {
 
     /// The configuration after the step, in which forced agents are where they have to be; none if PIBT finds none,
     /// which happens only if somebody is forced.
-    pub fn step<C: AsRef<[u32]>>(
-        &mut self,
-        scene: &Scene<'_, C>,
-        forced: &[(Agent, Vertex)],
-    ) -> Option<&[Vertex]> {
+    pub fn step<C: Costs>(&mut self, scene: &Scene<'_, C>, forced: &[(Agent, Vertex)]) -> Option<&[Vertex]> {
         self.next.clear();
         self.next.resize(scene.now.len(), NONE);
         for (agent, &vertex) in scene.now.iter().enumerate() {
@@ -159,7 +167,7 @@ impl Stepper {
         self.next[agent as usize] != NONE
     }
 
-    fn force<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
+    fn force<C: Costs>(&mut self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
         let is_free = self.taken[vertex as usize] == NONE && !self.would_exchange(scene, agent, vertex);
         if is_free {
             self.take(agent, vertex);
@@ -173,13 +181,13 @@ impl Stepper {
     }
 
     /// Whether who stands at a vertex goes to where the agent is.
-    fn would_exchange<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
+    fn would_exchange<C: Costs>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> bool {
         let other = self.standing[vertex as usize];
         other != NONE && other != agent && self.next[other as usize] == scene.place(agent)
     }
 
     /// Decides where an agent goes, and all whom it pushes; whether that was possible.
-    fn decide<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> bool {
+    fn decide<C: Costs>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> bool {
         let first = self.frame(scene, agent);
         self.stack.clear();
         self.stack.push(first);
@@ -211,7 +219,7 @@ impl Stepper {
     }
 
     /// Takes the next place that is free.
-    fn try_next<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, frame: &mut Frame) -> Try {
+    fn try_next<C: Costs>(&mut self, scene: &Scene<'_, C>, frame: &mut Frame) -> Try {
         while frame.tried < frame.num_places {
             let vertex = frame.places[usize::from(frame.tried)];
             frame.tried += 1;
@@ -229,7 +237,7 @@ impl Stepper {
     }
 
     /// Lets the follower of an agent that got its best place follow.
-    fn pull<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, frame: &Frame) {
+    fn pull<C: Costs>(&mut self, scene: &Scene<'_, C>, frame: &Frame) {
         let left = scene.place(frame.agent);
         if frame.follower != NONE
             && frame.tried == 1
@@ -241,7 +249,7 @@ impl Stepper {
     }
 
     /// Where an agent would go, best first.
-    fn frame<C: AsRef<[u32]>>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> Frame {
+    fn frame<C: Costs>(&mut self, scene: &Scene<'_, C>, agent: Agent) -> Frame {
         let here = scene.place(agent);
         let around = scene.graph.neighbours(here);
         let hint = scene.hints.next(agent, here);
@@ -268,7 +276,7 @@ impl Stepper {
     }
 
     /// How many others around a vertex want to go there.
-    fn hindered<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> u64 {
+    fn hindered<C: Costs>(&self, scene: &Scene<'_, C>, agent: Agent, vertex: Vertex) -> u64 {
         let wants = |&&place: &&Vertex| {
             let other = self.standing[place as usize];
             other != NONE && other != agent && scene.cost(other, vertex) < scene.cost(other, place)
@@ -277,7 +285,7 @@ impl Stepper {
     }
 
     /// Who has to be led away, the agent going first, so that the two can pass each other.
-    fn partner<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
+    fn partner<C: Costs>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
         let here = scene.place(agent);
         if best == here {
             return NONE;
@@ -294,7 +302,7 @@ impl Stepper {
     }
 
     /// Who stands beside the agent and can pass it only once the agent has made room.
-    fn pusher_behind<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
+    fn pusher_behind<C: Costs>(&self, scene: &Scene<'_, C>, agent: Agent, best: Vertex) -> Agent {
         let here = scene.place(agent);
         let is_pusher = |&place: &Vertex| {
             let other = self.standing[place as usize];
@@ -308,7 +316,7 @@ impl Stepper {
     }
 
     /// Whether the pusher, going on behind the puller, meets no place to pass before one of them must turn.
-    fn must_swap<C: AsRef<[u32]>>(
+    fn must_swap<C: Costs>(
         &self,
         scene: &Scene<'_, C>,
         pusher: Agent,
@@ -328,7 +336,7 @@ impl Stepper {
     }
 
     /// Whether the puller, walking away from the pusher, comes to a fork.
-    fn can_swap<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, pusher: Vertex, puller: Vertex) -> bool {
+    fn can_swap<C: Costs>(&self, scene: &Scene<'_, C>, pusher: Vertex, puller: Vertex) -> bool {
         let (mut behind, mut ahead) = (pusher, puller);
         loop {
             match self.way_on(scene, behind, ahead) {
@@ -343,7 +351,7 @@ impl Stepper {
     }
 
     /// How a corridor goes on; a dead end whose agent has arrived there does not count.
-    fn way_on<C: AsRef<[u32]>>(&self, scene: &Scene<'_, C>, behind: Vertex, ahead: Vertex) -> Way {
+    fn way_on<C: Costs>(&self, scene: &Scene<'_, C>, behind: Vertex, ahead: Vertex) -> Way {
         let mut way = Way::End;
         for &vertex in scene.graph.neighbours(ahead) {
             let agent = self.standing[vertex as usize];

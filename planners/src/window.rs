@@ -18,12 +18,14 @@ use std::sync::Arc;
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
-use crate::distances::UNREACHABLE;
+use crate::discount::Discount;
+use crate::distances::{CostToGo, UNREACHABLE};
 use crate::graph::{Graph, Vertex};
 use crate::problem::Clock;
-use crate::push::Push;
 use crate::reservations::Reservations;
+use crate::scatter::Hints;
 use crate::sipp::{Horizon, Leg, Order, Sipp, Task};
+use crate::stepper::{Agent, Costs, PibtRules, Scene, Stepper};
 
 /// The next steps of all agents.
 #[derive(Debug)]
@@ -33,11 +35,12 @@ pub(crate) struct Window {
     /// Shape: `[agents, steps + 1]`
     paths: Vec<Vec<Vertex>>,
     costs: Vec<u32>,
+    discount: Discount,
     reserved: Reservations,
     /// The old paths of those that are taken out and not yet put back.
     left: Reservations,
     sipp: Sipp,
-    push: Push,
+    stepper: Stepper,
 }
 
 impl Window {
@@ -45,18 +48,24 @@ impl Window {
     const PATIENCE: usize = 16;
 
     /// A window of so many steps, with nobody in it.
-    pub(crate) fn new(graph: Arc<Graph>, num_steps: usize) -> Self {
+    pub(crate) fn new(graph: Arc<Graph>, num_steps: usize, seed: u64) -> Self {
         let num_vertices = graph.num_vertices();
         Self {
             num_steps,
             paths: Vec::new(),
             costs: Vec::new(),
+            discount: Discount::new(1.0),
             reserved: Reservations::new(num_vertices),
             left: Reservations::new(num_vertices),
             sipp: Sipp::new(graph.clone()),
-            push: Push::new(num_vertices),
+            stepper: Stepper::new(&graph, PibtRules::default(), seed),
             graph,
         }
+    }
+
+    /// From now on each step of a delay weighs so many times the one before.
+    pub(crate) fn set_discount(&mut self, factor: f64) {
+        self.discount = Discount::new(factor);
     }
 
     /// Where agents are after a step of the plan, counted from now.
@@ -65,7 +74,7 @@ impl Window {
     }
 
     /// Takes the first step as done if agents are where it led to, else begins where they are; says which.
-    pub(crate) fn advance(&mut self, now: &[Vertex], legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> bool {
+    pub(crate) fn advance(&mut self, now: &[Vertex], legs: &[Vec<Leg>]) -> bool {
         let is_as_planned = self.paths.len() == now.len() && self.after(1).eq(now.iter().copied());
         if is_as_planned {
             self.paths.iter_mut().for_each(|path| {
@@ -74,7 +83,7 @@ impl Window {
         } else {
             self.paths = now.iter().map(|&at| vec![at]).collect();
         }
-        self.extend(legs, rng);
+        self.extend(legs);
         self.take_stock(legs);
         is_as_planned
     }
@@ -89,25 +98,34 @@ impl Window {
         self.costs.iter().map(|&cost| u64::from(cost)).sum()
     }
 
-    /// Lets agents push each other until the window is full.
-    fn extend(&mut self, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) {
+    fn total_loss(&self) -> u64 {
+        self.costs.iter().map(|&cost| self.discount.loss(cost)).sum()
+    }
+
+    /// Lets agents push each other until the window is full, those first who are nearest to their goals.
+    fn extend(&mut self, legs: &[Vec<Leg>]) {
         let mut length = self.paths.first().map_or(usize::MAX, Vec::len);
         let mut phases: Vec<usize> =
             self.paths.iter().zip(legs).map(|(path, legs)| phase(path, legs)).collect();
+        let mut order: Vec<Agent> = (0..self.paths.len() as Agent).collect();
         while length <= self.num_steps {
-            let places: Vec<Vertex> = self.after(length - 1).collect();
-            let to_go: Vec<_> = phases
-                .iter()
-                .zip(legs)
-                .map(|(&phase, legs)| legs.get(phase).map(|leg| leg.to_go.clone()))
-                .collect();
-            let mut order: Vec<usize> = (0..places.len()).collect();
-            let urgency = |agent: usize| match &to_go[agent] {
-                Some(to_go) => to_go[places[agent] as usize],
-                None => UNREACHABLE,
+            let now: Vec<Vertex> = self.after(length - 1).collect();
+            let wish = |agent: usize| match legs[agent].get(phases[agent]) {
+                Some(leg) => Wish::Go(&leg.to_go),
+                None => Wish::Rest(now[agent]),
+            };
+            let costs: Vec<Wish<'_>> = (0..now.len()).map(wish).collect();
+            let urgency = |agent: Agent| match costs[agent as usize] {
+                Wish::Go(to_go) => to_go[now[agent as usize] as usize],
+                Wish::Rest(_) => UNREACHABLE,
             };
             order.sort_by_key(|&agent| urgency(agent));
-            let next = self.push.step(&self.graph, &places, &to_go, &order, rng.next_u32());
+            let (graph, hints) = (&self.graph, &Hints::default());
+            // No place in a corridor is closed by an agent that will not stay.
+            let goals = vec![Vertex::MAX; now.len()];
+            let scene = Scene { graph, now: &now, goals: &goals, costs: &costs, order: &order, hints };
+            // Where nobody is forced, there is always a step.
+            let next = self.stepper.step(&scene, &[]).map_or_else(|| now.clone(), <[Vertex]>::to_vec);
             for (agent, &to) in next.iter().enumerate() {
                 self.paths[agent].push(to);
                 while legs[agent].get(phases[agent]).is_some_and(|leg| leg.to_go[to as usize] == 0) {
@@ -147,9 +165,9 @@ impl Window {
                 return;
             }
             let group = self.group(seed, legs, rng);
-            let before = self.total_cost();
+            let before = self.total_loss();
             self.replan(&group, legs, clock, rng);
-            num_in_vain = if self.total_cost() < before { 0 } else { num_in_vain + 1 };
+            num_in_vain = if self.total_loss() < before { 0 } else { num_in_vain + 1 };
         }
     }
 
@@ -250,7 +268,7 @@ impl Window {
         clock: &mut Clock,
         rng: &mut Pcg64Mcg,
     ) -> Vec<(Vec<Vertex>, u32)> {
-        let most: u64 = order.iter().map(|&agent| u64::from(self.costs[agent])).sum();
+        let most: u64 = order.iter().map(|&agent| self.discount.loss(self.costs[agent])).sum();
         let (mut found, mut total) = (Vec::with_capacity(order.len()), 0);
         for &agent in order {
             if clock.count_node() {
@@ -258,7 +276,7 @@ impl Window {
             }
             self.left.remove(agent, &self.paths[agent], false);
             let way = self.find(agent, legs, rng.next_u32());
-            total += way.as_ref().map_or(0, |way| u64::from(way.1));
+            total += way.as_ref().map_or(0, |way| self.discount.loss(way.1));
             let Some(way) = way.filter(|_| total <= most) else {
                 self.left.add(agent, &self.paths[agent], false);
                 break;
@@ -281,6 +299,23 @@ impl Window {
             salt,
         };
         self.sipp.find(&task).map(|way| (way.path, way.cost))
+    }
+}
+
+/// Where an agent would rather be.
+#[derive(Clone, Copy, Debug)]
+enum Wish<'a> {
+    Go(&'a CostToGo),
+    /// Where it is.
+    Rest(Vertex),
+}
+
+impl Costs for Wish<'_> {
+    fn cost(&self, vertex: Vertex) -> u32 {
+        match self {
+            Self::Go(to_go) => to_go[vertex as usize],
+            Self::Rest(here) => u32::from(vertex != *here),
+        }
     }
 }
 
