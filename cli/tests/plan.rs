@@ -82,6 +82,11 @@ fn planners_play_whole_episodes() {
         assert!(told["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{policy}: {told}");
         assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
     }
+    let foreseeing =
+        ["run", "--policy", "rhcr", "--nodes", "300", "--on-target", "restart", "--future-goals"];
+    let foreseeing = [&foreseeing, TASK.as_slice(), &["--collision-system", "soft"]].concat();
+    let (_, error, status) = run(folder.path(), &foreseeing);
+    assert_eq!((error.as_str(), status), ("", 0));
 }
 
 #[test]
@@ -95,6 +100,14 @@ fn wrong_calls_are_one_line() {
         (vec!["plan", "--out", "no/such/folder"], "no/such"),
         (vec!["bench", "planners", "--suite", "nowhere"], "nowhere/01-random.yaml"),
         (vec!["bench", "planners", "--suite", ".", "--sets", "cities"], "a part of a set's name"),
+        (vec!["bench", "planners", "--suite", ".", "--future-goals"], "expected `--setting lmapf`"),
+        (vec!["bench", "planners", "--suite", ".", "--speed"], "04-movingai.yaml"),
+        (vec!["bench", "planners", "--suite", ".", "--speed", "--sets", "x"], "cannot be used with '--sets"),
+        (vec!["run", "--policy", "lacam", "--future-goals"], "`--future-goals` needs `--policy rhcr`"),
+        (
+            vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],
+            "expected `rhcr`, to make use of goals still to come",
+        ),
     ] {
         let (_, error, status) = run(folder.path(), &arguments);
         assert_eq!((status, error.lines().count()), (2, 1), "{arguments:?}: {error}");

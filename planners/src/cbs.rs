@@ -66,7 +66,7 @@ impl Planner for Cbs {
             Err(outcome) => return outcome,
         };
         if clock.count_node() {
-            return Outcome::TimedOut { best: None };
+            return clock.unsolved(None);
         }
         let legs = one_leg_each(&costs);
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
@@ -80,13 +80,13 @@ impl Planner for Cbs {
             num_entries: 0,
             room: Room::new(self.params.most_bytes),
         };
-        let Some(root) = search.low.root(&mut clock) else { return Outcome::TimedOut { best: None } };
+        let Some(root) = search.low.root(&mut clock) else { return clock.unsolved(None) };
         let mut doubt = Doubt::default();
         search.put(root, vec![None; problem.num_agents()]);
         while let Some(entry) = search.open.pop() {
             let Some(meeting) = entry.choice else { return entry.node.paths.outcome(problem, entry.bound) };
             if clock.count_node() || clock.is_spent() || search.room.is_full() {
-                return Outcome::TimedOut { best: None };
+                return clock.unsolved(None);
             }
             search.room.remove_node(&entry.node);
             if let Some(reason) = doubt.count(problem, &mut clock) {

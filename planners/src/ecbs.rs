@@ -71,7 +71,7 @@ impl Planner for Ecbs {
         let give_up = |clock: &mut Clock| doubt.count(problem, clock);
         match search(&mut sipp, &problem.graph, &setting, &self.params, &mut clock, give_up) {
             Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
-            Found::Nothing => Outcome::TimedOut { best: None },
+            Found::Nothing => clock.unsolved(None),
             Found::Proof(reason) => Outcome::Impossible { reason },
         }
     }

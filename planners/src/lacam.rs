@@ -126,7 +126,8 @@ impl<'a> Work<'a> {
             Found::Plan(steps) => self.answer(steps),
             Found::Impossible => impossible(),
             Found::Spent => {
-                Outcome::TimedOut { best: self.problem.plan(&self.within_cap(self.search.closest())).ok() }
+                let best = self.problem.plan(&self.within_cap(self.search.closest())).ok();
+                self.clock.unsolved(best)
             }
         }
     }
@@ -142,12 +143,12 @@ impl<'a> Work<'a> {
         None
     }
 
-    fn answer(&self, steps: Steps) -> Outcome {
+    fn answer(&mut self, steps: Steps) -> Outcome {
         let is_late = self.is_late(&steps);
         match self.problem.plan(&self.within_cap(steps)) {
-            Ok(plan) if is_late => Outcome::TimedOut { best: Some(plan) },
+            Ok(plan) if is_late => self.clock.unsolved(Some(plan)),
             Ok(plan) => Outcome::Solved { plan, lower_bound: self.lower_bound },
-            Err(_) => Outcome::TimedOut { best: None },
+            Err(_) => self.clock.unsolved(None),
         }
     }
 

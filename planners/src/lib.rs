@@ -35,6 +35,7 @@ mod plan;
 mod plan_text;
 mod policy;
 mod problem;
+mod random;
 mod refine;
 mod reservations;
 mod rhcr;

@@ -54,7 +54,7 @@ impl Planner for Pbs {
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
         let Some(paths) = search(&mut sipp, &problem.graph, &setting, &mut clock) else {
-            return Outcome::TimedOut { best: None };
+            return clock.unsolved(None);
         };
         paths.outcome(problem, problem.lower_bound(&costs))
     }

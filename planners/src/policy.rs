@@ -86,11 +86,8 @@ impl PlannerPolicy {
             most_steps: self.most_steps.map(|most| most.saturating_sub(now.step) as usize),
         };
         let outcome = self.planner.plan(&problem, &self.budget);
-        let plan = match &outcome {
-            Outcome::Solved { plan, .. } | Outcome::TimedOut { best: Some(plan) } => plan.clone(),
-            _ => Plan::new(vec![cells])?,
-        };
-        let is_partial = matches!(&outcome, Outcome::TimedOut { .. });
+        let plan = outcome.best().cloned().map_or_else(|| Plan::new(vec![cells]), Ok)?;
+        let is_partial = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
         self.outcomes.push(outcome);
         Ok(Followed { agents, goals, plan, began: now.step, is_partial })
     }

@@ -82,7 +82,7 @@ impl Problem {
         let mut costs = Vec::with_capacity(self.num_agents());
         for (agent, &goal) in self.goals.iter().enumerate() {
             if clock.is_spent() {
-                return Err(Outcome::TimedOut { best: self.plan(std::slice::from_ref(&self.starts)).ok() });
+                return Err(clock.unsolved(self.plan(std::slice::from_ref(&self.starts)).ok()));
             }
             let own: CostToGo = flood.costs_to_go(goal).collect();
             if let Some(reason) = self.obstruction(agent, &own) {
@@ -136,6 +136,12 @@ pub enum Outcome {
         /// The plan that came closest, if there is one.
         best: Option<Plan>,
     },
+    /// The planner knows no better, though it had time left: others may find a plan. What was found is valid, but
+    /// brings not all agents to their goals.
+    GaveUp {
+        /// The plan that came closest, if there is one.
+        best: Option<Plan>,
+    },
     /// There is no plan.
     Impossible {
         /// Why.
@@ -151,6 +157,15 @@ impl Outcome {
             _ => None,
         }
     }
+
+    /// The plan that solves the problem, or else the one that came closest.
+    pub fn best(&self) -> Option<&Plan> {
+        match self {
+            Self::Solved { plan, .. } => Some(plan),
+            Self::TimedOut { best } | Self::GaveUp { best } => best.as_ref(),
+            Self::Impossible { .. } => None,
+        }
+    }
 }
 
 impl fmt::Display for Outcome {
@@ -161,6 +176,7 @@ impl fmt::Display for Outcome {
                 write!(f, "solved: sum of costs {cost}, at least {lower_bound}; makespan {makespan}")
             }
             Self::TimedOut { .. } => write!(f, "timed out"),
+            Self::GaveUp { .. } => write!(f, "gave up"),
             Self::Impossible { reason } => write!(f, "impossible: {reason}"),
         }
     }
@@ -223,6 +239,11 @@ impl Clock {
         let is_cancelled = self.budget.cancelled.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         self.is_spent |= is_late || is_cancelled;
         self.is_spent
+    }
+
+    /// What it came to if no plan was found.
+    pub(crate) fn unsolved(&mut self, best: Option<Plan>) -> Outcome {
+        if self.is_spent() { Outcome::TimedOut { best } } else { Outcome::GaveUp { best } }
     }
 
     /// Nodes counted so far.

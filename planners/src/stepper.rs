@@ -41,7 +41,12 @@ pub(crate) fn patience_by(num_agents: usize, cost: impl Fn(Agent) -> u32) -> Vec
 
 /// The patience of an agent after a step.
 pub(crate) fn patience_after(patience: u32, is_there: bool) -> u32 {
-    if is_there { patience & RANK } else { patience.saturating_add(RANK + 1) }
+    match patience.checked_add(RANK + 1) {
+        _ if is_there => patience & RANK,
+        Some(more) => more,
+        // Nobody waits longer than it can count, and all who do keep their ranks.
+        None => patience,
+    }
 }
 
 /// Puts first who has waited longest.

@@ -22,6 +22,7 @@ use crate::discount::Discount;
 use crate::distances::{CostToGo, UNREACHABLE};
 use crate::graph::{Graph, Vertex};
 use crate::problem::Clock;
+use crate::random::{below, shuffle};
 use crate::reservations::Reservations;
 use crate::scatter::Hints;
 use crate::sipp::{Horizon, Leg, Order, Sipp, Task};
@@ -178,7 +179,10 @@ impl Window {
         };
         let num_late = (0..self.paths.len()).filter(|&agent| delay(agent) > 0).count();
         let total: u64 = (0..self.paths.len()).map(delay).sum();
-        let mut at = u64::from(rng.next_u32()).checked_rem(total)?;
+        if total == 0 {
+            return None;
+        }
+        let mut at = below(rng, total as usize) as u64;
         let seed = (0..self.paths.len()).find(|&agent| {
             let found = at < delay(agent);
             at = at.saturating_sub(delay(agent));
@@ -189,11 +193,11 @@ impl Window {
 
     /// The agent and those that keep it from going straight on.
     fn group(&self, seed: usize, legs: &[Vec<Leg>], rng: &mut Pcg64Mcg) -> Vec<usize> {
-        let most = 2 + (rng.next_u32() % 6) as usize;
+        let most = 2 + below(rng, 6);
         let mut group = vec![seed];
         for _ in 0..3 {
-            let walker = group[rng.next_u32() as usize % group.len()];
-            let start = (rng.next_u32() as usize % 2) * (rng.next_u32() as usize % self.num_steps);
+            let walker = group[below(rng, group.len())];
+            let start = below(rng, 2) * below(rng, self.num_steps);
             self.walk(walker, start, legs, most, &mut group, rng);
             if group.len() >= most {
                 break;
@@ -223,7 +227,7 @@ impl Window {
             if count == 0 {
                 return;
             }
-            let to = around.iter().filter(nearer).nth(rng.next_u32() as usize % count).copied().unwrap_or(at);
+            let to = around.iter().filter(nearer).nth(below(rng, count)).copied().unwrap_or(at);
             for other in self.reserved.holders(to, step as u32 - 1, step as u32) {
                 if group.len() < most && !group.contains(&other) {
                     group.push(other);
@@ -348,10 +352,4 @@ fn cost(path: &[Vertex], legs: &[Leg]) -> u32 {
 /// What the way would cost if the agent were alone.
 fn least(path: &[Vertex], legs: &[Leg]) -> u32 {
     legs.first().map_or(0, |leg| leg.to_go[path[0] as usize].saturating_add(leg.then))
-}
-
-pub(crate) fn shuffle<T>(items: &mut [T], rng: &mut Pcg64Mcg) {
-    for last in (1..items.len()).rev() {
-        items.swap(last, rng.next_u32() as usize % (last + 1));
-    }
 }

@@ -27,11 +27,11 @@ class Plan:
     Shape: `cells` is `(steps + 1, agents, 2)`, int32, the start first; `actions` is `(steps, agents)`, int64
     """
 
-    #: "solved", "timed_out" or "impossible"
+    #: "solved", "timed_out", "gave_up" or "impossible"
     outcome: str
     #: Time that it took. Units: seconds
     seconds: float
-    #: Where each agent is; of a plan that timed out, the one that came closest, if there is one.
+    #: Where each agent is; where none was found, of the plan that came closest, if there is one.
     cells: Optional[NDArray[np.int32]] = None
     #: What each agent does.
     actions: Optional[NDArray[np.int64]] = None
@@ -70,7 +70,7 @@ def plan(
     Shape: `obstacles` `(height, width)`, nonzero for an obstacle; `starts` and `goals` `(agents, 2)`
 
     Errors: ValueError for cells that are not free, wrong shapes, or a planner that there is not. That there is no
-    plan, or that time ran out, is no error but an outcome.
+    plan, or that none was found, is no error but an outcome.
     """
     told = _engine.make_plan(
         obstacles, starts, goals, planner, _budget(seconds, nodes), most_steps, num_threads, seed
@@ -104,8 +104,10 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
 class PlannerAgents:
     """Agents of an environment that follow a planner, made from observations of the type `MAPF`.
 
-    It plans in the first step of an episode, and again when agents or goals are not where the plan has them. Goals
-    that are still to come it is never told. `act` and `reset_states` are what pogema-toolbox asks of an algorithm.
+    It plans in the first step of an episode, and again when agents or goals are not where the plan has them. With
+    `lifelong=True`, for episodes in which agents get goal after goal, it is one of the planners `rhcr`, `pibt` and
+    `guided-pibt` that plan as they go, and `seconds` and `nodes` are for each step. Goals that are still to come it
+    is never told. `act` and `reset_states` are what pogema-toolbox asks of an algorithm.
     """
 
     def __init__(
@@ -117,9 +119,14 @@ class PlannerAgents:
         most_steps: Optional[int] = None,
         num_threads: int = 1,
         seed: int = 0,
+        lifelong: bool = False,
     ) -> None:
-        """See `plan`; `most_steps` are those of an episode."""
-        self._follower = _engine.PlanFollower(planner, _budget(seconds, nodes), most_steps, num_threads, seed)
+        """See `plan`; `most_steps` are those of an episode.
+
+        Errors: ValueError for a planner that there is not, or not for such episodes.
+        """
+        budget = _budget(seconds, nodes)
+        self._follower = _engine.PlanFollower(planner, budget, most_steps, num_threads, seed, lifelong)
 
     def act(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
         """The actions of all agents.

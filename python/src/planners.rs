@@ -6,8 +6,10 @@ use std::time::{Duration, Instant};
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Cell, Error, Map, Snapshot};
-use pogema_planners::{Budget, Choice, Distances, Graph, Outcome, Plan, PlannerPolicy, Problem};
+use pogema_core::{Action, Cell, Error, Map, Snapshot};
+use pogema_planners::{
+    Budget, Choice, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, Problem,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -51,8 +53,9 @@ pub fn make_plan<'py>(
             told.set_item("lower_bound", lower_bound)?;
             tell(&told, plan)?;
         }
-        Outcome::TimedOut { best } => {
-            told.set_item("outcome", "timed_out")?;
+        Outcome::TimedOut { best } | Outcome::GaveUp { best } => {
+            let is_late = matches!(&outcome, Outcome::TimedOut { .. });
+            told.set_item("outcome", if is_late { "timed_out" } else { "gave_up" })?;
             best.as_ref().map_or(Ok(()), |plan| tell(&told, plan))?;
         }
         Outcome::Impossible { reason } => {
@@ -130,8 +133,31 @@ pub struct PlanFollower {
 }
 
 struct Follower {
-    policy: PlannerPolicy,
+    policy: Policy,
     step: u64,
+}
+
+enum Policy {
+    /// One goal for each agent.
+    Once(PlannerPolicy),
+    /// Goal after goal.
+    Lifelong(LifelongPolicy),
+}
+
+impl Policy {
+    fn act(&mut self, map: &Map, now: &Snapshot) -> Result<Vec<Action>, Error> {
+        match self {
+            Self::Once(policy) => policy.act(map, now),
+            Self::Lifelong(policy) => policy.act(map, now),
+        }
+    }
+
+    fn reset(&mut self) {
+        match self {
+            Self::Once(policy) => policy.reset(),
+            Self::Lifelong(policy) => policy.reset(),
+        }
+    }
 }
 
 #[pymethods]
@@ -143,10 +169,19 @@ impl PlanFollower {
         most_steps: Option<u64>,
         num_threads: usize,
         seed: u64,
+        lifelong: bool,
     ) -> PyResult<Self> {
         let made = || {
-            let planner = pogema_planners::planner(planner, Choice { seed, threads: num_threads })?;
-            Ok(PlannerPolicy::new(planner, read_budget(budget)?, most_steps))
+            let (choice, budget) = (Choice { seed, threads: num_threads }, read_budget(budget)?);
+            Ok(if lifelong {
+                Policy::Lifelong(LifelongPolicy::new(planner, choice, budget)?)
+            } else {
+                Policy::Once(PlannerPolicy::new(
+                    pogema_planners::planner(planner, choice)?,
+                    budget,
+                    most_steps,
+                ))
+            })
         };
         let policy = made().map_err(|error: Error| errors::plan(&error))?;
         Ok(Self { inner: Mutex::new(Follower { policy, step: 0 }) })

@@ -127,6 +127,25 @@ def test_agents_follow_a_plan_to_their_goals(on_target):
         assert infos[0]["metrics"]["CSR"] == 1.0
 
 
+@pytest.mark.parametrize("planner", ["rhcr", "pibt", "guided-pibt"])
+def test_agents_go_from_goal_to_goal(planner):
+    config = GridConfig(
+        num_agents=8, size=12, seed=2, on_target="restart", observation_type="MAPF", collision_system="soft"
+    )
+    env, agents = pogema_v0(config), PlannerAgents(planner, nodes=200, lifelong=True)
+    throughputs = []
+    for _ in range(2):
+        agents.reset_states()
+        observations, _ = env.reset()
+        truncated = [False]
+        while not all(truncated):
+            observations, _, _, truncated, infos = env.step(agents.act(observations))
+        throughputs.append(infos[0]["metrics"]["avg_throughput"])
+    assert throughputs[0] == throughputs[1] > 0.5
+    with pytest.raises(ValueError, match="expected `rhcr`, `pibt`, `guided-pibt`"):
+        PlannerAgents("cbs", lifelong=True)
+
+
 def test_agents_want_to_see_everything():
     env = pogema_v0(GridConfig(num_agents=2, seed=1))
     with pytest.raises(TypeError, match="observation_type='MAPF'"):

@@ -45,7 +45,7 @@ pub struct MakePlan {
 }
 
 impl MakePlan {
-    /// The exit status is 0 for a plan that solves the instance, 1 if there is none or time ran out.
+    /// The exit status is 0 for a plan that solves the instance, 1 if there is none or none was found.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
         for path in [&self.out, &self.result, &self.trace].into_iter().flatten() {
@@ -135,6 +135,7 @@ fn as_json(outcome: &Outcome, seconds: f64) -> String {
             "seconds": seconds,
         }),
         Outcome::TimedOut { .. } => json!({"outcome": "timed_out", "seconds": seconds}),
+        Outcome::GaveUp { .. } => json!({"outcome": "gave_up", "seconds": seconds}),
         Outcome::Impossible { reason } => {
             json!({"outcome": "impossible", "reason": reason, "seconds": seconds})
         }

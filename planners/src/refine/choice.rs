@@ -8,6 +8,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
 use crate::graph::Vertex;
+use crate::random::below;
 use crate::refine::team::Team;
 use crate::stepper::Agent;
 
@@ -45,11 +46,6 @@ pub(crate) struct Choice {
     queue: Vec<Vertex>,
     /// For each vertex, the round in which it was last looked at.
     seen: Vec<u32>,
-}
-
-/// A random number below a bound.
-pub(crate) fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
-    ((u128::from(random.next_u64()) * bound as u128) >> 64) as usize
 }
 
 impl Choice {

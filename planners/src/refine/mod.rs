@@ -22,8 +22,9 @@ use rand_pcg::Pcg64Mcg;
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
 use crate::problem::Problem;
+use crate::random::{below, shuffle};
 use crate::stepper::Agent;
-use choice::{Choice, below};
+use choice::Choice;
 use detour::{Detours, Trip};
 use reservations::{Path, Reservations};
 pub(crate) use shared::Shared;
@@ -271,11 +272,5 @@ fn keep<'p>(room: &mut Vec<Path>, paths: impl Iterator<Item = &'p [Vertex]>) {
         }
         room[index].clear();
         room[index].extend_from_slice(path);
-    }
-}
-
-fn shuffle(agents: &mut [Agent], random: &mut Pcg64Mcg) {
-    for end in (1..agents.len()).rev() {
-        agents.swap(end, below(random, end + 1));
     }
 }

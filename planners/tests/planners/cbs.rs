@@ -58,7 +58,7 @@ fn the_tree_takes_no_more_than_it_may() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
     let params = CbsParams { most_bytes: 200_000, ..CbsParams::default() };
     let outcome = Cbs::new(params).plan(&case.problem(), &Budget::default());
-    assert_eq!(outcome, Outcome::TimedOut { best: None });
+    assert_eq!(outcome, Outcome::GaveUp { best: None });
 }
 
 #[test]

@@ -152,6 +152,27 @@ fn what_is_solvable_is_solved_and_what_is_not_is_proved_impossible() {
 }
 
 #[test]
+fn agents_that_keep_apart_make_a_plan_that_is_no_worse() {
+    let mut random = Pcg64Mcg::seed_from_u64(8);
+    let (mut num_better, mut num_worse) = (0, 0);
+    for seed in 0..40 {
+        let (map, starts, goals) = random_problem(&mut random, 16, 16, 30);
+        let problem = Problem::new(&map, &starts, &goals).unwrap();
+        let cost = |scatter| {
+            let params = LacamParams { seed, scatter, refine: false, ..LacamParams::default() };
+            let outcome = Lacam::new(params).plan(&problem, &Budget::of_nodes(5000));
+            let plan = outcome.solution()?;
+            validate(&map, &starts, Some(&goals), plan).unwrap();
+            Some(plan.sum_of_costs())
+        };
+        let Some((plain, scattered)) = cost(false).zip(cost(true)) else { continue };
+        num_better += usize::from(scattered < plain);
+        num_worse += usize::from(scattered > plain);
+    }
+    assert!(num_better > 5 && num_worse == 0, "{num_better} better, {num_worse} worse");
+}
+
+#[test]
 fn sums_of_costs_come_to_the_least_and_bounds_never_exceed_it() {
     let mut random = Pcg64Mcg::seed_from_u64(2);
     let (mut num_solved, mut num_optimal) = (0, 0);

@@ -88,6 +88,9 @@ struct Record {
     throughput: Option<f64>,
     /// Units: seconds.
     runtime: f64,
+    /// The least that any plan's sum of costs can be, as far as the planner knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bound: Option<u64>,
     /// What a proof says about an episode that was not solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     impossible: Option<String>,
@@ -197,13 +200,11 @@ impl Planners {
                 task.set, task.map, task.seed, task.num_agents
             ),
         };
-        let (played, impossible) = match self.setting {
-            Setting::Mapf => play::play_once(&config, self.planner(), &self.thinking).map_err(in_task)?,
-            Setting::Lmapf => (
-                play::play_on(&config, self.planner(), &self.thinking, self.future_goals).map_err(in_task)?,
-                None,
-            ),
+        let played = match self.setting {
+            Setting::Mapf => play::play_once(&config, self.planner(), &self.thinking),
+            Setting::Lmapf => play::play_on(&config, self.planner(), &self.thinking, self.future_goals),
         };
+        let played = played.map_err(in_task)?;
         Ok(Record {
             setting: self.setting.name().to_owned(),
             planner: self.planner().to_owned(),
@@ -218,7 +219,8 @@ impl Planners {
             makespan: played.metrics.makespan,
             throughput: played.metrics.avg_throughput,
             runtime: played.runtime.as_secs_f64(),
-            impossible,
+            bound: played.bound,
+            impossible: played.impossible,
         })
     }
 

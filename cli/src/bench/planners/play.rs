@@ -18,6 +18,10 @@ pub struct Played {
     pub runtime: Duration,
     /// Moves that the engine took back; a valid plan has none.
     pub num_reverted: u64,
+    /// The least that any plan's sum of costs can be, as far as the planner knows.
+    pub bound: Option<u64>,
+    /// Why there is no plan, if that was proved.
+    pub impossible: Option<String>,
 }
 
 /// Plays an episode to its end.
@@ -46,38 +50,33 @@ pub fn play(
         now = next;
         if let Some(metrics) = meter.feed(&now.on_goal, &terminated, &truncated) {
             let num_reverted = collisions.with_agents + collisions.with_obstacles;
-            return Ok(Played { metrics, runtime, num_reverted });
+            return Ok(Played { metrics, runtime, num_reverted, bound: None, impossible: None });
         }
     }
 }
 
-/// Plays an episode of one goal for each agent; its plan, if it is whole, has to be valid and to come true. Also
-/// returns why there is none, if that was proved.
-pub fn play_once(
-    config: &GridConfig,
-    name: &str,
-    thinking: &Thinking,
-) -> Result<(Played, Option<String>), Error> {
+/// Plays an episode of one goal for each agent; its plan, if it is whole, has to be valid and to come true.
+pub fn play_once(config: &GridConfig, name: &str, thinking: &Thinking) -> Result<Played, Error> {
     let most_steps = u64::try_from(config.max_episode_steps).ok();
     let mut policy = PlannerPolicy::new(planner(name, thinking.choice())?, thinking.budget()?, most_steps);
     let mut task = None;
-    let played = play(config, |instance, now| {
+    let mut played = play(config, |instance, now| {
         task.get_or_insert_with(|| (instance.map().clone(), now.cells.clone(), now.goals.clone()));
         policy.act(instance.map(), now)
     })?;
     let outcome = policy.outcomes().first();
-    if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, .. })) = (task, outcome) {
+    if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, lower_bound })) = (task, outcome) {
         let wrong = |reason: String| Error::State { reason: format!("a plan is wrong: {reason}") };
         validate(&map, &starts, Some(&goals), plan).map_err(|conflict| wrong(conflict.to_string()))?;
         if played.num_reverted > 0 || policy.outcomes().len() > 1 {
             return Err(wrong(format!("the engine took {} moves back", played.num_reverted)));
         }
+        played.bound = Some(*lower_bound);
     }
-    let reason = match outcome {
-        Some(Outcome::Impossible { reason }) => Some(reason.clone()),
-        _ => None,
-    };
-    Ok((played, reason))
+    if let Some(Outcome::Impossible { reason }) = outcome {
+        played.impossible = Some(reason.clone());
+    }
+    Ok(played)
 }
 
 /// Plays an episode of goal after goal, all of which the planner may be told of from the beginning; no move of it may

@@ -21,28 +21,39 @@ impl Crowd {
         mean(self.records.iter().filter_map(figure))
     }
 
-    /// Mean sums of costs, ours and published, over the episodes that both solved.
-    fn both(&self) -> Option<(f64, f64)> {
+    /// Mean sums of costs, ours and published, and the bound of ours, over the episodes that both solved.
+    fn both(&self) -> Option<Both> {
+        let bound = |record: &Record| record.bound.map(|bound| bound as f64);
         let Some(solved) = &self.solved else {
             let published = self.mean.as_ref().filter(|mean| mean.csr == Some(1.0))?.soc?;
-            let ours = self.mean_of(Record::solved_soc)?;
-            return self.records.iter().all(|record| record.csr == Some(1.0)).then_some((ours, published));
+            let all = self.records.iter().all(|record| record.csr == Some(1.0));
+            let ours = self.mean_of(Record::solved_soc).filter(|_| all)?;
+            return Some(Both { ours, published, bound: self.mean_of(bound) });
         };
-        let pairs: Vec<(f64, f64)> = self
-            .records
-            .iter()
-            .filter_map(|record| {
-                let place = (record.num_agents, record.map.clone(), record.seed);
-                Some((record.solved_soc()?, *solved.get(&place)?))
-            })
-            .collect();
-        let ours = mean(pairs.iter().map(|pair| pair.0))?;
-        Some((ours, mean(pairs.iter().map(|pair| pair.1))?))
+        let place = |record: &Record| (record.num_agents, record.map.clone(), record.seed);
+        let pairs = self.records.iter().filter_map(|record| {
+            record.solved_soc()?;
+            Some((record, *solved.get(&place(record))?))
+        });
+        let pairs: Vec<(&Record, f64)> = pairs.collect();
+        Some(Both {
+            ours: mean(pairs.iter().filter_map(|(record, _)| record.solved_soc()))?,
+            published: mean(pairs.iter().map(|pair| pair.1))?,
+            bound: mean(pairs.iter().filter_map(|(record, _)| bound(record))),
+        })
     }
 
     fn longest(&self) -> f64 {
         self.records.iter().map(|record| record.runtime).fold(0.0, f64::max)
     }
+}
+
+/// Mean figures over episodes that both solved.
+#[derive(Clone, Copy)]
+struct Both {
+    ours: f64,
+    published: f64,
+    bound: Option<f64>,
 }
 
 fn mean(figures: impl Iterator<Item = f64>) -> Option<f64> {
@@ -76,6 +87,7 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
         "where both solve",
         "published",
         "times",
+        "at least",
         "makespan",
         "published",
         "seconds",
@@ -91,9 +103,10 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
             figure(crowd.mean_of(|record| record.csr), 4),
             figure(published(|mean| mean.csr), 4),
             figure(crowd.mean_of(Record::solved_soc), 2),
-            figure(both.map(|pair| pair.0), 2),
-            figure(both.map(|pair| pair.1), 2),
-            figure(both.map(|(ours, theirs)| ours / theirs), 4),
+            figure(both.map(|both| both.ours), 2),
+            figure(both.map(|both| both.published), 2),
+            figure(both.map(|both| both.ours / both.published), 4),
+            figure(both.and_then(|both| Some(both.bound? / both.published)), 4),
             figure(crowd.mean_of(|record| record.makespan), 2),
             figure(published(|mean| mean.makespan), 2),
             figure(crowd.mean_of(|record| Some(record.runtime)), 3),
