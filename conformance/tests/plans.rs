@@ -137,6 +137,26 @@ fn a_policy_may_be_told_of_the_goals_to_come() {
 }
 
 #[test]
+fn few_agents_that_know_their_goals_to_come_reach_more_of_them() {
+    let (mut num_known, mut num_unknown) = (0.0, 0.0);
+    for seed in 0..12 {
+        let (config, instance) = drawn(seed, 5, 3, "restart");
+        for is_told in [false, true] {
+            let mut policy =
+                LifelongPolicy::new("rhcr", Choice { seed, threads: 1 }, Budget::of_nodes(100)).unwrap();
+            if is_told {
+                policy.foresee(&instance).unwrap();
+            }
+            let (num_reached, _) = play(&config.rules(), &instance, |environment| {
+                policy.act(instance.map(), &environment.snapshot()).unwrap()
+            });
+            *(if is_told { &mut num_known } else { &mut num_unknown }) += num_reached;
+        }
+    }
+    assert!(num_known >= num_unknown, "{num_known} goals by knowing, {num_unknown} without");
+}
+
+#[test]
 fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     let (config, instance) = drawn(1, 12, 16, "restart");
     let new = |name| LifelongPolicy::new(name, Choice::default(), Budget::of_nodes(50)).unwrap();

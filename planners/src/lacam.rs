@@ -31,7 +31,8 @@ pub struct LacamParams {
     /// Attempts to make a plan better, one after the other in vain, after which a planner without a bound on its time
     /// and nodes is done.
     pub patience: u64,
-    /// Most bytes that the nodes of a search may take, and as much again for the tables of those who refine.
+    /// Most bytes that the nodes of a search may take, and as much again for the tables of those who refine. The costs
+    /// to go take four bytes more for each agent and free cell.
     pub most_bytes: usize,
 }
 

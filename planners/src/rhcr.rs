@@ -41,8 +41,9 @@ pub struct RhcrParams {
     /// Searches for one agent that a planning may take, whatever the budget.
     pub most_searches: u64,
     /// With [`WindowSolver::Neighbourhoods`], how many times as much as the one before each step of a delay weighs; 1
-    /// means the sum of costs. Unless it is given, it is 0.85 for at most four agents and 1 for more: where few get in
-    /// each other's way, a delay far ahead may never come, for goals change; in a crowd it only grows.
+    /// means the sum of costs. Unless it is given, it is 0.85 for at most four agents that do not know their next
+    /// goals, and else 1: where few get in each other's way, a delay far ahead may never come, for goals change; in a
+    /// crowd it only grows.
     pub discount: Option<f64>,
     /// Chooses among what is equally good.
     pub seed: u64,
@@ -86,6 +87,8 @@ pub struct Rhcr {
     goals: Vec<Vertex>,
     /// Steps since the last planning.
     age: usize,
+    /// For how many agents delays are weighed now, and whether those know their next goals.
+    weighed: Option<(usize, bool)>,
     rng: Pcg64Mcg,
 }
 
@@ -102,8 +105,18 @@ impl Rhcr {
             window: Window::new(graph, params.planning_window, params.seed),
             goals: Vec::new(),
             age: 0,
+            weighed: None,
             rng: Pcg64Mcg::seed_from_u64(params.seed),
             params,
+        }
+    }
+
+    /// Chooses what delays weigh, for so many agents that know their next goals or do not.
+    fn weigh(&mut self, num_agents: usize, foresees: bool) {
+        if self.weighed != Some((num_agents, foresees)) {
+            self.weighed = Some((num_agents, foresees));
+            let own = if num_agents <= 4 && !foresees { 0.85 } else { 1.0 };
+            self.window.set_discount(self.params.discount.unwrap_or(own));
         }
     }
 
@@ -139,10 +152,6 @@ impl Rhcr {
         let mut clock = budget.start();
         let is_new = |agent: &usize| self.goals.get(*agent) != Some(&goals[*agent]);
         let changed: Vec<usize> = (0..goals.len()).filter(is_new).collect();
-        if self.goals.len() != goals.len() {
-            let own = if goals.len() <= 4 { 0.85 } else { 1.0 };
-            self.window.set_discount(self.params.discount.unwrap_or(own));
-        }
         let is_as_planned = self.window.advance(now, &legs);
         self.age += 1;
         let is_due = self.age >= self.params.simulation_window || !is_as_planned || !changed.is_empty();
@@ -193,11 +202,13 @@ impl Lifelong for Rhcr {
         self.window = Window::new(graph, self.params.planning_window, self.params.seed);
         self.goals.clear();
         self.age = 0;
+        self.weighed = None;
         self.rng = Pcg64Mcg::seed_from_u64(self.params.seed);
     }
 
     fn next(&mut self, now: &[Vertex], goals: &[Vertex], budget: &Budget) -> Result<Vec<Vertex>, Error> {
         check_agents(self.distances.graph().num_vertices(), now, goals)?;
+        self.weigh(now.len(), false);
         let legs = now.iter().zip(goals).map(|(&at, &goal)| self.legs(at, &[goal])).collect();
         Ok(self.step(now, goals.to_vec(), legs, budget))
     }
@@ -220,6 +231,7 @@ impl Lifelong for Rhcr {
                 return Err(Error::agent(agent, format!("goal {goal} is none of {num_vertices} vertices")));
             }
         }
+        self.weigh(now.len(), true);
         let legs = now.iter().zip(goals).map(|(&at, goals)| self.legs(at, goals)).collect();
         Ok(self.step(now, present, legs, budget))
     }
