@@ -69,9 +69,8 @@ impl Default for PibtRules {
     }
 }
 
-/// What it costs an agent to be somewhere.
+/// What it costs an agent to go on from a vertex.
 pub(crate) trait Costs {
-    /// What it costs to go on from a vertex.
     fn cost(&self, vertex: Vertex) -> u32;
 }
 
