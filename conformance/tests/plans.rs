@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Collision, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, StepOut};
-use pogema_maps::{GridConfig, InstanceSource};
+use pogema_maps::{GridConfig, InstanceSource, PUZZLES, Puzzle, named_map};
 use pogema_planners::{
     Budget, Choice, ConflictKind, LIFELONG, LifelongPolicy, PLANNERS, Plan, PlannerPolicy, Problem, planner,
     validate,
@@ -16,7 +16,11 @@ fn drawn(seed: u64, size: u64, num_agents: u64, on_target: &str) -> (GridConfig,
         "seed": seed, "size": size, "num_agents": num_agents, "density": 0.25, "on_target": on_target,
         "collision_system": "soft", "max_episode_steps": 64,
     });
-    let config = GridConfig::from_value(&fields).unwrap();
+    made(&fields)
+}
+
+fn made(fields: &serde_json::Value) -> (GridConfig, Instance) {
+    let config = GridConfig::from_value(fields).unwrap();
     let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
     (config, instance)
 }
@@ -115,27 +119,35 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
 }
 
 /// Goals reached by agents that are told only of their present goals, and by agents that know those to come.
-fn reached_by_knowing(num_seeds: u64, size: u64, num_agents: u64, nodes: u64) -> [f32; 2] {
-    let reached = |is_told: bool, seed: u64| {
-        let (config, instance) = drawn(seed, size, num_agents, "restart");
-        let choice = Choice { seed, threads: 1 };
-        let mut policy = LifelongPolicy::new("rhcr", choice, Budget::of_nodes(nodes)).unwrap();
+fn reached_by_knowing(episodes: &[(GridConfig, Instance)]) -> [f32; 2] {
+    let reached = |is_told: bool, (config, instance): &(GridConfig, Instance)| {
+        let mut policy = LifelongPolicy::new("rhcr", Choice::default(), Budget::of_nodes(200)).unwrap();
         if is_told {
-            policy.foresee(&instance).unwrap();
+            policy.foresee(instance).unwrap();
         }
         // That a goal is another than the one foretold would be an error.
-        let (num_reached, num_reverted) = play(&config.rules(), &instance, |environment| {
+        let (num_reached, num_reverted) = play(&config.rules(), instance, |environment| {
             policy.act(instance.map(), &environment.snapshot()).unwrap()
         });
-        assert_eq!(num_reverted, 0, "seed {seed}");
+        assert_eq!(num_reverted, 0, "seed {:?}", config.seed);
         num_reached
     };
-    [false, true].map(|is_told| (0..num_seeds).map(|seed| reached(is_told, seed)).sum())
+    [false, true].map(|is_told| episodes.iter().map(|episode| reached(is_told, episode)).sum())
 }
 
 #[test]
 fn agents_that_know_their_goals_to_come_reach_more_of_them() {
-    for [unknown, known] in [reached_by_knowing(6, 12, 16, 200), reached_by_knowing(12, 5, 3, 100)] {
+    let crowds: Vec<_> = (0..6).map(|seed| drawn(seed, 12, 16, "restart")).collect();
+    let puzzle = |puzzle: &Puzzle| {
+        let rows = named_map(puzzle.name).unwrap().map.rows();
+        made(&json!({
+            "map": rows.join("\n"), "num_agents": 2, "seed": 0, "on_target": "restart",
+            "collision_system": "soft", "max_episode_steps": 256,
+        }))
+    };
+    let pairs: Vec<_> = PUZZLES.iter().map(puzzle).collect();
+    for episodes in [crowds, pairs] {
+        let [unknown, known] = reached_by_knowing(&episodes);
         assert!(known > unknown, "{known} goals by knowing, {unknown} without");
     }
 }
