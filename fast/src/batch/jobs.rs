@@ -1,12 +1,12 @@
 //! The work of one call, cut into parts for the threads.
 
 use pogema_core::{Action, Config, Error, StepOut};
-use rayon::ThreadPool;
 
 use crate::observe::{is_beyond_cache, words_per_agent};
 use crate::simd::fetch_all;
 
 use super::Lane;
+use super::team::Team;
 
 /// Where observations of a batch go, if anywhere.
 #[derive(Debug)]
@@ -135,27 +135,23 @@ pub(super) struct Jobs<'a> {
 type Play<'a> = &'a (dyn Fn(&mut Lane, &[Action], StepOut<'_>) -> Result<(), Error> + Sync);
 
 impl Jobs<'_> {
-    /// Plays and observes all lanes, on the threads of a pool if there is one.
-    pub fn run(self, pool: Option<&ThreadPool>, play: Play<'_>) -> Result<(), Error> {
+    /// Plays and observes all lanes, shared among a team.
+    pub fn run(self, team: &Team, play: Play<'_>) -> Result<(), Error> {
         // Parts small enough that no thread waits long for another.
         const PARTS_PER_THREAD: usize = 4;
-        match pool {
-            None => self.run_here(play),
-            Some(pool) => {
-                let most = self.lanes.len().div_ceil(PARTS_PER_THREAD * pool.current_num_threads());
-                pool.install(|| self.run_in_parts(most, play))
-            }
-        }
-    }
-
-    fn run_in_parts(self, most: usize, play: Play<'_>) -> Result<(), Error> {
-        if self.lanes.len() <= most {
+        if team.num_threads() == 1 {
             return self.run_here(play);
         }
-        let middle = self.lanes.len() / 2;
-        let (left, right) = self.split_at(middle);
-        let (left, right) = rayon::join(|| left.run_in_parts(most, play), || right.run_in_parts(most, play));
-        left.and(right)
+        let most = self.lanes.len().div_ceil(PARTS_PER_THREAD * team.num_threads());
+        let mut parts = Vec::with_capacity(self.lanes.len().div_ceil(most));
+        let mut rest = self;
+        while rest.lanes.len() > most {
+            let (part, others) = rest.split_at(most);
+            parts.push(part);
+            rest = others;
+        }
+        parts.push(rest);
+        team.share(parts, |part| part.run_here(play)).into_iter().collect()
     }
 
     fn run_here(mut self, play: Play<'_>) -> Result<(), Error> {

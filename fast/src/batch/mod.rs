@@ -3,16 +3,16 @@
 mod jobs;
 mod lane;
 mod prepare;
+mod team;
 
 use pogema_core::{Action, Config, Error, Metrics, StepOut};
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{Engine, Path};
 
 use jobs::Jobs;
 use lane::Lane;
 use prepare::Preparer;
+use team::Team;
 
 pub use jobs::{Observations, View};
 pub use prepare::Instances;
@@ -41,13 +41,14 @@ pub struct Batch {
     config: Config,
     autoreset: Autoreset,
     lanes: Vec<Lane>,
-    pool: Option<ThreadPool>,
+    team: Team,
     preparer: Preparer,
     is_started: bool,
 }
 
 impl Batch {
-    /// A batch of `num_lanes` environments, played by `num_threads` threads; it wants a reset first.
+    /// A batch of `num_lanes` environments, played by `num_threads` threads, the calling one among them; it wants a
+    /// reset first.
     ///
     /// # Errors
     /// If the config is out of range; for no lanes, no threads or more threads than lanes; if threads cannot be
@@ -68,10 +69,9 @@ impl Batch {
         let path = Path::from_environment()?;
         let lane = |index| Lane::new(index, config, path);
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;
-        let pool = (num_threads > 1).then(|| ThreadPoolBuilder::new().num_threads(num_threads).build());
-        let pool = pool.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
+        let team = Team::new(num_threads)?;
         let preparer = Preparer::new(Box::new(source), num_lanes)?;
-        Ok(Self { config, autoreset: Autoreset::default(), lanes, pool, preparer, is_started: false })
+        Ok(Self { config, autoreset: Autoreset::default(), lanes, team, preparer, is_started: false })
     }
 
     /// The same batch with another rule for the ends of episodes, to be chosen before the first reset.
@@ -107,12 +107,16 @@ impl Batch {
     pub fn reset_lanes(&mut self, chosen: &[bool]) -> Result<(), Error> {
         self.check_chosen(chosen)?;
         let preparer = &self.preparer;
-        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| {
+        over_lanes(&self.team, &mut self.lanes, |lane| {
             if chosen[lane.index] { lane.look_ahead(preparer) } else { Ok(()) }
         })?;
-        over_lanes(self.pool.as_ref(), &mut self.lanes, |lane| {
-            if chosen[lane.index] { lane.begin() } else { Ok(()) }
-        })?;
+        over_lanes(
+            &self.team,
+            &mut self.lanes,
+            |lane| {
+                if chosen[lane.index] { lane.begin() } else { Ok(()) }
+            },
+        )?;
         self.is_started = true;
         Ok(())
     }
@@ -124,7 +128,7 @@ impl Batch {
     /// As for [`Batch::reset_lanes`]; if the thread of the source cannot be started.
     pub fn reset_with(&mut self, source: impl Instances + 'static, chosen: &[bool]) -> Result<(), Error> {
         self.check_chosen(chosen)?;
-        let (pool, config) = (self.pool.as_ref(), &self.config);
+        let (team, config) = (&self.team, &self.config);
         let preparer = Preparer::new(Box::new(source), self.lanes.len())?;
         let first = |lane: &mut Lane| {
             let instance = preparer.take(lane.index)?;
@@ -132,7 +136,7 @@ impl Batch {
         };
         let firsts =
             over_lanes(
-                pool,
+                team,
                 &mut self.lanes,
                 |lane| if chosen[lane.index] { first(lane) } else { Ok(None) },
             )?;
@@ -174,7 +178,7 @@ impl Batch {
         let beyond_cache = view.observations.is_beyond_cache();
         let steps = Some((actions, out));
         let jobs = Jobs { lanes: &mut self.lanes, steps, view, beyond_cache };
-        jobs.run(self.pool.as_ref(), &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
+        jobs.run(&self.team, &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
     }
 
     /// Observes every lane, or shows whatever else is asked for.
@@ -189,7 +193,7 @@ impl Batch {
         view.check(self.lanes.len(), &self.config)?;
         let beyond_cache = view.observations.is_beyond_cache();
         let jobs = Jobs { lanes: &mut self.lanes, steps: None, view, beyond_cache };
-        jobs.run(self.pool.as_ref(), &|_, _, _| Ok(()))
+        jobs.run(&self.team, &|_, _, _| Ok(()))
     }
 
     /// Observes the last episodes of some lanes at their ends, in the order given.
@@ -271,33 +275,23 @@ impl Batch {
         self.lanes.get(lane).ok_or_else(|| Error::config("lane", lane, expected()))
     }
 
-    /// Writes a buffer part by part, on the threads of the pool if there is one.
+    /// Writes a buffer part by part, shared among the team.
     fn in_parts<T: Send>(
         &self,
         per_part: usize,
         out: &mut [T],
         write: impl Fn(usize, &mut [T]) -> Result<(), Error> + Sync,
     ) -> Result<(), Error> {
-        match &self.pool {
-            Some(pool) => pool.install(|| {
-                let parts = out.par_chunks_mut(per_part).enumerate();
-                parts.try_for_each(|(part, out)| write(part, out))
-            }),
-            None => out.chunks_mut(per_part).enumerate().try_for_each(|(part, out)| write(part, out)),
-        }
+        let parts = out.chunks_mut(per_part).enumerate().collect();
+        self.team.share(parts, |(part, out)| write(part, out)).into_iter().collect()
     }
 }
 
-/// Does something to all lanes, on the threads of a pool if there is one; the error is that of the first lane that
-/// has one.
-fn over_lanes<T: Send>(
-    pool: Option<&ThreadPool>,
+/// Does something to all lanes, shared among a team; the error is that of the first lane that has one.
+fn over_lanes<T: Send + Sync>(
+    team: &Team,
     lanes: &mut [Lane],
     work: impl Fn(&mut Lane) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    let done: Vec<_> = match pool {
-        Some(pool) => pool.install(|| lanes.par_iter_mut().map(&work).collect()),
-        None => lanes.iter_mut().map(work).collect(),
-    };
-    done.into_iter().collect()
+    team.share(lanes.iter_mut().collect(), work).into_iter().collect()
 }

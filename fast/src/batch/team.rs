@@ -1,0 +1,142 @@
+//! Work shared between the calling thread and helpers.
+
+use std::hint::spin_loop;
+use std::sync::atomic::{AtomicUsize, Ordering::Acquire, Ordering::Release};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use pogema_core::Error;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Looks at the others' progress before the caller goes to sleep: some tens of microseconds.
+const MOST_LOOKS: usize = 1000;
+/// Pauses that a helper needs to hand in what it did.
+const HANDING_IN: usize = 5;
+
+/// The calling thread and the threads that help it.
+///
+/// The caller works along, and at the end looks for the others awake for a while: to hand a step over to other
+/// threads, sleep, and be woken takes as long as the steps of some lanes.
+#[derive(Debug)]
+pub struct Team {
+    helpers: Option<ThreadPool>,
+}
+
+impl Team {
+    /// A team of so many threads, the caller's among them.
+    ///
+    /// # Errors
+    /// If threads cannot be started.
+    pub fn new(num_threads: usize) -> Result<Self, Error> {
+        let helpers =
+            (num_threads > 1).then(|| ThreadPoolBuilder::new().num_threads(num_threads - 1).build());
+        let helpers = helpers.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
+        Ok(Self { helpers })
+    }
+
+    /// Number of threads, the caller's among them.
+    pub fn num_threads(&self) -> usize {
+        1 + self.helpers.as_ref().map_or(0, ThreadPool::current_num_threads)
+    }
+
+    /// Does all parts of some work; what comes out is in the order of the parts.
+    ///
+    /// Each thread begins where its share begins, so that it finds near it what it worked on the last time, and then
+    /// takes over what others have not begun.
+    pub fn share<P: Send, T: Send + Sync>(&self, parts: Vec<P>, work: impl Fn(P) -> T + Sync) -> Vec<T> {
+        let Some(helpers) = &self.helpers else { return parts.into_iter().map(work).collect() };
+        let (num_parts, num_threads) = (parts.len(), self.num_threads());
+        let open: Vec<_> = parts.into_iter().map(|part| Mutex::new(Some(part))).collect();
+        let done: Vec<_> = open.iter().map(|_| OnceLock::new()).collect();
+        let work_from = |first: usize| {
+            for part in (first..num_parts).chain(0..first) {
+                let taken = open[part].lock().unwrap_or_else(PoisonError::into_inner).take();
+                if let Some(taken) = taken {
+                    // INVARIANT: empty until now, since nobody else takes this part.
+                    let _ = done[part].set(work(taken));
+                }
+            }
+        };
+        let num_at_work = AtomicUsize::new(num_threads - 1);
+        helpers.in_place_scope(|scope| {
+            let (work_from, num_at_work) = (&work_from, &num_at_work);
+            for helper in 1..num_threads {
+                scope.spawn(move |_| {
+                    work_from(helper * num_parts / num_threads);
+                    num_at_work.fetch_sub(1, Release);
+                });
+            }
+            work_from(0);
+            look_until(|| num_at_work.load(Acquire) == 0);
+        });
+        // INVARIANT: the scope ends when all parts are done.
+        done.into_iter().filter_map(OnceLock::into_inner).collect()
+    }
+}
+
+/// Looks again and again, for a while.
+fn look_until(is_done: impl Fn() -> bool) {
+    for _ in 0..MOST_LOOKS {
+        if is_done() {
+            break;
+        }
+        spin_loop();
+    }
+    for _ in 0..HANDING_IN {
+        spin_loop();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+    use std::thread;
+
+    use super::Team;
+
+    #[test]
+    fn what_comes_out_is_in_order_and_done_once() {
+        for num_threads in [1, 2, 3, 8] {
+            let team = Team::new(num_threads).unwrap();
+            assert_eq!(team.num_threads(), num_threads);
+            for num_parts in [0, 1, 2, 7, 100] {
+                let mut flags = vec![0; num_parts];
+                let numbers = team.share(flags.iter_mut().enumerate().collect(), |(part, flag)| {
+                    *flag += 1;
+                    part
+                });
+                assert_eq!(numbers, (0..num_parts).collect::<Vec<_>>());
+                assert!(flags.iter().all(|&times| times == 1));
+            }
+        }
+    }
+
+    #[test]
+    fn all_threads_work_at_once_and_the_caller_is_one_of_them() {
+        let team = Team::new(3).unwrap();
+        let all_here = Barrier::new(3);
+        let mut threads = team.share(vec![(); 3], |()| {
+            all_here.wait();
+            format!("{:?}", thread::current().id())
+        });
+        assert!(threads.contains(&format!("{:?}", thread::current().id())));
+        threads.sort();
+        threads.dedup();
+        assert_eq!(threads.len(), 3);
+    }
+
+    #[test]
+    fn the_caller_waits_for_whoever_takes_long() {
+        let team = Team::new(2).unwrap();
+        let here = thread::current().id();
+        let both_here = Barrier::new(2);
+        let slept = team.share(vec![(); 2], |()| {
+            both_here.wait();
+            let is_helper = thread::current().id() != here;
+            if is_helper {
+                thread::sleep(std::time::Duration::from_millis(20));
+            }
+            is_helper
+        });
+        assert_eq!(slept.iter().filter(|&&helper| helper).count(), 1);
+    }
+}
