@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use pogema_benches::episode;
-use pogema_conformance::sample;
 use pogema_core::{Action, Environment, StepOut};
 use pogema_fast::{Batch, Engine, Observations, Path, words_per_agent};
 use pogema_maps::numpy::Generator;
+use pogema_planners::sample;
 
 /// Side, agents.
 const SIZES: [(usize, usize); 3] = [(32, 64), (64, 64), (256, 10_000)];

@@ -15,7 +15,7 @@ use crate::output::{check_writable, say};
 use crate::plan::Thinking;
 use crate::render::Pictures;
 use episode::Episode;
-use policy::{Policy, PolicyName};
+use policy::Policy;
 pub use settings::{Settings, put_map};
 
 #[derive(Args, Debug)]
@@ -23,8 +23,8 @@ pub struct Run {
     #[command(flatten)]
     settings: Settings,
     /// Who chooses the actions
-    #[arg(long, value_enum, default_value_t = PolicyName::Random)]
-    policy: PolicyName,
+    #[arg(long, value_parser = policy::names(), default_value = "random")]
+    policy: String,
     /// The actions for `--policy file`: a trace, or a JSON list of action numbers per line
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
@@ -51,14 +51,12 @@ impl Run {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
-        let mut policy = Policy::new(self.policy, self.actions.as_deref(), &self.thinking, &config)?;
+        let settings = self.thinking.settings(self.future_goals)?;
         let mut episode = Episode::start(config, self.trace.is_some() || self.pictures.are_wanted())?;
         for warning in episode.warnings() {
             eprintln!("warning: {warning}");
         }
-        if self.future_goals {
-            policy.foresee(episode.instance())?;
-        }
+        let mut policy = Policy::new(&self.policy, self.actions.as_deref(), &settings, &episode)?;
         let mut screen = self.render.then(|| self.pictures.screen());
         loop {
             if let Some(screen) = &mut screen {
@@ -88,7 +86,7 @@ impl Run {
 
     /// What was played, in a few words.
     fn title(&self) -> String {
-        let words = [self.settings.what(), Some(self.policy.to_string())];
+        let words = [self.settings.what(), Some(self.policy.clone())];
         words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
@@ -96,7 +94,7 @@ impl Run {
         if self.json {
             let summary = json!({
                 "config": episode.config().to_value(),
-                "policy": self.policy.to_string(),
+                "policy": self.policy,
                 "steps": episode.num_steps(),
                 "ended": episode.is_over(),
                 "metrics": episode.metrics(),

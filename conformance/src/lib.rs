@@ -19,6 +19,7 @@
 pub mod cases;
 mod compare;
 mod dice;
+mod digits;
 mod draw;
 mod events;
 pub mod files;
@@ -27,13 +28,11 @@ mod laws;
 mod literal;
 mod oracle;
 mod play;
-mod policies;
 pub mod port;
 mod request;
 mod runner;
 mod script;
 mod tally;
-mod windows;
 
 pub use compare::{Divergence, compare, compare_in};
 pub use draw::draw_request;
@@ -42,11 +41,9 @@ pub use laws::{BrokenLaw, broken_law};
 pub use literal::Literal;
 pub use oracle::{Oracle, find_oracle_python};
 pub use play::{Engine, play, play_on};
-pub use policies::{pogema_team, sample};
 pub use request::{
     Back, Derived, Failure, History, Op, Record, Registered, Request, ResetRecord, Response, StepRecord, When,
 };
 pub use runner::{Fault, Part, Progress, Report};
 pub use script::{Script, play_script};
 pub use tally::{Tally, families_of};
-pub use windows::Windows;

@@ -7,13 +7,12 @@ use pogema_core::{
 };
 use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
-use pogema_planners::AStarTeam;
+use pogema_planners::{AStarTeam, Windows, pairs, pogema_team, sample};
 
-use crate::policies::{pogema_team, sample};
+use crate::digits::pack;
 use crate::request::{
     Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
 };
-use crate::windows::{Windows, pack, pairs};
 
 /// Longer episodes have too many goals to list; the oracle lists none for them either.
 const MOST_FORETOLD_STEPS: i64 = 4096;

@@ -9,17 +9,18 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 use pogema_conformance::golden;
 
 /// A crate uses lower layers only, never its own.
-const LAYERS: [(&str, u8); 10] = [
+const LAYERS: [(&str, u8); 11] = [
     ("pogema-core", 0),
     ("pogema-reference", 1),
     ("pogema-fast", 1),
     ("pogema-maps", 1),
-    ("pogema-planners", 1),
+    ("pogema-planners", 2),
     ("pogema-render", 1),
-    ("pogema-conformance", 2),
-    ("pogema", 3),
-    ("pogema-benches", 3),
-    ("pogema-python", 3),
+    ("pogema-conformance", 3),
+    ("pogema-toolbox", 3),
+    ("pogema", 4),
+    ("pogema-benches", 4),
+    ("pogema-python", 4),
 ];
 
 #[test]

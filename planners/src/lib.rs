@@ -9,7 +9,8 @@
 //! [`planner()`] and [`lifelong()`] make a planner by its name; [`PlannerPolicy`] and [`LifelongPolicy`] let one drive any
 //! environment.
 //!
-//! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; its random numbers come in from outside.
+//! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; [`pogema_team`] and [`sample`] draw the numbers
+//! that POGEMA draws.
 
 mod astar;
 mod cbs;
@@ -17,6 +18,7 @@ mod conflict;
 mod constraints;
 mod discount;
 mod distances;
+mod drawn;
 mod ecbs;
 mod flood;
 mod foresight;
@@ -27,6 +29,7 @@ mod joint;
 mod lacam;
 mod lifelong;
 mod mdd;
+mod named_policy;
 mod names;
 mod parts;
 mod pbs;
@@ -46,15 +49,18 @@ mod stepper;
 mod tree;
 mod validate;
 mod window;
+mod windows;
 
 pub use astar::{AStarAgent, AStarTeam, View};
 pub use cbs::{Cbs, CbsParams};
 pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
+pub use drawn::{pogema_team, sample};
 pub use ecbs::{Ecbs, EcbsParams};
 pub use graph::{Graph, Vertex};
 pub use guide::GuideParams;
 pub use lacam::{Lacam, LacamParams};
 pub use lifelong::Lifelong;
+pub use named_policy::{NamedPolicy, PolicySettings, SIMPLE};
 pub use names::{Choice, LIFELONG, PLANNERS, lifelong, planner};
 pub use pbs::{Pbs, PbsParams};
 pub use pibt::{Pibt, PibtLifelong, PibtParams};
@@ -66,3 +72,4 @@ pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub use stepper::PibtRules;
 pub use validate::{Conflict, ConflictKind, validate};
+pub use windows::{Windows, pairs};

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use pogema_conformance::sample;
 use pogema_core::{Action, Environment, Error, StepOut};
 use pogema_fast::{Batch, Engine, Observations, words_per_agent};
 use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_planners::sample;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use serde_json::{Value, json};

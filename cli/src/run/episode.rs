@@ -1,12 +1,11 @@
 //! One episode on the reference engine, measured and, if wanted, recorded.
 
-use pogema_conformance::Windows;
 use pogema_core::{
     Action, CollisionMeter, DensityMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot,
     StepOut, Trace, TraceHeader, TraceStart, TraceStep,
 };
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_planners::AStarTeam;
+use pogema_planners::{NamedPolicy, Windows};
 use pogema_reference::Reference;
 use pogema_render::Ground;
 
@@ -83,9 +82,9 @@ impl Episode {
         Ok(())
     }
 
-    /// Lets POGEMA's A* agents choose.
-    pub fn ask(&self, team: &mut AStarTeam) -> Result<Vec<Action>, Error> {
-        team.act(Windows::of(&self.environment)?.views())
+    /// Lets a policy choose.
+    pub fn ask(&self, policy: &mut NamedPolicy) -> Result<Vec<Action>, Error> {
+        policy.act(&self.environment, self.instance.map())
     }
 
     /// The trace so far, if it is recorded.

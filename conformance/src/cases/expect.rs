@@ -6,8 +6,8 @@ use pogema_core::{Cell, Change, Map, Metrics, Observed, Snapshot, picture};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::digits::unpack;
 use crate::request::{Record, ResetRecord, StepRecord};
-use crate::windows::unpack;
 
 /// What holds after one operation. Pictures may end in blank lines.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use pogema_core::{Cell, Map, picture};
 
+use crate::digits::unpack;
 use crate::request::{Record, Response};
-use crate::windows::unpack;
 
 /// Before, expected and got, below each other.
 pub fn states(expected: &Response, got: &Response, op: usize) -> String {

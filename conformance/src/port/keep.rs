@@ -8,10 +8,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::group::Example;
+use crate::digits::unpack;
 use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
-use crate::windows::unpack;
 
 /// The file of a case, in the order in which it is read.
 #[derive(Serialize)]

@@ -6,7 +6,7 @@ use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, P
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::windows::{pack_bits, unpack};
+use crate::digits::{pack_bits, unpack};
 
 /// Reads what a port told; an error says in words what is wrong with its form.
 ///

@@ -8,8 +8,8 @@ use pogema_core::{
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
+use crate::digits::unpack;
 use crate::request::numbers;
-use crate::windows::unpack;
 
 /// A port at work on one config.
 ///

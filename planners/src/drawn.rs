@@ -2,7 +2,8 @@
 
 use pogema_core::Action;
 use pogema_maps::numpy::Generator;
-use pogema_planners::AStarTeam;
+
+use crate::AStarTeam;
 
 /// POGEMA's A* policy: every agent draws its random moves from a generator of seed 0.
 ///

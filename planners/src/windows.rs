@@ -1,16 +1,25 @@
-//! What agents see, as policies, meters and records want it.
+//! What agents see, as policies and meters want it.
 
 use pogema_core::{Environment, Error, PomapfOut};
-use pogema_planners::View;
+
+use crate::astar::View;
 
 /// The arrays of the `POMAPF` observation.
 #[derive(Clone, Debug)]
 pub struct Windows {
     side: usize,
-    pub(crate) obstacles: Vec<f32>,
-    pub(crate) agents: Vec<f32>,
-    pub(crate) cells: Vec<i32>,
-    pub(crate) goals: Vec<i32>,
+    /// Shape: `[agents, side, side]`, not 0 for an obstacle.
+    pub obstacles: Vec<f32>,
+    /// Shape: `[agents, side, side]`, not 0 for an agent.
+    pub agents: Vec<f32>,
+    /// Where each agent is, counted from its start.
+    ///
+    /// Shape: `[agents, 2]`
+    pub cells: Vec<i32>,
+    /// Where each agent's goal is, counted from its start.
+    ///
+    /// Shape: `[agents, 2]`
+    pub goals: Vec<i32>,
 }
 
 impl Windows {
@@ -56,38 +65,6 @@ impl Windows {
 }
 
 /// Values two by two.
-pub(crate) fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
+pub fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
     values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
-}
-
-/// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
-pub(crate) fn pack(window: &[f32]) -> String {
-    in_digits(window, |&value| value != 0.0)
-}
-
-/// The same of flags.
-pub(crate) fn pack_bits(bits: &[bool]) -> String {
-    in_digits(bits, |&bit| bit)
-}
-
-fn in_digits<T>(cells: &[T], is_set: impl Fn(&T) -> bool) -> String {
-    const DIGITS: [char; 16] =
-        ['0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'a', 'b', 'c', 'd', 'e', 'f'];
-    let mut text = String::with_capacity(2 * cells.len().div_ceil(8));
-    for cells in cells.chunks(8) {
-        let bit = |byte: u8, (at, cell)| byte | u8::from(is_set(cell)) << (7 - at);
-        let byte = cells.iter().enumerate().fold(0u8, bit);
-        text.push(DIGITS[usize::from(byte >> 4)]);
-        text.push(DIGITS[usize::from(byte & 15)]);
-    }
-    text
-}
-
-/// What [`pack`] packed, and the zeros that filled the last byte.
-pub(crate) fn unpack(window: &str) -> Vec<bool> {
-    let digit = |character: char| character.to_digit(16).unwrap_or(0);
-    window
-        .chars()
-        .flat_map(|character| (0..4).rev().map(move |bit| digit(character) >> bit & 1 == 1))
-        .collect()
 }

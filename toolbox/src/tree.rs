@@ -1,0 +1,141 @@
+//! A YAML file as it is written: keys in their order, each value with its line.
+
+use std::fmt;
+
+use pogema_core::Error;
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
+use serde_saphyr::Spanned;
+
+/// A value of a file, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// The line, counted from 1.
+    pub line: u64,
+    /// The value.
+    pub content: Content,
+}
+
+/// A value of a file.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// What is neither list nor fields.
+    Plain(Value),
+    /// Values one after the other.
+    List(Vec<Node>),
+    /// Values by key, in the order of the file.
+    Fields(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// Reads a file's text.
+    ///
+    /// # Errors
+    /// [`Error::Syntax`] with the place of what is no YAML.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        serde_saphyr::from_str(text).map_err(|error| Error::Syntax { reason: error.to_string() })
+    }
+
+    /// The fields, if it has some.
+    pub fn fields(&self) -> Option<&[(String, Node)]> {
+        match &self.content {
+            Content::Fields(fields) => Some(fields),
+            _ => None,
+        }
+    }
+
+    /// The field of a key.
+    pub fn field(&self, key: &str) -> Option<&Node> {
+        self.fields()?.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+    }
+
+    /// The values of a list.
+    pub fn list(&self) -> Option<&[Node]> {
+        match &self.content {
+            Content::List(nodes) => Some(nodes),
+            _ => None,
+        }
+    }
+
+    /// A text.
+    pub fn text(&self) -> Option<&str> {
+        match &self.content {
+            Content::Plain(Value::String(text)) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// The same without lines.
+    pub fn value(&self) -> Value {
+        match &self.content {
+            Content::Plain(value) => value.clone(),
+            Content::List(nodes) => nodes.iter().map(Self::value).collect(),
+            Content::Fields(fields) => fields.iter().map(|(key, node)| (key.clone(), node.value())).collect(),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let read = Spanned::<Content>::deserialize(deserializer)?;
+        Ok(Self { line: read.referenced.line(), content: read.value })
+    }
+}
+
+impl<'de> Deserialize<'de> for Content {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Reader)
+    }
+}
+
+struct Reader;
+
+impl<'de> Visitor<'de> for Reader {
+    type Value = Content;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value, a list or fields")
+    }
+
+    fn visit_unit<E>(self) -> Result<Content, E> {
+        Ok(Content::Plain(Value::Null))
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Content, E> {
+        Ok(Content::Plain(value.into()))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Content, E> {
+        Ok(Content::Plain(value.into()))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Content, E> {
+        Ok(Content::Plain(value.into()))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Content, E> {
+        // JSON has no NaN; the word is left for whoever reads the field to refuse.
+        let number = serde_json::Number::from_f64(value).map(Value::Number);
+        Ok(Content::Plain(number.unwrap_or_else(|| value.to_string().into())))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Content, E> {
+        Ok(Content::Plain(value.into()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Content, A::Error> {
+        let mut nodes = Vec::new();
+        while let Some(node) = list.next_element()? {
+            nodes.push(node);
+        }
+        Ok(Content::List(nodes))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Content, A::Error> {
+        let mut fields = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            fields.push(entry);
+        }
+        Ok(Content::Fields(fields))
+    }
+}

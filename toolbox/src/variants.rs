@@ -1,0 +1,157 @@
+//! One environment for each combination of what is varied.
+
+use pogema_core::Error;
+use serde_json::{Map as Object, Value};
+
+use crate::tree::{Content, Node};
+
+/// The key whose list says what a field is varied over.
+const GRID: &str = "grid_search";
+
+/// A field that takes one value after the other.
+#[derive(Clone, Debug)]
+struct Parameter {
+    path: Vec<String>,
+    values: Vec<Value>,
+}
+
+/// The combinations of all varied fields, of which the last one changes fastest; each is made when it is asked for.
+///
+/// Source: pogema-toolbox 0.1.1, `config_variant_generator.py`, `generate_variants`
+#[derive(Clone, Debug)]
+pub struct Variants {
+    fields: Value,
+    parameters: Vec<Parameter>,
+}
+
+/// One combination.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// What was varied, by the last key of its path, in the order of the file.
+    pub changes: Vec<(String, Value)>,
+    /// All fields.
+    pub fields: Object<String, Value>,
+}
+
+impl Variants {
+    /// Finds what is varied in some fields, however deep, but not in lists.
+    ///
+    /// # Errors
+    /// One line for fields that are none, for values to be varied over that are no list, or for two varied fields of
+    /// the same last key, which results could not tell apart.
+    pub fn of(node: &Node) -> Result<Self, Error> {
+        let mut parameters: Vec<Parameter> = Vec::new();
+        let fields = plain(node, &mut Vec::new(), &mut parameters)?;
+        for (index, parameter) in parameters.iter().enumerate() {
+            let twin = parameters[..index].iter().find(|other| other.path.last() == parameter.path.last());
+            if let Some(twin) = twin {
+                let (one, other) = (twin.path.join("."), parameter.path.join("."));
+                let reason = format!("`{one}` and `{other}` are both varied under the same last name");
+                return Err(Error::State { reason });
+            }
+        }
+        Ok(Self { fields, parameters })
+    }
+
+    /// Number of combinations; one if nothing is varied.
+    pub fn len(&self) -> usize {
+        self.parameters.iter().map(|parameter| parameter.values.len()).product()
+    }
+
+    /// Whether a field is varied over nothing.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The combination of a number below their count.
+    pub fn at(&self, index: usize) -> Option<Variant> {
+        if index >= self.len() {
+            return None;
+        }
+        let (mut rest, mut fields, mut changes) = (index, self.fields.clone(), Vec::new());
+        for Parameter { path, values } in self.parameters.iter().rev() {
+            let value = &values[rest % values.len()];
+            rest /= values.len();
+            let place = path.iter().try_fold(&mut fields, |place, key| place.get_mut(key))?;
+            place.clone_from(value);
+            changes.push((path.last()?.clone(), value.clone()));
+        }
+        changes.reverse();
+        match fields {
+            Value::Object(fields) => Some(Variant { changes, fields }),
+            _ => None,
+        }
+    }
+}
+
+/// The value of a node, with null in the place of what is varied.
+fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Result<Value, Error> {
+    let Content::Fields(fields) = &node.content else { return Ok(node.value()) };
+    if let Some(values) = node.field(GRID) {
+        let wrong = |what: &str| {
+            let key = path.join(".");
+            Error::Syntax { reason: format!("line {}: `{key}`: {what}", node.line) }
+        };
+        if path.is_empty() {
+            return Err(wrong("`grid_search` belongs below a field"));
+        }
+        let values = values.list().ok_or_else(|| wrong("`grid_search`, expected a list"))?;
+        found.push(Parameter { path: path.clone(), values: values.iter().map(Node::value).collect() });
+        return Ok(Value::Null);
+    }
+    let mut object = Object::new();
+    for (key, value) in fields {
+        path.push(key.clone());
+        object.insert(key.clone(), plain(value, path, found)?);
+        path.pop();
+    }
+    Ok(Value::Object(object))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn variants(text: &str) -> Result<Variants, Error> {
+        Variants::of(&Node::parse(text)?)
+    }
+
+    #[test]
+    fn the_last_field_changes_fastest() {
+        let text = "size: 8\nseed:\n  grid_search: [1, 2]\ndeep:\n  agents:\n    grid_search: [a, b, c]\n";
+        let variants = variants(text).unwrap();
+        let told = |index: usize| {
+            let variant = variants.at(index).unwrap();
+            assert_eq!(variant.fields["size"], 8);
+            assert_eq!(variant.fields["seed"], variant.changes[0].1);
+            assert_eq!(variant.fields["deep"]["agents"], variant.changes[1].1);
+            assert_eq!((variant.changes[0].0.as_str(), variant.changes[1].0.as_str()), ("seed", "agents"));
+            format!("{}{}", variant.changes[0].1, variant.changes[1].1.as_str().unwrap())
+        };
+        assert_eq!(variants.len(), 6);
+        assert_eq!((0..6).map(told).collect::<Vec<_>>(), ["1a", "1b", "1c", "2a", "2b", "2c"]);
+        assert!(variants.at(6).is_none());
+    }
+
+    #[test]
+    fn nothing_varied_is_one_and_over_nothing_is_none() {
+        assert_eq!(variants("size: 8").unwrap().len(), 1);
+        assert!(variants("size: 8").unwrap().at(0).unwrap().changes.is_empty());
+        assert!(variants("seed: {grid_search: []}").unwrap().is_empty());
+        // A list is a value like any other.
+        assert_eq!(variants("maps: [{grid_search: [1, 2]}]").unwrap().len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_varied_is_told_with_its_line() {
+        let told = |text: &str| variants(text).unwrap_err().to_string();
+        assert!(
+            told("size: 8\nseed:\n  grid_search: 5\n").contains("line 3: `seed`"),
+            "{}",
+            told("seed:\n  grid_search: 5\n")
+        );
+        let twins = "a:\n  seed: {grid_search: [1]}\nb:\n  seed: {grid_search: [2]}\n";
+        assert!(told(twins).contains("`a.seed` and `b.seed`"));
+        assert!(told("grid_search: [1]").contains("belongs below a field"));
+    }
+}
