@@ -16,7 +16,7 @@ use crate::plan::Thinking;
 use crate::render::Pictures;
 use episode::Episode;
 use policy::Policy;
-pub use settings::{Settings, put_map};
+pub use settings::Settings;
 
 #[derive(Args, Debug)]
 pub struct Run {

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
+use pogema_maps::files::{Reading, read_maps, read_scenario};
 use pogema_maps::formats::{
     NamedMap, Scenario, Task, Water, write_archive, write_movingai, write_scen, write_set,
 };
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
-use super::read::{Reading, read_maps, read_scenario};
 use super::{Sources, write_out};
 use crate::output::check_writable;
 

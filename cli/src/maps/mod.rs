@@ -2,7 +2,6 @@
 
 mod convert;
 mod generate;
-pub mod read;
 mod show;
 mod stats;
 
@@ -11,6 +10,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use pogema_core::Error;
 use pogema_maps::Library;
+use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::NamedMap;
 
 use crate::output::{check_writable, said};
@@ -69,7 +69,7 @@ impl Sources {
     pub fn library(&self) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {
-            for name in library.register(read::read_maps(path, read::Reading::default())?) {
+            for name in library.register(read_maps(path, Reading::default())?) {
                 eprintln!(
                     "warning: {}: a second map named `{name}` takes the place of the first",
                     path.display()
@@ -86,7 +86,7 @@ impl Sources {
             return Ok(vec![NamedMap { name: word.into(), text: text.clone() }]);
         }
         if Path::new(word).exists() {
-            return read::read_maps(Path::new(word), read::Reading::default());
+            return read_maps(Path::new(word), Reading::default());
         }
         let names = library.matching(word)?;
         names

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use comfy_table::Table;
 use pogema_core::{Error, OnGoal};
+use pogema_maps::files::read_scenario;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Doubt, GridConfig, InstanceSource, MapStats, ScenarioStats};
 use serde_json::{Value, json};
 
 use super::Sources;
-use super::read::read_scenario;
 use crate::output::{markdown_table, say};
 
 #[derive(Args, Debug)]

@@ -7,10 +7,10 @@ use std::process::ExitCode;
 use clap::Args;
 use pogema_core::{Cell, Error, Instance, Map};
 use pogema_maps::InstanceSource;
+use pogema_maps::files::{Reading, read_maps, read_text};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
 use serde_json::json;
 
-use crate::maps::read::{Reading, read_maps, read_text};
 use crate::output::say;
 use crate::run::Settings;
 

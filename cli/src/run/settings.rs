@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pogema_core::{Error, Map};
-use pogema_maps::formats::{NamedMap, Scenario};
+use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
+use pogema_maps::formats::NamedMap;
 use pogema_maps::numpy::{Generator, SeedSequence};
-use pogema_maps::{GridConfig, InstanceSource, Library, MapText, Targets};
+use pogema_maps::{GridConfig, InstanceSource, Library, MapText, put_map, put_scenario};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::Sources;
-use crate::maps::read::{Reading, read_maps, read_scenario, read_text};
 
 #[derive(Args, Debug)]
 pub struct Settings {
@@ -198,29 +198,6 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     let chance = SeedSequence::from_os().map_err(|error| Error::State { reason: error.to_string() })?;
     let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
-}
-
-/// Puts a map in the place of whatever a config has.
-pub fn put_map(text: &MapText, fields: &mut Object<String, Value>) -> Result<(), Error> {
-    for derived in ["width", "height", "size"] {
-        fields.remove(derived);
-    }
-    let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
-    fields.insert("map".into(), plain.to_text()?.into());
-    if text.starts.is_empty() || fields.contains_key("agents_xy") {
-        return Ok(());
-    }
-    put_scenario(
-        &Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) },
-        fields,
-    )
-}
-
-fn put_scenario(scenario: &Scenario, fields: &mut Object<String, Value>) -> Result<(), Error> {
-    let num_agents = fields.get("num_agents").and_then(Value::as_u64);
-    let num_agents = num_agents.map_or(scenario.starts.len(), |number| number as usize);
-    fields.extend(scenario.truncated(num_agents)?.fields());
-    Ok(())
 }
 
 fn word(choice: Option<impl ValueEnum>) -> Option<String> {

@@ -14,10 +14,10 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_core::Error;
+use pogema_maps::files::read_text;
 use pogema_maps::formats::NamedMap;
 use serde::{Deserialize, Serialize};
 
-use crate::maps::read::read_text;
 use crate::output::say;
 use crate::plan::Thinking;
 

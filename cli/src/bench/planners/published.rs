@@ -4,9 +4,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use pogema_core::Error;
+use pogema_maps::files::read_text;
 use serde::Deserialize;
-
-use crate::maps::read::read_text;
 
 use super::suite::Setting;
 

@@ -3,12 +3,10 @@
 use std::path::Path;
 
 use pogema_core::Error;
-use pogema_maps::GridConfig;
+use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::NamedMap;
+use pogema_maps::{GridConfig, put_map};
 use serde_json::json;
-
-use crate::maps::read::{Reading, read_maps};
-use crate::run::put_map;
 
 /// What the agents of an episode have to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -1,14 +1,15 @@
-//! Maps from files.
+//! Maps and scenarios from files.
 
 use std::fs::File;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-use pogema_core::Error;
-use pogema_maps::formats::{
+use crate::config::{FIELDS, GridConfig, value_from_yaml};
+use crate::formats::{
     NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
 };
-use pogema_maps::{FIELDS, GridConfig, MapText, parse_map_text, value_from_yaml};
+use crate::text::{MapText, parse_map_text};
+use pogema_core::Error;
 
 /// A larger file is not read. Units: bytes.
 const MOST_BYTES: u64 = 1 << 28;
@@ -16,12 +17,16 @@ const MOST_BYTES: u64 = 1 << 28;
 /// What MovingAI maps are taken for.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reading {
+    /// What water is.
     pub water: Water,
     /// Whether their outermost cells are taken off.
     pub strips_border: bool,
 }
 
 /// All maps of a file, or of the files of a folder in the order of their names.
+///
+/// # Errors
+/// [`Error::Io`] with the file, and what is wrong about it.
 pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
     if !path.is_dir() {
         return read_file(path, reading);
@@ -93,7 +98,11 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
     Ok(vec![NamedMap { name: stem(path), text }])
 }
 
-/// The starts and goals of a scenario file, all on the map: MovingAI's, or a YAML file with `agents_xy` and `targets_xy`.
+/// The starts and goals of a scenario file, all on the map: MovingAI's, or a YAML file with `agents_xy` and
+/// `targets_xy`.
+///
+/// # Errors
+/// As [`read_maps`]; if a start or goal is not on the map.
 pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Error> {
     let text = read_text(path)?;
     let scenario = if ending(path) == "scen" {
@@ -107,6 +116,9 @@ pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Er
 }
 
 /// A file as text, without the mark that some programs put first.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read or is no text.
 pub fn read_text(path: &Path) -> Result<String, Error> {
     let text = String::from_utf8(read_bytes(path)?).map_err(|error| {
         let place = error.utf8_error().valid_up_to();
@@ -128,6 +140,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
+/// What stands behind the last point of a file's name.
 pub fn ending(path: &Path) -> &str {
     path.extension().and_then(|ending| ending.to_str()).unwrap_or_default()
 }
