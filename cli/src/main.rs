@@ -2,6 +2,7 @@
 
 mod bench;
 mod conform;
+mod evaluate;
 mod maps;
 mod output;
 mod plan;
@@ -32,6 +33,8 @@ enum Command {
     Validate(plan::Validate),
     /// Look at maps, make, convert and judge them
     Maps(maps::Maps),
+    /// Play all episodes of a suite, and keep their results
+    Evaluate(evaluate::Evaluate),
     /// Draw a recorded episode
     Render(render::Render),
     /// Check that all engines follow the rules; exit status 0 only if they do
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Command::Plan(plan) => plan.run(),
         Command::Validate(validate) => validate.run(),
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
+        Command::Evaluate(evaluate) => evaluate.run().map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),

@@ -2,10 +2,24 @@
 //!
 //! A [`Suite`] is read from one YAML file: environments, of which fields may be varied, algorithms, and views.
 
+mod built_in;
+mod environments;
+mod pairs;
+mod play;
+mod progress;
+mod run;
+mod store;
 mod suite;
 mod tree;
 mod variants;
 
+pub use built_in::BuiltIn;
+pub use environments::{Environment, Environments};
+pub use pairs::Pairs;
+pub use play::{Played, play};
+pub use progress::{Done, Failed, Progress};
+pub use run::{Event, Running, Summary, built_in, run};
+pub use store::{About, Begin, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};

@@ -4,18 +4,17 @@ use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
 use pogema_maps::{FIELDS, nearest};
-use serde_json::{Map as Object, Value};
 
 use crate::tree::Node;
 use crate::variants::Variants;
 
 /// The keys of a file.
-const KEYS: [&str; 4] = ["environment", "algorithms", "results_views", "dask"];
+const KEYS: [&str; 5] = ["environment", "algorithms", "results_views", "maps", "dask"];
 
 /// The fields of an environment that are not POGEMA's.
 ///
 /// Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
-const OWN_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
+pub(crate) const OWN_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
 
 /// How episodes of an algorithm are shared among processes; built-in algorithms use threads instead.
 ///
@@ -24,19 +23,23 @@ pub const BACKENDS: [&str; 5] =
     ["sequential", "multiprocessing", "balanced_multiprocessing", "dask", "balanced_dask"];
 
 /// The keys of every algorithm; all others are parameters of its own.
-const ALGORITHM_KEYS: [&str; 4] = ["name", "num_process", "parallel_backend", "seed"];
+const ALGORITHM_KEYS: [&str; 3] = ["name", "num_process", "parallel_backend"];
 
 /// An evaluation as its file says it.
 #[derive(Clone, Debug)]
 pub struct Suite {
     /// Where it was read.
     pub path: PathBuf,
+    /// What was read.
+    pub text: String,
     /// One environment for each episode.
     pub environments: Variants,
     /// Who plays, each all episodes.
     pub algorithms: Vec<Algorithm>,
     /// What to show of the results, by name.
     pub views: Vec<(String, Node)>,
+    /// Files and folders with maps.
+    pub maps: Vec<PathBuf>,
     /// The address of a Dask scheduler.
     pub dask: Option<String>,
 }
@@ -50,12 +53,12 @@ pub struct Algorithm {
     pub line: u64,
     /// The name under which it is registered.
     pub name: String,
-    /// Most processes or threads that play its episodes.
-    pub num_processes: usize,
+    /// Most processes or threads that play its episodes, if it says so.
+    pub num_processes: Option<usize>,
     /// One of [`BACKENDS`].
     pub backend: String,
-    /// All its fields as they stand there.
-    pub fields: Object<String, Value>,
+    /// The fields that are its own, in the order of the file.
+    pub parameters: Vec<(String, Node)>,
 }
 
 impl Suite {
@@ -64,8 +67,7 @@ impl Suite {
     /// # Errors
     /// One line with the file, the line and the key of what is wrong, and of what was expected there.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-        Self::parse(path, &text)
+        Self::parse(path, &pogema_maps::files::read_text(path)?)
     }
 
     /// Reads the text of a file.
@@ -73,84 +75,100 @@ impl Suite {
     /// # Errors
     /// As for [`Suite::read`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, Error> {
-        let in_file = |error: Error| match error {
-            Error::Syntax { reason } | Error::State { reason } => Error::io(path, reason),
-            error => Error::io(path, error),
-        };
-        Self::from_node(path, &Node::parse(text).map_err(in_file)?).map_err(in_file)
+        Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
 
-    fn from_node(path: &Path, root: &Node) -> Result<Self, Error> {
+    /// Tells an error with the file.
+    pub fn in_file(&self, error: Error) -> Error {
+        in_file(&self.path, error)
+    }
+
+    fn of(path: &Path, text: &str, root: &Node) -> Result<Self, Error> {
         check_keys(root, "the file", &KEYS, &[])?;
         let environment = required(root, "environment")?;
         check_keys(environment, "environment", &FIELDS, &OWN_FIELDS)?;
+        let environments = Variants::of(environment)?;
+        if environments.is_empty() {
+            return Err(wrong(environment, "environment", "at least one value of each varied field"));
+        }
         let entries = required(root, "algorithms")?;
+        let algorithms = fields(entries, "algorithms")?.iter();
         let algorithms =
-            entries.fields().ok_or_else(|| wrong(entries, "algorithms", "names and their fields"))?;
-        let algorithms = algorithms.iter().map(|(key, node)| Algorithm::read(key, node));
-        let views = match root.field("results_views") {
-            Some(node) => {
-                node.fields().ok_or_else(|| wrong(node, "results_views", "names and their fields"))?
-            }
-            None => &[],
-        };
-        let dask = root.field("dask").map(|node| {
-            node.text()
-                .map(str::to_owned)
-                .ok_or_else(|| wrong(node, "dask", "an address such as tcp://host:8786"))
-        });
+            algorithms.map(|(key, node)| Algorithm::read(key, node)).collect::<Result<_, _>>()?;
+        let views = root.field("results_views").map(|node| fields(node, "results_views")).transpose()?;
+        let dask = root.field("dask").map(|node| text_of(node, "dask", "an address such as tcp://host:8786"));
         Ok(Self {
             path: path.to_owned(),
-            environments: Variants::of(environment)?,
-            algorithms: algorithms.collect::<Result<_, _>>()?,
-            views: views.to_vec(),
-            dask: dask.transpose()?,
+            text: text.to_owned(),
+            environments,
+            algorithms,
+            views: views.unwrap_or_default().to_vec(),
+            maps: maps(path, root)?,
+            dask: dask.transpose()?.map(str::to_owned),
         })
     }
 }
 
+/// The files that are named, beside the suite's own.
+fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
+    let Some(node) = root.field("maps") else { return Ok(Vec::new()) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let nodes = node.list().unwrap_or(std::slice::from_ref(node)).iter();
+    nodes.map(|node| Ok(folder.join(text_of(node, "maps", "a file or folder, or a list of them")?))).collect()
+}
+
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
-        let fields = node.fields().ok_or_else(|| wrong(node, key, "fields such as `name: lacam`"))?;
-        let text = |field: &str, expected: &str| match node.field(field) {
-            Some(node) => {
-                node.text().map(Some).ok_or_else(|| wrong(node, &format!("{key}.{field}"), expected))
-            }
-            None => Ok(None),
-        };
-        let name = text("name", "the name of an algorithm")?;
-        let name = name.ok_or_else(|| wrong(node, key, "a field `name`"))?;
-        let backend = text("parallel_backend", "a backend")?.unwrap_or("balanced_multiprocessing");
-        if !BACKENDS.contains(&backend) {
-            let at = node.field("parallel_backend").unwrap_or(node);
-            return Err(wrong(
-                at,
-                &format!("{key}.parallel_backend"),
-                &format!("one of {}", BACKENDS.join(", ")),
-            ));
+        let is_plain = |letter: char| !letter.is_control() && !matches!(letter, '/' | '\\');
+        if key.is_empty() || key.starts_with('.') || !key.chars().all(is_plain) {
+            return Err(wrong(node, key, "a name that a file may have"));
         }
-        let num_processes = match node.field("num_process") {
-            Some(at) => at
-                .value()
-                .as_u64()
-                .filter(|&number| number > 0)
-                .ok_or_else(|| wrong(at, &format!("{key}.num_process"), "a number of 1 or more"))?,
-            None => 3,
-        };
+        let own = |field: &str| format!("{key}.{field}");
+        let all = fields(node, key)?;
+        let name = node.field("name").ok_or_else(|| wrong(node, key, "a field `name`"))?;
+        let name = text_of(name, &own("name"), "the name of an algorithm")?;
+        let backend = node.field("parallel_backend");
+        let backend = backend.map(|node| one_of(node, &own("parallel_backend"), &BACKENDS)).transpose()?;
+        let num_processes = node.field("num_process").map(|node| {
+            let number = node.value().as_u64().filter(|&number| number > 0);
+            number.ok_or_else(|| wrong(node, &own("num_process"), "a number of 1 or more"))
+        });
+        let is_own = |(key, _): &&(String, Node)| !ALGORITHM_KEYS.contains(&key.as_str());
         Ok(Self {
             key: key.to_owned(),
             line: node.line,
             name: name.to_owned(),
-            num_processes: num_processes as usize,
-            backend: backend.to_owned(),
-            fields: fields.iter().map(|(key, node)| (key.clone(), node.value())).collect(),
+            num_processes: num_processes.transpose()?.map(|number| number as usize),
+            backend: backend.unwrap_or("balanced_multiprocessing").to_owned(),
+            parameters: all.iter().filter(is_own).cloned().collect(),
         })
     }
 
-    /// The fields that are its own, not those of every algorithm.
-    pub fn parameters(&self) -> impl Iterator<Item = (&String, &Value)> {
-        self.fields.iter().filter(|(key, _)| !ALGORITHM_KEYS.contains(&key.as_str()))
+    /// All that decides what it does, as text, to know it by.
+    pub fn told(&self) -> String {
+        let parameters = self.parameters.iter().map(|(key, node)| serde_json::json!([key, node.value()]));
+        serde_json::json!([self.name, parameters.collect::<Vec<_>>()]).to_string()
     }
+}
+
+fn in_file(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Syntax { reason } | Error::State { reason } => Error::io(path, reason),
+        error => Error::io(path, error),
+    }
+}
+
+fn fields<'a>(node: &'a Node, key: &str) -> Result<&'a [(String, Node)], Error> {
+    node.fields().ok_or_else(|| wrong(node, key, "names and their fields"))
+}
+
+fn text_of<'a>(node: &'a Node, key: &str, expected: &str) -> Result<&'a str, Error> {
+    node.text().ok_or_else(|| wrong(node, key, expected))
+}
+
+fn one_of<'a>(node: &'a Node, key: &str, known: &[&str]) -> Result<&'a str, Error> {
+    let text = node.text().filter(|text| known.contains(text));
+    text.ok_or_else(|| wrong(node, key, &format!("one of {}", known.join(", "))))
 }
 
 fn required<'a>(root: &'a Node, key: &str) -> Result<&'a Node, Error> {

@@ -12,7 +12,8 @@ const GRID: &str = "grid_search";
 #[derive(Clone, Debug)]
 struct Parameter {
     path: Vec<String>,
-    values: Vec<Value>,
+    /// Each with the line of the file on which it stands.
+    values: Vec<(Value, u64)>,
 }
 
 /// The combinations of all varied fields, of which the last one changes fastest; each is made when it is asked for.
@@ -22,6 +23,7 @@ struct Parameter {
 pub struct Variants {
     fields: Value,
     parameters: Vec<Parameter>,
+    line: u64,
 }
 
 /// One combination.
@@ -50,7 +52,7 @@ impl Variants {
                 return Err(Error::State { reason });
             }
         }
-        Ok(Self { fields, parameters })
+        Ok(Self { fields, parameters, line: node.line })
     }
 
     /// Number of combinations; one if nothing is varied.
@@ -63,6 +65,62 @@ impl Variants {
         self.len() == 0
     }
 
+    /// What was varied in the combination of a number below their count, by the last name of its path.
+    pub fn changes_at(&self, index: usize) -> Option<Vec<(String, Value)>> {
+        Some(self.at(index)?.changes)
+    }
+
+    /// Numbers of combinations that together have each value of each varied field, all others being the first, with
+    /// the line of that value.
+    pub fn probes(&self) -> impl Iterator<Item = (usize, u64)> {
+        let mut stride = self.len();
+        let values = self.parameters.iter().flat_map(move |Parameter { values, .. }| {
+            stride /= values.len().max(1);
+            let first_stride = stride;
+            values.iter().enumerate().map(move |(at, (_, line))| (at * first_stride, *line))
+        });
+        let is_plain = self.parameters.is_empty();
+        is_plain.then_some((0, self.line)).into_iter().chain(values).take(if self.is_empty() {
+            0
+        } else {
+            usize::MAX
+        })
+    }
+
+    /// All values of an outermost field, varied or not.
+    pub fn values_of(&self, field: &str) -> Vec<&Value> {
+        match self.parameter(field) {
+            Some(parameter) => parameter.values.iter().map(|(value, _)| value).collect(),
+            None => self.fields.get(field).into_iter().collect(),
+        }
+    }
+
+    /// The value of an outermost field in a combination.
+    pub fn value_at(&self, index: usize, field: &str) -> Option<&Value> {
+        let Some(parameter) = self.parameter(field) else { return self.fields.get(field) };
+        let faster = self.parameters.iter().skip_while(|other| !std::ptr::eq(*other, parameter)).skip(1);
+        let stride: usize = faster.map(|other| other.values.len()).product();
+        let values = &parameter.values;
+        values.get(index / stride.max(1) % values.len().max(1)).map(|(value, _)| value)
+    }
+
+    fn parameter(&self, field: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|parameter| parameter.path == [field])
+    }
+
+    /// All that makes the combinations, as text, to know them by.
+    pub fn told(&self) -> String {
+        let parameters: Vec<_> = self
+            .parameters
+            .iter()
+            .map(|Parameter { path, values }| {
+                let values: Vec<&Value> = values.iter().map(|(value, _)| value).collect();
+                serde_json::json!([path, values])
+            })
+            .collect();
+        serde_json::json!([self.fields, parameters]).to_string()
+    }
+
     /// The combination of a number below their count.
     pub fn at(&self, index: usize) -> Option<Variant> {
         if index >= self.len() {
@@ -70,7 +128,7 @@ impl Variants {
         }
         let (mut rest, mut fields, mut changes) = (index, self.fields.clone(), Vec::new());
         for Parameter { path, values } in self.parameters.iter().rev() {
-            let value = &values[rest % values.len()];
+            let (value, _) = &values[rest % values.len()];
             rest /= values.len();
             let place = path.iter().try_fold(&mut fields, |place, key| place.get_mut(key))?;
             place.clone_from(value);
@@ -96,7 +154,10 @@ fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Res
             return Err(wrong("`grid_search` belongs below a field"));
         }
         let values = values.list().ok_or_else(|| wrong("`grid_search`, expected a list"))?;
-        found.push(Parameter { path: path.clone(), values: values.iter().map(Node::value).collect() });
+        found.push(Parameter {
+            path: path.clone(),
+            values: values.iter().map(|node| (node.value(), node.line)).collect(),
+        });
         return Ok(Value::Null);
     }
     let mut object = Object::new();

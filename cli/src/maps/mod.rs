@@ -67,8 +67,13 @@ pub struct Sources {
 impl Sources {
     /// The maps that come with the program and those of the files.
     pub fn library(&self) -> Result<Library, Error> {
+        self.library_with(&[])
+    }
+
+    /// The same, and before those of the files the maps of further ones.
+    pub fn library_with(&self, further: &[PathBuf]) -> Result<Library, Error> {
         let mut library = Library::built_in();
-        for path in &self.paths {
+        for path in further.iter().chain(&self.paths) {
             for name in library.register(read_maps(path, Reading::default())?) {
                 eprintln!(
                     "warning: {}: a second map named `{name}` takes the place of the first",

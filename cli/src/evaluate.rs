@@ -1,0 +1,105 @@
+//! `pogema evaluate`: all episodes of a suite, kept one by one.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use pogema_core::Error;
+use pogema_toolbox::{Begin, Environments, Event, Running, Store, Suite, Summary, built_in, run};
+
+use crate::maps::Sources;
+use crate::output::say;
+
+#[derive(Args, Debug)]
+pub struct Evaluate {
+    /// What to play: a YAML file with environments, algorithms and views
+    suite: PathBuf,
+    /// The folder for the results
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    #[command(flatten)]
+    sources: Sources,
+    /// Threads that play; by default as many as the machine has
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Go on with the results of an earlier run that broke off
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Delete the results that are in the folder
+    #[arg(long)]
+    force: bool,
+}
+
+impl Evaluate {
+    pub fn run(&self) -> Result<(), Error> {
+        let suite = Suite::read(&self.suite)?;
+        built_in(&suite)?;
+        let environments = Environments::new(&suite, self.sources.library_with(&maps(&suite))?)?;
+        let begin = match (self.resume, self.force) {
+            (true, _) => Begin::Resume,
+            (_, true) => Begin::Anew,
+            _ => Begin::New,
+        };
+        let store = Store::open(&self.out, &suite, begin)?;
+        let bar = Bar::default();
+        let watch = |event: Event<'_>| bar.show(event);
+        let stop = AtomicBool::new(false);
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = self.threads.map_or(cores, usize::from);
+        let running = Running { threads, stop: &stop, watch: &watch };
+        let summary = run(&suite, &environments, &store, running)?;
+        tell(&self.out, &suite, &summary)
+    }
+}
+
+/// The suite's maps: those it names, and a `maps.yaml` beside it.
+fn maps(suite: &Suite) -> Vec<PathBuf> {
+    let beside = suite.path.with_file_name("maps.yaml");
+    let is_there = beside.exists() && !suite.maps.contains(&beside);
+    is_there.then_some(beside).into_iter().chain(suite.maps.iter().cloned()).collect()
+}
+
+fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
+    let Summary { num_played, num_failed, is_whole } = summary;
+    if *num_failed > 0 {
+        let files: Vec<String> =
+            suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key)).collect();
+        let files: Vec<&String> = files.iter().filter(|name| folder.join(name).exists()).collect();
+        let reason =
+            format!("{num_failed} episodes could not be played; {files:?} say why, `--resume` tries again");
+        return Err(Error::io(folder, reason));
+    }
+    let rest = if *is_whole { "all results are there" } else { "`--resume` plays the rest" };
+    say(&format!("{num_played} episodes played; {rest}: {}", folder.display()))
+}
+
+/// A bar for each algorithm.
+#[derive(Default)]
+struct Bar(Mutex<Option<ProgressBar>>);
+
+impl Bar {
+    fn show(&self, event: Event<'_>) {
+        let mut bar = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        match (event, bar.as_ref()) {
+            (Event::Begin { algorithm, total, done }, _) => *bar = Some(begin(algorithm, total, done)),
+            (Event::Played, Some(bar)) => bar.inc(1),
+            (Event::Failed(failed), Some(bar)) => {
+                bar.suspend(|| eprintln!("warning: episode {}: {}", failed.index, failed.error));
+                bar.inc(1);
+            }
+            (Event::End, Some(bar)) => bar.finish_and_clear(),
+            (_, None) => {}
+        }
+    }
+}
+
+fn begin(algorithm: &str, total: usize, done: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
+    let bar = ProgressBar::new(total as u64).with_message(algorithm.to_owned());
+    let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
+    bar.inc(done as u64);
+    bar.reset_eta();
+    bar
+}

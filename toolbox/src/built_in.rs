@@ -1,0 +1,82 @@
+//! The algorithms that are built in: planners, and POGEMA's own policies.
+
+use std::time::Duration;
+
+use pogema_core::Error;
+use pogema_maps::nearest;
+use pogema_planners::{Budget, Choice, NamedPolicy, PolicySettings};
+
+use crate::suite::{Algorithm, wrong};
+use crate::tree::Node;
+
+/// The parameters of every built-in algorithm.
+const PARAMETERS: [&str; 5] = ["seed", "seconds", "nodes", "threads", "future_goals"];
+
+/// What pogema-toolbox's algorithms may say, and nothing built in makes use of.
+const IDLE: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
+
+/// A built-in algorithm with its settings.
+#[derive(Clone, Debug)]
+pub struct BuiltIn {
+    /// Its name among policies.
+    pub name: String,
+    /// What its policies are made with.
+    pub settings: PolicySettings,
+}
+
+impl BuiltIn {
+    /// The built-in algorithm that is meant, whatever the case of its name; none if there is no such.
+    ///
+    /// # Errors
+    /// One line about a parameter that it does not have, or that is not as it has to be.
+    pub fn of(algorithm: &Algorithm) -> Option<Result<Self, Error>> {
+        let name = match algorithm.name.to_lowercase().replace('_', "-").as_str() {
+            "a*" => "astar".to_owned(),
+            name => name.to_owned(),
+        };
+        let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
+        is_known.then(|| Self::read(name, algorithm))
+    }
+
+    fn read(name: String, algorithm: &Algorithm) -> Result<Self, Error> {
+        let settings =
+            PolicySettings { budget: Budget::default(), choice: Choice::default(), future_goals: false };
+        let mut built_in = Self { name, settings };
+        for (key, node) in &algorithm.parameters {
+            built_in.set(&format!("{}.{key}", algorithm.key), key, node)?;
+        }
+        let budget = &mut built_in.settings.budget;
+        if budget.time.is_none() && budget.nodes.is_none() {
+            *budget = Budget::of_time(Duration::from_secs(1));
+        }
+        Ok(built_in)
+    }
+
+    fn set(&mut self, path: &str, key: &str, node: &Node) -> Result<(), Error> {
+        let (value, settings) = (node.value(), &mut self.settings);
+        let number = |expected: &str| value.as_u64().ok_or_else(|| wrong(node, path, expected));
+        match key {
+            "seconds" => {
+                let time = value.as_f64().and_then(|time| Duration::try_from_secs_f64(time).ok());
+                settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, "a time of 0 or more"))?);
+            }
+            "nodes" => settings.budget.nodes = Some(number("a number of nodes")?),
+            "seed" => settings.choice.seed = if value.is_null() { 0 } else { number("a number")? },
+            "threads" => {
+                let threads = value.as_u64().filter(|threads| (1..=2).contains(threads));
+                settings.choice.threads = threads.ok_or_else(|| wrong(node, path, "1 or 2"))? as usize;
+            }
+            "future_goals" => {
+                settings.future_goals = value.as_bool().ok_or_else(|| wrong(node, path, "true or false"))?;
+            }
+            idle if IDLE.contains(&idle) => {}
+            _ => {
+                let hint = nearest(key, PARAMETERS).unwrap_or_default();
+                let reason =
+                    format!("line {}: `{path}` is unknown; the nearest known one is `{hint}`", node.line);
+                return Err(Error::Syntax { reason });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! The environments of a suite, one for each episode.
+
+use std::collections::BTreeSet;
+
+use pogema_core::Error;
+use pogema_maps::files::read_scenario;
+use pogema_maps::{GridConfig, Library, put_map, put_scenario};
+use serde_json::{Map as Object, Value};
+
+use crate::Pairs;
+use crate::suite::{OWN_FIELDS, Suite};
+use crate::variants::Variants;
+
+/// The environments of a suite, each made when it is asked for.
+#[derive(Clone, Debug)]
+pub struct Environments {
+    variants: Variants,
+    library: Library,
+    folder: std::path::PathBuf,
+}
+
+/// One environment.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    /// What was varied, by its last name, in the order of the file.
+    pub changes: Pairs,
+    /// The map that `map_name` stands for.
+    pub map_name: Option<String>,
+    /// What makes the episode.
+    pub config: GridConfig,
+}
+
+impl Environments {
+    /// The environments of a suite, whose maps are in a library.
+    ///
+    /// # Errors
+    /// One line with all maps that are missing; else about the first environment that cannot be, of those that
+    /// differ from the first one in one field.
+    pub fn new(suite: &Suite, library: Library) -> Result<Self, Error> {
+        let folder = suite.path.parent().map(std::path::Path::to_owned).unwrap_or_default();
+        let environments = Self { variants: suite.environments.clone(), library, folder };
+        environments.check_maps().map_err(|error| suite.in_file(error))?;
+        environments.variants.probes().try_for_each(|(index, line)| {
+            let tell = |error: Error| suite.in_file(Error::State { reason: format!("line {line}: {error}") });
+            environments.at(index).map(|_| ()).map_err(tell)
+        })?;
+        Ok(environments)
+    }
+
+    /// Number of environments.
+    pub fn len(&self) -> usize {
+        self.variants.len()
+    }
+
+    /// Whether a field is varied over nothing.
+    pub fn is_empty(&self) -> bool {
+        self.variants.is_empty()
+    }
+
+    /// The environment of a number below their count.
+    ///
+    /// # Errors
+    /// If it is out of range, or cannot be.
+    pub fn at(&self, index: usize) -> Result<Environment, Error> {
+        let variant = self.variants.at(index);
+        let out_of_range = || Error::config("episode", index, format!("below {}", self.len()));
+        let variant = variant.ok_or_else(out_of_range)?;
+        let mut fields = variant.fields;
+        let scenario = fields.get("scenario").cloned();
+        let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
+        if !matches!(fields.get("name").and_then(Value::as_str), None | Some("Environment")) {
+            let name = fields.get("name").cloned().unwrap_or_default();
+            return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
+        }
+        for own in OWN_FIELDS {
+            fields.remove(own);
+        }
+        let seed = fields.get("seed").and_then(Value::as_u64);
+        let seed = seed.ok_or_else(|| {
+            let given = fields.get("seed").cloned().unwrap_or_default();
+            Error::config("seed", given, "a number, or results could not be repeated")
+        })?;
+        let map_name = if uses_maps { self.put_map(&mut fields, seed)? } else { None };
+        if let Some(scenario) = scenario.filter(|value| !value.is_null()) {
+            self.put_scenario(&scenario, &mut fields)?;
+        }
+        let config = GridConfig::from_value(&Value::Object(fields))?;
+        Ok(Environment { changes: Pairs(variant.changes), map_name, config })
+    }
+
+    /// What was varied for the environment of a number below their count.
+    ///
+    /// # Errors
+    /// If it is out of range.
+    pub fn changes(&self, index: usize) -> Result<Pairs, Error> {
+        let changes = self.variants.changes_at(index).map(Pairs);
+        changes.ok_or_else(|| Error::config("episode", index, format!("below {}", self.len())))
+    }
+
+    /// Work that an environment makes, for the longest to begin first. Units: agent steps, at most.
+    pub fn cost(&self, index: usize) -> u64 {
+        let number = |name: &str, otherwise: u64| {
+            self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
+        };
+        // POGEMA's defaults stand for what is not given.
+        number("num_agents", 1) * number("max_episode_steps", 64)
+    }
+
+    /// Puts the map that the seed chooses among those of the name in its place.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
+    fn put_map(&self, fields: &mut Object<String, Value>, seed: u64) -> Result<Option<String>, Error> {
+        let Some(Value::String(pattern)) = fields.get("map_name").cloned() else { return Ok(None) };
+        fields.remove("map_name");
+        let (name, text) = match self.library.map(&pattern) {
+            Ok(text) => (pattern.as_str(), text),
+            Err(_) => self.library.choose(&pattern, seed)?,
+        };
+        put_map(text, fields)?;
+        Ok(Some(name.to_owned()))
+    }
+
+    fn put_scenario(&self, scenario: &Value, fields: &mut Object<String, Value>) -> Result<(), Error> {
+        let file = scenario.as_str().ok_or_else(|| Error::config("scenario", scenario, "a file"))?;
+        let map = GridConfig::from_value(&Value::Object(fields.clone()))?.map;
+        let map = map.ok_or_else(|| Error::config("scenario", file, "a map that it is on"))?;
+        put_scenario(&read_scenario(&self.folder.join(file), &map)?, fields)
+    }
+
+    /// Passes if there is a map for each name.
+    fn check_maps(&self) -> Result<(), Error> {
+        if self.variants.values_of("use_maps").contains(&&Value::Bool(false)) {
+            return Ok(());
+        }
+        let names: BTreeSet<&str> =
+            self.variants.values_of("map_name").into_iter().filter_map(Value::as_str).collect();
+        let is_missing =
+            |name: &&str| self.library.map(name).is_err() && self.library.matching(name).is_err();
+        let missing: Vec<&str> = names.into_iter().filter(is_missing).collect();
+        match missing[..] {
+            [] => Ok(()),
+            [name] => self.library.matching(name).map(|_| ()),
+            _ => {
+                let told: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
+                let number = missing.len();
+                Err(Error::State { reason: format!("{number} maps are not known: {}", told.join(", ")) })
+            }
+        }
+    }
+}

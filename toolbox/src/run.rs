@@ -1,0 +1,183 @@
+//! All episodes of the built-in algorithms of a suite, played on threads.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
+
+use pogema_core::Error;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::built_in::BuiltIn;
+use crate::environments::Environments;
+use crate::pairs::Pairs;
+use crate::play::{Played, play};
+use crate::progress::{Done, Failed, Progress};
+use crate::store::Store;
+use crate::suite::{Algorithm, Suite};
+
+/// What happens while a suite is run.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// An algorithm begins.
+    Begin {
+        /// Its name among the results.
+        algorithm: &'a str,
+        /// Number of episodes.
+        total: usize,
+        /// Number of those that an earlier run did.
+        done: usize,
+    },
+    /// An episode is done.
+    Played,
+    /// An episode could not be played.
+    Failed(&'a Failed),
+    /// An algorithm has done all it could.
+    End,
+}
+
+/// How a suite is run.
+#[derive(Clone, Copy)]
+pub struct Running<'a> {
+    /// Threads; of an algorithm at most as many as it asks for.
+    pub threads: usize,
+    /// Set it to end after the episodes that are being played.
+    pub stop: &'a AtomicBool,
+    /// Told of all that happens.
+    pub watch: &'a (dyn Fn(Event<'_>) + Sync),
+}
+
+/// What a run came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Episodes that this run played.
+    pub num_played: usize,
+    /// Episodes that could not be played.
+    pub num_failed: usize,
+    /// Whether all results are there.
+    pub is_whole: bool,
+}
+
+/// Plays what a store does not have yet of the algorithms that are built in.
+///
+/// # Errors
+/// For an algorithm that is not built in, before anything is played; if results cannot be written.
+pub fn run(
+    suite: &Suite,
+    environments: &Environments,
+    store: &Store,
+    running: Running<'_>,
+) -> Result<Summary, Error> {
+    let algorithms = built_in(suite)?;
+    let mut summary = Summary { is_whole: true, ..Summary::default() };
+    for (algorithm, built_in) in algorithms {
+        if running.stop.load(Relaxed) {
+            summary.is_whole = false;
+            break;
+        }
+        let part = run_one(algorithm, &built_in, environments, store, running)?;
+        summary.num_played += part.num_played;
+        summary.num_failed += part.num_failed;
+        summary.is_whole &= part.is_whole;
+    }
+    Ok(summary)
+}
+
+/// The algorithms of a suite, if all are built in.
+///
+/// # Errors
+/// One line about the first one that is not, or that has a parameter it cannot have.
+pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
+    let all = suite.algorithms.iter().map(|algorithm| {
+        let built_in = BuiltIn::of(algorithm).unwrap_or_else(|| Err(unknown(algorithm)));
+        Ok((algorithm, built_in.map_err(|error| suite.in_file(error))?))
+    });
+    all.collect()
+}
+
+fn unknown(algorithm: &Algorithm) -> Error {
+    let all: Vec<&str> = pogema_planners::NamedPolicy::all().into_iter().map(|(name, _)| name).collect();
+    let (line, key, name) = (algorithm.line, &algorithm.key, &algorithm.name);
+    let known = all.join(", ");
+    let reason = format!(
+        "line {line}: `{key}.name`: `{name}` is not built in, as {known} are; \
+         policies in Python are run by `pogema_rs.toolbox`"
+    );
+    Error::Syntax { reason }
+}
+
+fn run_one(
+    algorithm: &Algorithm,
+    built_in: &BuiltIn,
+    environments: &Environments,
+    store: &Store,
+    running: Running<'_>,
+) -> Result<Summary, Error> {
+    let total = environments.len();
+    let Some(progress) = Progress::open(store, &algorithm.key, total)? else {
+        return Ok(Summary { is_whole: true, ..Summary::default() });
+    };
+    (running.watch)(Event::Begin { algorithm: &algorithm.key, total, done: progress.num_done() });
+    let tasks = by_cost((0..total).filter(|&index| !progress.is_done(index)).collect(), environments);
+    let (num_played, num_failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let progress = Mutex::new(progress);
+    let one = |index: usize| {
+        if running.stop.load(Relaxed) {
+            return Ok(());
+        }
+        let played = played(index, environments, built_in);
+        let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
+        match played {
+            Ok(played) => {
+                progress.keep(&done(index, played))?;
+                num_played.fetch_add(1, Relaxed);
+                (running.watch)(Event::Played);
+            }
+            Err(failed) => {
+                progress.note(&failed)?;
+                num_failed.fetch_add(1, Relaxed);
+                (running.watch)(Event::Failed(&failed));
+            }
+        }
+        Ok(())
+    };
+    let threads = algorithm.num_processes.map_or(running.threads, |most| most.min(running.threads));
+    // Taken one by one, so that the longest begin first and nobody waits long at the end.
+    pool(threads)?.install(|| tasks.into_iter().par_bridge().try_for_each(one))?;
+    (running.watch)(Event::End);
+    let progress = progress.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let is_whole = progress.finish(|index| environments.changes(index))?;
+    Ok(Summary { num_played: num_played.into_inner(), num_failed: num_failed.into_inner(), is_whole })
+}
+
+fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Failed> {
+    let environment = environments.at(index).map_err(|error| Failed {
+        index,
+        env_grid_search: environments.changes(index).unwrap_or_default(),
+        config: serde_json::Value::Null,
+        error: error.to_string(),
+        traceback: String::new(),
+    })?;
+    play(&environment.config, built_in).map_err(|error| Failed {
+        index,
+        env_grid_search: environment.changes,
+        config: environment.config.to_value(),
+        error: error.to_string(),
+        traceback: String::new(),
+    })
+}
+
+fn done(index: usize, played: Played) -> Done {
+    let metrics = played.metrics.named().into_iter().map(|(name, value)| (name.to_owned(), value.into()));
+    Done { index, metrics: Pairs(metrics.collect()), runtime: played.runtime.as_secs_f64() }
+}
+
+/// The tasks with the longest first; of two as long, the earlier one.
+fn by_cost(mut tasks: Vec<usize>, environments: &Environments) -> Vec<usize> {
+    tasks.sort_by_cached_key(|&task| std::cmp::Reverse(environments.cost(task)));
+    tasks
+}
+
+fn pool(threads: usize) -> Result<ThreadPool, Error> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Error::State { reason: error.to_string() })
+}
