@@ -36,7 +36,11 @@ impl Evaluate {
     pub fn run(&self) -> Result<(), Error> {
         let suite = Suite::read(&self.suite)?;
         built_in(&suite)?;
-        let environments = Environments::new(&suite, self.sources.library_with(&maps(&suite))?)?;
+        let (library, warnings) = suite.library(self.sources.paths())?;
+        for warning in warnings {
+            eprintln!("warning: {warning}");
+        }
+        let environments = Environments::new(&suite, library)?;
         let begin = match (self.resume, self.force) {
             (true, _) => Begin::Resume,
             (_, true) => Begin::Anew,
@@ -52,13 +56,6 @@ impl Evaluate {
         let summary = run(&suite, &environments, &store, running)?;
         tell(&self.out, &suite, &summary)
     }
-}
-
-/// The suite's maps: those it names, and a `maps.yaml` beside it.
-fn maps(suite: &Suite) -> Vec<PathBuf> {
-    let beside = suite.path.with_file_name("maps.yaml");
-    let is_there = beside.exists() && !suite.maps.contains(&beside);
-    is_there.then_some(beside).into_iter().chain(suite.maps.iter().cloned()).collect()
 }
 
 fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {

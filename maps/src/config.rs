@@ -10,8 +10,7 @@ use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, 
 
 pub(crate) use fields::cells as cells_of;
 pub use fields::{FIELDS, nearest};
-pub(crate) use parse::yaml_document;
-pub use parse::{value_from_json, value_from_yaml};
+pub use parse::{value_from_json, value_from_yaml, yaml_document};
 pub(crate) use read::read_targets;
 
 /// A config under POGEMA's names, checked and with everything derived that POGEMA derives.

@@ -36,6 +36,7 @@ pub use catalogue::{PUZZLES, Puzzle, map_names, named_map};
 pub use components::{ComponentCells, Components};
 pub use config::{
     FIELDS, GridConfig, Integration, Limits, Targets, nearest, value_from_json, value_from_yaml,
+    yaml_document,
 };
 pub use distance::{distances_to, free_neighbours};
 pub use exhaustive::{Verdict, search};

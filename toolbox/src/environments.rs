@@ -41,7 +41,14 @@ impl Environments {
         let environments = Self { variants: suite.environments.clone(), library, folder };
         environments.check_maps().map_err(|error| suite.in_file(error))?;
         environments.variants.probes().try_for_each(|(index, line)| {
-            let tell = |error: Error| suite.in_file(Error::State { reason: format!("line {line}: {error}") });
+            let tell = |error: Error| {
+                let of_field = match &error {
+                    Error::Config { field, .. } => environments.variants.line_of(field),
+                    _ => None,
+                };
+                let reason = format!("line {}: {error}", of_field.unwrap_or(line));
+                suite.in_file(Error::State { reason })
+            };
             environments.at(index).map(|_| ()).map_err(tell)
         })?;
         Ok(environments)
@@ -69,7 +76,7 @@ impl Environments {
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
         if !matches!(fields.get("name").and_then(Value::as_str), None | Some("Environment")) {
-            let name = fields.get("name").cloned().unwrap_or_default();
+            let name = fields.get("name").map_or_else(String::new, told);
             return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
         }
         for own in OWN_FIELDS {
@@ -77,7 +84,7 @@ impl Environments {
         }
         let seed = fields.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| {
-            let given = fields.get("seed").cloned().unwrap_or_default();
+            let given = fields.get("seed").map_or_else(|| "missing".into(), told);
             Error::config("seed", given, "a number, or results could not be repeated")
         })?;
         let map_name = if uses_maps { self.put_map(&mut fields, seed)? } else { None };
@@ -147,4 +154,9 @@ impl Environments {
             }
         }
     }
+}
+
+/// A value as a file would have it.
+fn told(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

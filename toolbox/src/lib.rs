@@ -4,6 +4,7 @@
 
 mod built_in;
 mod environments;
+mod library;
 mod pairs;
 mod play;
 mod progress;

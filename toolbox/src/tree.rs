@@ -33,7 +33,7 @@ impl Node {
     /// # Errors
     /// [`Error::Syntax`] with the place of what is no YAML.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        serde_saphyr::from_str(text).map_err(|error| Error::Syntax { reason: error.to_string() })
+        pogema_maps::yaml_document(text)
     }
 
     /// The fields, if it has some.

@@ -24,6 +24,8 @@ pub struct Variants {
     fields: Value,
     parameters: Vec<Parameter>,
     line: u64,
+    /// Of each outermost field that is not varied.
+    lines: Vec<(String, u64)>,
 }
 
 /// One combination.
@@ -52,7 +54,10 @@ impl Variants {
                 return Err(Error::State { reason });
             }
         }
-        Ok(Self { fields, parameters, line: node.line })
+        let all = node.fields().unwrap_or_default().iter();
+        let plain = all.filter(|(_, node)| node.field(GRID).is_none());
+        let lines = plain.map(|(key, node)| (key.clone(), node.line)).collect();
+        Ok(Self { fields, parameters, line: node.line, lines })
     }
 
     /// Number of combinations; one if nothing is varied.
@@ -85,6 +90,11 @@ impl Variants {
         } else {
             usize::MAX
         })
+    }
+
+    /// The line of an outermost field that is not varied.
+    pub fn line_of(&self, field: &str) -> Option<u64> {
+        self.lines.iter().find(|(key, _)| key == field).map(|(_, line)| *line)
     }
 
     /// All values of an outermost field, varied or not.

@@ -65,15 +65,15 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// The maps that come with the program and those of the files.
-    pub fn library(&self) -> Result<Library, Error> {
-        self.library_with(&[])
+    /// The files and folders that are named.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
     }
 
-    /// The same, and before those of the files the maps of further ones.
-    pub fn library_with(&self, further: &[PathBuf]) -> Result<Library, Error> {
+    /// The maps that come with the program and those of the files.
+    pub fn library(&self) -> Result<Library, Error> {
         let mut library = Library::built_in();
-        for path in further.iter().chain(&self.paths) {
+        for path in &self.paths {
             for name in library.register(read_maps(path, Reading::default())?) {
                 eprintln!(
                     "warning: {}: a second map named `{name}` takes the place of the first",

@@ -23,7 +23,10 @@ pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
 }
 
 /// Reads one YAML document that holds something.
-pub(crate) fn yaml_document<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
+///
+/// # Errors
+/// [`Error::Syntax`] with the place; also for a text that aliases make far longer than it is.
+pub fn yaml_document<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
     serde_saphyr::from_str_with_options(text, options(text)).map_err(|error| yaml_error(&error))
 }
 

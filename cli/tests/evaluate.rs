@@ -1,0 +1,259 @@
+//! `pogema evaluate`: whole runs, runs that break off, and wrong input.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_pogema");
+
+fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
+    let output = Command::new(PROGRAM).args(arguments).current_dir(folder).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
+    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+}
+
+fn folder_with(suite: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("suite.yaml"), suite).unwrap();
+    folder
+}
+
+const EVALUATE: [&str; 4] = ["evaluate", "suite.yaml", "--out", "out"];
+const RESUME: [&str; 5] = ["evaluate", "suite.yaml", "--out", "out", "--resume"];
+
+const SUITE: &str = "
+environment:
+  name: Environment
+  on_target: nothing
+  collision_system: soft
+  max_episode_steps: 128
+  obs_radius: 5
+  size: 16
+  density: 0.2
+  seed: {grid_search: [3, 1, 2]}
+  num_agents: {grid_search: [4, 8]}
+algorithms:
+  Dice: {name: random}
+  LaCAM: {name: LaCAM, nodes: 500, num_process: 2, parallel_backend: balanced_dask, device: cpu}
+  A star: {name: \"A*\"}
+";
+
+fn read(folder: &Path, name: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join("out").join(name)).unwrap()).unwrap()
+}
+
+#[test]
+fn results_are_those_of_the_suite_in_its_order() {
+    let folder = folder_with(SUITE);
+    let (text, error, status) = run(folder.path(), &EVALUATE);
+    assert_eq!((text.as_str(), status), ("18 episodes played; all results are there: out", 0), "{error}");
+    for algorithm in ["Dice", "LaCAM", "A star"] {
+        let rows = read(folder.path(), &format!("{algorithm}.json"));
+        let rows = rows.as_array().unwrap();
+        let order = rows.iter().map(|row| {
+            let varied = &row["env_grid_search"];
+            (varied["seed"].as_u64().unwrap(), varied["num_agents"].as_u64().unwrap())
+        });
+        assert_eq!(order.collect::<Vec<_>>(), [(3, 4), (3, 8), (1, 4), (1, 8), (2, 4), (2, 8)]);
+        assert!(rows.iter().all(|row| row["algorithm"] == algorithm));
+        let times = read(folder.path(), &format!("{algorithm}.times.json"));
+        assert_eq!(times.as_array().unwrap().len(), rows.len());
+        assert!(!folder.path().join(format!("out/{algorithm}.jsonl")).exists());
+    }
+    // The figures are those of the same episodes played one by one on the reference.
+    for (index, seed, num_agents) in [(1, "3", "8"), (4, "2", "4")] {
+        for (algorithm, policy) in [("Dice", "random"), ("A star", "astar")] {
+            let settings = ["--seed", seed, "--num-agents", num_agents, "--size", "16", "--density", "0.2"];
+            let rules = ["--on-target", "nothing", "--collision-system", "soft", "--steps", "128"];
+            let policy = ["run", "--json", "--obs-radius", "5", "--policy", policy];
+            let (text, ..) = run(folder.path(), &[policy.as_slice(), &settings, &rules].concat());
+            let told: Value = serde_json::from_str(&text).unwrap();
+            let rows = read(folder.path(), &format!("{algorithm}.json"));
+            assert_eq!(rows[index]["metrics"], told["metrics"], "{algorithm} {index}");
+        }
+    }
+}
+
+/// All files of the results, but for run times.
+fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder.join("out")).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
+    files.retain(|path| !name(path).ends_with(".times.json"));
+    files.iter().map(|path| (name(path), fs::read(path).unwrap())).collect()
+}
+
+#[test]
+fn a_run_that_is_killed_anywhere_and_resumed_gives_the_same_bytes() {
+    let suite = SUITE.replace("[3, 1, 2]", "[0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19]");
+    let (whole, broken) = (folder_with(&suite), folder_with(&suite));
+    assert_eq!(run(whole.path(), &EVALUATE).2, 0);
+    let wanted = bytes(whole.path());
+    let is_whole = || broken.path().join("out/A star.json").exists();
+    let mut num_killed = 0;
+    for wait in (0..200).map(|attempt| Duration::from_millis(10 + 7 * attempt % 60)) {
+        let command = if broken.path().join("out/about.json").exists() { &RESUME[..] } else { &EVALUATE };
+        let mut child = Command::new(PROGRAM);
+        child.args(command).current_dir(broken.path()).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = child.spawn().unwrap();
+        std::thread::sleep(wait);
+        child.kill().unwrap();
+        num_killed += usize::from(!child.wait().unwrap().success());
+        if is_whole() {
+            break;
+        }
+    }
+    assert!(num_killed > 2, "a run that is killed {num_killed} times shows little");
+    let (text, error, status) = run(broken.path(), &RESUME);
+    assert_eq!(status, 0, "{text}{error}");
+    assert_eq!(bytes(broken.path()), wanted);
+}
+
+#[test]
+fn what_broke_off_within_a_line_is_played_again_and_other_damage_is_told() {
+    let folder = folder_with(SUITE);
+    assert_eq!(run(folder.path(), &EVALUATE).2, 0);
+    let wanted = bytes(folder.path());
+    let path = |name: &str| folder.path().join("out").join(name);
+    fs::remove_file(path("Dice.json")).unwrap();
+    let line = r#"{"index":2,"metrics":{"ISR":0.5},"runtime":0.25}"#;
+    fs::write(path("Dice.jsonl"), format!("{line}\n{}", &line[..20])).unwrap();
+    let (text, ..) = run(folder.path(), &RESUME);
+    assert!(text.starts_with("5 episodes played; all results are there"), "{text}");
+    let rows = read(folder.path(), "Dice.json");
+    assert_eq!(rows[2]["metrics"], serde_json::json!({"ISR": 0.5}), "what is kept is not played again");
+    for (text, told) in [
+        (format!("{line}\n{line}\n"), "Dice.jsonl: line 2: episode `2` again, which stands in line 1"),
+        (line.replace('2', "9") + "\n", "Dice.jsonl: line 1: episode `9`, expected one below 6"),
+        (format!("{line}\nnonsense\n"), "Dice.jsonl: line 2: expected"),
+        (line.replace("runtime", "runtme") + "\n", "Dice.jsonl: line 1: unknown field `runtme`"),
+    ] {
+        fs::remove_file(path("Dice.json")).ok();
+        fs::write(path("Dice.jsonl"), &text).unwrap();
+        let (_, error, status) = run(folder.path(), &RESUME);
+        assert!(error.contains(told), "{error}");
+        assert_eq!((status, fs::read_to_string(path("Dice.jsonl")).unwrap()), (2, text));
+    }
+    assert_eq!(run(folder.path(), &[&EVALUATE[..], &["--force"]].concat()).2, 0);
+    assert_eq!(bytes(folder.path()), wanted);
+}
+
+#[test]
+fn a_folder_of_something_else_is_left_as_it_is() {
+    let folder = folder_with(SUITE);
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("letter.json"), "{}").unwrap();
+    for more in [&[][..], &["--force"], &["--resume"]] {
+        let (_, error, status) = run(folder.path(), &[&EVALUATE, more].concat());
+        assert!(error.contains("holds `letter.json`, which no evaluation wrote"), "{error}");
+        assert_eq!((status, fs::read_to_string(out.join("letter.json")).unwrap().as_str()), (2, "{}"));
+    }
+    fs::remove_file(out.join("letter.json")).unwrap();
+    assert_eq!(run(folder.path(), &EVALUATE).2, 0);
+    let before = bytes(folder.path());
+    let (_, error, _) = run(folder.path(), &EVALUATE);
+    assert!(error.contains("`--resume` goes on with them, `--force` deletes them"), "{error}");
+    for (from, to, told) in [
+        ("density: 0.2", "density: 0.3", "results of other environments"),
+        ("nodes: 500", "nodes: 400", "results of `LaCAM` with other parameters"),
+    ] {
+        fs::write(folder.path().join("suite.yaml"), SUITE.replace(from, to)).unwrap();
+        let (_, error, status) = run(folder.path(), &RESUME);
+        assert!(error.contains(told), "{error}");
+        assert_eq!((status, bytes(folder.path())), (2, before.clone()));
+    }
+    // Further algorithms may join; those that leave keep their results.
+    let changed = SUITE.replace("  A star: {name: \"A*\"}\n", "  Nobody: {name: stay}\n");
+    fs::write(folder.path().join("suite.yaml"), changed).unwrap();
+    let (text, error, _) = run(folder.path(), &RESUME);
+    assert!(text.starts_with("6 episodes played"), "{text}{error}");
+    assert!(out.join("A star.json").exists() && out.join("Nobody.json").exists());
+}
+
+#[test]
+fn an_episode_that_cannot_be_played_is_told_and_the_rest_goes_on() {
+    let suite = SUITE.replace("num_agents: {grid_search: [4, 8]}", "num_agents: {grid_search: [4, 200]}");
+    let folder = folder_with(&suite.replace("size: 16", "size: 14").replace("density: 0.2", "density: 0"));
+    let (_, error, status) = run(folder.path(), &EVALUATE);
+    assert_eq!(status, 2);
+    assert!(
+        error.contains("9 episodes could not be played") && error.contains("LaCAM.failed.jsonl"),
+        "{error}"
+    );
+    let lines = fs::read_to_string(folder.path().join("out/Dice.failed.jsonl")).unwrap();
+    for line in lines.lines() {
+        let failed: Value = serde_json::from_str(line).unwrap();
+        assert_eq!(
+            (&failed["env_grid_search"]["num_agents"], &failed["config"]["num_agents"]),
+            (&200.into(), &200.into())
+        );
+        assert!(
+            failed["config"]["seed"].is_u64() && failed["error"].as_str().unwrap().contains("agents"),
+            "{line}"
+        );
+    }
+    assert_eq!(lines.lines().count(), 3);
+    assert_eq!(fs::read_to_string(folder.path().join("out/Dice.jsonl")).unwrap().lines().count(), 3);
+}
+
+#[test]
+fn a_suite_that_is_wrong_is_told_with_its_line() {
+    let folder = folder_with("");
+    for (from, to, told) in [
+        (
+            "  size: 16",
+            "  sise: 16",
+            "suite.yaml: line 8: unknown key `sise` in environment; the nearest known one is `size`",
+        ),
+        ("nodes: 500", "nods: 500", "`LaCAM.nods` is unknown; the nearest known one is `nodes`"),
+        ("nodes: 500", "nodes: many", "line 14: `LaCAM.nodes`, expected a number of nodes"),
+        ("{name: random}", "{name: SCRIMP}", "line 13: `Dice.name`: `SCRIMP` is not built in"),
+        ("{name: random}", "{nam: random}", "line 13: `Dice`, expected a field `name`"),
+        ("balanced_dask", "cloud", "`LaCAM.parallel_backend`, expected one of sequential"),
+        ("num_process: 2", "num_process: 0", "`LaCAM.num_process`, expected a number of 1 or more"),
+        ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
+        ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
+        ("seed: {grid_search: [3, 1, 2]}", "size: 4", "`size` stands twice"),
+        ("density: 0.2", "density: {grid_search: [0.1, 2]}", "line 9: config: `density`"),
+        (
+            "size: 16",
+            "map_name: {grid_search: [wall-e, wall-f, four-rooms]}",
+            "2 maps are not known: `wall-e`, `wall-f`",
+        ),
+        ("size: 16", "map_name: four-room", "the nearest is `four-rooms`"),
+        ("name: Environment", "name: MyEnv", "line 3: config: `name` is `MyEnv`, expected `Environment`"),
+        (
+            "algorithms:",
+            "algorithm:",
+            "unknown key `algorithm` in the file; the nearest known one is `algorithms`",
+        ),
+    ] {
+        assert!(SUITE.contains(from), "{from}");
+        fs::write(folder.path().join("suite.yaml"), SUITE.replacen(from, to, 1)).unwrap();
+        let (_, error, status) = run(folder.path(), &EVALUATE);
+        assert!(error.contains(told), "{to}: {error}");
+        assert_eq!((error.lines().count(), status), (1, 2), "{error}");
+        assert!(!folder.path().join("out").exists(), "{to}");
+    }
+}
+
+#[test]
+fn the_maps_of_the_paper_are_known_by_name() {
+    let suite = SUITE.replace(
+        "size: 16",
+        "map_name: {grid_search: [validation-mazes-seed-000, 'validation-random-seed-(00[1-3])']}",
+    );
+    let suite = suite.replace("density: 0.2", "use_maps: true").replace("[3, 1, 2]", "[5]");
+    let folder = folder_with(&suite);
+    let (text, error, status) = run(folder.path(), &EVALUATE);
+    assert_eq!((status, error.as_str()), (0, ""), "{text}");
+    let rows = read(folder.path(), "LaCAM.json");
+    assert_eq!(rows[2]["env_grid_search"]["map_name"], "validation-random-seed-(00[1-3])");
+}

@@ -1,0 +1,44 @@
+//! The maps that a suite may name.
+
+use std::path::PathBuf;
+
+use pogema_core::Error;
+use pogema_maps::Library;
+use pogema_maps::files::{Reading, read_maps};
+use pogema_maps::generators::Preset;
+use serde_json::Value;
+
+use crate::suite::Suite;
+
+impl Suite {
+    /// The maps that are built in, those of the suite's files and of a `maps.yaml` beside it, those of further files,
+    /// and those of the paper's generators that it names; and a warning for each map that took another's place.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub fn library(&self, further: &[PathBuf]) -> Result<(Library, Vec<String>), Error> {
+        let (mut library, mut warnings) = (Library::built_in(), Vec::new());
+        let beside = self.path.with_file_name("maps.yaml");
+        let beside = (beside.exists() && !self.maps.contains(&beside)).then_some(beside);
+        for path in beside.iter().chain(&self.maps).chain(further) {
+            let replaced = library.register(read_maps(path, Reading::default())?);
+            let path = path.display();
+            let tell = |name| format!("{path}: a second map named `{name}` takes the place of the first");
+            warnings.extend(replaced.into_iter().map(tell));
+        }
+        for preset in Preset::ALL {
+            if self.names_of(preset).any(|name| library.matching(name).is_err()) {
+                let is_new = |name: &str| library.map(name).is_err();
+                let maps: Vec<_> = preset.maps()?.into_iter().filter(|map| is_new(&map.name)).collect();
+                library.register(maps);
+            }
+        }
+        Ok((library, warnings))
+    }
+
+    /// The names of maps that may be those of a generator.
+    fn names_of(&self, preset: Preset) -> impl Iterator<Item = &str> {
+        let names = self.environments.values_of("map_name").into_iter().filter_map(Value::as_str);
+        names.filter(move |name| name.starts_with(preset.name()))
+    }
+}
