@@ -1,8 +1,8 @@
 //! `pogema evaluate`: all episodes of a suite, kept one by one.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -46,7 +46,7 @@ impl Evaluate {
             (_, true) => Begin::Anew,
             _ => Begin::New,
         };
-        let store = Store::open(&self.out, &suite, begin)?;
+        let store = Arc::new(Store::open(&self.out, &suite, begin)?);
         let bar = Bar::default();
         let watch = |event: Event<'_>| bar.show(event);
         let stop = AtomicBool::new(false);

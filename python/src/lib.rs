@@ -5,6 +5,7 @@ mod config;
 mod drawn;
 mod engine;
 mod errors;
+mod evaluation;
 mod film;
 mod lists;
 mod observe;
@@ -21,6 +22,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<vec::Batch>()?;
     module.add_class::<astar::AStarAgent>()?;
     module.add_class::<planners::PlanFollower>()?;
+    module.add_class::<evaluation::Evaluation>()?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;

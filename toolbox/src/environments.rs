@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use pogema_core::Error;
 use pogema_maps::files::read_scenario;
-use pogema_maps::{GridConfig, Library, put_map, put_scenario};
+use pogema_maps::{GridConfig, Library, MapText, put_map, put_scenario};
 use serde_json::{Map as Object, Value};
 
 use crate::Pairs;
-use crate::suite::{OWN_FIELDS, Suite};
+use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
 use crate::variants::Variants;
 
 /// The environments of a suite, each made when it is asked for.
@@ -37,21 +37,39 @@ impl Environments {
     /// One line with all maps that are missing; else about the first environment that cannot be, of those that
     /// differ from the first one in one field.
     pub fn new(suite: &Suite, library: Library) -> Result<Self, Error> {
+        let environments = Self::unchecked(suite, library);
+        environments.check(suite).map(|()| environments)
+    }
+
+    /// The environments of a suite that somebody else makes, who knows what they may be.
+    pub fn unchecked(suite: &Suite, library: Library) -> Self {
         let folder = suite.path.parent().map(std::path::Path::to_owned).unwrap_or_default();
-        let environments = Self { variants: suite.environments.clone(), library, folder };
-        environments.check_maps().map_err(|error| suite.in_file(error))?;
-        environments.variants.probes().try_for_each(|(index, line)| {
+        Self { variants: suite.environments.clone(), library, folder }
+    }
+
+    fn check(&self, suite: &Suite) -> Result<(), Error> {
+        self.check_maps().map_err(|error| suite.in_file(error))?;
+        self.variants.probes().try_for_each(|(index, line)| {
             let tell = |error: Error| {
                 let of_field = match &error {
-                    Error::Config { field, .. } => environments.variants.line_of(field),
+                    Error::Config { field, .. } => self.variants.line_of(field),
                     _ => None,
                 };
                 let reason = format!("line {}: {error}", of_field.unwrap_or(line));
                 suite.in_file(Error::State { reason })
             };
-            environments.at(index).map(|_| ()).map_err(tell)
-        })?;
-        Ok(environments)
+            self.at(index).map(|_| ()).map_err(tell)
+        })
+    }
+
+    /// All fields of an environment of a number below their count, as its file has them.
+    ///
+    /// # Errors
+    /// If it is out of range.
+    pub fn fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
+        let variant = self.variants.at(index);
+        let out_of_range = || Error::config("episode", index, format!("below {}", self.len()));
+        variant.map(|variant| variant.fields).ok_or_else(out_of_range)
     }
 
     /// Number of environments.
@@ -75,7 +93,7 @@ impl Environments {
         let mut fields = variant.fields;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
-        if !matches!(fields.get("name").and_then(Value::as_str), None | Some("Environment")) {
+        if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
             let name = fields.get("name").map_or_else(String::new, told);
             return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
         }
@@ -104,13 +122,32 @@ impl Environments {
         changes.ok_or_else(|| Error::config("episode", index, format!("below {}", self.len())))
     }
 
-    /// Work that an environment makes, for the longest to begin first. Units: agent steps, at most.
-    pub fn cost(&self, index: usize) -> u64 {
+    /// Numbers of environments with those first that make the most work; of two that make as much, the earlier one.
+    pub fn by_cost(&self, mut indices: Vec<usize>) -> Vec<usize> {
+        indices.sort_by_cached_key(|&index| std::cmp::Reverse(self.cost(index)));
+        indices
+    }
+
+    /// Work that an environment makes. Units: agent steps, at most.
+    fn cost(&self, index: usize) -> u64 {
         let number = |name: &str, otherwise: u64| {
             self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
         };
         // POGEMA's defaults stand for what is not given.
         number("num_agents", 1) * number("max_episode_steps", 64)
+    }
+
+    /// The name and text of the map that a name, or a pattern and a seed, mean.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn map(&self, pattern: &str, seed: u64) -> Result<(String, String), Error> {
+        let (name, text) = self.meant(pattern, seed)?;
+        Ok((name.to_owned(), text.to_text()?))
+    }
+
+    fn meant<'a>(&'a self, pattern: &'a str, seed: u64) -> Result<(&'a str, &'a MapText), Error> {
+        self.library.map(pattern).map(|text| (pattern, text)).or_else(|_| self.library.choose(pattern, seed))
     }
 
     /// Puts the map that the seed chooses among those of the name in its place.
@@ -119,10 +156,7 @@ impl Environments {
     fn put_map(&self, fields: &mut Object<String, Value>, seed: u64) -> Result<Option<String>, Error> {
         let Some(Value::String(pattern)) = fields.get("map_name").cloned() else { return Ok(None) };
         fields.remove("map_name");
-        let (name, text) = match self.library.map(&pattern) {
-            Ok(text) => (pattern.as_str(), text),
-            Err(_) => self.library.choose(&pattern, seed)?,
-        };
+        let (name, text) = self.meant(&pattern, seed)?;
         put_map(text, fields)?;
         Ok(Some(name.to_owned()))
     }

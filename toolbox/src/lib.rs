@@ -19,7 +19,7 @@ pub use environments::{Environment, Environments};
 pub use pairs::Pairs;
 pub use play::{Played, play};
 pub use progress::{Done, Failed, Progress};
-pub use run::{Event, Running, Summary, built_in, run};
+pub use run::{Event, Running, Summary, built_in, run, run_one};
 pub use store::{About, Begin, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};

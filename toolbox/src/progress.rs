@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use pogema_core::Error;
 use serde::{Deserialize, Serialize};
@@ -42,8 +43,8 @@ pub struct Failed {
 
 /// The file to which the episodes of an algorithm are written while it plays.
 #[derive(Debug)]
-pub struct Progress<'a> {
-    store: &'a Store,
+pub struct Progress {
+    store: Arc<Store>,
     key: String,
     path: PathBuf,
     file: File,
@@ -59,12 +60,12 @@ struct Row<'a> {
     algorithm: &'a str,
 }
 
-impl<'a> Progress<'a> {
+impl Progress {
     /// Takes up what is done of so many episodes of an algorithm; none if all are.
     ///
     /// # Errors
     /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
-    pub fn open(store: &'a Store, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
+    pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
         if store.path(&format!("{key}.{RESULTS}")).exists() {
             // A run may have broken off after it had written all.
             remove(&store.path(&format!("{key}.{LINES}")))?;
@@ -80,12 +81,12 @@ impl<'a> Progress<'a> {
         for line in &lines {
             done[line.index] = true;
         }
-        Ok(Some(Self { store, key: key.to_owned(), path, file, done, failed: None }))
+        Ok(Some(Self { store: Arc::clone(store), key: key.to_owned(), path, file, done, failed: None }))
     }
 
-    /// Whether an episode is done.
-    pub fn is_done(&self, index: usize) -> bool {
-        self.done[index]
+    /// The episodes that are not done.
+    pub fn to_do(&self) -> Vec<usize> {
+        (0..self.done.len()).filter(|&index| !self.done[index]).collect()
     }
 
     /// Number of episodes that are done.

@@ -1,7 +1,7 @@
 //! All episodes of the built-in algorithms of a suite, played on threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use pogema_core::Error;
 use rayon::prelude::*;
@@ -64,7 +64,7 @@ pub struct Summary {
 pub fn run(
     suite: &Suite,
     environments: &Environments,
-    store: &Store,
+    store: &Arc<Store>,
     running: Running<'_>,
 ) -> Result<Summary, Error> {
     let algorithms = built_in(suite)?;
@@ -105,11 +105,15 @@ fn unknown(algorithm: &Algorithm) -> Error {
     Error::Syntax { reason }
 }
 
-fn run_one(
+/// Plays what a store does not have yet of one algorithm.
+///
+/// # Errors
+/// If results cannot be written.
+pub fn run_one(
     algorithm: &Algorithm,
     built_in: &BuiltIn,
     environments: &Environments,
-    store: &Store,
+    store: &Arc<Store>,
     running: Running<'_>,
 ) -> Result<Summary, Error> {
     let total = environments.len();
@@ -117,7 +121,7 @@ fn run_one(
         return Ok(Summary { is_whole: true, ..Summary::default() });
     };
     (running.watch)(Event::Begin { algorithm: &algorithm.key, total, done: progress.num_done() });
-    let tasks = by_cost((0..total).filter(|&index| !progress.is_done(index)).collect(), environments);
+    let tasks = environments.by_cost(progress.to_do());
     let (num_played, num_failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let progress = Mutex::new(progress);
     let one = |index: usize| {
@@ -169,12 +173,6 @@ fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Resu
 fn done(index: usize, played: Played) -> Done {
     let metrics = played.metrics.named().into_iter().map(|(name, value)| (name.to_owned(), value.into()));
     Done { index, metrics: Pairs(metrics.collect()), runtime: played.runtime.as_secs_f64() }
-}
-
-/// The tasks with the longest first; of two as long, the earlier one.
-fn by_cost(mut tasks: Vec<usize>, environments: &Environments) -> Vec<usize> {
-    tasks.sort_by_cached_key(|&task| std::cmp::Reverse(environments.cost(task)));
-    tasks
 }
 
 fn pool(threads: usize) -> Result<ThreadPool, Error> {

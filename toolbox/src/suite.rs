@@ -11,6 +11,9 @@ use crate::variants::Variants;
 /// The keys of a file.
 const KEYS: [&str; 5] = ["environment", "algorithms", "results_views", "maps", "dask"];
 
+/// The name of POGEMA's environment; others are registered in Python, with fields of their own.
+pub(crate) const ENVIRONMENT: &str = "Environment";
+
 /// The fields of an environment that are not POGEMA's.
 ///
 /// Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
@@ -78,6 +81,11 @@ impl Suite {
         Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
 
+    /// Whether its environments are others than POGEMA's.
+    pub fn is_foreign(&self) -> bool {
+        self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
+    }
+
     /// Tells an error with the file.
     pub fn in_file(&self, error: Error) -> Error {
         in_file(&self.path, error)
@@ -86,7 +94,9 @@ impl Suite {
     fn of(path: &Path, text: &str, root: &Node) -> Result<Self, Error> {
         check_keys(root, "the file", &KEYS, &[])?;
         let environment = required(root, "environment")?;
-        check_keys(environment, "environment", &FIELDS, &OWN_FIELDS)?;
+        if matches!(environment.field("name").and_then(Node::text), None | Some(ENVIRONMENT)) {
+            check_keys(environment, "environment", &FIELDS, &OWN_FIELDS)?;
+        }
         let environments = Variants::of(environment)?;
         if environments.is_empty() {
             return Err(wrong(environment, "environment", "at least one value of each varied field"));

@@ -1,0 +1,210 @@
+//! Suites and the results of their episodes, whoever plays them.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use pogema_core::Error;
+use pogema_maps::formats::NamedMap;
+use pogema_maps::parse_map_text;
+use pogema_toolbox::{
+    Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Running, Store, Suite, run_one,
+};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+/// An algorithm of a suite: the name of its results, its own name, its parameters in JSON, processes, backend.
+type Listed = (String, String, String, Option<usize>, String);
+
+/// A suite, and the folder with what came of it.
+#[pyclass(frozen, module = "pogema_rs._engine")]
+pub struct Evaluation {
+    suite: Suite,
+    environments: Environments,
+    store: Arc<Store>,
+    progress: Mutex<Option<Progress>>,
+}
+
+#[pymethods]
+impl Evaluation {
+    /// Reads a suite and opens its folder; `begin` is `new`, `resume` or `anew`; `maps` are texts by name.
+    #[new]
+    fn new(
+        path: PathBuf,
+        text: Option<&str>,
+        folder: PathBuf,
+        begin: &str,
+        maps: Vec<(String, String)>,
+        files: Vec<PathBuf>,
+    ) -> PyResult<Self> {
+        let read = || {
+            let suite = match text {
+                Some(text) => Suite::parse(&path, text)?,
+                None => Suite::read(&path)?,
+            };
+            let environments = environments(&suite, maps, &files)?;
+            Ok((suite, environments, read_begin(begin)?))
+        };
+        let wrong = |error: Error| PyValueError::new_err(error.to_string());
+        let (suite, environments, begin) = read().map_err(wrong)?;
+        let store = Arc::new(Store::open(&folder, &suite, begin).map_err(|error| told(&error))?);
+        Ok(Self { suite, environments, store, progress: Mutex::new(None) })
+    }
+
+    /// Number of episodes of each algorithm.
+    fn num_episodes(&self) -> usize {
+        self.environments.len()
+    }
+
+    /// The algorithms, in the order of the suite.
+    fn algorithms(&self) -> Vec<Listed> {
+        let all = self.suite.algorithms.iter().map(|algorithm| {
+            let parameters = algorithm.parameters.iter().map(|(key, node)| (key.clone(), node.value()));
+            let parameters = Pairs(parameters.collect());
+            let (key, name, backend) = (&algorithm.key, &algorithm.name, &algorithm.backend);
+            let parameters = serde_json::to_string(&parameters).unwrap_or_default();
+            (key.clone(), name.clone(), parameters, algorithm.num_processes, backend.clone())
+        });
+        all.collect()
+    }
+
+    /// All fields of an episode's environment, in JSON, its map in the place of the map's name.
+    fn environment(&self, index: usize) -> PyResult<String> {
+        let fields = self.environments.fields(index).map_err(|error| told(&error))?;
+        Ok(serde_json::Value::Object(fields).to_string())
+    }
+
+    /// The name and text of the map that is meant by a name for a seed.
+    fn map(&self, name: &str, seed: u64) -> PyResult<(String, String)> {
+        self.environments.map(name, seed).map_err(|error| told(&error))
+    }
+
+    /// What was varied for an episode, in JSON.
+    fn changes(&self, index: usize) -> PyResult<String> {
+        let changes = self.environments.changes(index).map_err(|error| told(&error))?;
+        serde_json::to_string(&changes).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Begins with an algorithm: the episodes that are to be played, the longest first; none if all are done.
+    fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
+        let opened = Progress::open(&self.store, key, self.environments.len());
+        let progress = opened.map_err(|error| told(&error))?;
+        let to_do = progress.as_ref().map(|progress| self.environments.by_cost(progress.to_do()));
+        *self.progress()? = progress;
+        Ok(to_do)
+    }
+
+    /// Keeps an episode: its figures in JSON, and what the policy took of it in seconds.
+    fn keep(&self, index: usize, metrics: &str, runtime: f64) -> PyResult<()> {
+        let metrics: Pairs = read_json(metrics)?;
+        self.with(|progress| progress.keep(&Done { index, metrics, runtime }))
+    }
+
+    /// Notes an episode that could not be played.
+    fn note(&self, index: usize, config: &str, error: String, traceback: String) -> PyResult<()> {
+        let env_grid_search = self.environments.changes(index).map_err(|error| told(&error))?;
+        let config = read_json(config)?;
+        self.with(|progress| progress.note(&Failed { index, env_grid_search, config, error, traceback }))
+    }
+
+    /// Writes the results, if all episodes are done; says whether they are.
+    fn finish(&self) -> PyResult<bool> {
+        let progress = self.progress()?.take();
+        let finished = progress.map(|progress| progress.finish(|index| self.environments.changes(index)));
+        finished.unwrap_or(Ok(true)).map_err(|error| told(&error))
+    }
+
+    /// Plays all that is to be played of an algorithm that is built in; none if it is not. Tells `watch` of each
+    /// episode: its number and the error, if it could not be played.
+    ///
+    /// Returns how many episodes were played, how many could not be, and whether all results are there.
+    fn run_built_in(
+        &self,
+        py: Python<'_>,
+        key: &str,
+        threads: usize,
+        watch: Py<PyAny>,
+    ) -> PyResult<Option<(usize, usize, bool)>> {
+        let algorithm = self.suite.algorithms.iter().find(|algorithm| algorithm.key == key);
+        let Some((algorithm, built_in)) = algorithm.and_then(|it| Some((it, BuiltIn::of(it)?))) else {
+            return Ok(None);
+        };
+        let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
+        let stop = AtomicBool::new(false);
+        let raised: Mutex<Option<PyErr>> = Mutex::new(None);
+        let tell = |event: Event<'_>| {
+            let error = match event {
+                Event::Played => None,
+                Event::Failed(failed) => Some((failed.index, failed.error.clone())),
+                Event::Begin { .. } | Event::End => return,
+            };
+            Python::attach(|py| {
+                let heard = py.check_signals().and_then(|()| watch.call1(py, (error,)).map(|_| ()));
+                if let (Err(error), Ok(mut raised)) = (heard, raised.lock()) {
+                    stop.store(true, std::sync::atomic::Ordering::Relaxed);
+                    raised.get_or_insert(error);
+                }
+            });
+        };
+        let running = Running { threads: threads.max(1), stop: &stop, watch: &tell };
+        let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);
+        let summary = py.detach(run).map_err(|error| told(&error))?;
+        match raised.into_inner() {
+            Ok(Some(error)) => Err(error),
+            _ => Ok(Some((summary.num_played, summary.num_failed, summary.is_whole))),
+        }
+    }
+}
+
+impl Evaluation {
+    fn progress(&self) -> PyResult<MutexGuard<'_, Option<Progress>>> {
+        self.progress.try_lock().map_err(|_| {
+            PyRuntimeError::new_err("another thread is using this evaluation, expected one at a time")
+        })
+    }
+
+    fn with(&self, work: impl FnOnce(&mut Progress) -> Result<(), Error>) -> PyResult<()> {
+        let mut progress = self.progress()?;
+        let progress = progress.as_mut();
+        let progress = progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm was begun with"))?;
+        work(progress).map_err(|error| told(&error))
+    }
+}
+
+/// The environments of a suite, with maps by name beside those of files.
+fn environments(
+    suite: &Suite,
+    maps: Vec<(String, String)>,
+    files: &[PathBuf],
+) -> Result<Environments, Error> {
+    let (mut library, _) = suite.library(files)?;
+    let read = |(name, text): (String, String)| {
+        let text = parse_map_text(&text).map_err(|error| Error::io(&name, error))?;
+        Ok(NamedMap { name, text })
+    };
+    library.register(maps.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
+    if suite.is_foreign() {
+        return Ok(Environments::unchecked(suite, library));
+    }
+    Environments::new(suite, library)
+}
+
+fn read_begin(name: &str) -> Result<Begin, Error> {
+    match name {
+        "new" => Ok(Begin::New),
+        "resume" => Ok(Begin::Resume),
+        "anew" => Ok(Begin::Anew),
+        _ => Err(Error::config("begin", name, "`new`, `resume` or `anew`")),
+    }
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+fn told(error: &Error) -> PyErr {
+    match error {
+        Error::Io { .. } => pyo3::exceptions::PyOSError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
