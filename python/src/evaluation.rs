@@ -56,6 +56,16 @@ impl Evaluation {
         self.environments.len()
     }
 
+    /// Whether the environments are others than POGEMA's.
+    fn is_foreign(&self) -> bool {
+        self.suite.is_foreign()
+    }
+
+    /// The address of a Dask scheduler that the suite names.
+    fn dask(&self) -> Option<String> {
+        self.suite.dask.clone()
+    }
+
     /// The algorithms, in the order of the suite.
     fn algorithms(&self) -> Vec<Listed> {
         let all = self.suite.algorithms.iter().map(|algorithm| {

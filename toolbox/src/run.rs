@@ -170,10 +170,18 @@ fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Resu
     })
 }
 
+/// An episode as results have it: what POGEMA counts is whole, and a mean is not.
 fn done(index: usize, played: Played) -> Done {
-    let metrics = played.metrics.named().into_iter().map(|(name, value)| (name.to_owned(), value.into()));
+    let has_one_goal_each = played.metrics.soc.is_some();
+    let told = |(name, value): (&str, f64)| {
+        let is_count = COUNTS.contains(&name) || name == "ep_length" && has_one_goal_each;
+        (name.to_owned(), if is_count { (value as u64).into() } else { value.into() })
+    };
+    let metrics = played.metrics.named().into_iter().map(told);
     Done { index, metrics: Pairs(metrics.collect()), runtime: played.runtime.as_secs_f64() }
 }
+
+const COUNTS: [&str; 4] = ["SoC", "makespan", "a_collisions", "o_collisions"];
 
 fn pool(threads: usize) -> Result<ThreadPool, Error> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();

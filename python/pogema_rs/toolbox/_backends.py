@@ -1,0 +1,95 @@
+"""Where episodes are played: here, in processes, or on the workers of Dask."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from typing import Any, Optional
+
+from pogema_rs.toolbox._work import Outcome, Task, play, play_with
+from pogema_rs.toolbox.registry import ToolboxRegistry
+
+#: Episodes that wait for each process, so that none is idle.
+_AHEAD = 2
+#: A process that ends by itself so often takes its episode with it each time.
+_MOST_DEATHS = 3
+
+
+def here(tasks: Iterable[Task]) -> Iterator[Outcome]:
+    """Plays one episode after the other in this process."""
+    return map(play, tasks)
+
+
+def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
+    """Plays episodes in processes; those of a process that died are played again."""
+    waiting, deaths = list(tasks), 0
+    waiting.reverse()
+    while waiting:
+        state = ToolboxRegistry.get_state()
+        under_way: dict[Future[Outcome], Task] = {}
+        try:
+            with ProcessPoolExecutor(num_processes, initializer=_take_over, initargs=(state,)) as pool:
+                while waiting or under_way:
+                    while waiting and len(under_way) < _AHEAD * num_processes:
+                        task = waiting.pop()
+                        under_way[pool.submit(play, task)] = task
+                    for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                        outcome = future.result()
+                        del under_way[future]
+                        yield outcome
+        except BrokenProcessPool:
+            deaths += 1
+            lost = list(under_way.values())
+            ToolboxRegistry.warning(f"a process died; {len(lost)} episodes are played again")
+            if deaths >= _MOST_DEATHS:
+                reason = f"its process died, or one beside it, {deaths} times"
+                yield from (Outcome(task.index, error=reason) for task in lost)
+                deaths = 0
+            else:
+                waiting += reversed(lost)
+
+
+def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> Iterator[Outcome]:
+    """Plays episodes on the workers of a scheduler, by default of one of our own; Dask plays those of a worker that
+    died again."""
+    from distributed import Client, LocalCluster, as_completed
+
+    if address is None:
+        cluster = LocalCluster(n_workers=num_processes, threads_per_worker=1, dashboard_address=None)
+        client = Client(cluster, timeout="120s")
+    else:
+        cluster, client = None, Client(address, timeout="120s")
+    try:
+        state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
+        rest = iter(tasks)
+        num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+        submit = {"pure": False, "retries": _MOST_DEATHS}
+        names: dict[Any, int] = {}
+
+        def send(task: Task) -> Any:
+            future = client.submit(play_with, state, task, **submit)
+            names[future.key] = task.index
+            return future
+
+        under_way = as_completed([send(task) for task in islice(rest, num_ahead)])
+        for future in under_way:
+            index = names.pop(future.key)
+            if future.status == "finished":
+                yield future.result()
+            else:
+                yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
+            for task in islice(rest, 1):
+                under_way.add(send(task))
+    finally:
+        client.close()
+        if cluster is not None:
+            cluster.close()
+
+
+def _take_over(state: dict[str, Any]) -> None:
+    # Without this every process of NumPy takes all cores.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    ToolboxRegistry.recreate_from_state(state)

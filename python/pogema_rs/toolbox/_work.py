@@ -1,0 +1,91 @@
+"""One episode in any process: what it needs, and what comes of it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Optional
+
+from pogema_rs.toolbox.registry import ToolboxRegistry
+
+
+@dataclass(frozen=True)
+class Task:
+    """An episode that is to be played."""
+
+    index: int
+    algorithm: str
+    settings: dict[str, Any]
+    environment: dict[str, Any]
+    #: The map that the environment names.
+    maps: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of an episode: metrics, or why there are none."""
+
+    index: int
+    metrics: Optional[dict[str, Any]] = None
+    #: Units: seconds, of the policy alone where the environment measures that.
+    runtime: float = 0.0
+    error: str = ""
+    traceback: str = ""
+
+
+#: The algorithm that this process played last: one may take minutes to load.
+_ready: dict[str, tuple[dict[str, Any], Any, Any]] = {}
+
+
+def play(task: Task) -> Outcome:
+    """Plays an episode; whatever the policy or the environment raises is part of what comes of it."""
+    try:
+        return _play(task)
+    except Exception as error:  # noqa: BLE001 - a policy may raise anything
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        return Outcome(task.index, error=reason, traceback=traceback.format_exc())
+
+
+def play_with(state: dict[str, Any], task: Task) -> Outcome:
+    """The same where nothing is registered yet."""
+    if not _ready:
+        ToolboxRegistry.recreate_from_state(state)
+    return play(task)
+
+
+def _play(task: Task) -> Outcome:
+    ToolboxRegistry.register_maps(task.maps)
+    algorithm, settings = _algorithm(task)
+    env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)
+    if settings.preprocessing:
+        env = ToolboxRegistry.create_algorithm_preprocessing(env, task.settings["name"], **task.settings)
+    began = time.perf_counter()
+    metrics = dict(ToolboxRegistry.run_episode(env, algorithm, settings.run_episode_func))
+    runtime = metrics.pop("runtime", time.perf_counter() - began)
+    if task.environment.get("with_animation"):
+        _draw(env, task)
+    return Outcome(task.index, {name: _plain(value) for name, value in metrics.items()}, float(runtime))
+
+
+def _algorithm(task: Task) -> tuple[Any, Any]:
+    known = _ready.get(task.algorithm)
+    if known is None or known[0] != task.settings:
+        name = task.settings["name"]
+        settings = ToolboxRegistry.create_algorithm_config(name, **task.settings)
+        known = task.settings, ToolboxRegistry.create_algorithm(name, **task.settings), settings
+        _ready.clear()
+        _ready[task.algorithm] = known
+    return known[1], known[2]
+
+
+def _draw(env: Any, task: Task) -> None:
+    folder = Path("renders", task.algorithm)
+    folder.mkdir(parents=True, exist_ok=True)
+    env.unwrapped.save_animation(str(folder / f"episode-{task.index:05}.svg"))
+
+
+def _plain(value: Any) -> Any:
+    """A number of Python's own in the place of one of NumPy."""
+    return value.item() if hasattr(value, "item") else value

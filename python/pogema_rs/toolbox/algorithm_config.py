@@ -1,0 +1,26 @@
+"""What every algorithm of a suite may say of itself."""
+
+from __future__ import annotations
+
+from typing import Literal, Optional
+
+from pydantic import BaseModel
+
+__all__ = ["AlgoBase"]
+
+
+class AlgoBase(BaseModel):
+    """The settings of an algorithm; one that has more extends this class.
+
+    Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase`
+    """
+
+    name: Optional[str] = None
+    num_process: int = 3
+    device: str = "cuda"
+    parallel_backend: Literal[
+        "dask", "sequential", "balanced_dask", "balanced_multiprocessing", "multiprocessing"
+    ] = "balanced_multiprocessing"
+    run_episode_func: str = "default"
+    seed: Optional[int] = 0
+    preprocessing: Optional[str] = None

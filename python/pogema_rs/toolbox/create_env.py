@@ -1,0 +1,122 @@
+"""The environment of suites: POGEMA on maps by name."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs.grid_config import GridConfig
+from pogema_rs.integrations.make_pogema import pogema_v0
+from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.wrappers import Wrapper
+from pogema_rs.wrappers.metrics import AgentsDensityWrapper, RuntimeMetricWrapper
+
+__all__ = ["CollisionsWrapper", "Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "create_env_base"]
+
+
+class Environment(GridConfig):
+    """The fields of an environment in a suite.
+
+    Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
+    """
+
+    name: str = "Environment"
+    with_animation: bool = False
+    use_maps: bool = True
+
+
+class ProvideGlobalObstacles(Wrapper):
+    """Tells planners of the whole map."""
+
+    def get_global_obstacles(self) -> list[list[int]]:
+        """The map with its border, 1 for an obstacle."""
+        return self.grid.get_obstacles().astype(int).tolist()
+
+    def get_global_agents_xy(self) -> Any:
+        """Where each agent is on that map."""
+        return self.grid.get_agents_xy()
+
+    def get_global_targets_xy(self) -> Any:
+        """Where each agent's goal is on that map."""
+        return self.grid.get_targets_xy()
+
+
+class MultiMapWrapper(Wrapper):
+    """Chooses, at each reset, one of the maps whose names the config's `map_name` matches; the seed says which.
+
+    Errors: KeyError if no name matches.
+
+    Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper`
+    """
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        pattern = self.env.unwrapped.grid_config.map_name
+        self._names: list[str] = []
+        if pattern:
+            maps = ToolboxRegistry.get_maps()
+            is_meant = re.compile(f"^{pattern}$").match
+            self._names = [pattern] if pattern in maps else sorted(name for name in maps if is_meant(name))
+            if not self._names:
+                raise KeyError(f"No map matching: {pattern}")
+
+    def reset(self, *, seed: Optional[int] = None, **kwargs: Any) -> tuple[Any, Any]:
+        """Begins an episode, by default with the seed of the config."""
+        config = self.env.unwrapped.grid_config
+        seed = config.seed if seed is None else seed
+        if self._names:
+            name = self._names[np.random.default_rng(seed).integers(0, len(self._names))]
+            fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
+            fields.update(map=ToolboxRegistry.get_maps()[name], map_name=name, seed=seed)
+            self.env.unwrapped.grid_config = type(config)(**fields)
+        return self.env.reset(seed=seed, **kwargs)
+
+
+class CollisionsWrapper(Wrapper):
+    """Adds `a_collisions` and `o_collisions`: moves that another agent, or an obstacle, prevented.
+
+    Rule: metrics/collisions
+    """
+
+    def reset(self, **kwargs: Any) -> tuple[Any, Any]:
+        """Begins an episode."""
+        result = self.env.reset(**kwargs)
+        self._obstacles = self.grid.get_obstacles() != 0
+        self._moves = np.array(self.unwrapped.grid_config.MOVES)
+        self._with_agents = self._with_obstacles = 0
+        return result
+
+    def step(self, action: Any) -> Any:
+        """Plays a step and counts."""
+        wanted, before, active = np.array(action), np.array(self.grid.get_agents_xy()), self._active()
+        result = self.env.step(action)
+        _, _, terminated, truncated, infos = result
+        held = active & (wanted != 0) & (before == np.array(self.grid.get_agents_xy())).all(axis=1)
+        rows, cols = (before[held] + self._moves[wanted[held]]).T
+        num_hits = int(self._obstacles[rows, cols].sum())
+        self._with_obstacles += num_hits
+        self._with_agents += int(held.sum()) - num_hits
+        if all(terminated) or all(truncated):
+            counts = {"a_collisions": self._with_agents, "o_collisions": self._with_obstacles}
+            infos[0].setdefault("metrics", {}).update(counts)
+        return result
+
+    def _active(self) -> np.ndarray:
+        active = self.grid.is_active
+        return np.array([active[agent] for agent in range(len(active))])
+
+
+def create_env_base(config: Environment) -> Any:
+    """The environment of a suite, which measures all that results hold.
+
+    Source: pogema-toolbox 0.1.1, `create_env.py`, `create_env_base`
+    """
+    env: Wrapper = ProvideGlobalObstacles(pogema_v0(grid_config=config))
+    if config.use_maps:
+        env = MultiMapWrapper(env)
+    if config.with_animation:
+        env = AnimationMonitor(env, AnimationConfig(save_every_idx_episode=None))
+    return RuntimeMetricWrapper(CollisionsWrapper(AgentsDensityWrapper(env)))

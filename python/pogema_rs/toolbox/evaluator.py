@@ -1,0 +1,160 @@
+"""Runs suites: all episodes of all algorithms, kept one by one."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Literal, Optional, Union
+
+from pogema_rs._engine import Evaluation, num_cores
+from pogema_rs.toolbox import _backends
+from pogema_rs.toolbox._work import Outcome, Task
+from pogema_rs.toolbox.registry import ToolboxRegistry
+
+__all__ = ["EvaluationError", "evaluation"]
+
+_Path = Union[str, os.PathLike[str]]
+
+
+class EvaluationError(RuntimeError):
+    """Some episodes could not be played; their files `<algorithm>.failed.jsonl` say why, and `resume` tries again."""
+
+
+def evaluation(
+    evaluation_config: Union[_Path, Mapping[str, Any]],
+    eval_dir: _Path,
+    *,
+    begin: Literal["new", "resume", "anew"] = "new",
+    maps: Sequence[_Path] = (),
+    dask: Optional[str] = None,
+) -> list[dict[str, Any]]:
+    """Plays what is not played yet of a suite, and returns all results, in the layout of pogema-toolbox.
+
+    `evaluation_config` is a YAML file or what it holds. `begin` says what may be in the folder `eval_dir`: no results
+    (`new`), those of a run of the same suite that broke off (`resume`), or any, which are deleted (`anew`). `maps` are
+    files and folders with maps besides those that are registered. `dask` is the address of a scheduler, for
+    algorithms whose `parallel_backend` is one of Dask; without one, and without `dask` in the suite, they get a
+    cluster of processes on this machine.
+
+    An algorithm that nobody registered is the planner or policy of that name that is built in.
+
+    Errors: ValueError for a suite that is wrong, with its line; OSError for a folder that cannot be used;
+    `EvaluationError` if episodes could not be played, after all others were.
+
+    Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
+    """
+    if isinstance(evaluation_config, Mapping):
+        path, text = Path("suite.yaml"), json.dumps(evaluation_config)
+    else:
+        path, text = Path(evaluation_config), None
+    grids = [(name, _map_text(grid)) for name, grid in ToolboxRegistry.get_maps().items()]
+    suite = Evaluation(str(path), text, str(eval_dir), begin, grids, [str(file) for file in maps])
+    address = dask or suite.dask()
+    num_failed = 0
+    results: list[dict[str, Any]] = []
+    for key, name, parameters, num_processes, backend in suite.algorithms():
+        settings = {"name": name, **json.loads(parameters), "parallel_backend": backend}
+        if num_processes is not None:
+            settings["num_process"] = num_processes
+        num_failed += _run(suite, key, settings, address)
+        results += _results(Path(eval_dir), key)
+    if num_failed:
+        raise EvaluationError(f"{num_failed} episodes could not be played; see {Path(eval_dir)}/*.failed.jsonl")
+    return results
+
+
+def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str]) -> int:
+    """Plays what is to be played of an algorithm; the number of episodes that could not be."""
+    progress = _Progress(key, suite.num_episodes())
+    if settings["name"] not in ToolboxRegistry.get_state()["algorithms"]:
+        threads = min(settings.get("num_process", num_cores()), num_cores())
+        summary = suite.run_built_in(key, threads, progress.built_in)
+        if summary is not None:
+            return summary[1]
+    config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
+    to_do = suite.begin(key)
+    if to_do is None:
+        return 0
+    progress.begin(len(to_do))
+    num_failed = 0
+    tasks = (_task(suite, index, key, settings) for index in to_do)
+    with closing(_outcomes(tasks, config, address)) as outcomes:
+        for outcome in outcomes:
+            if outcome.metrics is None:
+                num_failed += 1
+                suite.note(outcome.index, suite.environment(outcome.index), outcome.error, outcome.traceback)
+            else:
+                suite.keep(outcome.index, json.dumps(outcome.metrics), outcome.runtime)
+            progress.step(outcome.index, outcome.error)
+    suite.finish()
+    return num_failed
+
+
+def _outcomes(tasks: Iterable[Task], config: Any, address: Optional[str]) -> Generator[Outcome, None, None]:
+    backend, num_processes = config.parallel_backend, min(config.num_process, num_cores())
+    if backend == "sequential":
+        yield from _backends.here(tasks)
+    elif backend.endswith("dask"):
+        yield from _backends.dask(tasks, num_processes, address)
+    else:
+        yield from _backends.processes(tasks, num_processes)
+
+
+def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any]) -> Task:
+    environment, maps = json.loads(suite.environment(index)), {}
+    name = environment.get("map_name")
+    if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
+        name, text = suite.map(name, environment.get("seed") or 0)
+        environment["map_name"], maps = name, {name: text}
+    return Task(index, key, settings, environment, maps)
+
+
+def _map_text(grid: Any) -> str:
+    """A registered map as text: of rows as lists, 0 is free."""
+    if isinstance(grid, str):
+        return grid
+    return "\n".join(row if isinstance(row, str) else "".join("#" if cell else "." for cell in row) for row in grid)
+
+
+def _results(folder: Path, key: str) -> list[dict[str, Any]]:
+    path = folder / f"{key}.json"
+    if not path.exists():
+        return []
+    rows, times = json.loads(path.read_text()), json.loads((folder / f"{key}.times.json").read_text())
+    for row, runtime in zip(rows, times):
+        row["metrics"].setdefault("runtime", runtime)
+    return rows
+
+
+class _Progress:
+    """How far an algorithm is, told now and then."""
+
+    #: Units: seconds.
+    EVERY = 10.0
+
+    def __init__(self, key: str, total: int) -> None:
+        self._key, self._total = key, total
+        self._began = self._told = time.monotonic()
+        self._done = self._before = 0
+
+    def begin(self, num_left: int) -> None:
+        self._before = self._done = self._total - num_left
+        ToolboxRegistry.info(f"{self._key}: {num_left} of {self._total} episodes to play")
+
+    def built_in(self, failed: Optional[tuple[int, str]]) -> None:
+        self.step(*(failed or (0, "")))
+
+    def step(self, index: int, error: str) -> None:
+        self._done += 1
+        if error:
+            ToolboxRegistry.error(f"{self._key}: episode {index}: {error}")
+        now = time.monotonic()
+        if now - self._told >= self.EVERY:
+            self._told = now
+            played = self._done - self._before
+            left = (now - self._began) / played * (self._total - self._done)
+            ToolboxRegistry.info(f"{self._key}: {self._done} of {self._total} episodes, {left:.0f} s left")

@@ -1,0 +1,23 @@
+"""What an environment tells of an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = ["ResultsHolder"]
+
+
+class ResultsHolder:
+    """Collects the metrics that the infos of an episode hold."""
+
+    def __init__(self) -> None:
+        self.results: dict[str, Any] = {}
+
+    def after_step(self, infos: Sequence[dict[str, Any]]) -> None:
+        """Takes in the infos of a step."""
+        self.results.update(infos[0].get("metrics", {}))
+
+    def get_final(self) -> dict[str, Any]:
+        """The metrics by name."""
+        return self.results

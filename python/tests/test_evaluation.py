@@ -1,0 +1,173 @@
+"""Suites with policies in Python: here, in processes, on Dask, broken off and resumed."""
+
+import json
+import random
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import yaml
+
+SCRIPT = Path(__file__).parent / "toolbox" / "play_suite.py"
+BACKENDS = ["sequential", "multiprocessing", "balanced_multiprocessing", "dask", "balanced_dask"]
+
+
+def suite(backend="sequential", seconds=0.0, num_seeds=5, **algorithms):
+    """A suite of A* agents, on three maps."""
+    return {
+        "environment": {
+            "name": "Environment",
+            "on_target": "nothing",
+            "collision_system": "soft",
+            "observation_type": "POMAPF",
+            "max_episode_steps": 32,
+            "obs_radius": 3,
+            "seed": {"grid_search": list(range(num_seeds))},
+            "num_agents": {"grid_search": [4, 8]},
+            "map_name": {"grid_search": ["hall", "validation-mazes-seed-00[0-3]"]},
+        },
+        "algorithms": {
+            "A star": {"name": "Slow", "seconds": seconds, "parallel_backend": backend, "num_process": 2},
+            **algorithms,
+        },
+    }
+
+
+def command(folder, begin="new", *address):
+    return [sys.executable, "-B", str(SCRIPT), str(folder / "suite.yaml"), str(folder / "out"), begin, *address]
+
+
+def write(folder, content):
+    folder.mkdir(exist_ok=True)
+    (folder / "suite.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+
+
+def play(folder, content, begin="new", *address):
+    """What the script says, and its status."""
+    write(folder, content)
+    done = subprocess.run(command(folder, begin, *address), capture_output=True, text=True, timeout=300)
+    return done.stdout + done.stderr, done.returncode
+
+
+def results(folder, key="A star"):
+    return (folder / "out" / f"{key}.json").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    """The same suite, played by the built-in A*."""
+    folder = tmp_path_factory.mktemp("built-in")
+    content = suite()
+    content["algorithms"]["A star"] = {"name": "astar"}
+    said, status = play(folder, content)
+    assert status == 0, said
+    return results(folder)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_wherever_it_plays_python_gets_what_the_built_in_policy_gets(backend, played, tmp_path):
+    said, status = play(tmp_path, suite(backend))
+    assert status == 0, said
+    assert said.splitlines()[-1] == "20" or said.startswith("20\n"), said
+    assert results(tmp_path) == played
+    rows = json.loads(played)
+    assert [row["env_grid_search"]["num_agents"] for row in rows[:4]] == [4, 4, 8, 8]
+    assert {"ISR", "CSR", "ep_length", "SoC", "makespan", "avg_agents_density", "a_collisions", "o_collisions"} == set(
+        rows[0]["metrics"]
+    )
+
+
+@pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing"])
+def test_a_run_killed_anywhere_and_resumed_gives_the_same_bytes(backend, played, tmp_path):
+    content = suite(backend, seconds=0.002)
+    write(tmp_path, content)
+    lines, dice, num_killed = tmp_path / "out" / "A star.jsonl", random.Random(1), 0
+    while not (tmp_path / "out" / "A star.json").exists() and num_killed < 5:
+        begin = "resume" if (tmp_path / "out" / "about.json").exists() else "new"
+        # In a group of its own, so that what it started ends with it.
+        child = subprocess.Popen(command(tmp_path, begin), stderr=subprocess.DEVNULL, start_new_session=True)
+        before = len(lines.read_bytes()) if lines.exists() else 0
+        deadline = time.monotonic() + 60
+        while child.poll() is None and time.monotonic() < deadline:
+            if lines.exists() and len(lines.read_bytes()) > before:
+                time.sleep(dice.uniform(0, 0.1))
+                break
+            time.sleep(0.001)
+        subprocess.run(["pkill", "-9", "-g", str(child.pid)], check=False)
+        num_killed += child.wait() != 0
+    assert num_killed >= 2
+    said, status = play(tmp_path, content, "resume")
+    assert status == 0, said
+    assert results(tmp_path) == played
+
+
+@contextmanager
+def cluster(folder):
+    """A scheduler's address and two workers."""
+    where = folder / "scheduler.json"
+    dask = [sys.executable, "-m", "dask"]
+    to_file = ["--scheduler-file", str(where)]
+    children = [subprocess.Popen([*dask, "scheduler", "--port", "0", "--no-dashboard", *to_file])]
+    try:
+        while not where.exists():
+            assert children[0].poll() is None, "the scheduler ended"
+            time.sleep(0.05)
+        for _ in range(2):
+            one = ["worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", *to_file]
+            children.append(subprocess.Popen([*dask, *one]))
+        yield json.loads(where.read_text())["address"], children[1:]
+    finally:
+        for child in children:
+            child.kill()
+            child.wait()
+
+
+def test_on_a_scheduler_of_which_a_worker_dies_nothing_is_lost(played, tmp_path):
+    write(tmp_path, suite("balanced_dask", seconds=0.01))
+    with cluster(tmp_path) as (address, workers):
+        child = subprocess.Popen(command(tmp_path, "new", address))
+        lines = tmp_path / "out" / "A star.jsonl"
+        while not lines.exists() or lines.read_bytes().count(b"\n") < 4:
+            assert child.poll() is None, "it ended before a worker could be killed"
+            time.sleep(0.01)
+        workers[0].kill()
+        assert child.wait(timeout=120) == 0
+    assert results(tmp_path) == played
+
+
+@pytest.mark.parametrize("backend", ["sequential", "multiprocessing", "dask"])
+def test_what_fails_is_told_and_the_rest_goes_on(backend, tmp_path):
+    crowded = {"name": "Crowded", "parallel_backend": backend, "num_process": 2}
+    said, status = play(tmp_path, suite(backend, num_seeds=2, Crowded=crowded, Still={"name": "stay"}))
+    assert status == 1
+    assert "EvaluationError: 4 episodes could not be played" in said
+    assert "Crowded: episode 2: ValueError: 8 are" in said
+    failed = [json.loads(line) for line in (tmp_path / "out" / "Crowded.failed.jsonl").read_text().splitlines()]
+    assert sorted(row["index"] for row in failed) == [2, 3, 6, 7]
+    for row in failed:
+        assert row["config"]["seed"] == row["env_grid_search"]["seed"]
+        assert row["config"]["num_agents"] == 8
+        assert "in act" in row["traceback"] and "too many" in row["traceback"]
+    assert len(json.loads(results(tmp_path, "Still"))) == 8
+    # Whoever mends the policy plays only what is missing.
+    assert (tmp_path / "out" / "Crowded.jsonl").read_bytes().count(b"\n") == 4
+
+
+def test_a_suite_or_folder_that_is_wrong_is_told(tmp_path):
+    def said(change, begin="new"):
+        content = suite(num_seeds=1)
+        change(content)
+        return play(tmp_path, content, begin)[0]
+
+    def environment(**fields):
+        return lambda content: content["environment"].update(fields)
+
+    assert "ValueError" in said(environment(map_name="nowhere")) and "nowhere" in said(environment(map_name="nowhere"))
+    assert "unknown key `sise` in environment; the nearest known one is `size`" in said(environment(sise=8))
+    assert "SCRIMP" in said(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
+    assert said(lambda content: None, "anew").startswith("4\n")
+    assert "OSError" in said(lambda content: None) and "`--resume`" in said(lambda content: None)
+    assert "results of other environments" in said(environment(max_episode_steps=16), "resume")

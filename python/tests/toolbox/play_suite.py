@@ -1,0 +1,58 @@
+"""Plays a suite with policies in Python: play_suite.py SUITE FOLDER BEGIN [ADDRESS]"""
+
+import sys
+import time
+
+from pogema_rs import BatchAStarAgent
+from pogema_rs.toolbox.algorithm_config import AlgoBase
+from pogema_rs.toolbox.evaluator import EvaluationError, evaluation
+from pogema_rs.toolbox.registry import ToolboxRegistry
+
+
+class SlowConfig(AlgoBase):
+    """How slow it is."""
+
+    seconds: float = 0.0
+
+
+class Slow(BatchAStarAgent):
+    """POGEMA's A*, slowly."""
+
+    def __init__(self, config):
+        super().__init__()
+        self.seconds = config.seconds
+
+    def act(self, observations):
+        """Sleeps, then walks."""
+        time.sleep(self.seconds)
+        return super().act(observations)
+
+
+class Crowded:
+    """Stays, and fails where there are many."""
+
+    def reset_states(self):
+        """Forgets nothing."""
+
+    def act(self, observations):
+        """Stays."""
+        if len(observations) > 6:
+            raise ValueError(f"{len(observations)} are\ntoo many")
+        return [0] * len(observations)
+
+
+def main():
+    suite, folder, begin, *address = sys.argv[1:]
+    ToolboxRegistry.setup_logger("INFO")
+    ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
+    ToolboxRegistry.register_algorithm("Crowded", Crowded)
+    ToolboxRegistry.register_maps({"hall": [[0] * 9 for _ in range(9)]})
+    try:
+        results = evaluation(suite, folder, begin=begin, dask=address[0] if address else None)
+    except (EvaluationError, ValueError, OSError) as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+    print(len(results))
+
+
+if __name__ == "__main__":
+    main()
