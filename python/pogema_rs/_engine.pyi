@@ -12,6 +12,7 @@ __all__ = [
     "Engine",
     "Evaluation",
     "PlanFollower",
+    "Witness",
     "__version__",
     "check_plan",
     "cost_to_go",
@@ -152,6 +153,14 @@ class Evaluation:
     def run_built_in(
         self, /, key: str, threads: int, watch: Callable[[Optional[tuple[int, str]]], object]
     ) -> Optional[tuple[int, int, bool]]: ...
+
+@final
+class Witness:
+    def __new__(cls) -> Witness: ...
+    def begin(self, /, engine: Engine) -> None: ...
+    def before(self, /, engine: Engine) -> None: ...
+    def after(self, /, engine: Engine, actions: Any) -> None: ...
+    def figures(self, /) -> tuple[float, int, int]: ...
 
 def make_plan(
     obstacles: Any,

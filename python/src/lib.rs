@@ -13,6 +13,7 @@ mod planners;
 mod seeds;
 mod state;
 mod vec;
+mod witness;
 
 use pyo3::prelude::*;
 
@@ -23,6 +24,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<astar::AStarAgent>()?;
     module.add_class::<planners::PlanFollower>()?;
     module.add_class::<evaluation::Evaluation>()?;
+    module.add_class::<witness::Witness>()?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;

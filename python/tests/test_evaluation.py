@@ -104,6 +104,19 @@ def test_a_run_killed_anywhere_and_resumed_gives_the_same_bytes(backend, played,
     assert results(tmp_path) == played
 
 
+@pytest.mark.parametrize("observations", ["default", "POMAPF", "MAPF"])
+@pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
+def test_a_policy_that_stays_has_the_figures_of_the_one_built_in(on_target, observations, tmp_path):
+    content = suite(Still={"name": "Crowded", "parallel_backend": "sequential"}, Stay={"name": "stay"})
+    del content["algorithms"]["A star"]
+    content["environment"].update(on_target=on_target, observation_type=observations, num_agents=6)
+    said, status = play(tmp_path, content)
+    assert status == 0, said
+    still, stay = (json.loads(results(tmp_path, key)) for key in ("Still", "Stay"))
+    assert [row["metrics"] for row in still] == [row["metrics"] for row in stay]
+    assert len(still) == 10
+
+
 @contextmanager
 def cluster(folder):
     """A scheduler's address and two workers."""

@@ -13,6 +13,7 @@ mod store;
 mod suite;
 mod tree;
 mod variants;
+mod witness;
 
 pub use built_in::BuiltIn;
 pub use environments::{Environment, Environments};
@@ -24,3 +25,4 @@ pub use store::{About, Begin, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};
+pub use witness::Witness;

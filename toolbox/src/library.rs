@@ -39,6 +39,6 @@ impl Suite {
     /// The names of maps that may be those of a generator.
     fn names_of(&self, preset: Preset) -> impl Iterator<Item = &str> {
         let names = self.environments.values_of("map_name").into_iter().filter_map(Value::as_str);
-        names.filter(move |name| name.starts_with(preset.name()))
+        names.filter(move |name| name.contains(preset.name()))
     }
 }

@@ -7,14 +7,15 @@ from typing import Any, Optional
 
 import numpy as np
 
+from pogema_rs._engine import Witness
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.integrations.make_pogema import pogema_v0
 from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.wrappers import Wrapper
-from pogema_rs.wrappers.metrics import AgentsDensityWrapper, RuntimeMetricWrapper
+from pogema_rs.wrappers.metrics import RuntimeMetricWrapper
 
-__all__ = ["CollisionsWrapper", "Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "create_env_base"]
+__all__ = ["Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "WitnessWrapper", "create_env_base"]
 
 
 class Environment(GridConfig):
@@ -75,38 +76,35 @@ class MultiMapWrapper(Wrapper):
         return self.env.reset(seed=seed, **kwargs)
 
 
-class CollisionsWrapper(Wrapper):
-    """Adds `a_collisions` and `o_collisions`: moves that another agent, or an obstacle, prevented.
+class WitnessWrapper(Wrapper):
+    """Adds `avg_agents_density`, `a_collisions` and `o_collisions`, for which every step has to be seen.
 
-    Rule: metrics/collisions
+    Collisions are moves that another agent, or an obstacle, prevented.
+
+    Rule: metrics/density, metrics/collisions
     """
 
     def reset(self, **kwargs: Any) -> tuple[Any, Any]:
         """Begins an episode."""
         result = self.env.reset(**kwargs)
-        self._obstacles = self.grid.get_obstacles() != 0
-        self._moves = np.array(self.unwrapped.grid_config.MOVES)
-        self._with_agents = self._with_obstacles = 0
+        self._witness = Witness()
+        self._witness.begin(self.unwrapped._engine)
         return result
 
     def step(self, action: Any) -> Any:
-        """Plays a step and counts."""
-        wanted, before, active = np.array(action), np.array(self.grid.get_agents_xy()), self._active()
+        """Plays a step and looks at it."""
+        engine, witness = self.unwrapped._engine, self._witness
+        # The environment may change the list that it is given.
+        wanted = list(action)
+        witness.before(engine)
         result = self.env.step(action)
+        witness.after(engine, wanted)
         _, _, terminated, truncated, infos = result
-        held = active & (wanted != 0) & (before == np.array(self.grid.get_agents_xy())).all(axis=1)
-        rows, cols = (before[held] + self._moves[wanted[held]]).T
-        num_hits = int(self._obstacles[rows, cols].sum())
-        self._with_obstacles += num_hits
-        self._with_agents += int(held.sum()) - num_hits
         if all(terminated) or all(truncated):
-            counts = {"a_collisions": self._with_agents, "o_collisions": self._with_obstacles}
-            infos[0].setdefault("metrics", {}).update(counts)
+            density, with_agents, with_obstacles = witness.figures()
+            figures = {"avg_agents_density": density, "a_collisions": with_agents, "o_collisions": with_obstacles}
+            infos[0].setdefault("metrics", {}).update(figures)
         return result
-
-    def _active(self) -> np.ndarray:
-        active = self.grid.is_active
-        return np.array([active[agent] for agent in range(len(active))])
 
 
 def create_env_base(config: Environment) -> Any:
@@ -119,4 +117,4 @@ def create_env_base(config: Environment) -> Any:
         env = MultiMapWrapper(env)
     if config.with_animation:
         env = AnimationMonitor(env, AnimationConfig(save_every_idx_episode=None))
-    return RuntimeMetricWrapper(CollisionsWrapper(AgentsDensityWrapper(env)))
+    return RuntimeMetricWrapper(WitnessWrapper(env))

@@ -1,0 +1,45 @@
+"""Times evaluations of a policy in Python beside pogema-toolbox 0.1.1, in one run on one machine.
+
+python3.11 benches/peers/toolbox.py [--rounds N] [--seeds N]
+
+Needs the package installed by `python/run`, and POGEMA behind POGEMA_ORACLE_PYTHON. What counts is the time outside
+the policy; the peers take turns, and the ratio is the median over the rounds.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+FOLDER = HERE.parent.parent / "target/python"
+
+
+def outside(python, package, seeds, *folder):
+    """Seconds that an evaluation took outside the policy."""
+    command = [python, "-B", HERE / "toolbox_worker.py", package, str(seeds), *folder]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    total, policy = json.loads(done.stdout)
+    return total - policy
+
+
+def main():
+    """Prints the seconds of both, and their ratio."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seeds", type=int, default=4)
+    arguments = parser.parse_args()
+    pogema = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("toolbox: POGEMA_ORACLE_PYTHON is not set")
+    rounds = []
+    for _ in range(arguments.rounds):
+        theirs = outside(pogema, "pogema_toolbox", arguments.seeds, FOLDER / "toolbox")
+        ours = outside(FOLDER / "new/bin/python", "pogema_rs.toolbox", arguments.seeds)
+        rounds.append((theirs, ours, ours / theirs))
+    theirs, ours, share = (statistics.median(column) for column in zip(*rounds))
+    print(f"pogema-toolbox {theirs:.2f} s, here {ours:.3f} s: {share:.1%} of its time outside the policy")
+
+
+main()
