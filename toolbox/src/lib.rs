@@ -16,6 +16,7 @@ mod store;
 mod suite;
 mod tree;
 mod variants;
+pub mod views;
 
 pub use built_in::BuiltIn;
 pub use environments::{Environment, Environments};
