@@ -2,8 +2,15 @@
 //!
 //! [`read_views`] reads the file; [`View::show`] makes of [`Results`] what one view asks for.
 
+mod axes;
 mod grid;
+mod legend;
 mod options;
+mod panel;
+mod picture;
+mod plot;
+mod series;
+mod style;
 mod table;
 
 use std::path::Path;
@@ -12,6 +19,8 @@ use pogema_core::Error;
 use pogema_maps::nearest;
 
 pub use grid::{Cell, Format, Table};
+pub use picture::{Kind, Picture};
+pub use plot::PlotView;
 pub use table::TableView;
 
 use crate::results::Results;
@@ -22,20 +31,24 @@ use crate::tree::Node;
 const VIEWS: &str = "results_views";
 
 /// The types of views.
-const TYPES: [&str; 1] = ["tabular"];
+const TYPES: [&str; 3] = ["tabular", "plot", "multi-plot"];
 
 /// One way to look at results.
 #[derive(Clone, Debug)]
 pub enum View {
     /// `type: tabular`
     Table(TableView),
+    /// `type: plot`, `type: multi-plot`
+    Plot(Box<PlotView>),
 }
 
 /// What a view shows.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Shown {
     /// Its tables.
     pub tables: Vec<Table>,
+    /// Its plots.
+    pub pictures: Vec<Picture>,
     /// What was left out or looks wrong, a line each.
     pub notes: Vec<String>,
 }
@@ -68,6 +81,9 @@ impl View {
         let kind = node.field("type").ok_or_else(|| wrong(node, name, "a field `type`"))?;
         match kind.text().unwrap_or_default() {
             "tabular" => TableView::read(name, node).map(Self::Table),
+            kind @ ("plot" | "multi-plot") => {
+                PlotView::read(name, node, kind == "multi-plot").map(|view| Self::Plot(Box::new(view)))
+            }
             other => {
                 let hint = nearest(other, TYPES).unwrap_or_default();
                 let types = TYPES.join(", ");
@@ -81,6 +97,7 @@ impl View {
     pub fn format(&self) -> Option<Format> {
         match self {
             Self::Table(view) => Some(view.format),
+            Self::Plot(_) => None,
         }
     }
 
@@ -91,6 +108,7 @@ impl View {
     pub fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         match self {
             Self::Table(view) => view.show(name, results),
+            Self::Plot(view) => view.show(name, results),
         }
     }
 }

@@ -30,7 +30,6 @@ pub(super) struct Options<'a> {
     view: &'a str,
 }
 
-#[allow(dead_code, reason = "plots take the others")]
 impl<'a> Options<'a> {
     /// Takes a view's fields if they are all known.
     pub fn new(view: &'a str, node: &'a Node, known: &[&str]) -> Result<Self, Error> {

@@ -111,7 +111,7 @@ impl TableView {
         self.sort(name, &mut lines, &keys, &metrics)?;
         let table = self.table(&lines, &keys, &metrics);
         let notes = lacking(&results.rows, &metrics);
-        Ok(Shown { tables: vec![table], notes })
+        Ok(Shown { tables: vec![table], notes, ..Shown::default() })
     }
 
     fn table(&self, lines: &[Line<'_>], keys: &[String], metrics: &[String]) -> Table {
