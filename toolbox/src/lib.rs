@@ -12,6 +12,7 @@ mod play;
 mod progress;
 pub mod results;
 mod run;
+pub mod six;
 mod store;
 mod suite;
 mod tree;

@@ -10,6 +10,10 @@ use super::legend::Legend;
 /// Space between a legend and what is around it. Units: points.
 const GAP: f64 = 4.0;
 
+/// Where a legend is put if there is room, the first choice first.
+const CORNERS: [&str; 7] =
+    ["upper right", "upper left", "lower left", "lower right", "center right", "center left", "lower center"];
+
 /// Draws plots without their axes.
 pub(super) fn bare(plots: Vec<Plot>, layout: Layout) -> Scene {
     let mut scene = render_multiple(plots, layout);
@@ -38,62 +42,77 @@ pub(super) fn insert(scene: &mut Scene, part: Scene, (x, y): (f64, f64)) {
 
 /// Draws a legend where it was asked for; if that is left to us, where no line is, or else beside the plot.
 pub(super) fn place_legend(
-    scene: Scene,
+    mut scene: Scene,
     frame: &Frame,
     legend: Legend,
     place: Option<&str>,
     lines: &[Vec<(f64, f64)>],
 ) -> Scene {
     let computed = ComputedLayout::from_layout(&frame.layout());
-    let (width, height) = legend.size();
-    let (left, right) = (computed.margin_left + GAP, computed.width - computed.margin_right - GAP - width);
-    let (top, bottom) = (computed.margin_top + GAP, computed.height - computed.margin_bottom - GAP - height);
-    let (middle, centre) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
-    let at = |place: &str| match place {
-        "upper right" => (right, top),
-        "upper left" => (left, top),
-        "lower left" => (left, bottom),
-        "lower right" => (right, bottom),
-        "right" | "center right" => (right, centre),
-        "center left" => (left, centre),
-        "lower center" => (middle, bottom),
-        "upper center" => (middle, top),
-        _ => (middle, centre),
-    };
-    let mut scene = scene;
+    let room = Room::of(&computed, legend.size());
     if let Some(place) = place.filter(|&place| place != "best") {
-        legend.draw(&mut scene, at(place), true);
+        legend.draw(&mut scene, room.at(place), true);
         return scene;
     }
-    let lines: Vec<Vec<(f64, f64)>> = lines
-        .iter()
-        .map(|line| line.iter().map(|&(x, y)| (computed.map_x(x), computed.map_y(y))).collect())
-        .collect();
-    let is_free = |&(x, y): &(f64, f64)| {
-        let is_inside = x >= left && y >= top && x <= right + 0.1 && y <= bottom + 0.1;
-        is_inside
-            && !lines
-                .iter()
-                .any(|line| crosses(line, (x - GAP, y - GAP), (width + 2.0 * GAP, height + 2.0 * GAP)))
+    let on_page = |line: &Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+        line.iter().map(|&(x, y)| (computed.map_x(x), computed.map_y(y))).collect()
     };
-    let places = [
-        "upper right",
-        "upper left",
-        "lower left",
-        "lower right",
-        "center right",
-        "center left",
-        "lower center",
-    ];
-    if let Some(corner) = places.map(at).into_iter().find(is_free) {
+    let lines: Vec<Vec<(f64, f64)>> = lines.iter().map(on_page).collect();
+    if let Some(corner) = CORNERS.map(|place| room.at(place)).into_iter().find(|&at| room.is_free(at, &lines))
+    {
         legend.draw(&mut scene, corner, true);
         return scene;
     }
+    let (width, height) = room.size;
     let beside = (scene.width + GAP, computed.margin_top);
     scene.width += width + 3.0 * GAP;
     scene.height = scene.height.max(computed.margin_top + height + GAP);
     legend.draw(&mut scene, beside, false);
     scene
+}
+
+/// Where in a plot the upper left corner of a legend may be.
+struct Room {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    /// Width and height of the legend.
+    size: (f64, f64),
+}
+
+impl Room {
+    fn of(computed: &ComputedLayout, (width, height): (f64, f64)) -> Self {
+        Self {
+            left: computed.margin_left + GAP,
+            right: computed.width - computed.margin_right - GAP - width,
+            top: computed.margin_top + GAP,
+            bottom: computed.height - computed.margin_bottom - GAP - height,
+            size: (width, height),
+        }
+    }
+
+    fn at(&self, place: &str) -> (f64, f64) {
+        let (middle, centre) = (f64::midpoint(self.left, self.right), f64::midpoint(self.top, self.bottom));
+        let x = match place {
+            place if place.ends_with("left") => self.left,
+            place if place.ends_with("right") => self.right,
+            _ => middle,
+        };
+        let y = match place {
+            place if place.starts_with("upper") => self.top,
+            place if place.starts_with("lower") => self.bottom,
+            _ => centre,
+        };
+        (x, y)
+    }
+
+    /// Whether a legend is within the plot and away from its lines.
+    fn is_free(&self, (x, y): (f64, f64), lines: &[Vec<(f64, f64)>]) -> bool {
+        let is_inside = self.left <= self.right && self.top <= self.bottom;
+        let size = (self.size.0 + 2.0 * GAP, self.size.1 + 2.0 * GAP);
+        is_inside && !lines.iter().any(|line| crosses(line, (x - GAP, y - GAP), size))
+    }
 }
 
 /// Whether a line comes into a rectangle, as far as points close together tell.
