@@ -44,10 +44,11 @@ impl Axis {
         Self { title: title.to_owned(), is_log, range, ticks }
     }
 
-    /// An axis for names, at 0, 1, 2 and so on.
-    pub fn of_names(title: &str, names: &[String]) -> Self {
-        let ticks = names.iter().enumerate().map(|(place, name)| (place as f64, name.clone())).collect();
-        let range = (-0.5, names.len() as f64 - 0.5);
+    /// An axis for names, of which the first has a place and each next one the next whole number.
+    pub fn of_names(title: &str, names: &[String], first: f64) -> Self {
+        let ticks =
+            names.iter().enumerate().map(|(place, name)| (first + place as f64, name.clone())).collect();
+        let range = (first - 0.5, first + names.len() as f64 - 0.5);
         Self { title: title.to_owned(), is_log: false, range, ticks }
     }
 }
@@ -135,7 +136,7 @@ impl Frame {
             behind.push(line((x, top), (x, bottom), GRID));
             scene.add(line((x, bottom), (x, bottom + TICK), "black"));
             if x - half > free_from {
-                free_from = x + half + 1.0;
+                free_from = x + half + size * 0.5;
                 scene.add(self.text(text, (x, bottom + TICK + size), TextAnchor::Middle, None));
             }
         }

@@ -24,6 +24,8 @@ pub enum Cell {
     Text(String),
     /// A whole number, to the right.
     Count(usize),
+    /// A figure that leaves no doubt, or nothing where there is none, to the right.
+    Number(Option<f64>),
     /// A mean and its doubt, or nothing where no row had a number.
     Mean(Option<Estimate>),
 }
@@ -78,7 +80,8 @@ impl Table {
         match cell {
             Cell::Text(text) => text.clone(),
             Cell::Count(count) => count.to_string(),
-            Cell::Mean(None) => "-".to_owned(),
+            Cell::Number(None) | Cell::Mean(None) => "-".to_owned(),
+            Cell::Number(Some(number)) => format!("{number:.*}", self.digits),
             Cell::Mean(Some(estimate)) => self.parts(estimate).join(" ± "),
         }
     }
@@ -128,6 +131,7 @@ fn csv_cells(cell: &Cell) -> Vec<String> {
     match cell {
         Cell::Text(text) => vec![text.clone()],
         Cell::Count(count) => vec![count.to_string()],
+        Cell::Number(number) => vec![number.map(|number| number.to_string()).unwrap_or_default()],
         Cell::Mean(None) => vec![String::new(), String::new(), String::new(), "0".to_owned()],
         Cell::Mean(Some(Estimate { mean, interval, count })) => {
             let end = |end: Option<f64>| end.map(|end| end.to_string()).unwrap_or_default();

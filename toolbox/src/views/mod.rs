@@ -3,12 +3,17 @@
 //! [`read_views`] reads the file; [`View::show`] makes of [`Results`] what one view asks for.
 
 mod axes;
+mod boxes;
+mod cactus;
+mod compare;
 mod grid;
 mod legend;
 mod options;
 mod panel;
 mod picture;
 mod plot;
+mod radar;
+mod seeds;
 mod series;
 mod style;
 mod table;
@@ -18,12 +23,18 @@ use std::path::Path;
 use pogema_core::Error;
 use pogema_maps::nearest;
 
+pub use boxes::BoxView;
+pub use cactus::CactusView;
+pub use compare::CompareView;
 pub use grid::{Cell, Format, Table};
 pub use picture::{Kind, Picture};
 pub use plot::PlotView;
+pub use radar::RadarView;
+pub use seeds::SeedsView;
 pub use table::TableView;
 
 use crate::results::Results;
+use crate::six::Definition;
 use crate::suite::wrong;
 use crate::tree::Node;
 
@@ -31,7 +42,7 @@ use crate::tree::Node;
 const VIEWS: &str = "results_views";
 
 /// The types of views.
-const TYPES: [&str; 3] = ["tabular", "plot", "multi-plot"];
+const TYPES: [&str; 8] = ["tabular", "plot", "multi-plot", "radar", "box", "cactus", "compare", "seeds"];
 
 /// One way to look at results.
 #[derive(Clone, Debug)]
@@ -40,6 +51,16 @@ pub enum View {
     Table(TableView),
     /// `type: plot`, `type: multi-plot`
     Plot(Box<PlotView>),
+    /// `type: radar`
+    Radar(Box<RadarView>),
+    /// `type: box`
+    Box(Box<BoxView>),
+    /// `type: cactus`
+    Cactus(Box<CactusView>),
+    /// `type: compare`
+    Compare(Box<CompareView>),
+    /// `type: seeds`
+    Seeds(SeedsView),
 }
 
 /// What a view shows.
@@ -84,6 +105,11 @@ impl View {
             kind @ ("plot" | "multi-plot") => {
                 PlotView::read(name, node, kind == "multi-plot").map(|view| Self::Plot(Box::new(view)))
             }
+            "radar" => RadarView::read(name, node).map(|view| Self::Radar(Box::new(view))),
+            "box" => BoxView::read(name, node).map(|view| Self::Box(Box::new(view))),
+            "cactus" => CactusView::read(name, node).map(|view| Self::Cactus(Box::new(view))),
+            "compare" => CompareView::read(name, node).map(|view| Self::Compare(Box::new(view))),
+            "seeds" => SeedsView::read(name, node).map(Self::Seeds),
             other => {
                 let hint = nearest(other, TYPES).unwrap_or_default();
                 let types = TYPES.join(", ");
@@ -97,20 +123,41 @@ impl View {
     pub fn format(&self) -> Option<Format> {
         match self {
             Self::Table(view) => Some(view.format),
-            Self::Plot(_) => None,
+            _ => None,
         }
     }
 
-    /// Makes what it shows; its name is for messages and titles.
+    /// Makes what it shows; its name is for messages.
+    ///
+    /// A definition of the six metrics that is given has precedence over that of a radar view.
     ///
     /// # Errors
     /// If the results do not have what it needs.
-    pub fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+    pub fn show(
+        &self,
+        name: &str,
+        results: &Results,
+        definition: Option<Definition>,
+    ) -> Result<Shown, Error> {
         match self {
             Self::Table(view) => view.show(name, results),
             Self::Plot(view) => view.show(name, results),
+            Self::Radar(view) => view.show(name, results, definition),
+            Self::Box(view) => view.show(name, results),
+            Self::Cactus(view) => view.show(name, results),
+            Self::Compare(view) => view.show(name, results),
+            Self::Seeds(view) => view.show(name, results),
         }
     }
+}
+
+/// Passes if the results have a column.
+fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Result<(), Error> {
+    let columns: Vec<String> = results.key_columns().into_iter().chain(results.metric_columns()).collect();
+    if columns.iter().any(|known| known == column) {
+        return Ok(());
+    }
+    Err(named(view, key, column, columns.iter().map(String::as_str)))
 }
 
 /// An error about an option that names no column of the results.

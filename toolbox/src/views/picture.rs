@@ -6,7 +6,7 @@ use kuva::backend::{pdf::PdfBackend, png::PngBackend, svg::SvgBackend};
 use kuva::render::render::{Primitive, Scene};
 use pogema_core::Error;
 
-use super::style::INCH;
+use super::style::{INCH, Style};
 
 /// The format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,14 +33,20 @@ impl Kind {
 /// A drawn plot.
 pub struct Picture {
     /// What is drawn, in points.
-    pub(super) scene: Scene,
+    scene: Scene,
     /// Dots in an inch, where it is drawn with dots.
-    pub(super) dots_per_inch: f64,
+    dots_per_inch: f64,
     /// The format that its view asks for.
     pub kind: Kind,
 }
 
 impl Picture {
+    /// A scene as a view's options want it.
+    pub(super) fn new(mut scene: Scene, style: &Style) -> Self {
+        scene.background_color = Some(style.background.clone());
+        Self { scene, dots_per_inch: style.dots_per_inch, kind: style.kind }
+    }
+
     /// The file's content.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use super::panel::{framed, insert, place_legend};
 use super::picture::Picture;
 use super::series::{Places, Series, at, means};
 use super::style::Style;
-use super::{Shown, named};
+use super::{Shown, known_column};
 use crate::bootstrap::{RESAMPLES, Spread};
 use crate::frame::{compare, lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
@@ -71,14 +71,9 @@ impl PlotView {
     /// # Errors
     /// If the results have no such columns, or no row has numbers in them.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
-        let columns: Vec<String> =
-            results.key_columns().into_iter().chain(results.metric_columns()).collect();
-        let known = || columns.iter().map(String::as_str);
         let over = self.panels.as_ref().map(|panels| ("over", &panels.over));
         for (key, column) in [("x", &self.x), ("y", &self.y), ("by", &self.by)].into_iter().chain(over) {
-            if !columns.contains(column) {
-                return Err(named(name, key, column, known()));
-            }
+            known_column(name, key, column, results)?;
         }
         let (names, mut notes) = self.lines(results);
         let places = Places::of(&results.rows, &self.x);
@@ -105,7 +100,7 @@ impl PlotView {
         }
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
         let scene = self.draw(&contents, &names, &places);
-        let picture = Picture { scene, dots_per_inch: self.style.dots_per_inch, kind: self.style.kind };
+        let picture = Picture::new(scene, &self.style);
         notes.extend(self.remark(name));
         Ok(Shown { pictures: vec![picture], notes, ..Shown::default() })
     }
@@ -163,7 +158,7 @@ impl PlotView {
         let x = match places {
             Places::Names(names) => {
                 let names: Vec<String> = names.iter().map(|name| self.common.shown(&self.x, name)).collect();
-                Axis::of_names(&x_title, &names)
+                Axis::of_names(&x_title, &names, 0.0)
             }
             Places::Numbers => {
                 let is_log = self.style.log_x && xs.iter().all(|&x| x > 0.0);
@@ -191,7 +186,7 @@ impl PlotView {
             let plots = content.series.iter().flat_map(|series| series.plots(&self.style)).collect();
             (framed(plots, &frame), frame)
         };
-        let mut scene = if let Some(panels) = &self.panels {
+        if let Some(panels) = &self.panels {
             let parts = contents.iter().map(|content| draw(content).0).collect();
             self.grid(parts, panels.columns, legend(self.style.legend_columns))
         } else {
@@ -199,9 +194,7 @@ impl PlotView {
             let line = |series: &Series| series.points.iter().map(|(x, found)| (*x, found.mean)).collect();
             let lines: Vec<Vec<(f64, f64)>> = contents[0].series.iter().map(line).collect();
             place_legend(scene, &frame, legend(1), self.style.legend_place, &lines)
-        };
-        scene.background_color = Some(self.style.background.clone());
-        scene
+        }
     }
 
     /// Panels side by side, and the legend below them, or above if it was asked for there.
@@ -303,7 +296,7 @@ mod tests {
 
     fn show(fields: &str) -> Result<Shown, String> {
         let view = View::read("Plot1", &Node::parse(fields).unwrap());
-        view.and_then(|view| view.show("Plot1", &results())).map_err(|error| error.to_string())
+        view.and_then(|view| view.show("Plot1", &results(), None)).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -106,7 +106,7 @@ pub(super) fn means(
 impl Series {
     /// What the library draws for it.
     pub fn plots(&self, style: &Style) -> Vec<Plot> {
-        let (colour, marker, dashes) = self.signs(style);
+        let (colour, marker, dashes) = signs(self.number, style);
         let ends = self.points.iter().map(|(_, found)| found.interval.unwrap_or((found.mean, found.mean)));
         let (low, high): (Vec<f64>, Vec<f64>) = ends.unzip();
         let x: Vec<f64> = self.points.iter().map(|(x, _)| *x).collect();
@@ -130,12 +130,6 @@ impl Series {
         plots
     }
 
-    fn signs<'a>(&self, style: &'a Style) -> (&'a str, MarkerShape, Option<String>) {
-        let dashes = DASHES[self.number % DASHES.len()];
-        let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());
-        (style.colour(self.number), MARKERS[self.number % MARKERS.len()], dashes)
-    }
-
     /// The legend's line for the series of a number.
     pub fn entry(number: usize, label: String, style: &Style) -> Entry {
         let point = |x| (x, Estimate { mean: 0.5, interval: None, count: 1 });
@@ -146,4 +140,11 @@ impl Series {
         }
         Entry { label, sign }
     }
+}
+
+/// The colour, the marker and the dashes of the line of a number.
+pub(super) fn signs(number: usize, style: &Style) -> (&str, MarkerShape, Option<String>) {
+    let dashes = DASHES[number % DASHES.len()];
+    let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());
+    (style.colour(number), MARKERS[number % MARKERS.len()], dashes)
 }

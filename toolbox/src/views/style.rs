@@ -18,7 +18,7 @@ const COLOURS: [&str; 8] =
 /// The options of every plot.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_plot.py`, `PlotView`
-const KEYS: [&str; 28] = [
+const KEYS: [&str; 27] = [
     "name",
     "width",
     "height",
@@ -46,7 +46,6 @@ const KEYS: [&str; 28] = [
     "x",
     "y",
     "by",
-    "metric",
 ];
 
 /// Where a legend may be.

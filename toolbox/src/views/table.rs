@@ -189,7 +189,7 @@ mod tests {
     fn shown(fields: &str) -> Result<Shown, String> {
         let results = Results { rows: serde_json::from_str(ROWS).unwrap(), notes: Vec::new() };
         let view = View::read("Table1", &Node::parse(fields).unwrap());
-        view.and_then(|view| view.show("Table1", &results)).map_err(|error| error.to_string())
+        view.and_then(|view| view.show("Table1", &results, None)).map_err(|error| error.to_string())
     }
 
     #[test]

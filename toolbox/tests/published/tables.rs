@@ -8,7 +8,7 @@ use crate::archive::{Published, published};
 
 fn table(results: &Results, drop_keys: &str) -> Shown {
     let fields = format!("{{type: tabular, drop_keys: [{drop_keys}]}}");
-    View::read("Table", &Node::parse(&fields).unwrap()).unwrap().show("Table", results).unwrap()
+    View::read("Table", &Node::parse(&fields).unwrap()).unwrap().show("Table", results, None).unwrap()
 }
 
 /// What a column says of an algorithm, without its interval.
