@@ -18,6 +18,9 @@ const RUNTIME: &str = "runtime";
 /// What is added to an algorithm's name for its file of times.
 const TIMES: &str = ".times.json";
 
+/// What is added to an algorithm's name for its file of episodes that could not be played.
+const FAILED: &str = ".failed.jsonl";
+
 /// What an evaluation says of how it was made.
 const ABOUT: &str = "about.json";
 
@@ -92,7 +95,10 @@ impl Results {
         let set = name_of(folder);
         for path in files_of(folder)? {
             let name = name_of(&path);
-            if let Some(algorithm) = name.strip_suffix(".jsonl") {
+            if let Some(algorithm) = name.strip_suffix(FAILED) {
+                self.notes
+                    .push(format!("{}: episodes of `{algorithm}` could not be played", folder.display()));
+            } else if let Some(algorithm) = name.strip_suffix(".jsonl") {
                 self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
             } else if let Some(algorithm) = name.strip_suffix(".json").filter(|_| !is_apart(&name)) {
                 let mut rows = read_rows(&path, algorithm)?;
