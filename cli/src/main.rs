@@ -9,6 +9,7 @@ mod plan;
 mod port;
 mod render;
 mod run;
+mod views;
 
 use std::process::ExitCode;
 
@@ -35,6 +36,8 @@ enum Command {
     Maps(maps::Maps),
     /// Play all episodes of a suite, and keep their results
     Evaluate(evaluate::Evaluate),
+    /// Show results as tables and plots
+    Views(views::Views),
     /// Draw a recorded episode
     Render(render::Render),
     /// Check that all engines follow the rules; exit status 0 only if they do
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
         Command::Validate(validate) => validate.run(),
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
         Command::Evaluate(evaluate) => evaluate.run().map(|()| ExitCode::SUCCESS),
+        Command::Views(views) => views.run(),
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),

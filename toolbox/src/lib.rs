@@ -2,17 +2,22 @@
 //!
 //! A [`Suite`] is read from one YAML file: environments, of which fields may be varied, algorithms, and views.
 
+pub mod bootstrap;
 mod built_in;
 mod environments;
+pub mod frame;
 mod library;
 mod pairs;
 mod play;
 mod progress;
+pub mod results;
 mod run;
+pub mod six;
 mod store;
 mod suite;
 mod tree;
 mod variants;
+pub mod views;
 mod witness;
 
 pub use built_in::BuiltIn;
@@ -20,6 +25,7 @@ pub use environments::{Environment, Environments};
 pub use pairs::Pairs;
 pub use play::{Played, play};
 pub use progress::{Done, Failed, Progress};
+pub use results::{Results, Row};
 pub use run::{Event, Running, Summary, built_in, run, run_one};
 pub use store::{About, Begin, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};

@@ -1,0 +1,143 @@
+//! How sure a mean is.
+
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+
+/// So many times the values are drawn anew.
+///
+/// Source: pogema-toolbox 0.1.1, `view_tabular.py`, `Aggregator.bootstrap`
+pub const RESAMPLES: usize = 1000;
+
+/// What every sequence of draws begins with; any number would do.
+const SEED: u128 = 0x706f_6765_6d61;
+
+/// How far a mean may be off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Between percentiles of the means of [`RESAMPLES`] samples drawn from the values with replacement.
+    Bootstrap {
+        /// So many percent of the means are within.
+        level: f64,
+    },
+    /// The sample's standard deviation, so many times.
+    Deviation {
+        /// How many times.
+        factor: f64,
+    },
+    /// Not asked for.
+    Unknown,
+}
+
+/// A mean and how sure it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The mean.
+    pub mean: f64,
+    /// The lower and the upper end, if there is more than one value.
+    pub interval: Option<(f64, f64)>,
+    /// Number of values.
+    pub count: usize,
+}
+
+impl Estimate {
+    /// The mean of values, and its interval by draws that depend on the values and a number alone; nothing of none.
+    pub fn of(values: &[f64], spread: Spread, number: u64) -> Option<Self> {
+        if values.is_empty() {
+            return None;
+        }
+        let mean = mean(values);
+        let interval = match spread {
+            _ if values.len() == 1 => None,
+            Spread::Bootstrap { level } => Some(bootstrap(values, level, number)),
+            Spread::Deviation { factor } => {
+                let half = deviation(values, mean) * factor;
+                Some((mean - half, mean + half))
+            }
+            Spread::Unknown => None,
+        };
+        Some(Self { mean, interval, count: values.len() })
+    }
+
+    /// Half the length of the interval.
+    pub fn half(&self) -> Option<f64> {
+        self.interval.map(|(low, high)| (high - low) / 2.0)
+    }
+}
+
+/// The mean of values, of which there is one at least.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn deviation(values: &[f64], mean: f64) -> f64 {
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (squares / (values.len() - 1) as f64).sqrt()
+}
+
+fn bootstrap(values: &[f64], level: f64, number: u64) -> (f64, f64) {
+    if values.iter().all(|value| *value == values[0]) {
+        return (values[0], values[0]);
+    }
+    let mut random = Pcg64::new(SEED, u128::from(number));
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let drawn = (0..values.len()).map(|_| values[below(&mut random, values.len())]);
+            drawn.sum::<f64>() / values.len() as f64
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    let lower = (100.0 - level) / 2.0;
+    (percentile(&means, lower), percentile(&means, 100.0 - lower))
+}
+
+/// A number below a bound.
+fn below(random: &mut Pcg64, bound: usize) -> usize {
+    ((u128::from(random.next_u64()) * bound as u128) >> 64) as usize
+}
+
+/// The value below which so many percent of sorted values lie, in a straight line between two of them.
+///
+/// Source: NumPy 1.26, `numpy.percentile`, method `linear`
+pub fn percentile(sorted: &[f64], percent: f64) -> f64 {
+    let place = (sorted.len() - 1) as f64 * (percent / 100.0).clamp(0.0, 1.0);
+    let (low, share) = (place.floor() as usize, place.fract());
+    let high = (low + 1).min(sorted.len() - 1);
+    let step = sorted[high] - sorted[low];
+    // As NumPy does: from the nearer end.
+    if share < 0.5 { sorted[low] + step * share } else { sorted[high] - step * (1.0 - share) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SURE: Spread = Spread::Bootstrap { level: 95.0 };
+
+    #[test]
+    fn percentiles_are_numpy_s() {
+        // numpy.percentile([1, 2, 4, 8], [0, 2.5, 50, 97.5, 100])
+        let values = [1.0, 2.0, 4.0, 8.0];
+        let found = [0.0, 2.5, 50.0, 97.5, 100.0].map(|percent| percentile(&values, percent));
+        assert_eq!(found, [1.0, 1.075, 3.0, 7.699_999_999_999_999, 8.0]);
+    }
+
+    #[test]
+    fn the_interval_is_near_that_of_a_normal_mean_and_the_same_each_time() {
+        let values: Vec<f64> = (0..400).map(f64::from).collect();
+        let estimate = Estimate::of(&values, SURE, 7).unwrap();
+        assert_eq!(Estimate::of(&values, SURE, 7), Some(estimate));
+        assert_ne!(Estimate::of(&values, SURE, 8), Some(estimate));
+        let expected = 1.96 * deviation(&values, 199.5) / 20.0;
+        assert!((estimate.half().unwrap() / expected - 1.0).abs() < 0.1, "{estimate:?} {expected}");
+    }
+
+    #[test]
+    fn one_value_or_equal_values_leave_no_doubt() {
+        assert_eq!(Estimate::of(&[], SURE, 0), None);
+        assert_eq!(Estimate::of(&[3.0], SURE, 0).unwrap().half(), None);
+        assert_eq!(Estimate::of(&[3.0; 5], SURE, 0).unwrap().half(), Some(0.0));
+        let spread = Spread::Deviation { factor: 1.96 };
+        let half = Estimate::of(&[1.0, 3.0], spread, 0).unwrap().half().unwrap();
+        assert!((half - 1.96 * 2f64.sqrt()).abs() < 1e-12, "{half}");
+    }
+}

@@ -1,0 +1,116 @@
+//! Rows sorted into groups, and what their metrics amount to.
+
+use std::cmp::Ordering;
+use std::collections::HashMap;
+
+use serde_json::Value;
+
+use crate::results::{ALGORITHM, Row};
+
+/// Rows that are alike in some columns.
+#[derive(Clone, Debug)]
+pub struct Group<'a> {
+    /// What stands in these columns, null where a row has none.
+    pub keys: Vec<Value>,
+    /// The rows, in their order.
+    pub rows: Vec<&'a Row>,
+}
+
+/// Sorts rows into groups by some columns; the groups are sorted by what stands there, numbers by size.
+pub fn group_by<'a>(rows: impl IntoIterator<Item = &'a Row>, columns: &[String]) -> Vec<Group<'a>> {
+    let mut places: HashMap<String, usize> = HashMap::new();
+    let mut groups: Vec<Group<'a>> = Vec::new();
+    for row in rows {
+        let keys: Vec<Value> = columns.iter().map(|column| row.key(column).unwrap_or_default()).collect();
+        let place = *places.entry(Value::from(keys.clone()).to_string()).or_insert(groups.len());
+        match groups.get_mut(place) {
+            Some(group) => group.rows.push(row),
+            None => groups.push(Group { keys, rows: vec![row] }),
+        }
+    }
+    groups.sort_by(|one, other| {
+        let pairs = one.keys.iter().zip(&other.keys);
+        pairs.map(|(one, other)| compare(one, other)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    });
+    groups
+}
+
+/// The order of values in tables: numbers by size, then texts, then the rest, then what is missing.
+pub fn compare(one: &Value, other: &Value) -> Ordering {
+    let rank = |value: &Value| match value {
+        Value::Bool(_) | Value::Number(_) => 0,
+        Value::String(_) => 1,
+        Value::Array(_) | Value::Object(_) => 2,
+        Value::Null => 3,
+    };
+    let number = |value: &Value| value.as_bool().map(f64::from).or(value.as_f64());
+    match (number(one), number(other), one, other) {
+        (Some(one), Some(other), ..) => one.total_cmp(&other),
+        (_, _, Value::String(one), Value::String(other)) => one.cmp(other),
+        _ => rank(one).cmp(&rank(other)).then_with(|| one.to_string().cmp(&other.to_string())),
+    }
+}
+
+/// A value as it is shown: a text without quotes, nothing for what is missing.
+pub fn shown(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Null => String::new(),
+        value => value.to_string(),
+    }
+}
+
+/// The figures of a metric, without those of rows that have none.
+pub fn values(rows: &[&Row], metric: &str) -> Vec<f64> {
+    rows.iter().filter_map(|row| row.metric(metric)).collect()
+}
+
+/// One line for each algorithm and metric about how many rows have no number there.
+pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) -> Vec<String> {
+    let groups = group_by(rows, &[ALGORITHM.to_owned()]);
+    let count = |group: &Group<'_>, metric: &str| {
+        group.rows.iter().filter(|row| row.metric(metric).is_none()).count()
+    };
+    let notes = groups.iter().flat_map(|group| {
+        metrics
+            .iter()
+            .map(move |metric| (group, metric, count(group, metric)))
+            .filter(|&(.., lacking)| lacking > 0)
+    });
+    notes
+        .map(|(group, metric, lacking)| {
+            let (algorithm, all) = (shown(&group.keys[0]), group.rows.len());
+            format!("`{algorithm}` has no `{metric}` in {lacking} of {all} rows; means are over the others")
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(settings: &str, metrics: &str) -> Row {
+        let text = format!(r#"{{"metrics": {metrics}, "env_grid_search": {settings}, "algorithm": "A"}}"#);
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn groups_are_sorted_and_what_is_missing_is_last() {
+        let rows = ["{\"n\": 16}", "{}", "{\"n\": 8}", "{\"n\": 16}", "{\"n\": \"all\"}"];
+        let rows: Vec<Row> = rows.iter().map(|settings| row(settings, "{}")).collect();
+        let groups = group_by(&rows, &["n".to_owned()]);
+        let told: Vec<(String, usize)> =
+            groups.iter().map(|group| (shown(&group.keys[0]), group.rows.len())).collect();
+        let expected = [("8", 1), ("16", 2), ("all", 1), ("", 1)];
+        assert_eq!(told, expected.map(|(key, count)| (key.to_owned(), count)));
+    }
+
+    #[test]
+    fn rows_without_a_metric_are_told() {
+        let rows = [row("{}", "{\"SoC\": 4}"), row("{}", "{\"SoC\": null}"), row("{}", "{\"SoC\": [1]}")];
+        let all: Vec<&Row> = rows.iter().collect();
+        assert_eq!(values(&all, "SoC"), [4.0]);
+        let notes = lacking(&rows, &["SoC".to_owned()]);
+        assert_eq!(notes, ["`A` has no `SoC` in 2 of 3 rows; means are over the others"]);
+    }
+}

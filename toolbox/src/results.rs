@@ -1,0 +1,274 @@
+//! What came of an evaluation: the rows of all algorithms, read from its folder.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use pogema_core::Error;
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::pairs::Pairs;
+
+/// The column of the algorithm's name.
+pub const ALGORITHM: &str = "algorithm";
+
+/// The metric that a file of times adds.
+const RUNTIME: &str = "runtime";
+
+/// What is added to an algorithm's name for its file of times.
+const TIMES: &str = ".times.json";
+
+/// What is added to an algorithm's name for its file of episodes that could not be played.
+const FAILED: &str = ".failed.jsonl";
+
+/// What an evaluation says of how it was made.
+const ABOUT: &str = "about.json";
+
+/// One episode of one algorithm.
+///
+/// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+pub struct Row {
+    /// Figures by name; what is neither number nor truth value is left to others.
+    pub metrics: Pairs,
+    /// What was varied, by name.
+    #[serde(rename = "env_grid_search")]
+    pub settings: Pairs,
+    /// Who played.
+    pub algorithm: String,
+    /// The name of the folder in which it was found.
+    #[serde(skip)]
+    pub set: String,
+}
+
+impl Row {
+    /// A metric, if it is a number.
+    pub fn metric(&self, name: &str) -> Option<f64> {
+        match self.metrics.get(name)? {
+            Value::Bool(is_so) => Some(f64::from(u8::from(*is_so))),
+            value => value.as_f64(),
+        }
+    }
+
+    /// What stands in a column that is no metric.
+    pub fn key(&self, column: &str) -> Option<Value> {
+        if column == ALGORITHM {
+            Some(self.algorithm.clone().into())
+        } else {
+            self.settings.get(column).cloned()
+        }
+    }
+}
+
+/// The rows of one or more folders.
+#[derive(Clone, Debug, Default)]
+pub struct Results {
+    /// Folder by folder, algorithm by algorithm, in the order of the files.
+    pub rows: Vec<Row>,
+    /// What was found but left out, a line each.
+    pub notes: Vec<String>,
+}
+
+impl Results {
+    /// Reads the folders of one or more evaluations, together.
+    ///
+    /// Each `<algorithm>.json` holds rows; `<algorithm>.times.json`, a list of seconds in their order, is read as their
+    /// metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm that is not finished.
+    ///
+    /// # Errors
+    /// One line with the file and the place in it for anything else, or if there are no rows at all.
+    pub fn read(folders: &[PathBuf]) -> Result<Self, Error> {
+        let mut results = Self::default();
+        for folder in folders {
+            results.read_folder(folder)?;
+        }
+        if results.rows.is_empty() {
+            let names: Vec<String> = folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
+            let reason =
+                format!("no results in {}, expected <algorithm>.json files with rows", names.join(", "));
+            return Err(Error::State { reason });
+        }
+        Ok(results)
+    }
+
+    fn read_folder(&mut self, folder: &Path) -> Result<(), Error> {
+        let set = name_of(folder);
+        for path in files_of(folder)? {
+            let name = name_of(&path);
+            if let Some(algorithm) = name.strip_suffix(FAILED) {
+                self.notes
+                    .push(format!("{}: episodes of `{algorithm}` could not be played", folder.display()));
+            } else if let Some(algorithm) = name.strip_suffix(".jsonl") {
+                self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
+            } else if let Some(algorithm) = name.strip_suffix(".json").filter(|_| !is_apart(&name)) {
+                let mut rows = read_rows(&path, algorithm)?;
+                join_times(&mut rows, &folder.join(format!("{algorithm}{TIMES}")))?;
+                if rows.is_empty() {
+                    self.notes.push(format!("{}: no rows", path.display()));
+                }
+                self.rows.extend(rows.into_iter().map(|row| Row { set: set.clone(), ..row }));
+            }
+        }
+        Ok(())
+    }
+
+    /// The algorithms, sorted by name.
+    pub fn algorithms(&self) -> Vec<String> {
+        let names: std::collections::BTreeSet<&String> = self.rows.iter().map(|row| &row.algorithm).collect();
+        names.into_iter().cloned().collect()
+    }
+
+    /// Columns that are no metrics: what was varied, in order of first appearance, then the algorithm.
+    pub fn key_columns(&self) -> Vec<String> {
+        let settings = self.rows.iter().flat_map(|row| row.settings.iter().map(|(name, _)| name));
+        let mut columns = first_appearances(settings.filter(|&name| name != ALGORITHM));
+        columns.push(ALGORITHM.to_owned());
+        columns
+    }
+
+    /// Metrics that are numbers in some row, or nowhere anything, in order of first appearance.
+    pub fn metric_columns(&self) -> Vec<String> {
+        let is_figure = |value: &Value| value.is_number() || value.is_boolean() || value.is_null();
+        let metrics = self.rows.iter().flat_map(|row| row.metrics.iter());
+        first_appearances(metrics.filter(|(_, value)| is_figure(value)).map(|(name, _)| name))
+    }
+}
+
+/// Whether a JSON file holds something else than rows.
+fn is_apart(name: &str) -> bool {
+    name == ABOUT || name.ends_with(TIMES)
+}
+
+fn first_appearances<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut seen = HashSet::new();
+    names.filter(|name| seen.insert(*name)).map(str::to_owned).collect()
+}
+
+fn name_of(path: &Path) -> String {
+    // `.` and `..` have no name of their own.
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The files of a folder, sorted by name.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let entries = std::fs::read_dir(folder).map_err(|error| Error::io(folder, error))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|error| Error::io(folder, error))?.path();
+        if path.is_file() {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
+    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let rows: Vec<Row> = serde_json::from_str(&without_nan(&text)).map_err(|error| {
+        Error::io(
+            path,
+            format!("expected a list of results with metrics, env_grid_search and algorithm: {error}"),
+        )
+    })?;
+    match rows.iter().position(|row| row.algorithm != algorithm) {
+        None => Ok(rows),
+        Some(index) => {
+            let (number, found) = (index + 1, &rows[index].algorithm);
+            let reason = format!(
+                "row {number} is of algorithm `{found}`, expected `{algorithm}` as the file is named"
+            );
+            Err(Error::io(path, reason))
+        }
+    }
+}
+
+/// Adds the seconds of a file, if there is one, to the rows that have no runtime.
+fn join_times(rows: &mut [Row], path: &Path) -> Result<(), Error> {
+    if !path.exists() {
+        return Ok(());
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let times: Vec<Option<f64>> = serde_json::from_str(&without_nan(&text))
+        .map_err(|error| Error::io(path, format!("expected a list of seconds: {error}")))?;
+    if times.len() != rows.len() {
+        let reason = format!("`{}` times, expected {}, one for each row", times.len(), rows.len());
+        return Err(Error::io(path, reason));
+    }
+    for (row, time) in rows.iter_mut().zip(times) {
+        if row.metrics.get(RUNTIME).is_none() {
+            row.metrics.set(RUNTIME, time.into());
+        }
+    }
+    Ok(())
+}
+
+/// The text with null in place of the numbers that Python writes though JSON does not have them.
+fn without_nan(text: &str) -> String {
+    let (mut clean, mut rest, mut in_string) = (String::with_capacity(text.len()), text, false);
+    while let Some(next) = rest.chars().next() {
+        let word = ["NaN", "-Infinity", "Infinity"].into_iter().find(|word| rest.starts_with(word));
+        let taken = match (in_string, next, word) {
+            (false, _, Some(word)) => {
+                clean.push_str("null");
+                rest = &rest[word.len()..];
+                continue;
+            }
+            (true, '\\', _) => 1 + rest.chars().nth(1).map_or(0, char::len_utf8),
+            _ => next.len_utf8(),
+        };
+        in_string ^= next == '"';
+        clean.push_str(&rest[..taken]);
+        rest = &rest[taken..];
+    }
+    clean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROW: &str =
+        r#"{"metrics": {"CSR": 1.0, "list": [1]}, "env_grid_search": {"seed": 1}, "algorithm": "A"}"#;
+
+    fn read(files: &[(&str, &str)]) -> Result<Results, String> {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        Results::read(&[folder.path().to_owned()]).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn times_are_the_runtime_and_unfinished_algorithms_are_told() {
+        let rows = format!("[{ROW}, {ROW}]");
+        let results =
+            read(&[("A.json", &rows), ("A.times.json", "[0.5, NaN]"), ("B.jsonl", "what")]).unwrap();
+        assert_eq!(results.rows[0].metric("runtime"), Some(0.5));
+        assert_eq!(results.rows[1].metric("runtime"), None);
+        assert_eq!(results.metric_columns(), ["CSR", "runtime"]);
+        assert_eq!(results.key_columns(), ["seed", "algorithm"]);
+        assert_eq!(results.notes.len(), 1);
+        assert!(results.notes[0].contains("`B` is not finished"), "{:?}", results.notes);
+    }
+
+    #[test]
+    fn what_is_no_result_is_told_with_its_place() {
+        let told = |files: &[(&str, &str)]| read(files).unwrap_err();
+        let whole = format!("[{ROW}]");
+        assert!(told(&[("A.json", &whole[..60])]).contains("A.json: expected a list of results"));
+        assert!(told(&[("A.json", &whole[..60])]).contains("line 1 column 60"));
+        assert!(told(&[("A.json", "{\"some\": 1}")]).contains("invalid type: map"));
+        assert!(told(&[("A.json", "[{\"some\": 1}]")]).contains("missing field `metrics` at line 1"));
+        assert!(told(&[("B.json", &whole)]).contains("row 1 is of algorithm `A`, expected `B`"));
+        assert!(told(&[("A.json", &whole), ("A.times.json", "[1, 2]")]).contains("`2` times, expected 1"));
+        assert!(told(&[]).contains("no results in"));
+        assert!(told(&[("A.json", "[]")]).contains("no results in"));
+    }
+
+    #[test]
+    fn python_s_numbers_are_null_outside_of_strings() {
+        assert_eq!(without_nan(r#"[NaN, "NaN \" NaN", -Infinity]"#), r#"[null, "NaN \" NaN", null]"#);
+    }
+}

@@ -1,0 +1,348 @@
+//! The six metrics by which the POGEMA benchmark compares algorithms, each between 0 and 1.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use serde_json::Value;
+
+use crate::frame::{compare, shown};
+use crate::results::{Results, Row};
+
+/// How the metrics are computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Definition {
+    /// As the numbers were that have been published: all of them come out of the published files.
+    ///
+    /// - What nobody solved counts for nobody. The best is the best of the algorithms that take part.
+    /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
+    /// - Pathfinding counts a way that was not found as one of the length of the episode.
+    /// - Coordination counts the steps of an episode as its makespan less 1. That is what the published files have as
+    ///   `ep_length` wherever they count collisions. POGEMA 1.4.0, and so what we play, has one more in `ep_length`,
+    ///   while makespan is the same everywhere; so files of either kind can be compared.
+    ///
+    /// Source: `build_web_plot.py` of the public repository pogema-benchmark, commit 7b86d776
+    #[default]
+    Published,
+    /// As the paper's text says it.
+    ///
+    /// - What was not solved is 0, whoever else solved it.
+    /// - Scalability uses seconds, and has no upper bound; all pairs count, which the text leaves open.
+    /// - Pathfinding is 0 where no way was found.
+    /// - Coordination counts as many steps as `ep_length` says.
+    ///
+    /// Source: POGEMA (ICLR 2025), section 4.2, equations 1 to 9
+    Paper,
+}
+
+/// One of the six.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Metric {
+    /// Best sum of costs over own, on random maps and mazes.
+    Performance,
+    /// The same on tiles of cities.
+    OutOfDistribution,
+    /// The same on puzzles.
+    Cooperation,
+    /// How much time per agent few agents take, over what more take, in the warehouse.
+    Scalability,
+    /// How seldom agents are in each other's way, on random maps and mazes.
+    Coordination,
+    /// Shortest way over own, with one agent on whole cities.
+    Pathfinding,
+}
+
+/// The six in the order in which they are shown.
+pub const METRICS: [Metric; 6] = [
+    Metric::Performance,
+    Metric::OutOfDistribution,
+    Metric::Cooperation,
+    Metric::Scalability,
+    Metric::Coordination,
+    Metric::Pathfinding,
+];
+
+impl Metric {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Performance => "Performance",
+            Self::OutOfDistribution => "Out-of-Distribution",
+            Self::Cooperation => "Cooperation",
+            Self::Scalability => "Scalability",
+            Self::Coordination => "Coordination",
+            Self::Pathfinding => "Pathfinding",
+        }
+    }
+
+    /// Parts of the names of the folders that it needs.
+    fn sets(self) -> &'static [&'static str] {
+        match self {
+            Self::Performance | Self::Coordination => &["random", "mazes"],
+            Self::OutOfDistribution => &["movingai"],
+            Self::Cooperation => &["puzzles"],
+            Self::Scalability => &["warehouse"],
+            Self::Pathfinding => &["pathfinding"],
+        }
+    }
+}
+
+/// The metrics of one algorithm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Six {
+    /// Its name.
+    pub algorithm: String,
+    /// In the order of [`METRICS`]; none where its folder is missing or rows lack what is needed.
+    pub values: [Option<f64>; 6],
+    /// Scalability before it is bounded by 1.
+    pub unbounded_scalability: Option<f64>,
+}
+
+/// Length of the benchmark's lifelong episodes, which the published numbers divide by whatever the length was.
+const LIFELONG_STEPS: f64 = 256.0;
+
+/// Computes the metrics of all algorithms from the folders of one evaluation, known by their names.
+///
+/// An instance counts if all algorithms of its folder have it. A row's collisions are taken as none if no row of its
+/// algorithm has any. Lifelong episodes are known by their `avg_throughput`, which stands for the sum of costs there.
+/// The second result says what is missing, a line each.
+pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>) {
+    let mut notes = Vec::new();
+    let joined: Vec<Joined<'_>> =
+        METRICS.iter().map(|metric| Joined::of(results, metric.sets(), *metric, &mut notes)).collect();
+    let one = |algorithm: String| {
+        let found: Vec<Option<f64>> = METRICS
+            .iter()
+            .zip(&joined)
+            .map(|(metric, joined)| {
+                joined.metric(*metric, &algorithm, definition).filter(|value| value.is_finite())
+            })
+            .collect();
+        let mut values = [None; 6];
+        values.copy_from_slice(&found);
+        let unbounded_scalability = values[3];
+        if definition == Definition::Published {
+            values[3] = values[3].map(|value| value.min(1.0));
+        }
+        Six { algorithm, values, unbounded_scalability }
+    };
+    let all: Vec<Six> = results.algorithms().into_iter().map(one).collect();
+    for six in &all {
+        for ((metric, joined), value) in METRICS.iter().zip(&joined).zip(&six.values) {
+            if value.is_none() && !joined.instances.is_empty() {
+                let (algorithm, metric) = (&six.algorithm, metric.name());
+                notes.push(format!(
+                    "`{algorithm}` has no {metric}: its rows are missing or lack a metric for it"
+                ));
+            }
+        }
+    }
+    (all, notes)
+}
+
+/// The instances of some folders that every algorithm there has played.
+struct Joined<'a> {
+    instances: Vec<HashMap<&'a str, &'a Row>>,
+    is_lifelong: bool,
+}
+
+impl<'a> Joined<'a> {
+    fn of(results: &'a Results, sets: &[&str], metric: Metric, notes: &mut Vec<String>) -> Self {
+        let is_of = |row: &&Row, set: &str| row.set.to_lowercase().contains(set);
+        for set in sets {
+            if !results.rows.iter().any(|row| is_of(&row, set)) {
+                notes.push(format!("{}: no folder with `{set}` in its name", metric.name()));
+            }
+        }
+        let rows: Vec<&Row> =
+            results.rows.iter().filter(|row| sets.iter().any(|set| is_of(row, set))).collect();
+        let algorithms: HashSet<&str> = rows.iter().map(|row| row.algorithm.as_str()).collect();
+        let mut instances: BTreeMap<String, HashMap<&str, &Row>> = BTreeMap::new();
+        for &row in &rows {
+            instances.entry(instance(row)).or_default().insert(&row.algorithm, row);
+        }
+        let all = instances.len();
+        instances.retain(|_, rows| rows.len() == algorithms.len());
+        if instances.len() < all {
+            let (name, left) = (metric.name(), instances.len());
+            notes.push(format!("{name}: {left} of {all} instances count, which every algorithm has played"));
+        }
+        let is_lifelong = rows.iter().any(|row| row.metric("avg_throughput").is_some());
+        Self { instances: instances.into_values().collect(), is_lifelong }
+    }
+
+    fn metric(&self, metric: Metric, algorithm: &str, definition: Definition) -> Option<f64> {
+        match metric {
+            Metric::Performance | Metric::OutOfDistribution | Metric::Cooperation => {
+                self.ratio(algorithm, definition)
+            }
+            Metric::Scalability => self.scalability(algorithm, definition),
+            Metric::Coordination => self.coordination(algorithm, definition),
+            Metric::Pathfinding => self.pathfinding(algorithm, definition),
+        }
+    }
+
+    /// The mean of a figure of each instance; instances without one are left out, and none may lack what it is of.
+    fn mean(&self, figure: impl Fn(&HashMap<&str, &Row>) -> Option<Counted>) -> Option<f64> {
+        let found: Option<Vec<Counted>> = self.instances.iter().map(figure).collect();
+        let counted: Vec<f64> = found?.into_iter().flatten().collect();
+        (!counted.is_empty()).then(|| crate::bootstrap::mean(&counted))
+    }
+
+    /// Best sum of costs over own, or own throughput over the best.
+    fn ratio(&self, algorithm: &str, definition: Definition) -> Option<f64> {
+        let nobody = (definition == Definition::Paper).then_some(0.0);
+        self.mean(|rows| {
+            let own = rows.get(algorithm)?;
+            if self.is_lifelong {
+                let all: Option<Vec<f64>> = rows.values().map(|row| row.metric("avg_throughput")).collect();
+                let best = all?.into_iter().fold(0.0, f64::max);
+                return Some(if best > 0.0 { Some(own.metric("avg_throughput")? / best) } else { nobody });
+            }
+            let costs: Option<Vec<Counted>> = rows.values().map(|row| solved(row, "SoC")).collect();
+            let best = costs?.into_iter().flatten().reduce(f64::min);
+            let Some(best) = best else { return Some(nobody) };
+            Some(Some(solved(own, "SoC")?.map_or(0.0, |cost| best / cost)))
+        })
+    }
+
+    fn scalability(&self, algorithm: &str, definition: Definition) -> Option<f64> {
+        let mut times: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+        for rows in &self.instances {
+            let row = rows.get(algorithm)?;
+            let is_per_step = definition == Definition::Published && !self.is_lifelong;
+            let steps = if is_per_step { row.metric("makespan")? } else { 1.0 };
+            let num_agents = row.settings.get("num_agents")?.as_u64()?;
+            times.entry(num_agents).or_default().push(row.metric("runtime")? / steps);
+        }
+        let per_agent = times.iter().map(|(&number, times)| crate::bootstrap::mean(times) / number as f64);
+        let per_agent: Vec<f64> = per_agent.collect();
+        let pairs = per_agent
+            .iter()
+            .enumerate()
+            .flat_map(|(at, few)| per_agent[at + 1..].iter().map(move |many| few / many));
+        let pairs: Vec<f64> = pairs.collect();
+        (!pairs.is_empty()).then(|| crate::bootstrap::mean(&pairs))
+    }
+
+    fn coordination(&self, algorithm: &str, definition: Definition) -> Option<f64> {
+        let collisions = |row: &Row| Some(row.metric("a_collisions")? + row.metric("o_collisions")?);
+        let mut own = self.instances.iter().filter_map(|rows| rows.get(algorithm)).peekable();
+        own.peek()?;
+        if own.all(|row| row.metrics.get("a_collisions").is_none()) {
+            return Some(1.0);
+        }
+        let mean = self.mean(|rows| {
+            let row = rows.get(algorithm)?;
+            let num_agents = row.settings.get("num_agents")?.as_f64()?;
+            let steps = match definition {
+                Definition::Published if self.is_lifelong => LIFELONG_STEPS,
+                // An episode of one step has no collision that is not of this step.
+                Definition::Published => (row.metric("makespan")? - 1.0).max(1.0),
+                Definition::Paper if self.is_lifelong => row.metric("ep_length").unwrap_or(LIFELONG_STEPS),
+                Definition::Paper => row.metric("ep_length")?.max(1.0),
+            };
+            Some(Some(collisions(row)? / (steps * num_agents)))
+        });
+        mean.map(|share| 1.0 - share)
+    }
+
+    fn pathfinding(&self, algorithm: &str, definition: Definition) -> Option<f64> {
+        let length =
+            if self.is_lifelong && definition == Definition::Published { "ep_length" } else { "makespan" };
+        self.mean(|rows| {
+            let own = rows.get(algorithm)?;
+            if definition == Definition::Paper {
+                let costs: Option<Vec<Counted>> = rows.values().map(|row| solved(row, length)).collect();
+                let best = costs?.into_iter().flatten().reduce(f64::min);
+                return Some(Some(
+                    solved(own, length)?.map_or(0.0, |cost| best.map_or(0.0, |best| best / cost)),
+                ));
+            }
+            let lengths: Option<Vec<f64>> = rows.values().map(|row| row.metric(length)).collect();
+            let best = lengths?.into_iter().reduce(f64::min)?;
+            let own = own.metric(length)?;
+            Some(Some(if own > 0.0 { best / own } else { 0.0 }))
+        })
+    }
+}
+
+/// A figure, or none for what does not count.
+type Counted = Option<f64>;
+
+/// A metric of a row, none if it was not solved; nothing at all if that is not known.
+fn solved(row: &Row, metric: &str) -> Option<Counted> {
+    Some(if row.metric("CSR")? > 0.0 { Some(row.metric(metric)?) } else { None })
+}
+
+/// What tells an instance from others: its folder and all that was varied, whatever the order.
+pub(crate) fn instance(row: &Row) -> String {
+    let mut settings: Vec<(&str, &Value)> = row.settings.iter().collect();
+    settings.sort_by(|one, other| one.0.cmp(other.0).then_with(|| compare(one.1, other.1)));
+    let told = settings.into_iter().map(|(name, value)| format!("{name}={}", shown(value)));
+    std::iter::once(row.set.clone()).chain(told).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(set: &str, algorithm: &str, seed: u64, metrics: &str) -> Row {
+        let settings = format!("{{\"num_agents\": 2, \"seed\": {seed}}}");
+        let text = format!(
+            "{{\"metrics\": {metrics}, \"env_grid_search\": {settings}, \"algorithm\": \"{algorithm}\"}}"
+        );
+        Row { set: set.to_owned(), ..serde_json::from_str(&text).unwrap() }
+    }
+
+    fn of(rows: Vec<Row>, definition: Definition) -> (Vec<Six>, Vec<String>) {
+        six(&Results { rows, notes: Vec::new() }, definition)
+    }
+
+    #[test]
+    fn what_nobody_solved_counts_for_nobody_or_as_nothing() {
+        let metrics = [r#"{"CSR": 1, "SoC": 4}"#, r#"{"CSR": 1, "SoC": 8}"#, r#"{"CSR": 0, "SoC": 9}"#];
+        let rows = || {
+            let of_seed = |seed, one: usize, other: usize| {
+                [row("05-puzzles", "A", seed, metrics[one]), row("05-puzzles", "B", seed, metrics[other])]
+            };
+            [of_seed(0, 0, 1), of_seed(1, 2, 2)].into_iter().flatten().collect::<Vec<_>>()
+        };
+        let cooperation =
+            |definition| of(rows(), definition).0.iter().map(|six| six.values[2]).collect::<Vec<_>>();
+        assert_eq!(cooperation(Definition::Published), [Some(1.0), Some(0.5)]);
+        assert_eq!(cooperation(Definition::Paper), [Some(0.5), Some(0.25)]);
+        let (_, notes) = of(rows(), Definition::Published);
+        assert!(
+            notes.contains(&"Scalability: no folder with `warehouse` in its name".to_owned()),
+            "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn coordination_is_that_of_either_count_of_steps() {
+        let coordination = |ep_length: u64, definition| {
+            let metrics = format!(
+                r#"{{"ep_length": {ep_length}, "makespan": 11, "a_collisions": 3, "o_collisions": 2}}"#
+            );
+            of(vec![row("01-random", "A", 0, &metrics), row("02-mazes", "A", 0, &metrics)], definition).0[0]
+                .values[4]
+        };
+        // As published, and as POGEMA 1.4.0 counts.
+        assert_eq!(coordination(10, Definition::Published), Some(0.75));
+        assert_eq!(coordination(11, Definition::Published), Some(0.75));
+        assert_eq!(coordination(10, Definition::Paper), Some(0.75));
+    }
+
+    #[test]
+    fn instances_that_somebody_lacks_are_told() {
+        let metrics = r#"{"avg_throughput": 0.5}"#;
+        let rows = vec![
+            row("04-movingai", "A", 0, metrics),
+            row("04-movingai", "A", 1, metrics),
+            row("04-movingai", "B", 0, r#"{"avg_throughput": 1.0}"#),
+        ];
+        let (all, notes) = of(rows, Definition::Published);
+        assert_eq!(all.iter().map(|six| six.values[1]).collect::<Vec<_>>(), [Some(0.5), Some(1.0)]);
+        let told = "Out-of-Distribution: 1 of 2 instances count, which every algorithm has played";
+        assert!(notes.contains(&told.to_owned()), "{notes:?}");
+    }
+}

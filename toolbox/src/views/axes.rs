@@ -1,0 +1,196 @@
+//! Axes with ticks where the data is, which the plotting library cannot place freely.
+
+use kuva::render::layout::{ComputedLayout, Layout};
+use kuva::render::render::{Primitive, Scene, TextAnchor};
+
+/// The colour of the lines behind a plot.
+const GRID: &str = "#DDDDDD";
+
+/// The share of an axis that is left free at each end.
+const MARGIN: f64 = 0.05;
+
+/// Length of a tick. Units: points.
+const TICK: f64 = 3.0;
+
+/// Mean width of a letter in widths of the font's size.
+const LETTER: f64 = 0.62;
+
+/// One axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Axis {
+    pub title: String,
+    pub is_log: bool,
+    /// From where to where it reaches.
+    pub range: (f64, f64),
+    /// Where it is marked, and what is written there.
+    pub ticks: Vec<(f64, String)>,
+}
+
+impl Axis {
+    /// An axis for numbers, marked at the given ones or at round ones.
+    pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
+        let shown = |value: f64| if is_log { value.max(f64::MIN_POSITIVE).log2() } else { value };
+        let all = values.iter().chain(ticks.unwrap_or_default()).map(|&value| shown(value));
+        let (low, high) = all
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let margin = if high > low { (high - low) * MARGIN } else { 0.5 };
+        let (low, high) = (low - margin, high + margin);
+        let range = if is_log { (low.exp2(), high.exp2()) } else { (low, high) };
+        let ticks = match ticks {
+            Some(ticks) => ticks.iter().map(|&tick| (tick, number(tick))).collect(),
+            None if is_log => powers(range),
+            None => round_numbers(range),
+        };
+        Self { title: title.to_owned(), is_log, range, ticks }
+    }
+
+    /// An axis for names, of which the first has a place and each next one the next whole number.
+    pub fn of_names(title: &str, names: &[String], first: f64) -> Self {
+        let ticks =
+            names.iter().enumerate().map(|(place, name)| (first + place as f64, name.clone())).collect();
+        let range = (first - 0.5, first + names.len() as f64 - 0.5);
+        Self { title: title.to_owned(), is_log: false, range, ticks }
+    }
+}
+
+/// A number as it is written at a tick.
+pub(super) fn number(value: f64) -> String {
+    let is_small = value != 0.0 && value.abs() < 1e-3;
+    if is_small || value.abs() >= 1e7 {
+        format!("{value:e}")
+    } else {
+        ((value * 1e9).round() / 1e9).to_string()
+    }
+}
+
+/// Round numbers within a range, about five of them.
+fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
+    let rough = (high - low) / 5.0;
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 2.5, 5.0, 10.0].map(|factor| factor * power);
+    let step = step.into_iter().find(|&step| step >= rough).unwrap_or(power * 10.0);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
+}
+
+/// Powers of two, or of ten where those were too many, within a range above zero.
+fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
+    let base: f64 = if (high / low).log2() > 10.0 { 10.0 } else { 2.0 };
+    let power = |value: f64| value.ln() / base.ln();
+    let (first, last) = (power(low).ceil() as i32, power(high).floor() as i32);
+    (first..=last).map(|count| base.powi(count)).map(|tick| (tick, number(tick))).collect()
+}
+
+/// About how wide a text is.
+pub(super) fn text_width(text: &str, size: u32) -> f64 {
+    text.chars().count() as f64 * f64::from(size) * LETTER
+}
+
+/// The frame of one plot: how large it is, and what is written around it.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub width: f64,
+    pub height: f64,
+    pub font_size: u32,
+    pub title: Option<String>,
+    pub x: Axis,
+    pub y: Axis,
+}
+
+impl Frame {
+    /// The layout for the plotting library, with nothing but the lines of the axes.
+    pub fn layout(&self) -> Layout {
+        let size = f64::from(self.font_size);
+        let widest = |axis: &Axis| {
+            axis.ticks.iter().map(|(_, text)| text_width(text, self.font_size)).fold(0.0, f64::max)
+        };
+        let left = size * 2.0 + widest(&self.y) + TICK + 2.0;
+        let right = 5.0 + self.x.ticks.last().map_or(0.0, |(_, text)| text_width(text, self.font_size) / 2.0);
+        let top = self.title.as_ref().map_or(5.0, |_| size * 2.0);
+        let mut layout = Layout::new(self.x.range, self.y.range)
+            .with_width(self.width)
+            .with_height(self.height)
+            .with_show_grid(false)
+            .with_force_margins(left.min(self.width * 0.45), right.min(self.width * 0.25))
+            .with_force_margins_y(top, TICK + size * 3.1)
+            .with_x_axis_min(self.x.range.0)
+            .with_x_axis_max(self.x.range.1)
+            .with_y_axis_min(self.y.range.0)
+            .with_y_axis_max(self.y.range.1)
+            .with_axis_line_width(0.6);
+        (layout.suppress_x_ticks, layout.suppress_y_ticks, layout.show_legend) = (true, true, false);
+        (layout.log_x, layout.log_y) = (self.x.is_log, self.y.is_log);
+        layout
+    }
+
+    /// Draws lines behind the plot, and ticks and texts around it.
+    pub fn draw(&self, scene: &mut Scene) {
+        let place = ComputedLayout::from_layout(&self.layout());
+        let (left, right) = (place.margin_left, place.width - place.margin_right);
+        let (top, bottom) = (place.margin_top, place.height - place.margin_bottom);
+        let size = f64::from(self.font_size);
+        let mut behind = Vec::new();
+        let mut free_from = f64::NEG_INFINITY;
+        for (tick, text) in within(&self.x) {
+            let (x, half) = (place.map_x(tick), text_width(text, self.font_size) / 2.0);
+            behind.push(line((x, top), (x, bottom), GRID));
+            scene.add(line((x, bottom), (x, bottom + TICK), "black"));
+            if x - half > free_from {
+                free_from = x + half + size * 0.5;
+                scene.add(self.text(text, (x, bottom + TICK + size), TextAnchor::Middle, None));
+            }
+        }
+        for (tick, text) in within(&self.y) {
+            let y = place.map_y(tick);
+            behind.push(line((left, y), (right, y), GRID));
+            scene.add(line((left - TICK, y), (left, y), "black"));
+            scene.add(self.text(text, (left - TICK - 2.0, y + size * 0.35), TextAnchor::End, None));
+        }
+        scene.elements.splice(0..0, behind);
+        let (middle_x, middle_y) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
+        scene.add(self.text(&self.x.title, (middle_x, bottom + TICK + size * 2.5), TextAnchor::Middle, None));
+        scene.add(self.text(&self.y.title, (size * 1.2, middle_y), TextAnchor::Middle, Some(-90.0)));
+        if let Some(title) = &self.title {
+            scene.add(self.text(title, (middle_x, top - size * 0.6), TextAnchor::Middle, None));
+        }
+    }
+
+    fn text(&self, text: &str, (x, y): (f64, f64), anchor: TextAnchor, rotate: Option<f64>) -> Primitive {
+        let (content, size) = (text.to_owned(), self.font_size);
+        Primitive::Text { x, y, content, size, anchor, rotate, bold: false, color: None }
+    }
+}
+
+/// A text in the middle of a place.
+pub(super) fn text(text: &str, (x, y): (f64, f64), size: u32) -> Primitive {
+    let (content, anchor) = (text.to_owned(), TextAnchor::Middle);
+    Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None }
+}
+
+/// The ticks that are on the axis.
+fn within(axis: &Axis) -> impl Iterator<Item = (f64, &String)> {
+    let (low, high) = axis.range;
+    axis.ticks.iter().map(|(tick, text)| (*tick, text)).filter(move |&(tick, _)| low <= tick && tick <= high)
+}
+
+fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &str) -> Primitive {
+    Primitive::Line { x1, y1, x2, y2, stroke: colour.into(), stroke_width: 0.5, stroke_dasharray: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_within() {
+        let texts = |axis: Axis| axis.ticks.into_iter().map(|(_, text)| text).collect::<Vec<_>>();
+        assert_eq!(texts(Axis::of_numbers("", &[0.0, 1.0], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);
+        assert_eq!(texts(Axis::of_numbers("", &[3.0, 1210.0], false, None)), ["0", "500", "1000"]);
+        assert_eq!(texts(Axis::of_numbers("", &[8.0, 64.0], true, None)), ["8", "16", "32", "64"]);
+        assert_eq!(
+            texts(Axis::of_numbers("", &[0.01, 900.0], true, None)),
+            ["0.01", "0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(texts(Axis::of_numbers("", &[5.0], false, Some(&[5.0]))), ["5"]);
+    }
+}

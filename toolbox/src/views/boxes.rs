@@ -1,0 +1,112 @@
+//! How a metric is spread in each group of rows.
+
+use kuva::plot::boxplot::BoxPlot;
+use kuva::plot::scatter::ScatterPlot;
+use kuva::render::plots::Plot;
+use pogema_core::Error;
+use serde_json::Value;
+
+use super::axes::{Axis, Frame};
+use super::options::{Common, Options};
+use super::panel::framed;
+use super::picture::Picture;
+use super::series::at;
+use super::style::Style;
+use super::{Shown, known_column};
+use crate::bootstrap::percentile;
+use crate::frame::{compare, lacking, values};
+use crate::results::{ALGORITHM, Results, Row};
+use crate::tree::Node;
+
+/// `type: box`: for each value of the column `x`, the algorithm if it is not said, a box of the metric `y`.
+///
+/// A box is the middle half of the values with their median; its whiskers reach to the last value within 1.5 of its
+/// lengths; values beyond are dots.
+#[derive(Clone, Debug)]
+pub struct BoxView {
+    common: Common,
+    style: Style,
+    x: String,
+    y: String,
+}
+
+impl BoxView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let options = Options::new(name, node, &Style::keys(&[]))?;
+        Ok(Self {
+            common: Common::read(&options)?,
+            style: Style::read(&options, (3.6, 2.6))?,
+            x: options.text("x")?.unwrap_or_else(|| ALGORITHM.to_owned()),
+            y: options.required("y")?,
+        })
+    }
+
+    /// Draws it.
+    ///
+    /// # Errors
+    /// If the results have no such columns, or no row has numbers in them.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        known_column(name, "x", &self.x, results)?;
+        known_column(name, "y", &self.y, results)?;
+        let mut keys: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &self.x)).collect();
+        keys.sort_by(compare);
+        keys.dedup();
+        let group = |key: &Value| {
+            let rows: Vec<&Row> =
+                results.rows.iter().filter(|row| at(row, &self.x).as_ref() == Some(key)).collect();
+            (self.common.shown(&self.x, key), values(&rows, &self.y))
+        };
+        // The first is on top.
+        let groups: Vec<(String, Vec<f64>)> =
+            keys.iter().rev().map(group).filter(|(_, values)| !values.is_empty()).collect();
+        if groups.is_empty() {
+            let reason = format!("view `{name}`: no row has a number in `{}`", self.y);
+            return Err(Error::State { reason });
+        }
+        let notes = lacking(&results.rows, std::slice::from_ref(&self.y));
+        Ok(Shown { pictures: vec![self.draw(groups)], notes, ..Shown::default() })
+    }
+
+    fn draw(&self, groups: Vec<(String, Vec<f64>)>) -> Picture {
+        let all: Vec<f64> = groups.iter().flat_map(|(_, values)| values).copied().collect();
+        let is_log = self.style.log_y && all.iter().all(|&value| value > 0.0);
+        let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
+        let colours = (0..groups.len()).rev().map(|number| self.style.colour(number));
+        let outliers: Vec<(f64, f64)> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(number, (_, values))| {
+                outliers(values).into_iter().map(move |x| (x, number as f64 + 1.0))
+            })
+            .collect();
+        let mut boxes = BoxPlot::new().with_horizontal(true).with_width(0.6).with_group_colors(colours);
+        for (name, values) in groups {
+            boxes = boxes.with_group(name, values);
+        }
+        let mut plots = vec![Plot::Box(boxes)];
+        if !outliers.is_empty() {
+            let dots = ScatterPlot::new().with_data(outliers).with_color("#555555").with_size(1.0);
+            plots.push(Plot::Scatter(dots.with_marker_opacity(0.5)));
+        }
+        let Style { width, height, font_size, .. } = self.style;
+        let frame = Frame {
+            width,
+            height,
+            font_size,
+            title: self.style.title().map(str::to_owned),
+            x: Axis::of_numbers(&self.common.title(&self.y), &all, is_log, self.style.ticks.as_deref()),
+            y: Axis::of_names(&self.common.title(&self.x), &names, 1.0),
+        };
+        Picture::new(framed(plots, &frame), &self.style)
+    }
+}
+
+/// What lies further than 1.5 boxes from its box.
+fn outliers(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (percentile(&sorted, 25.0), percentile(&sorted, 75.0));
+    let reach = 1.5 * (high - low);
+    sorted.retain(|&value| value < low - reach || value > high + reach);
+    sorted
+}

@@ -1,0 +1,110 @@
+//! How many instances each algorithm solves within a time.
+
+use kuva::plot::line::{LinePlot, LineStyle};
+use kuva::render::plots::Plot;
+use pogema_core::Error;
+
+use super::axes::{Axis, Frame};
+use super::legend::Legend;
+use super::options::{Common, Options};
+use super::panel::{framed, place_legend};
+use super::picture::Picture;
+use super::series::{Series, signs};
+use super::style::Style;
+use super::{Shown, known_column};
+use crate::frame::lacking;
+use crate::results::Results;
+use crate::tree::Node;
+
+/// What tells whether an instance was solved.
+const SOLVED: &str = "CSR";
+
+/// `type: cactus`: a line for each algorithm, which rises by one at the `runtime` of each instance that it solved.
+///
+/// The axis of times is logarithmic unless `use_log_scale_x` says otherwise; `x` may name another metric.
+#[derive(Clone, Debug)]
+pub struct CactusView {
+    common: Common,
+    style: Style,
+    x: String,
+}
+
+impl CactusView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let options = Options::new(name, node, &Style::keys(&[]))?;
+        let log_x = options.flag("use_log_scale_x")?.unwrap_or(true);
+        Ok(Self {
+            common: Common::read(&options)?,
+            style: Style { log_x, has_markers: false, ..Style::read(&options, (3.6, 2.6))? },
+            x: options.text("x")?.unwrap_or_else(|| "runtime".to_owned()),
+        })
+    }
+
+    /// Draws it.
+    ///
+    /// # Errors
+    /// If the results have no such metrics, or nothing was solved.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        known_column(name, "x", &self.x, results)?;
+        known_column(name, "solved", SOLVED, results)?;
+        let times = |algorithm: &String| {
+            let own = results.rows.iter().filter(|row| row.algorithm == *algorithm);
+            let solved = own.filter(|row| row.metric(SOLVED).is_some_and(|share| share > 0.0));
+            let mut times: Vec<f64> = solved.filter_map(|row| row.metric(&self.x)).collect();
+            times.sort_by(f64::total_cmp);
+            times
+        };
+        let lines: Vec<(String, Vec<f64>)> = results
+            .algorithms()
+            .into_iter()
+            .map(|algorithm| (algorithm.clone(), times(&algorithm)))
+            .collect();
+        if lines.iter().all(|(_, times)| times.is_empty()) {
+            let reason = format!("view `{name}`: no row is solved and has a `{}`", self.x);
+            return Err(Error::State { reason });
+        }
+        let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
+        notes.extend(
+            lines
+                .iter()
+                .filter(|(_, times)| times.is_empty())
+                .map(|(name, _)| format!("`{name}` solved nothing")),
+        );
+        Ok(Shown { pictures: vec![self.draw(&lines)], notes, ..Shown::default() })
+    }
+
+    fn draw(&self, lines: &[(String, Vec<f64>)]) -> Picture {
+        let all: Vec<f64> = lines.iter().flat_map(|(_, times)| times).copied().collect();
+        let is_log = self.style.log_x && all.iter().all(|&time| time > 0.0);
+        let end = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let most = lines.iter().map(|(_, times)| times.len()).max().unwrap_or(0) as f64;
+        let (mut plots, mut entries, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, (name, times)) in lines.iter().enumerate().filter(|(_, (_, times))| !times.is_empty()) {
+            let mut points: Vec<(f64, f64)> =
+                times.iter().enumerate().map(|(count, &time)| (time, count as f64 + 1.0)).collect();
+            points.push((end, times.len() as f64));
+            let (colour, _, dashes) = signs(number, &self.style);
+            let line = LinePlot::new()
+                .with_data(points.clone())
+                .with_color(colour)
+                .with_stroke_width(self.style.line_width)
+                .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
+            plots.push(Plot::Line(line));
+            entries.push(Series::entry(number, self.common.algorithm(name), &self.style));
+            drawn.push(points);
+        }
+        let Style { width, height, font_size, .. } = self.style;
+        let frame = Frame {
+            width,
+            height,
+            font_size,
+            title: self.style.title().map(str::to_owned),
+            x: Axis::of_numbers(&self.common.title(&self.x), &all, is_log, self.style.ticks.as_deref()),
+            y: Axis::of_numbers("Solved Instances", &[0.0, most], false, None),
+        };
+        let legend = Legend { title: None, entries, columns: 1, font_size: self.style.legend_font_size };
+        let scene = framed(plots, &frame);
+        let scene = place_legend(scene, &frame, legend, self.style.legend_place, &drawn);
+        Picture::new(scene, &self.style)
+    }
+}

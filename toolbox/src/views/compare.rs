@@ -1,0 +1,187 @@
+//! Two algorithms side by side, instance by instance.
+
+use std::collections::HashMap;
+
+use kuva::plot::line::LinePlot;
+use kuva::plot::scatter::ScatterPlot;
+use kuva::render::plots::Plot;
+use pogema_core::Error;
+
+use super::axes::{Axis, Frame};
+use super::grid::{Cell, Table};
+use super::options::{Common, Options};
+use super::panel::framed;
+use super::picture::Picture;
+use super::style::Style;
+use super::{Shown, known_column, named};
+use crate::frame::lacking;
+use crate::results::{Results, Row};
+use crate::six::instance;
+use crate::tree::Node;
+
+/// What tells whether an instance was solved.
+const SOLVED: &str = "CSR";
+
+/// Metrics of which more is better.
+const MORE_IS_BETTER: [&str; 3] = ["CSR", "ISR", "avg_throughput"];
+
+/// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and who was better.
+///
+/// `y` is the metric, `SoC` if it is not said. Less of it is better, except of those of which more is, or as `better`
+/// says: `lower` or `higher`. Results without `CSR`, as lifelong ones are, count as solved.
+#[derive(Clone, Debug)]
+pub struct CompareView {
+    common: Common,
+    style: Style,
+    metric: String,
+    first: Option<String>,
+    second: Option<String>,
+    is_more_better: bool,
+}
+
+/// How the instances ended that both played.
+#[derive(Clone, Debug, Default)]
+struct Score {
+    /// The figures of both, where both solved the instance.
+    both: Vec<(f64, f64)>,
+    only_first: usize,
+    only_second: usize,
+    neither: usize,
+    /// Instances that one of them has not played, or of which it has no figure.
+    alone: usize,
+}
+
+impl CompareView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let options = Options::new(name, node, &Style::keys(&["first", "second", "better"]))?;
+        let metric = options.text("y")?.unwrap_or_else(|| "SoC".to_owned());
+        let is_more_better = match options.choice("better", &["lower", "higher"])? {
+            Some(better) => better == "higher",
+            None => MORE_IS_BETTER.contains(&metric.as_str()),
+        };
+        Ok(Self {
+            common: Common::read(&options)?,
+            style: Style::read(&options, (2.8, 2.8))?,
+            metric,
+            first: options.text("first")?,
+            second: options.text("second")?,
+            is_more_better,
+        })
+    }
+
+    /// Counts and draws.
+    ///
+    /// # Errors
+    /// If the results have no such metric or algorithms.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        known_column(name, "y", &self.metric, results)?;
+        let pair = self.pair(name, results)?;
+        let score = self.score(results, &pair);
+        let rows = results.rows.iter().filter(|row| pair.contains(&row.algorithm));
+        let mut notes = lacking(rows, std::slice::from_ref(&self.metric));
+        if score.alone > 0 {
+            notes.push(format!("{} instances are left out, which only one of the two has", score.alone));
+        }
+        let pictures = if score.both.is_empty() {
+            notes.push(format!("view `{name}`: there is no instance that both solved, and so no picture"));
+            Vec::new()
+        } else {
+            vec![self.draw(&pair, &score.both)]
+        };
+        Ok(Shown { tables: vec![self.table(&pair, &score)], pictures, notes })
+    }
+
+    /// The two algorithms; those of the results if there are just two.
+    fn pair(&self, name: &str, results: &Results) -> Result<[String; 2], Error> {
+        let all = results.algorithms();
+        let (first, second) = match (&self.first, &self.second, all.as_slice()) {
+            (Some(first), Some(second), _) | (None, None, [first, second]) => (first.clone(), second.clone()),
+            _ => {
+                let known = all.join(", ");
+                let reason = format!("view `{name}`: expected `first` and `second`, each one of {known}");
+                return Err(Error::State { reason });
+            }
+        };
+        for (key, algorithm) in [("first", &first), ("second", &second)] {
+            if !all.contains(algorithm) {
+                return Err(named(name, key, algorithm, all.iter().map(String::as_str)));
+            }
+        }
+        Ok([first, second])
+    }
+
+    fn score(&self, results: &Results, [first, second]: &[String; 2]) -> Score {
+        let mut played: HashMap<String, [Option<&Row>; 2]> = HashMap::new();
+        for row in &results.rows {
+            for (place, algorithm) in [first, second].into_iter().enumerate() {
+                if row.algorithm == *algorithm {
+                    played.entry(instance(row)).or_default()[place] = Some(row);
+                }
+            }
+        }
+        let mut played: Vec<(String, [Option<&Row>; 2])> = played.into_iter().collect();
+        played.sort_by(|one, other| one.0.cmp(&other.0));
+        let mut score = Score::default();
+        for (_, rows) in played {
+            let [Some(one), Some(other)] = rows else {
+                score.alone += 1;
+                continue;
+            };
+            match (self.is_solved(one), self.is_solved(other)) {
+                (true, true) => match (one.metric(&self.metric), other.metric(&self.metric)) {
+                    (Some(one), Some(other)) => score.both.push((one, other)),
+                    _ => score.alone += 1,
+                },
+                (true, false) => score.only_first += 1,
+                (false, true) => score.only_second += 1,
+                (false, false) => score.neither += 1,
+            }
+        }
+        score
+    }
+
+    /// Whether a row's figure counts: that of the share of solved ones always does.
+    fn is_solved(&self, row: &Row) -> bool {
+        MORE_IS_BETTER.contains(&self.metric.as_str()) || row.metric(SOLVED).is_none_or(|share| share > 0.0)
+    }
+
+    fn table(&self, pair: &[String; 2], score: &Score) -> Table {
+        let [first, second] = pair.each_ref().map(|name| self.common.algorithm(name));
+        let is_less = |&&(one, other): &&(f64, f64)| one < other;
+        let ties = score.both.iter().filter(|(one, other)| one == other).count();
+        let less = score.both.iter().filter(is_less).count();
+        let more = score.both.len() - ties - less;
+        let (wins, losses) = if self.is_more_better { (more, less) } else { (less, more) };
+        let row = |what: String, count: usize| vec![Cell::Text(what), Cell::Count(count)];
+        let metric = self.common.title(&self.metric);
+        Table {
+            head: vec![format!("{first} and {second}: {metric}"), "Instances".to_owned()],
+            rows: vec![
+                row(format!("{first} is better"), wins),
+                row("both are alike".to_owned(), ties),
+                row(format!("{second} is better"), losses),
+                row(format!("only {first} solved it"), score.only_first),
+                row(format!("only {second} solved it"), score.only_second),
+                row("neither solved it".to_owned(), score.neither),
+            ],
+            ..Table::default()
+        }
+    }
+
+    fn draw(&self, pair: &[String; 2], both: &[(f64, f64)]) -> Picture {
+        let all: Vec<f64> = both.iter().flat_map(|&(one, other)| [one, other]).collect();
+        let is_log = (self.style.log_x || self.style.log_y) && all.iter().all(|&value| value > 0.0);
+        let [x, y] = pair.each_ref().map(|name| {
+            let title = format!("{}, {}", self.common.title(&self.metric), self.common.algorithm(name));
+            Axis::of_numbers(&title, &all, is_log, self.style.ticks.as_deref())
+        });
+        let (low, high) = x.range;
+        let diagonal = LinePlot::new().with_data([(low, low), (high, high)]).with_color("#888888");
+        let dots = ScatterPlot::new().with_data(both.to_vec()).with_color(self.style.colour(0));
+        let dots = dots.with_size(1.6).with_marker_opacity(0.5);
+        let Style { width, height, font_size, .. } = self.style;
+        let frame = Frame { width, height, font_size, title: self.style.title().map(str::to_owned), x, y };
+        let plots = vec![Plot::Line(diagonal.with_stroke_width(0.7)), Plot::Scatter(dots)];
+        Picture::new(framed(plots, &frame), &self.style)
+    }
+}

@@ -1,0 +1,197 @@
+//! A table in one of its formats.
+
+use comfy_table::{CellAlignment, Table as Drawn, presets};
+
+use crate::bootstrap::Estimate;
+
+/// How a table is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// With lines around its cells.
+    Terminal,
+    /// As GitHub reads it.
+    Markdown,
+    /// With the rules of the package booktabs.
+    Latex,
+    /// Commas, and a column each for mean, lower end, upper end and number of values.
+    Csv,
+}
+
+/// What stands in a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A text, to the left.
+    Text(String),
+    /// A whole number, to the right.
+    Count(usize),
+    /// A figure that leaves no doubt, or nothing where there is none, to the right.
+    Number(Option<f64>),
+    /// A mean and its doubt, or nothing where no row had a number.
+    Mean(Option<Estimate>),
+}
+
+/// A table, whatever its format.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// What its columns are called.
+    pub head: Vec<String>,
+    /// Its cells, as many in each row as there are columns.
+    pub rows: Vec<Vec<Cell>>,
+    /// Number of decimals.
+    pub digits: usize,
+    /// Whether an interval of no length is left out.
+    pub skips_zero: bool,
+    /// What has to be known to read it, in one line.
+    pub remark: Option<String>,
+}
+
+impl Table {
+    /// The whole text, without a line break at its end.
+    pub fn text(&self, format: Format) -> String {
+        match format {
+            Format::Terminal => self.drawn(presets::UTF8_FULL_CONDENSED, str::to_owned),
+            Format::Markdown => self.drawn(presets::ASCII_MARKDOWN, |text| text.replace('|', "\\|")),
+            Format::Latex => self.latex(),
+            Format::Csv => self.csv(),
+        }
+    }
+
+    fn drawn(&self, style: comfy_table::TableStyle, escape: impl Fn(&str) -> String) -> String {
+        let mut table = Drawn::new();
+        table.load_style(style).set_header(self.head.iter().map(|title| escape(title)));
+        for row in &self.rows {
+            table.add_row(row.iter().map(|cell| escape(&self.shown(cell))));
+        }
+        for (index, column) in table.column_iter_mut().enumerate() {
+            if self.is_figure(index) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        let gap = if style == presets::ASCII_MARKDOWN { "\n\n" } else { "\n" };
+        format!("{table}{}", self.remark.as_ref().map(|remark| format!("{gap}{remark}")).unwrap_or_default())
+    }
+
+    /// Whether a column holds figures.
+    fn is_figure(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| !matches!(row.get(column), Some(Cell::Text(_)) | None))
+    }
+
+    fn shown(&self, cell: &Cell) -> String {
+        match cell {
+            Cell::Text(text) => text.clone(),
+            Cell::Count(count) => count.to_string(),
+            Cell::Number(None) | Cell::Mean(None) => "-".to_owned(),
+            Cell::Number(Some(number)) => format!("{number:.*}", self.digits),
+            Cell::Mean(Some(estimate)) => self.parts(estimate).join(" ± "),
+        }
+    }
+
+    /// The mean, and half its interval if there is one to show.
+    fn parts(&self, estimate: &Estimate) -> Vec<String> {
+        let half = estimate.half().filter(|&half| !(self.skips_zero && half == 0.0));
+        let numbers = [Some(estimate.mean), half];
+        numbers.into_iter().flatten().map(|number| format!("{number:.*}", self.digits)).collect()
+    }
+
+    fn latex(&self) -> String {
+        let columns: String =
+            (0..self.head.len()).map(|at| if self.is_figure(at) { 'r' } else { 'l' }).collect();
+        let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
+        let cell = |cell: &Cell| match cell {
+            Cell::Mean(Some(estimate)) => format!("${}$", self.parts(estimate).join(" \\pm ")),
+            other => latex_text(&self.shown(other)),
+        };
+        let remark = self.remark.as_ref().map(|remark| format!("% {remark}\n")).unwrap_or_default();
+        let head = line(self.head.iter().map(|title| latex_text(title)).collect());
+        let body: String = self.rows.iter().map(|row| line(row.iter().map(cell).collect())).collect();
+        format!(
+            "{remark}\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}"
+        )
+    }
+
+    fn csv(&self) -> String {
+        let is_mean =
+            |column: usize| self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Mean(_))));
+        let head = self.head.iter().enumerate().flat_map(|(column, title)| {
+            let more = ["low", "high", "n"].map(|part| format!("{title} {part}"));
+            std::iter::once(title.clone()).chain(more.into_iter().take(if is_mean(column) { 3 } else { 0 }))
+        });
+        let rows = self.rows.iter().map(|row| row.iter().flat_map(csv_cells).collect::<Vec<_>>());
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for record in std::iter::once(head.collect()).chain(rows) {
+            // A vector takes all that is written, and all rows are of one length.
+            let _ = writer.write_record(&record);
+        }
+        let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
+        text.trim_end().to_owned()
+    }
+}
+
+fn csv_cells(cell: &Cell) -> Vec<String> {
+    match cell {
+        Cell::Text(text) => vec![text.clone()],
+        Cell::Count(count) => vec![count.to_string()],
+        Cell::Number(number) => vec![number.map(|number| number.to_string()).unwrap_or_default()],
+        Cell::Mean(None) => vec![String::new(), String::new(), String::new(), "0".to_owned()],
+        Cell::Mean(Some(Estimate { mean, interval, count })) => {
+            let end = |end: Option<f64>| end.map(|end| end.to_string()).unwrap_or_default();
+            let (low, high) = interval.unzip();
+            vec![mean.to_string(), end(low), end(high), count.to_string()]
+        }
+    }
+}
+
+/// A text in which nothing is a command of LaTeX.
+fn latex_text(text: &str) -> String {
+    let mut escaped = String::new();
+    for letter in text.chars() {
+        match letter {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => escaped.extend(['\\', letter]),
+            '~' => escaped.push_str("\\textasciitilde{}"),
+            '^' => escaped.push_str("\\textasciicircum{}"),
+            '\\' => escaped.push_str("\\textbackslash{}"),
+            '±' => escaped.push_str("$\\pm$"),
+            letter => escaped.push(letter),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let mean = |mean, interval| Cell::Mean(Some(Estimate { mean, interval, count: 8 }));
+        Table {
+            head: vec!["map_name".into(), "SoC".into()],
+            rows: vec![
+                vec![Cell::Text("a|b".into()), mean(2.125, Some((1.0, 2.0)))],
+                vec![Cell::Text("c".into()), mean(7.0, Some((7.0, 7.0)))],
+                vec![Cell::Text("d".into()), Cell::Mean(None)],
+            ],
+            digits: 2,
+            skips_zero: true,
+            remark: None,
+        }
+    }
+
+    #[test]
+    fn a_table_says_the_same_in_every_format() {
+        let lines = |format| table().text(format).lines().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(lines(Format::Markdown)[2], "| a\\|b     | 2.12 ± 0.50 |");
+        assert_eq!(lines(Format::Terminal)[4], "│ c        ┆        7.00 │");
+        let expected = ["a|b & $2.12 \\pm 0.50$ \\\\", "c & $7.00$ \\\\", "d & - \\\\"];
+        assert_eq!(lines(Format::Latex)[2..7][0], "map\\_name & SoC \\\\");
+        assert_eq!(lines(Format::Latex)[4..7], expected);
+        let expected = ["map_name,SoC,SoC low,SoC high,SoC n", "a|b,2.125,1,2,8", "c,7,7,7,8", "d,,,,0"];
+        assert_eq!(lines(Format::Csv), expected);
+    }
+
+    #[test]
+    fn numbers_are_rounded_as_python_does() {
+        // f"{179.825:.2f}" and f"{755.975:.2f}", of which the first lies below and the second above what is written.
+        let shown = |mean| table().shown(&Cell::Mean(Some(Estimate { mean, interval: None, count: 1 })));
+        assert_eq!([shown(179.825), shown(755.975), shown(0.125)], ["179.82", "755.98", "0.12"]);
+    }
+}

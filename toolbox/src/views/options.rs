@@ -1,0 +1,176 @@
+//! The options of a view, read with their places.
+
+use pogema_core::Error;
+use pogema_maps::nearest;
+use serde_json::Value;
+
+use crate::suite::{check_keys, wrong};
+use crate::tree::Node;
+
+/// The options of every view.
+///
+/// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
+const COMMON: [&str; 6] =
+    ["type", "drop_keys", "round_digits", "rename_fields", "rename_algorithms", "sort_by"];
+
+/// What columns are called where a view does not say.
+///
+/// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
+const TITLES: [(&str, &str); 5] = [
+    ("algorithm", "Algorithm"),
+    ("num_agents", "Number of Agents"),
+    ("avg_throughput", "Average Throughput"),
+    ("runtime", "Runtime (seconds)"),
+    ("max_episode_steps", "Episode Length"),
+];
+
+/// The fields of one view in its file.
+pub(super) struct Options<'a> {
+    node: &'a Node,
+    view: &'a str,
+}
+
+impl<'a> Options<'a> {
+    /// Takes a view's fields if they are all known.
+    pub fn new(view: &'a str, node: &'a Node, known: &[&str]) -> Result<Self, Error> {
+        check_keys(node, &format!("view `{view}`"), &COMMON, known)?;
+        Ok(Self { node, view })
+    }
+
+    /// A field that is there and not null.
+    fn field(&self, key: &str) -> Option<&'a Node> {
+        self.node.field(key).filter(|node| !node.value().is_null())
+    }
+
+    /// A field's value as `read` understands it.
+    fn read<T>(
+        &self,
+        key: &str,
+        expected: &str,
+        read: impl Fn(&'a Node) -> Option<T>,
+    ) -> Result<Option<T>, Error> {
+        let Some(node) = self.field(key) else { return Ok(None) };
+        read(node).map(Some).ok_or_else(|| self.wrong(node, key, expected))
+    }
+
+    /// An error about a field that should be something else.
+    fn wrong(&self, node: &Node, key: &str, expected: &str) -> Error {
+        let found = node.value().to_string();
+        let found = pogema_core::shorten(&found, Error::LONGEST_QUOTE);
+        wrong(node, &format!("{}.{key}", self.view), &format!("{expected}, found `{found}`"))
+    }
+
+    pub fn text(&self, key: &str) -> Result<Option<String>, Error> {
+        self.read(key, "a text", |node| node.text().map(str::to_owned))
+    }
+
+    /// A text that there has to be.
+    pub fn required(&self, key: &str) -> Result<String, Error> {
+        let missing = || wrong(self.node, self.view, &format!("a field `{key}`"));
+        self.text(key)?.ok_or_else(missing)
+    }
+
+    /// One of some words.
+    pub fn choice(&self, key: &str, words: &[&'static str]) -> Result<Option<&'static str>, Error> {
+        let Some(node) = self.field(key) else { return Ok(None) };
+        let given = node.text().unwrap_or_default();
+        let found = words.iter().copied().find(|&word| word == given);
+        found.map(Some).ok_or_else(|| {
+            let hint = nearest(given, words.iter().copied()).unwrap_or_default();
+            self.wrong(node, key, &format!("one of {} (such as `{hint}`)", words.join(", ")))
+        })
+    }
+
+    pub fn flag(&self, key: &str) -> Result<Option<bool>, Error> {
+        self.read(key, "True or False", |node| node.value().as_bool())
+    }
+
+    /// A number above zero.
+    pub fn size(&self, key: &str) -> Result<Option<f64>, Error> {
+        let above_zero = |node: &Node| node.value().as_f64().filter(|&number| number > 0.0 && number < 1e4);
+        self.read(key, "a number above 0", above_zero)
+    }
+
+    /// A whole number from zero up to a bound.
+    pub fn whole(&self, key: &str, most: u64) -> Result<Option<usize>, Error> {
+        let within = |node: &Node| node.value().as_u64().filter(|&number| number <= most);
+        Ok(self.read(key, &format!("a whole number from 0 to {most}"), within)?.map(|number| number as usize))
+    }
+
+    /// A list of numbers.
+    pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, Error> {
+        self.read(key, "a list of numbers", |node| {
+            node.list()?.iter().map(|node| node.value().as_f64()).collect()
+        })
+    }
+
+    /// A text or a list of texts.
+    pub fn words(&self, key: &str) -> Result<Option<Vec<String>>, Error> {
+        self.read(key, "a text or a list of texts", |node| match node.text() {
+            Some(text) => Some(vec![text.to_owned()]),
+            None => node.list()?.iter().map(|node| node.text().map(str::to_owned)).collect(),
+        })
+    }
+
+    /// Texts by name.
+    pub fn names(&self, key: &str) -> Result<Option<Vec<(String, String)>>, Error> {
+        self.read(key, "names and texts", |node| {
+            let name = |(key, node): &(String, Node)| Some((key.clone(), node.text()?.to_owned()));
+            node.fields()?.iter().map(name).collect()
+        })
+    }
+
+    /// A list of values of any kind, such as `[ci, 95]`.
+    pub fn values(&self, key: &str) -> Result<Option<Vec<Value>>, Error> {
+        self.read(key, "a list", |node| Some(node.list()?.iter().map(Node::value).collect()))
+    }
+
+    /// An error about a field, wherever it is.
+    pub fn refuse(&self, key: &str, expected: &str) -> Error {
+        self.wrong(self.field(key).unwrap_or(self.node), key, expected)
+    }
+}
+
+/// What every view may say.
+#[derive(Clone, Debug)]
+pub(super) struct Common {
+    pub drop_keys: Vec<String>,
+    pub digits: usize,
+    pub sort_by: Vec<String>,
+    titles: Vec<(String, String)>,
+    algorithms: Vec<(String, String)>,
+}
+
+impl Common {
+    pub fn read(options: &Options<'_>) -> Result<Self, Error> {
+        let owned = |(name, title): (&str, &str)| (name.to_owned(), title.to_owned());
+        Ok(Self {
+            drop_keys: options.words("drop_keys")?.unwrap_or_else(|| vec!["seed".to_owned()]),
+            digits: options.whole("round_digits", 17)?.unwrap_or(2),
+            sort_by: options.words("sort_by")?.unwrap_or_default(),
+            titles: options.names("rename_fields")?.unwrap_or_else(|| TITLES.map(owned).to_vec()),
+            algorithms: options.names("rename_algorithms")?.unwrap_or_default(),
+        })
+    }
+
+    /// What a column is called.
+    pub fn title(&self, column: &str) -> String {
+        renamed(&self.titles, column)
+    }
+
+    /// What an algorithm is called.
+    pub fn algorithm(&self, name: &str) -> String {
+        renamed(&self.algorithms, name)
+    }
+
+    /// What stands in a column, for people.
+    pub fn shown(&self, column: &str, value: &Value) -> String {
+        let text = crate::frame::shown(value);
+        if column == crate::results::ALGORITHM { self.algorithm(&text) } else { text }
+    }
+}
+
+fn renamed(names: &[(String, String)], name: &str) -> String {
+    let found = names.iter().find(|(old, _)| old == name);
+    found.map_or(name, |(_, new)| new).to_owned()
+}

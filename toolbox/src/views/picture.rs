@@ -1,0 +1,99 @@
+//! A drawn plot, in one of the formats of pictures.
+
+use std::fmt;
+
+use kuva::backend::{pdf::PdfBackend, png::PngBackend, svg::SvgBackend};
+use kuva::render::render::{Primitive, Scene};
+use pogema_core::Error;
+
+use super::style::{INCH, Style};
+
+/// The format of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Lines and letters, for the web.
+    Svg,
+    /// Lines and letters with their font, for papers.
+    Pdf,
+    /// Dots.
+    Png,
+}
+
+impl Kind {
+    /// What such files end with.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Pdf => "pdf",
+            Self::Png => "png",
+        }
+    }
+}
+
+/// A drawn plot.
+pub struct Picture {
+    /// What is drawn, in points.
+    scene: Scene,
+    /// Dots in an inch, where it is drawn with dots.
+    dots_per_inch: f64,
+    /// The format that its view asks for.
+    pub kind: Kind,
+}
+
+impl Picture {
+    /// A scene as a view's options want it.
+    pub(super) fn new(mut scene: Scene, style: &Style) -> Self {
+        scene.background_color = Some(style.background.clone());
+        Self { scene, dots_per_inch: style.dots_per_inch, kind: style.kind }
+    }
+
+    /// The file's content.
+    ///
+    /// # Errors
+    /// If the library cannot write it, such as a picture of more dots than there is memory.
+    pub fn bytes(&self, kind: Kind) -> Result<Vec<u8>, Error> {
+        let told = |reason: String| Error::State { reason: format!("plot: {reason}") };
+        match kind {
+            Kind::Svg => Ok(SvgBackend::new().render_scene(&self.scene).into_bytes()),
+            Kind::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),
+            Kind::Png => {
+                let scale = (self.dots_per_inch / INCH) as f32;
+                PngBackend::new()
+                    .with_scale(scale)
+                    .render_scene(&with_dashes(&self.scene, scale))
+                    .map_err(told)
+            }
+        }
+    }
+}
+
+/// The scene as the library draws it with dots: there it leaves out the dashes of lines of more than two points, and
+/// does not enlarge those of others.
+fn with_dashes(scene: &Scene, scale: f32) -> Scene {
+    let mut copy = Scene::new(scene.width, scene.height);
+    copy.background_color.clone_from(&scene.background_color);
+    copy.text_color.clone_from(&scene.text_color);
+    copy.font_family.clone_from(&scene.font_family);
+    copy.defs.clone_from(&scene.defs);
+    copy.elements = scene.elements.iter().flat_map(|element| in_pieces(element, scale)).collect();
+    copy
+}
+
+fn in_pieces(element: &Primitive, scale: f32) -> Vec<Primitive> {
+    let Primitive::PolyLine { points, stroke, stroke_width, stroke_dasharray: Some(dashes) } = element else {
+        return vec![element.clone()];
+    };
+    let lengths = dashes.split(' ').filter_map(|length| length.parse::<f32>().ok());
+    let dashes = lengths.map(|length| (length * scale).to_string()).collect::<Vec<_>>().join(" ");
+    let pieces = points.iter().zip(points.iter().skip(1)).map(|(&(x1, y1), &(x2, y2))| {
+        let (stroke, stroke_width, stroke_dasharray) = (stroke.clone(), *stroke_width, Some(dashes.clone()));
+        Primitive::Line { x1, y1, x2, y2, stroke, stroke_width, stroke_dasharray }
+    });
+    pieces.collect()
+}
+
+impl fmt::Debug for Picture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Picture of {} x {} points", self.scene.width, self.scene.height)
+    }
+}

@@ -1,0 +1,341 @@
+//! Plots of means, one or several.
+
+use kuva::render::render::Scene;
+use pogema_core::Error;
+use serde_json::Value;
+
+use super::axes::{Axis, Frame, number};
+use super::legend::Legend;
+use super::options::{Common, Options};
+use super::panel::{framed, insert, place_legend};
+use super::picture::Picture;
+use super::series::{Places, Series, at, means};
+use super::style::Style;
+use super::{Shown, known_column};
+use crate::bootstrap::{RESAMPLES, Spread};
+use crate::frame::{compare, lacking, shown};
+use crate::results::{ALGORITHM, Results, Row};
+use crate::tree::Node;
+
+/// `type: plot` and `type: multi-plot`: the mean of a metric over what was varied, a line for each algorithm.
+///
+/// Around each line is the interval of its means. A `multi-plot` has one panel for each value of the column `over`.
+///
+/// Source: pogema-toolbox 0.1.1, `view_plot.py`, `view_multi_plot.py`
+#[derive(Clone, Debug)]
+pub struct PlotView {
+    common: Common,
+    style: Style,
+    x: String,
+    y: String,
+    by: String,
+    spread: Spread,
+    panels: Option<Panels>,
+}
+
+/// What a plot of several panels says beyond one of one.
+#[derive(Clone, Debug)]
+struct Panels {
+    over: String,
+    columns: usize,
+    share_x: bool,
+    share_y: bool,
+    have_titles: bool,
+}
+
+/// One panel before it is drawn.
+struct Content<'a> {
+    rows: Vec<&'a Row>,
+    title: Option<String>,
+    series: Vec<Series>,
+}
+
+impl PlotView {
+    pub(super) fn read(name: &str, node: &Node, is_multiple: bool) -> Result<Self, Error> {
+        let own = ["over", "num_cols", "share_x", "share_y", "remove_individual_titles"];
+        let options = Options::new(name, node, &Style::keys(if is_multiple { &own } else { &[] }))?;
+        let panels = is_multiple.then(|| Panels::read(&options)).transpose()?;
+        Ok(Self {
+            common: Common::read(&options)?,
+            style: Style::read(&options, if is_multiple { (2.0, 2.0) } else { (2.6, 2.8) })?,
+            x: options.required("x")?,
+            y: options.required("y")?,
+            by: options.text("by")?.unwrap_or_else(|| ALGORITHM.to_owned()),
+            spread: spread(&options)?,
+            panels,
+        })
+    }
+
+    /// Draws it.
+    ///
+    /// # Errors
+    /// If the results have no such columns, or no row has numbers in them.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        let over = self.panels.as_ref().map(|panels| ("over", &panels.over));
+        for (key, column) in [("x", &self.x), ("y", &self.y), ("by", &self.by)].into_iter().chain(over) {
+            known_column(name, key, column, results)?;
+        }
+        let (names, mut notes) = self.lines(results);
+        let places = Places::of(&results.rows, &self.x);
+        let mut contents = self.contents(results);
+        for content in &mut contents {
+            content.series = names
+                .iter()
+                .enumerate()
+                .filter_map(|(number, value)| {
+                    let rows: Vec<&Row> = content
+                        .rows
+                        .iter()
+                        .copied()
+                        .filter(|row| at(row, &self.by).as_ref() == Some(value))
+                        .collect();
+                    let points = means(&rows, &self.x, &places, &self.y, self.spread);
+                    (!points.is_empty()).then_some(Series { number, points })
+                })
+                .collect();
+        }
+        if contents.iter().all(|content| content.series.is_empty()) {
+            let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);
+            return Err(Error::State { reason });
+        }
+        notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
+        let scene = self.draw(&contents, &names, &places);
+        let picture = Picture::new(scene, &self.style);
+        notes.extend(self.remark(name));
+        Ok(Shown { pictures: vec![picture], notes, ..Shown::default() })
+    }
+
+    /// What tells lines apart, in the order of their colours, and a note on what has none.
+    fn lines(&self, results: &Results) -> (Vec<Value>, Vec<String>) {
+        let mut found: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &self.by)).collect();
+        found.sort_by(compare);
+        found.dedup();
+        let Some(order) = &self.style.order else { return (found, Vec::new()) };
+        let is_named = |value: &Value, name: &String| {
+            shown(value) == *name || self.common.shown(&self.by, value) == *name
+        };
+        let ordered =
+            order.iter().filter_map(|name| found.iter().find(|value| is_named(value, name)).cloned());
+        let ordered: Vec<Value> = ordered.collect();
+        let left_out = found.iter().filter(|value| !ordered.contains(value));
+        let notes = left_out.map(|value| format!("`{}` is not in `hue_order` and not drawn", shown(value)));
+        let notes = notes.collect();
+        (ordered, notes)
+    }
+
+    /// The rows of each panel.
+    fn contents<'a>(&self, results: &'a Results) -> Vec<Content<'a>> {
+        let Some(panels) = &self.panels else {
+            let title = self.style.title().map(str::to_owned);
+            return vec![Content { rows: results.rows.iter().collect(), title, series: Vec::new() }];
+        };
+        let mut values: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &panels.over)).collect();
+        values.sort_by(compare);
+        values.dedup();
+        let content = |value: Value| {
+            let rows = results.rows.iter().filter(|row| at(row, &panels.over).as_ref() == Some(&value));
+            let title = panels.have_titles.then(|| self.common.shown(&panels.over, &value));
+            Content { rows: rows.collect(), title, series: Vec::new() }
+        };
+        values.into_iter().map(content).collect()
+    }
+
+    fn frame(&self, content: &Content<'_>, all: &[Content<'_>], places: &Places) -> Frame {
+        let of = |is_shared: bool| if is_shared { all } else { std::slice::from_ref(content) };
+        let points = |contents: &[Content<'_>],
+                      read: &dyn Fn(&(f64, crate::bootstrap::Estimate)) -> Vec<f64>| {
+            let series = contents.iter().flat_map(|content| &content.series);
+            series.flat_map(|series| series.points.iter().flat_map(read)).collect::<Vec<f64>>()
+        };
+        let (share_x, share_y) =
+            self.panels.as_ref().map_or((false, false), |panels| (panels.share_x, panels.share_y));
+        let xs = points(of(share_x), &|(x, _)| vec![*x]);
+        let ys = points(of(share_y), &|(_, found)| {
+            let (low, high) = found.interval.unwrap_or((found.mean, found.mean));
+            vec![found.mean, low, high]
+        });
+        let x_title = self.common.title(&self.x);
+        let x = match places {
+            Places::Names(names) => {
+                let names: Vec<String> = names.iter().map(|name| self.common.shown(&self.x, name)).collect();
+                Axis::of_names(&x_title, &names, 0.0)
+            }
+            Places::Numbers => {
+                let is_log = self.style.log_x && xs.iter().all(|&x| x > 0.0);
+                x_axis(&x_title, &xs, is_log, self.style.ticks.as_deref())
+            }
+        };
+        let is_log = self.style.log_y && ys.iter().all(|&y| y > 0.0);
+        let y = Axis::of_numbers(&self.common.title(&self.y), &ys, is_log, None);
+        let Style { width, height, font_size, .. } = self.style;
+        Frame { width, height, font_size, title: content.title.clone(), x, y }
+    }
+
+    fn draw(&self, contents: &[Content<'_>], names: &[Value], places: &Places) -> Scene {
+        let legend = |columns| {
+            let used = names.iter().enumerate().filter(|(number, _)| {
+                contents.iter().flat_map(|content| &content.series).any(|series| series.number == *number)
+            });
+            let entries = used
+                .map(|(number, name)| Series::entry(number, self.common.shown(&self.by, name), &self.style));
+            let title = self.style.has_legend_title.then(|| self.common.title(&self.by));
+            Legend { title, entries: entries.collect(), columns, font_size: self.style.legend_font_size }
+        };
+        let draw = |content: &Content<'_>| {
+            let frame = self.frame(content, contents, places);
+            let plots = content.series.iter().flat_map(|series| series.plots(&self.style)).collect();
+            (framed(plots, &frame), frame)
+        };
+        if let Some(panels) = &self.panels {
+            let parts = contents.iter().map(|content| draw(content).0).collect();
+            self.grid(parts, panels.columns, legend(self.style.legend_columns))
+        } else {
+            let (scene, frame) = draw(&contents[0]);
+            let line = |series: &Series| series.points.iter().map(|(x, found)| (*x, found.mean)).collect();
+            let lines: Vec<Vec<(f64, f64)>> = contents[0].series.iter().map(line).collect();
+            place_legend(scene, &frame, legend(1), self.style.legend_place, &lines)
+        }
+    }
+
+    /// Panels side by side, and the legend below them, or above if it was asked for there.
+    fn grid(&self, parts: Vec<Scene>, columns: usize, mut legend: Legend) -> Scene {
+        let columns = columns.min(parts.len()).max(1);
+        let total = self.style.width * columns as f64;
+        while legend.columns > 1 && legend.size().0 > total {
+            legend.columns -= 1;
+        }
+        let (width, height) = legend.size();
+        let is_above = self.style.legend_place.is_some_and(|place| place.starts_with("upper"));
+        let heading = self.style.title().map_or(0.0, |_| f64::from(self.style.font_size) * 2.0);
+        let first = heading + if is_above { height } else { 0.0 };
+        let panels = self.style.height * parts.len().div_ceil(columns) as f64;
+        let total = total.max(width);
+        let mut scene = Scene::new(total, heading + panels + height + 4.0);
+        for (number, part) in parts.into_iter().enumerate() {
+            let (row, column) = (number / columns, number % columns);
+            insert(
+                &mut scene,
+                part,
+                (column as f64 * self.style.width, first + row as f64 * self.style.height),
+            );
+        }
+        if let Some(title) = self.style.title() {
+            let (x, y, size) = (total / 2.0, heading * 0.7, self.style.font_size + 1);
+            scene.add(super::axes::text(title, (x, y), size));
+        }
+        let top = if is_above { heading } else { first + panels };
+        legend.draw(&mut scene, ((total - width) / 2.0, top), false);
+        scene
+    }
+
+    fn remark(&self, name: &str) -> Option<String> {
+        match self.spread {
+            Spread::Bootstrap { level } => Some(format!(
+                "view `{name}`: bands are {level} % intervals of the means of {RESAMPLES} samples with replacement"
+            )),
+            _ => None,
+        }
+    }
+}
+
+impl Panels {
+    fn read(options: &Options<'_>) -> Result<Self, Error> {
+        Ok(Self {
+            over: options.required("over")?,
+            columns: options.whole("num_cols", 100)?.unwrap_or(3).max(1),
+            share_x: options.flag("share_x")?.unwrap_or(false),
+            share_y: options.flag("share_y")?.unwrap_or(false),
+            have_titles: !options.flag("remove_individual_titles")?.unwrap_or(true),
+        })
+    }
+}
+
+/// Marked where the data is, unless that is in too many places, or the view says where.
+fn x_axis(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Axis {
+    let mut distinct = values.to_vec();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    let ticks = ticks.map(|ticks| ticks.iter().copied().filter(|&tick| !is_log || tick > 0.0).collect());
+    let ticks: Option<Vec<f64>> = ticks.or_else(|| (distinct.len() <= 16).then_some(distinct));
+    let mut axis = Axis::of_numbers(title, values, is_log, ticks.as_deref());
+    for (tick, text) in &mut axis.ticks {
+        *text = number(*tick);
+    }
+    axis
+}
+
+/// What `error_bar` asks for, such as `[ci, 95]`.
+fn spread(options: &Options<'_>) -> Result<Spread, Error> {
+    let Some(values) = options.values("error_bar")? else { return Ok(Spread::Bootstrap { level: 95.0 }) };
+    let level = values.get(1).and_then(Value::as_f64).filter(|&level| level > 0.0);
+    match (values.first().and_then(Value::as_str), level) {
+        (Some("ci"), Some(level)) if level <= 100.0 => Ok(Spread::Bootstrap { level }),
+        (Some("sd"), Some(factor)) => Ok(Spread::Deviation { factor }),
+        _ => Err(options.refuse("error_bar", "`[ci, 95]` or `[sd, 1]`")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::views::{Kind, View};
+
+    fn results() -> Results {
+        let row = |number: u64, algorithm: &str, soc: Value| {
+            let (metrics, settings) = (json(&[("SoC", soc)]), json(&[("num_agents", (number % 3).into())]));
+            Row { metrics, settings, algorithm: algorithm.into(), set: String::new() }
+        };
+        let rows =
+            (0..12).flat_map(|number| [row(number, "A", number.into()), row(number, "B & <C>", Value::Null)]);
+        Results { rows: rows.collect(), notes: Vec::new() }
+    }
+
+    fn json(pairs: &[(&str, Value)]) -> crate::Pairs {
+        crate::Pairs(pairs.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect())
+    }
+
+    fn show(fields: &str) -> Result<Shown, String> {
+        let view = View::read("Plot1", &Node::parse(fields).unwrap());
+        view.and_then(|view| view.show("Plot1", &results(), None)).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn every_format_is_written_and_every_lack_told() {
+        let shown = show("{type: plot, x: num_agents, y: SoC, name: One, extension: svg}").unwrap();
+        let picture = &shown.pictures[0];
+        assert_eq!(picture.kind, Kind::Svg);
+        let svg = String::from_utf8(picture.bytes(Kind::Svg).unwrap()).unwrap();
+        for text in [">One<", ">Number of Agents<", ">SoC<", ">A<"] {
+            assert!(svg.contains(text), "{text}: {svg}");
+        }
+        // What has no numbers has no line.
+        assert!(!svg.contains("B &"), "{svg}");
+        assert!(picture.bytes(Kind::Pdf).unwrap().starts_with(b"%PDF"));
+        assert!(picture.bytes(Kind::Png).unwrap().starts_with(b"\x89PNG"));
+        assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; means are over the others");
+    }
+
+    #[test]
+    fn there_are_as_many_panels_as_values() {
+        let shown = show("{type: multi-plot, x: num_agents, y: SoC, over: num_agents, num_cols: 2}").unwrap();
+        let svg = String::from_utf8(shown.pictures[0].bytes(Kind::Svg).unwrap()).unwrap();
+        assert_eq!(svg.matches(">SoC<").count(), 3);
+    }
+
+    #[test]
+    fn without_data_there_is_a_message_and_no_picture() {
+        let told = |fields: &str| show(fields).unwrap_err();
+        assert!(told("{type: plot, x: num_agent, y: SoC}").contains("the nearest column is `num_agents`"));
+        assert!(told("{type: plot, y: SoC}").contains("expected a field `x`"));
+        assert!(
+            told("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
+                .contains("no row has numbers")
+        );
+        assert!(
+            told("{type: plot, x: num_agents, y: SoC, width: -1}")
+                .contains("expected a number above 0, found `-1`")
+        );
+        assert!(told("{type: plot, x: num_agents, y: SoC, palette: [\"#12\"]}").contains("expected colours"));
+        assert!(told("{type: plot, x: num_agents, y: SoC, over: seed}").contains("unknown key `over`"));
+    }
+}

@@ -1,0 +1,80 @@
+//! Whether all algorithms have played the same instances.
+
+use std::collections::BTreeMap;
+
+use pogema_core::Error;
+
+use super::Shown;
+use super::grid::{Cell, Table};
+use super::options::{Common, Options};
+use crate::frame::group_by;
+use crate::results::{ALGORITHM, Results};
+use crate::tree::Node;
+
+/// The column of the folder, where there is more than one.
+const FOLDER: &str = "Folder";
+
+/// `type: seeds`: a table of the instances that an algorithm has not or more than once; no table if there are none.
+///
+/// An instance is all that was varied; pogema-toolbox looks at map, number of agents and seed alone.
+///
+/// Source: pogema-toolbox 0.1.1, `view_utils.py`, `check_seeds`
+#[derive(Clone, Debug)]
+pub struct SeedsView {
+    common: Common,
+}
+
+impl SeedsView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        Ok(Self { common: Common::read(&Options::new(name, node, &[])?)? })
+    }
+
+    /// Checks each folder by itself.
+    #[allow(clippy::unnecessary_wraps, reason = "as every view's")]
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        let keys: Vec<String> = results.key_columns().into_iter().filter(|key| key != ALGORITHM).collect();
+        let algorithms = results.algorithms();
+        let mut sets: BTreeMap<&str, Vec<_>> = BTreeMap::new();
+        for row in &results.rows {
+            sets.entry(&row.set).or_default().push(row);
+        }
+        let has_folders = sets.len() > 1;
+        let (mut rows, mut problems, mut instances) = (Vec::new(), 0, 0);
+        for (set, of_set) in sets {
+            for group in group_by(of_set, &keys) {
+                instances += 1;
+                let counts: Vec<usize> = algorithms
+                    .iter()
+                    .map(|algorithm| group.rows.iter().filter(|row| row.algorithm == *algorithm).count())
+                    .collect();
+                let wrong = counts.iter().filter(|&&count| count != 1).count();
+                if wrong == 0 {
+                    continue;
+                }
+                problems += wrong;
+                let folder = has_folders.then(|| set.to_owned());
+                let places = keys.iter().zip(&group.keys).map(|(key, value)| self.common.shown(key, value));
+                let told = counts.into_iter().map(told);
+                rows.push(folder.into_iter().chain(places).chain(told).map(Cell::Text).collect());
+            }
+        }
+        if rows.is_empty() {
+            let note = format!("view `{name}`: every algorithm has each of {instances} instances once");
+            return Ok(Shown { notes: vec![note], ..Shown::default() });
+        }
+        let folder = has_folders.then(|| FOLDER.to_owned());
+        let keys = keys.iter().map(|key| self.common.title(key));
+        let names = algorithms.iter().map(|name| self.common.algorithm(name));
+        let head = folder.into_iter().chain(keys).chain(names).collect();
+        let remark = Some(format!("{problems} results are missing or double, of {instances} instances"));
+        Ok(Shown { tables: vec![Table { head, rows, remark, ..Table::default() }], ..Shown::default() })
+    }
+}
+
+fn told(count: usize) -> String {
+    match count {
+        0 => "missing".to_owned(),
+        1 => "ok".to_owned(),
+        count => format!("x{count}"),
+    }
+}

@@ -1,0 +1,150 @@
+//! Lines of means: one for each algorithm, or for whatever else tells rows apart.
+
+use kuva::plot::band::BandPlot;
+use kuva::plot::line::{LinePlot, LineStyle};
+use kuva::plot::scatter::{MarkerShape, ScatterPlot};
+use kuva::render::plots::Plot;
+use serde_json::Value;
+
+use super::legend::Entry;
+use super::style::Style;
+use crate::bootstrap::{Estimate, Spread};
+use crate::frame::{compare, group_by, values};
+use crate::results::Row;
+
+/// Dashes of lines: a solid one first.
+const DASHES: [&str; 6] = ["", "5 2", "1.5 1.5", "5 2 1.5 2", "8 2 2 2", "3 1"];
+
+/// Markers, as different from each other as they can be when small.
+const MARKERS: [MarkerShape; 8] = [
+    MarkerShape::Circle,
+    MarkerShape::Square,
+    MarkerShape::Triangle,
+    MarkerShape::Diamond,
+    MarkerShape::TriangleDown,
+    MarkerShape::Pentagon,
+    MarkerShape::Cross,
+    MarkerShape::Plus,
+];
+
+/// One line.
+#[derive(Clone, Debug)]
+pub(super) struct Series {
+    /// Its number among all lines of the figure, by which it has its colour.
+    pub number: usize,
+    /// Where it goes: along the axis, and the mean there.
+    pub points: Vec<(f64, Estimate)>,
+}
+
+/// What stands along the horizontal axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Places {
+    /// Numbers, where they are.
+    Numbers,
+    /// Anything else, side by side.
+    Names(Vec<Value>),
+}
+
+impl Places {
+    /// Finds out whether all rows have numbers there.
+    pub fn of<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Self {
+        let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
+        if found.iter().all(Value::is_number) {
+            return Self::Numbers;
+        }
+        found.sort_by(compare);
+        found.dedup();
+        Self::Names(found)
+    }
+
+    fn place(&self, value: &Value) -> Option<f64> {
+        match self {
+            Self::Numbers => value.as_f64(),
+            Self::Names(names) => names.iter().position(|name| name == value).map(|place| place as f64),
+        }
+    }
+}
+
+/// What a row has in a column, be it a metric or not.
+pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
+    let value = row.key(column).or_else(|| row.metrics.get(column).cloned())?;
+    (!value.is_null() && !value.is_array()).then_some(value)
+}
+
+/// The means of a metric at each place, and how sure they are.
+pub(super) fn means(
+    rows: &[&Row],
+    x: &str,
+    places: &Places,
+    y: &str,
+    spread: Spread,
+) -> Vec<(f64, Estimate)> {
+    let groups = group_by(rows.iter().copied(), &[x.to_owned()]);
+    // A column that is a metric is no key: its rows are all in one group.
+    let is_metric = rows.iter().all(|row| row.key(x).is_none());
+    let mut points: Vec<(f64, Vec<&Row>)> = Vec::new();
+    if is_metric {
+        for row in rows {
+            let Some(place) = at(row, x).and_then(|value| places.place(&value)) else { continue };
+            match points.iter_mut().find(|(known, _)| *known == place) {
+                Some((_, rows)) => rows.push(row),
+                None => points.push((place, vec![row])),
+            }
+        }
+    } else {
+        for group in groups {
+            points.extend(places.place(&group.keys[0]).map(|place| (place, group.rows)));
+        }
+    }
+    points.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+    let estimates = points.into_iter().enumerate().filter_map(|(number, (place, rows))| {
+        Some((place, Estimate::of(&values(&rows, y), spread, number as u64)?))
+    });
+    estimates.collect()
+}
+
+impl Series {
+    /// What the library draws for it.
+    pub fn plots(&self, style: &Style) -> Vec<Plot> {
+        let (colour, marker, dashes) = signs(self.number, style);
+        let ends = self.points.iter().map(|(_, found)| found.interval.unwrap_or((found.mean, found.mean)));
+        let (low, high): (Vec<f64>, Vec<f64>) = ends.unzip();
+        let x: Vec<f64> = self.points.iter().map(|(x, _)| *x).collect();
+        let points: Vec<(f64, f64)> = self.points.iter().map(|(x, found)| (*x, found.mean)).collect();
+        let has_band = low.iter().zip(&high).any(|(low, high)| low < high);
+        let line = LinePlot::new()
+            .with_data(points.clone())
+            .with_color(colour)
+            .with_stroke_width(style.line_width)
+            .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
+        let mut plots = Vec::new();
+        if has_band {
+            plots.push(Plot::Band(BandPlot::new(x, low, high).with_color(colour).with_opacity(0.15)));
+        }
+        plots.push(Plot::Line(line));
+        // A single point makes no line.
+        if style.has_markers || points.len() == 1 {
+            let dots = ScatterPlot::new().with_data(points).with_color(colour);
+            plots.push(Plot::Scatter(dots.with_size(style.line_width * 1.6).with_marker(marker)));
+        }
+        plots
+    }
+
+    /// The legend's line for the series of a number.
+    pub fn entry(number: usize, label: String, style: &Style) -> Entry {
+        let point = |x| (x, Estimate { mean: 0.5, interval: None, count: 1 });
+        let mut sign = Self { number, points: vec![point(0.0), point(1.0)] }
+            .plots(&Style { has_markers: false, ..style.clone() });
+        if style.has_markers {
+            sign.extend(Self { number, points: vec![point(0.5)] }.plots(style));
+        }
+        Entry { label, sign }
+    }
+}
+
+/// The colour, the marker and the dashes of the line of a number.
+pub(super) fn signs(number: usize, style: &Style) -> (&str, MarkerShape, Option<String>) {
+    let dashes = DASHES[number % DASHES.len()];
+    let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());
+    (style.colour(number), MARKERS[number % MARKERS.len()], dashes)
+}

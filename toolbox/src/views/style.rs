@@ -1,0 +1,181 @@
+//! How plots look.
+
+use pogema_core::Error;
+use serde_json::Value;
+
+use super::options::Options;
+use super::picture::Kind;
+
+/// Points in an inch; pictures are measured in points.
+pub(super) const INCH: f64 = 72.0;
+
+/// Colours that most people can tell apart, whatever they see of red and green.
+///
+/// Source: Okabe and Ito (2008), "Color Universal Design"; yellow, which is faint on white, is last
+const COLOURS: [&str; 8] =
+    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"];
+
+/// The options of every plot.
+///
+/// Source: pogema-toolbox 0.1.1, `view_plot.py`, `PlotView`
+const KEYS: [&str; 27] = [
+    "name",
+    "width",
+    "height",
+    "remove_title",
+    "line_width",
+    "error_bar",
+    "plt_style",
+    "figure_dpi",
+    "font_size",
+    "legend_font_size",
+    "legend_loc",
+    "legend_columns",
+    "legend_bbox_to_anchor",
+    "figure_face_color",
+    "use_log_scale_x",
+    "use_log_scale_y",
+    "markers",
+    "line_types",
+    "extension",
+    "palette",
+    "hue_order",
+    "tight_layout",
+    "ticks",
+    "remove_legend_title",
+    "x",
+    "y",
+    "by",
+];
+
+/// Where a legend may be.
+///
+/// Source: Matplotlib, `legend`, parameter `loc`
+const PLACES: [&str; 11] = [
+    "best",
+    "upper right",
+    "upper left",
+    "lower left",
+    "lower right",
+    "right",
+    "center left",
+    "center right",
+    "lower center",
+    "upper center",
+    "center",
+];
+
+/// How one plot looks; sizes are in points.
+#[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "options of a file that have nothing to do with each other")]
+pub(super) struct Style {
+    pub name: Option<String>,
+    pub has_title: bool,
+    pub width: f64,
+    pub height: f64,
+    pub line_width: f64,
+    pub font_size: u32,
+    pub legend_font_size: u32,
+    pub legend_place: Option<&'static str>,
+    pub legend_columns: usize,
+    pub has_legend_title: bool,
+    pub background: String,
+    pub log_x: bool,
+    pub log_y: bool,
+    pub has_markers: bool,
+    pub has_line_types: bool,
+    pub ticks: Option<Vec<f64>>,
+    pub order: Option<Vec<String>>,
+    pub kind: Kind,
+    pub dots_per_inch: f64,
+    pub palette: Vec<String>,
+}
+
+impl Style {
+    /// All keys that a plot may have, with some more of its own.
+    pub fn keys(more: &[&'static str]) -> Vec<&'static str> {
+        KEYS.iter().chain(more).copied().collect()
+    }
+
+    /// Reads the options of a plot whose size in inches is given if the view does not say.
+    pub fn read(options: &Options<'_>, (width, height): (f64, f64)) -> Result<Self, Error> {
+        // Of Matplotlib, or settled here once and for all.
+        options.text("plt_style")?;
+        options.flag("tight_layout")?;
+        options.numbers("legend_bbox_to_anchor")?;
+        let size = |key, default| Ok::<f64, Error>(options.size(key)?.unwrap_or(default));
+        let flag = |key, default| Ok::<bool, Error>(options.flag(key)?.unwrap_or(default));
+        Ok(Self {
+            name: options.text("name")?,
+            has_title: !flag("remove_title", false)?,
+            width: size("width", width)?.clamp(0.5, 100.0) * INCH,
+            height: size("height", height)?.clamp(0.5, 100.0) * INCH,
+            line_width: size("line_width", 2.0)? * 0.75,
+            font_size: size("font_size", 8.0)?.round().clamp(1.0, 100.0) as u32,
+            legend_font_size: size("legend_font_size", 7.0)?.round().clamp(1.0, 100.0) as u32,
+            legend_place: options.choice("legend_loc", &PLACES)?,
+            legend_columns: options.whole("legend_columns", 100)?.unwrap_or(5).max(1),
+            has_legend_title: !flag("remove_legend_title", true)?,
+            background: colour_option(options, "figure_face_color")?.unwrap_or_else(|| "#FFFFFF".to_owned()),
+            log_x: flag("use_log_scale_x", false)?,
+            log_y: flag("use_log_scale_y", false)?,
+            has_markers: flag("markers", true)?,
+            has_line_types: flag("line_types", true)?,
+            ticks: options.numbers("ticks")?.filter(|ticks| !ticks.is_empty()),
+            order: options.words("hue_order")?,
+            kind: kind(options)?,
+            dots_per_inch: size("figure_dpi", 300.0)?.clamp(10.0, 2400.0),
+            palette: palette(options)?,
+        })
+    }
+
+    /// The colour of the line of a number.
+    pub fn colour(&self, number: usize) -> &str {
+        &self.palette[number % self.palette.len()]
+    }
+
+    /// The title, if there is one to show.
+    pub fn title(&self) -> Option<&str> {
+        self.name.as_deref().filter(|_| self.has_title)
+    }
+}
+
+fn kind(options: &Options<'_>) -> Result<Kind, Error> {
+    Ok(match options.choice("extension", &["pdf", "svg", "png"])? {
+        Some("svg") => Kind::Svg,
+        Some("png") => Kind::Png,
+        _ => Kind::Pdf,
+    })
+}
+
+fn palette(options: &Options<'_>) -> Result<Vec<String>, Error> {
+    let Some(values) = options.values("palette")?.filter(|values| !values.is_empty()) else {
+        return Ok(COLOURS.map(str::to_owned).to_vec());
+    };
+    let colours: Option<Vec<String>> = values.iter().map(colour).collect();
+    colours.ok_or_else(|| options.refuse("palette", "colours such as `#0072B2` or [0.0, 0.45, 0.7]"))
+}
+
+fn colour_option(options: &Options<'_>, key: &str) -> Result<Option<String>, Error> {
+    let Some(text) = options.text(key)? else { return Ok(None) };
+    colour(&text.into()).map(Some).ok_or_else(|| options.refuse(key, "a colour such as `#0072B2`"))
+}
+
+/// A colour given as `#rrggbb`, by a name, or as three shares.
+fn colour(value: &Value) -> Option<String> {
+    match value {
+        Value::String(text) => {
+            let hex = text.strip_prefix('#').filter(|hex| hex.len() == 6);
+            let is_hex = hex.is_some_and(|hex| hex.bytes().all(|byte| byte.is_ascii_hexdigit()));
+            let is_name = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_lowercase());
+            (is_hex || is_name).then(|| text.clone())
+        }
+        Value::Array(shares) if shares.len() == 3 => {
+            let shares: Option<Vec<f64>> = shares.iter().map(Value::as_f64).collect();
+            let byte = |share: f64| (share.clamp(0.0, 1.0) * 255.0).round() as u8;
+            let bytes: Vec<u8> = shares?.into_iter().map(byte).collect();
+            Some(format!("#{:02X}{:02X}{:02X}", bytes[0], bytes[1], bytes[2]))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,228 @@
+//! Tables of means.
+
+use pogema_core::Error;
+
+use super::grid::{Cell, Format, Table};
+use super::options::{Common, Options};
+use super::{Shown, named};
+use crate::bootstrap::{Estimate, RESAMPLES, Spread};
+use crate::frame::{Group, compare, group_by, lacking, values};
+use crate::results::Results;
+use crate::tree::Node;
+
+/// Names of pogema-toolbox's table formats, in each of our formats.
+///
+/// Source: tabulate 0.9, `tabulate_formats`
+const FORMATS: [(Format, &[&str]); 4] = [
+    (
+        Format::Terminal,
+        &[
+            "psql",
+            "plain",
+            "simple",
+            "grid",
+            "simple_grid",
+            "rounded_grid",
+            "heavy_grid",
+            "mixed_grid",
+            "double_grid",
+            "fancy_grid",
+            "outline",
+            "simple_outline",
+            "rounded_outline",
+            "heavy_outline",
+            "mixed_outline",
+            "double_outline",
+            "fancy_outline",
+            "presto",
+            "pretty",
+            "orgtbl",
+            "rst",
+            "terminal",
+        ],
+    ),
+    (Format::Markdown, &["github", "pipe", "markdown"]),
+    (Format::Latex, &["latex", "latex_raw", "latex_booktabs", "latex_longtable"]),
+    (Format::Csv, &["csv", "tsv"]),
+];
+
+/// `type: tabular`: the mean of each metric in each group of rows.
+///
+/// Rows are alike that have the same in all columns but metrics and `drop_keys`. Metrics stand in the order in which
+/// they first appear in any row; pogema-toolbox takes those of the first row alone, and groups by the others.
+///
+/// Source: pogema-toolbox 0.1.1, `view_tabular.py`
+#[derive(Clone, Debug)]
+pub struct TableView {
+    common: Common,
+    spread: Spread,
+    skips_zero: bool,
+    /// The format that the view asks for.
+    pub(super) format: Format,
+}
+
+impl TableView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let known =
+            ["print_results", "table_format", "show_std", "skip_zero_std", "error_method", "error_level"];
+        let options = Options::new(name, node, &known)?;
+        // Whoever runs views wants to see them.
+        options.flag("print_results")?;
+        let words: Vec<&'static str> = FORMATS.iter().flat_map(|(_, words)| *words).copied().collect();
+        let word = options.choice("table_format", &words)?.unwrap_or("psql");
+        let format = FORMATS.iter().find(|(_, words)| words.contains(&word));
+        let method = options.choice("error_method", &["ci", "sd"])?.unwrap_or("ci");
+        let level = options.size("error_level")?;
+        let spread = match method {
+            _ if options.flag("show_std")? == Some(false) => Spread::Unknown,
+            "sd" => Spread::Deviation { factor: level.unwrap_or(1.96) },
+            _ => Spread::Bootstrap { level: level.unwrap_or(95.0) },
+        };
+        if matches!(spread, Spread::Bootstrap { level } if level > 100.0) {
+            return Err(options.refuse("error_level", "a percentage of at most 100"));
+        }
+        Ok(Self {
+            common: Common::read(&options)?,
+            spread,
+            skips_zero: options.flag("skip_zero_std")?.unwrap_or(false),
+            format: format.map_or(Format::Terminal, |(format, _)| *format),
+        })
+    }
+
+    /// Makes the table.
+    ///
+    /// # Errors
+    /// If `sort_by` names no column of it.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        let kept = |columns: Vec<String>| -> Vec<String> {
+            columns.into_iter().filter(|column| !self.common.drop_keys.contains(column)).collect()
+        };
+        let (keys, metrics) = (kept(results.key_columns()), kept(results.metric_columns()));
+        let keys: Vec<String> = keys.into_iter().filter(|key| !metrics.contains(key)).collect();
+        let mut lines: Vec<Line<'_>> = Vec::new();
+        for (number, group) in group_by(&results.rows, &keys).into_iter().enumerate() {
+            let estimates = metrics.iter().enumerate().map(|(column, metric)| {
+                let number = (number * metrics.len() + column) as u64;
+                Estimate::of(&values(&group.rows, metric), self.spread, number)
+            });
+            let estimates = estimates.collect();
+            lines.push(Line { group, estimates });
+        }
+        self.sort(name, &mut lines, &keys, &metrics)?;
+        let table = self.table(&lines, &keys, &metrics);
+        let notes = lacking(&results.rows, &metrics);
+        Ok(Shown { tables: vec![table], notes, ..Shown::default() })
+    }
+
+    fn table(&self, lines: &[Line<'_>], keys: &[String], metrics: &[String]) -> Table {
+        let row = |line: &Line<'_>| {
+            let texts = keys.iter().zip(&line.group.keys);
+            let texts = texts.map(|(column, value)| Cell::Text(self.common.shown(column, value)));
+            texts.chain(line.estimates.iter().map(|estimate| Cell::Mean(*estimate))).collect()
+        };
+        Table {
+            head: keys.iter().chain(metrics).map(|column| self.common.title(column)).collect(),
+            rows: lines.iter().map(row).collect(),
+            digits: self.common.digits,
+            skips_zero: self.skips_zero,
+            remark: self.remark(lines),
+        }
+    }
+
+    fn remark(&self, lines: &[Line<'_>]) -> Option<String> {
+        let mut estimates = lines.iter().flat_map(|line| &line.estimates).flatten();
+        estimates.find(|estimate| estimate.interval.is_some())?;
+        match self.spread {
+            Spread::Bootstrap { level } => Some(format!(
+                "mean ± half of the {level} % interval of the means of {RESAMPLES} samples with replacement"
+            )),
+            Spread::Deviation { factor } => Some(format!("mean ± {factor} times the standard deviation")),
+            Spread::Unknown => None,
+        }
+    }
+
+    /// Sorts by the columns of `sort_by`, the last of them first.
+    fn sort(
+        &self,
+        name: &str,
+        lines: &mut [Line<'_>],
+        keys: &[String],
+        metrics: &[String],
+    ) -> Result<(), Error> {
+        for column in self.common.sort_by.iter().rev() {
+            let place = |columns: &[String]| columns.iter().position(|known| known == column);
+            match (place(keys), place(metrics)) {
+                (Some(at), _) => {
+                    lines.sort_by(|one, other| compare(&one.group.keys[at], &other.group.keys[at]));
+                }
+                (_, Some(at)) => {
+                    let mean = |line: &Line<'_>| line.estimates[at].map_or(f64::INFINITY, |found| found.mean);
+                    lines.sort_by(|one, other| mean(one).total_cmp(&mean(other)));
+                }
+                _ => {
+                    let known = keys.iter().chain(metrics).map(String::as_str);
+                    return Err(named(name, "sort_by", column, known));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A row of the table before it is text.
+struct Line<'a> {
+    group: Group<'a>,
+    estimates: Vec<Option<Estimate>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::views::View;
+
+    const ROWS: &str = r#"[
+        {"metrics": {"CSR": 1.0, "steps": [1]}, "env_grid_search": {"num_agents": 16, "seed": 0}, "algorithm": "B"},
+        {"metrics": {"CSR": 0.0, "SoC": 9}, "env_grid_search": {"num_agents": 16, "seed": 1}, "algorithm": "B"},
+        {"metrics": {"CSR": 1.0, "SoC": 7}, "env_grid_search": {"num_agents": 8, "seed": 0}, "algorithm": "A"}
+    ]"#;
+
+    fn shown(fields: &str) -> Result<Shown, String> {
+        let results = Results { rows: serde_json::from_str(ROWS).unwrap(), notes: Vec::new() };
+        let view = View::read("Table1", &Node::parse(fields).unwrap());
+        view.and_then(|view| view.show("Table1", &results, None)).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn groups_are_rows_and_metrics_of_any_row_are_columns() {
+        let shown = shown("{type: tabular, show_std: False, sort_by: algorithm}").unwrap();
+        assert_eq!(
+            shown.tables[0].text(Format::Csv).lines().collect::<Vec<_>>(),
+            [
+                "Number of Agents,Algorithm,CSR,CSR low,CSR high,CSR n,SoC,SoC low,SoC high,SoC n",
+                "8,A,1,,,1,7,,,1",
+                "16,B,0.5,,,2,9,,,1",
+            ]
+        );
+        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; means are over the others"]);
+    }
+
+    #[test]
+    fn the_interval_is_told_and_named() {
+        let fields = "{type: tabular, drop_keys: [seed, SoC], rename_algorithms: {B: Best}, round_digits: 1}";
+        let text = shown(fields).unwrap().tables[0].text(Format::Markdown);
+        assert!(text.contains("| 16               | Best      | 0.5 ± 0.5 |"), "{text}");
+        assert!(text.ends_with("95 % interval of the means of 1000 samples with replacement"), "{text}");
+    }
+
+    #[test]
+    fn wrong_options_are_told_with_their_lines() {
+        let told = |fields: &str| shown(&format!("type: tabular\n{fields}")).unwrap_err();
+        let unknown = "config: line 2: unknown key `round_digit` in view `Table1`";
+        assert!(told("round_digit: 3").starts_with(unknown), "{}", told("round_digit: 3"));
+        assert!(told("round_digits: x").contains("line 2: `Table1.round_digits`, expected a whole number"));
+        assert!(told("table_format: latx").contains("such as `latex`"));
+        assert!(told("show_std: 3").contains("expected True or False, found `3`"));
+        assert!(told("sort_by: SOC").contains("the nearest column is `SoC`"));
+        assert!(shown("type: tablar").unwrap_err().contains("such as `tabular`"));
+    }
+}

@@ -1,0 +1,53 @@
+//! The published results, unpacked once.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use pogema_toolbox::Results;
+
+/// The folder that was named, and where its archive has been unpacked.
+pub struct Published {
+    pub folder: PathBuf,
+    unpacked: tempfile::TempDir,
+}
+
+static PUBLISHED: LazyLock<Option<Published>> = LazyLock::new(|| {
+    let folder = PathBuf::from(std::env::var_os("POGEMA_PUBLISHED").filter(|folder| !folder.is_empty())?);
+    let unpacked = tempfile::tempdir().unwrap();
+    let archive = File::open(folder.join("results-mapf.tar.gz")).unwrap();
+    tar::Archive::new(flate2::read::GzDecoder::new(archive)).unpack(unpacked.path()).unwrap();
+    Some(Published { folder, unpacked })
+});
+
+/// The published results, or a loud word on what is not checked without them.
+pub fn published(what: &str) -> Option<&'static Published> {
+    if PUBLISHED.is_none() {
+        eprintln!("SKIPPED: {what}: POGEMA_PUBLISHED does not name the folder of the published results");
+    }
+    PUBLISHED.as_ref()
+}
+
+impl Published {
+    pub fn set(&self, name: &str) -> PathBuf {
+        self.unpacked.path().join("results-mapf").join(name)
+    }
+
+    pub fn read(&self, sets: &[&str]) -> Results {
+        Results::read(&sets.iter().map(|set| self.set(set)).collect::<Vec<_>>()).unwrap()
+    }
+
+    pub fn csv(&self, name: &str) -> Vec<csv::StringRecord> {
+        csv_rows(&self.folder.join(name))
+    }
+}
+
+fn csv_rows(path: &Path) -> Vec<csv::StringRecord> {
+    csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_path(path)
+        .unwrap()
+        .records()
+        .collect::<Result<_, _>>()
+        .unwrap()
+}

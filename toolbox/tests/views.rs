@@ -1,0 +1,118 @@
+//! Views of small made-up results: boxes, cactuses, comparisons, checks of seeds and the six metrics.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_toolbox::six::Definition;
+use pogema_toolbox::views::{Format, Kind, Shown, View};
+use pogema_toolbox::{Node, Results, Row};
+
+/// A row of a folder: who solved which seed at what cost, in half as many seconds; nothing costs what was not solved.
+fn row(set: &str, algorithm: &str, seed: u64, cost: Option<u64>) -> Row {
+    let (csr, soc) = (u8::from(cost.is_some()), cost.unwrap_or(999));
+    let text = format!(
+        r#"{{"metrics": {{"CSR": {csr}, "SoC": {soc}, "makespan": {soc}, "runtime": {}}},
+            "env_grid_search": {{"num_agents": {}, "seed": {seed}}}, "algorithm": "{algorithm}"}}"#,
+        soc as f64 / 2.0,
+        2 + 2 * (seed % 2),
+    );
+    Row { set: set.to_owned(), ..serde_json::from_str(&text).unwrap() }
+}
+
+fn results() -> Results {
+    let costs = [(Some(4), Some(4)), (Some(5), Some(9)), (Some(7), None), (None, Some(8)), (None, None)];
+    let sets = ["01-random", "02-mazes", "03-warehouse", "04-movingai", "05-puzzles", "06-pathfinding"];
+    let rows = sets.iter().flat_map(|set| {
+        costs.iter().zip(0..).flat_map(move |((one, other), seed)| {
+            [row(set, "One", seed, *one), row(set, "Other", seed, *other)]
+        })
+    });
+    Results { rows: rows.collect(), notes: Vec::new() }
+}
+
+fn show_of(results: &Results, fields: &str) -> Result<Shown, String> {
+    let view = View::read("View1", &Node::parse(fields).unwrap());
+    view.and_then(|view| view.show("View1", results, None)).map_err(|error| error.to_string())
+}
+
+fn show(fields: &str) -> Result<Shown, String> {
+    show_of(&results(), fields)
+}
+
+fn svg(shown: &Shown) -> String {
+    String::from_utf8(shown.pictures[0].bytes(Kind::Svg).unwrap()).unwrap()
+}
+
+fn csv(shown: &Shown) -> Vec<String> {
+    shown.tables[0].text(Format::Csv).lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn a_comparison_counts_each_instance_once() {
+    let shown = show("{type: compare}").unwrap();
+    assert_eq!(
+        csv(&shown),
+        [
+            "One and Other: SoC,Instances",
+            "One is better,6",
+            "both are alike,6",
+            "Other is better,0",
+            "only One solved it,6",
+            "only Other solved it,6",
+            "neither solved it,6",
+        ]
+    );
+    assert!(svg(&shown).contains(">SoC, One<"));
+    let shown = show("{type: compare, y: CSR, first: Other, second: One}").unwrap();
+    assert_eq!(csv(&shown)[1..4], ["Other is better,6", "both are alike,18", "One is better,6"]);
+    assert!(show("{type: compare, first: One, second: Oter}").unwrap_err().contains("nearest"));
+    assert!(show("{type: compare, first: One}").unwrap_err().contains("each one of One, Other"));
+}
+
+#[test]
+fn what_is_missing_or_double_is_told() {
+    let shown = show("{type: seeds}").unwrap();
+    assert_eq!(shown.notes, ["view `View1`: every algorithm has each of 30 instances once"]);
+    let mut broken = results();
+    broken.rows.remove(0);
+    let double = broken.rows[2].clone();
+    broken.rows.push(double);
+    let shown = show_of(&broken, "{type: seeds}").unwrap();
+    assert_eq!(
+        csv(&shown),
+        ["Folder,Number of Agents,seed,One,Other", "01-random,2,0,missing,ok", "01-random,4,1,ok,x2",]
+    );
+    assert!(
+        shown.tables[0].text(Format::Markdown).ends_with("2 results are missing or double, of 30 instances")
+    );
+}
+
+#[test]
+fn boxes_and_cactuses_are_drawn_of_what_there_is() {
+    let text = svg(&show("{type: box, y: SoC}").unwrap());
+    assert!(text.contains(">One<") && text.contains(">SoC<"), "{text}");
+    let text = svg(&show("{type: cactus}").unwrap());
+    assert!(text.contains(">Solved Instances<") && text.contains(">Runtime (seconds)<"), "{text}");
+    assert!(show("{type: cactus, x: run_time}").unwrap_err().contains("the nearest column is `runtime`"));
+    let none = results().rows.into_iter().filter(|row| row.metric("CSR") == Some(0.0)).collect();
+    let none = Results { rows: none, notes: Vec::new() };
+    assert!(show_of(&none, "{type: cactus}").unwrap_err().contains("no row is solved"));
+}
+
+#[test]
+fn the_six_metrics_are_a_table_and_a_star() {
+    let shown = show("{type: radar, round_digits: 4}").unwrap();
+    let rows = csv(&shown);
+    assert!(
+        rows[0].starts_with("Algorithm,Performance,Out-of-Distribution,Cooperation,Scalability"),
+        "{rows:?}"
+    );
+    // Of four instances that somebody solved, One solved three as well as anybody.
+    assert!(rows[1].starts_with("One,0.75,0.75,0.75,"), "{rows:?}");
+    assert!(svg(&shown).contains(">Cooperation<"));
+    let view = View::read("View1", &Node::parse("{type: radar}").unwrap()).unwrap();
+    let paper = view.show("View1", &results(), Some(Definition::Paper)).unwrap();
+    assert!(csv(&paper)[1].starts_with("One,0.6,0.6,0.6,"), "{:?}", csv(&paper));
+    let other = Results { rows: vec![row("elsewhere", "One", 0, None)], notes: Vec::new() };
+    let error = show_of(&other, "{type: radar}").unwrap_err();
+    assert!(error.contains("no folder with `random` in its name"), "{error}");
+}
