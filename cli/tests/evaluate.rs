@@ -223,6 +223,8 @@ fn a_suite_that_is_wrong_is_told_with_its_line() {
         ("{name: random}", "{nam: random}", "line 13: `Dice`, expected a field `name`"),
         ("balanced_dask", "cloud", "`LaCAM.parallel_backend`, expected one of sequential"),
         ("num_process: 2", "num_process: 0", "`LaCAM.num_process`, expected a number of 1 or more"),
+        ("  Dice:", "  about:", "line 13: `about`, expected a name that a file of results may have"),
+        ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that a file of results may have"),
         ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
         ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
         ("seed: {grid_search: [3, 1, 2]}", "size: 4", "`size` stands twice"),

@@ -130,8 +130,10 @@ fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
         let is_plain = |letter: char| !letter.is_control() && !matches!(letter, '/' | '\\');
-        if key.is_empty() || key.starts_with('.') || !key.chars().all(is_plain) {
-            return Err(wrong(node, key, "a name that a file may have"));
+        // Beside the results stands a file about them, and their times.
+        let is_taken = key == "about" || key.ends_with(".times");
+        if key.is_empty() || key.starts_with('.') || is_taken || !key.chars().all(is_plain) {
+            return Err(wrong(node, key, "a name that a file of results may have"));
         }
         let own = |field: &str| format!("{key}.{field}");
         let all = fields(node, key)?;
