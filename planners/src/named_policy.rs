@@ -15,7 +15,7 @@ pub const SIMPLE: [(&str, &str); 3] = [
 ];
 
 /// What a policy is made with, besides its name.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PolicySettings {
     /// How long a planner may think of one plan.
     pub budget: Budget,

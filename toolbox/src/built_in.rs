@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use pogema_core::Error;
 use pogema_maps::nearest;
-use pogema_planners::{Budget, Choice, NamedPolicy, PolicySettings};
+use pogema_planners::{Budget, NamedPolicy, PolicySettings};
 
 use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
@@ -39,9 +39,7 @@ impl BuiltIn {
     }
 
     fn read(name: String, algorithm: &Algorithm) -> Result<Self, Error> {
-        let settings =
-            PolicySettings { budget: Budget::default(), choice: Choice::default(), future_goals: false };
-        let mut built_in = Self { name, settings };
+        let mut built_in = Self { name, settings: PolicySettings::default() };
         for (key, node) in &algorithm.parameters {
             built_in.set(&format!("{}.{key}", algorithm.key), key, node)?;
         }
