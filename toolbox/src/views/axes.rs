@@ -73,12 +73,21 @@ fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
 }
 
-/// Powers of two, or of ten where those were too many, within a range above zero.
+/// Powers of two within a range above zero; where they were too many or below one, powers of ten, and if those are
+/// too few, their doubles and fives as well.
 fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
-    let base: f64 = if (high / low).log2() > 10.0 { 10.0 } else { 2.0 };
-    let power = |value: f64| value.ln() / base.ln();
-    let (first, last) = (power(low).ceil() as i32, power(high).floor() as i32);
-    (first..=last).map(|count| base.powi(count)).map(|tick| (tick, number(tick))).collect()
+    let of = |base: i32, factors: &[f64]| -> Vec<(f64, String)> {
+        let power = |value: f64| value.ln() / f64::from(base).ln();
+        let counts = power(low).floor() as i32..=power(high).ceil() as i32;
+        let all =
+            counts.flat_map(|count| factors.iter().map(move |factor| factor * f64::from(base).powi(count)));
+        all.filter(|tick| (low..=high).contains(tick)).map(|tick| (tick, number(tick))).collect()
+    };
+    if low >= 0.5 && high / low < 1024.0 {
+        return of(2, &[1.0]);
+    }
+    let decades = of(10, &[1.0]);
+    if decades.len() > 2 { decades } else { of(10, &[1.0, 2.0, 5.0]) }
 }
 
 /// About how wide a text is.
@@ -190,6 +199,10 @@ mod tests {
         assert_eq!(
             texts(Axis::of_numbers("", &[0.01, 900.0], true, None)),
             ["0.01", "0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            texts(Axis::of_numbers("", &[6e-5, 0.003], true, None)),
+            ["5e-5", "1e-4", "2e-4", "5e-4", "0.001", "0.002"]
         );
         assert_eq!(texts(Axis::of_numbers("", &[5.0], false, Some(&[5.0]))), ["5"]);
     }

@@ -86,6 +86,7 @@ impl CactusView {
             let (colour, _, dashes) = signs(number, &self.style);
             let line = LinePlot::new()
                 .with_data(points.clone())
+                .with_step()
                 .with_color(colour)
                 .with_stroke_width(self.style.line_width)
                 .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));

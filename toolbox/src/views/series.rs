@@ -118,7 +118,11 @@ impl Series {
             .with_stroke_width(style.line_width)
             .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
         let mut plots = Vec::new();
-        if has_band {
+        if let (true, [(x, _)]) = (has_band, points.as_slice()) {
+            // A band needs two points; of one, the interval is a line.
+            let interval = LinePlot::new().with_data([(*x, low[0]), (*x, high[0])]).with_color(colour);
+            plots.push(Plot::Line(interval.with_stroke_width(style.line_width * 0.6)));
+        } else if has_band {
             plots.push(Plot::Band(BandPlot::new(x, low, high).with_color(colour).with_opacity(0.15)));
         }
         plots.push(Plot::Line(line));

@@ -101,11 +101,9 @@ impl TableView {
         let keys: Vec<String> = keys.into_iter().filter(|key| !metrics.contains(key)).collect();
         let mut lines: Vec<Line<'_>> = Vec::new();
         for (number, group) in group_by(&results.rows, &keys).into_iter().enumerate() {
-            let estimates = metrics.iter().enumerate().map(|(column, metric)| {
-                let number = (number * metrics.len() + column) as u64;
-                Estimate::of(&values(&group.rows, metric), self.spread, number)
-            });
-            let estimates = estimates.collect();
+            // One number for the whole group: metrics that are alike have intervals that are alike.
+            let estimate = |metric| Estimate::of(&values(&group.rows, metric), self.spread, number as u64);
+            let estimates = metrics.iter().map(|metric| estimate(metric)).collect();
             lines.push(Line { group, estimates });
         }
         self.sort(name, &mut lines, &keys, &metrics)?;
