@@ -24,6 +24,9 @@ const FAILED: &str = ".failed.jsonl";
 /// What an evaluation says of how it was made.
 const ABOUT: &str = "about.json";
 
+/// What is larger is no figure.
+const LARGEST: f64 = 1e100;
+
 /// One episode of one algorithm.
 ///
 /// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
@@ -42,12 +45,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// A metric, if it is a number.
+    /// A metric, if it is a number, and not one so large that only a mistake makes it.
     pub fn metric(&self, name: &str) -> Option<f64> {
-        match self.metrics.get(name)? {
-            Value::Bool(is_so) => Some(f64::from(u8::from(*is_so))),
-            value => value.as_f64(),
-        }
+        figure(self.metrics.get(name)?)
     }
 
     /// What stands in a column that is no metric.
@@ -58,6 +58,12 @@ impl Row {
             self.settings.get(column).cloned()
         }
     }
+}
+
+/// A number that can be reckoned with and drawn.
+pub(crate) fn figure(value: &Value) -> Option<f64> {
+    let number = value.as_bool().map(|is_so| f64::from(u8::from(is_so))).or(value.as_f64());
+    number.filter(|number| number.abs() <= LARGEST)
 }
 
 /// The rows of one or more folders.

@@ -9,6 +9,9 @@ const GRID: &str = "#DDDDDD";
 /// The share of an axis that is left free at each end.
 const MARGIN: f64 = 0.05;
 
+/// The least power of two on a logarithmic axis, which is the library's own.
+const LEAST: f64 = -33.0;
+
 /// Length of a tick. Units: points.
 const TICK: f64 = 3.0;
 
@@ -27,17 +30,24 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// An axis for numbers, marked at the given ones or at round ones.
+    /// An axis for numbers, marked at the given ones or at round ones; from 0 to 1 if there are none.
     pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
+        let may_be_shown = |tick: &&f64| !is_log || **tick > 0.0;
+        let ticks: Option<Vec<f64>> = ticks.map(|ticks| ticks.iter().filter(may_be_shown).copied().collect());
         let shown = |value: f64| if is_log { value.max(f64::MIN_POSITIVE).log2() } else { value };
-        let all = values.iter().chain(ticks.unwrap_or_default()).map(|&value| shown(value));
+        let all = values.iter().chain(ticks.iter().flatten()).map(|&value| shown(value));
         let (low, high) = all
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let margin = if high > low { (high - low) * MARGIN } else { 0.5 };
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
+        let margin = match high - low {
+            length if length > 0.0 => length * MARGIN,
+            _ if is_log => 0.5,
+            _ => low.abs().max(1.0) / 2.0,
+        };
         let (low, high) = (low - margin, high + margin);
-        let range = if is_log { (low.exp2(), high.exp2()) } else { (low, high) };
+        let range = if is_log { (low.max(LEAST).exp2(), high.max(LEAST + 1.0).exp2()) } else { (low, high) };
         let ticks = match ticks {
-            Some(ticks) => ticks.iter().map(|&tick| (tick, number(tick))).collect(),
+            Some(ticks) => ticks.into_iter().map(|tick| (tick, number(tick))).collect(),
             None if is_log => powers(range),
             None => round_numbers(range),
         };
@@ -54,7 +64,7 @@ impl Axis {
 }
 
 /// A number as it is written at a tick.
-pub(super) fn number(value: f64) -> String {
+fn number(value: f64) -> String {
     let is_small = value != 0.0 && value.abs() < 1e-3;
     if is_small || value.abs() >= 1e7 {
         format!("{value:e}")
@@ -204,6 +214,8 @@ mod tests {
             texts(Axis::of_numbers("", &[6e-5, 0.003], true, None)),
             ["5e-5", "1e-4", "2e-4", "5e-4", "0.001", "0.002"]
         );
+        assert_eq!(texts(Axis::of_numbers("", &[], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);
+        assert_eq!(texts(Axis::of_numbers("", &[2.0, 8.0], true, Some(&[0.0, 4.0]))), ["4"]);
         assert_eq!(texts(Axis::of_numbers("", &[5.0], false, Some(&[5.0]))), ["5"]);
     }
 }

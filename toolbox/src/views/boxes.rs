@@ -10,7 +10,7 @@ use super::axes::{Axis, Frame};
 use super::options::{Common, Options};
 use super::panel::framed;
 use super::picture::Picture;
-use super::series::at;
+use super::series::{at, placeless};
 use super::style::Style;
 use super::{Shown, known_column};
 use crate::bootstrap::percentile;
@@ -63,7 +63,8 @@ impl BoxView {
             let reason = format!("view `{name}`: no row has a number in `{}`", self.y);
             return Err(Error::State { reason });
         }
-        let notes = lacking(&results.rows, std::slice::from_ref(&self.y));
+        let mut notes = placeless(&results.rows, [&self.x]);
+        notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
         Ok(Shown { pictures: vec![self.draw(groups)], notes, ..Shown::default() })
     }
 

@@ -8,6 +8,9 @@ use pogema_core::Error;
 
 use super::style::{INCH, Style};
 
+/// A picture of dots may have so many, 4 bytes each.
+const MOST_DOTS: f64 = 2e8;
+
 /// The format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -50,7 +53,7 @@ impl Picture {
     /// The file's content.
     ///
     /// # Errors
-    /// If the library cannot write it, such as a picture of more dots than there is memory.
+    /// If it is too large, or the library cannot write it.
     pub fn bytes(&self, kind: Kind) -> Result<Vec<u8>, Error> {
         let told = |reason: String| Error::State { reason: format!("plot: {reason}") };
         match kind {
@@ -58,6 +61,10 @@ impl Picture {
             Kind::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),
             Kind::Png => {
                 let scale = (self.dots_per_inch / INCH) as f32;
+                let dots = self.scene.width * self.scene.height * f64::from(scale).powi(2);
+                if dots > MOST_DOTS {
+                    return Err(told(format!("`{dots:.0}` dots, expected at most {MOST_DOTS:.0}")));
+                }
                 PngBackend::new()
                     .with_scale(scale)
                     .render_scene(&with_dashes(&self.scene, scale))

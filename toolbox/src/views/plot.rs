@@ -4,12 +4,12 @@ use kuva::render::render::Scene;
 use pogema_core::Error;
 use serde_json::Value;
 
-use super::axes::{Axis, Frame, number};
+use super::axes::{Axis, Frame};
 use super::legend::Legend;
 use super::options::{Common, Options};
 use super::panel::{framed, insert, place_legend};
 use super::picture::Picture;
-use super::series::{Places, Series, at, means};
+use super::series::{Places, Series, at, means, placeless};
 use super::style::Style;
 use super::{Shown, known_column};
 use crate::bootstrap::{RESAMPLES, Spread};
@@ -98,10 +98,14 @@ impl PlotView {
             let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);
             return Err(Error::State { reason });
         }
+        notes.extend(placeless(
+            &results.rows,
+            [&self.x, &self.by].into_iter().chain(over.map(|(_, over)| over)),
+        ));
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
         let scene = self.draw(&contents, &names, &places);
         let picture = Picture::new(scene, &self.style);
-        notes.extend(self.remark(name));
+        notes.extend(self.remarks(name, &contents));
         Ok(Shown { pictures: vec![picture], notes, ..Shown::default() })
     }
 
@@ -228,13 +232,24 @@ impl PlotView {
         scene
     }
 
-    fn remark(&self, name: &str) -> Option<String> {
-        match self.spread {
+    /// What has to be known to read the picture.
+    fn remarks(&self, name: &str, contents: &[Content<'_>]) -> Vec<String> {
+        let mut points =
+            contents.iter().flat_map(|content| &content.series).flat_map(|series| &series.points);
+        let is_linear = points.any(|(x, found)| {
+            let low = found.interval.map_or(found.mean, |(low, _)| low);
+            (self.style.log_x && *x <= 0.0) || (self.style.log_y && low <= 0.0)
+        });
+        let linear = is_linear.then(|| {
+            format!("view `{name}`: an axis with values not above 0 cannot be logarithmic, and is not")
+        });
+        let bands = match self.spread {
             Spread::Bootstrap { level } => Some(format!(
                 "view `{name}`: bands are {level} % intervals of the means of {RESAMPLES} samples with replacement"
             )),
             _ => None,
-        }
+        };
+        linear.into_iter().chain(bands).collect()
     }
 }
 
@@ -255,13 +270,8 @@ fn x_axis(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> A
     let mut distinct = values.to_vec();
     distinct.sort_by(f64::total_cmp);
     distinct.dedup();
-    let ticks = ticks.map(|ticks| ticks.iter().copied().filter(|&tick| !is_log || tick > 0.0).collect());
-    let ticks: Option<Vec<f64>> = ticks.or_else(|| (distinct.len() <= 16).then_some(distinct));
-    let mut axis = Axis::of_numbers(title, values, is_log, ticks.as_deref());
-    for (tick, text) in &mut axis.ticks {
-        *text = number(*tick);
-    }
-    axis
+    let own = (1..=16).contains(&distinct.len()).then_some(distinct.as_slice());
+    Axis::of_numbers(title, values, is_log, ticks.or(own))
 }
 
 /// What `error_bar` asks for, such as `[ci, 95]`.

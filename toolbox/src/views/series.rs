@@ -10,7 +10,7 @@ use super::legend::Entry;
 use super::style::Style;
 use crate::bootstrap::{Estimate, Spread};
 use crate::frame::{compare, group_by, values};
-use crate::results::Row;
+use crate::results::{Row, figure};
 
 /// Dashes of lines: a solid one first.
 const DASHES: [&str; 6] = ["", "5 2", "1.5 1.5", "5 2 1.5 2", "8 2 2 2", "3 1"];
@@ -59,7 +59,7 @@ impl Places {
 
     fn place(&self, value: &Value) -> Option<f64> {
         match self {
-            Self::Numbers => value.as_f64(),
+            Self::Numbers => figure(value),
             Self::Names(names) => names.iter().position(|name| name == value).map(|place| place as f64),
         }
     }
@@ -68,7 +68,20 @@ impl Places {
 /// What a row has in a column, be it a metric or not.
 pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
     let value = row.key(column).or_else(|| row.metrics.get(column).cloned())?;
-    (!value.is_null() && !value.is_array()).then_some(value)
+    let is_shown =
+        if value.is_number() { figure(&value).is_some() } else { !value.is_null() && !value.is_array() };
+    is_shown.then_some(value)
+}
+
+/// A note for each column about rows that have nothing there, and so no place in the picture.
+pub(super) fn placeless<'a>(rows: &[Row], columns: impl IntoIterator<Item = &'a String>) -> Vec<String> {
+    let lacking = |column: &String| rows.iter().filter(|row| at(row, column).is_none()).count();
+    let told =
+        columns.into_iter().map(|column| (column, lacking(column))).filter(|(_, lacking)| *lacking > 0);
+    told.map(|(column, lacking)| {
+        format!("{lacking} of {} rows have nothing in `{column}` and are not drawn", rows.len())
+    })
+    .collect()
 }
 
 /// The means of a metric at each place, and how sure they are.
