@@ -17,6 +17,7 @@ mod store;
 mod suite;
 mod tree;
 mod variants;
+#[cfg(feature = "views")]
 pub mod views;
 mod witness;
 
