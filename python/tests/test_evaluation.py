@@ -104,6 +104,15 @@ def test_a_run_killed_anywhere_and_resumed_gives_the_same_bytes(backend, played,
     assert results(tmp_path) == played
 
 
+def test_a_process_that_dies_is_replaced_and_nothing_is_lost(played, tmp_path):
+    content = suite("balanced_multiprocessing")
+    content["algorithms"]["A star"].update(name="Mortal", mark=str(tmp_path / "died"))
+    said, status = play(tmp_path, content)
+    assert status == 0, said
+    assert "a process died" in said and (tmp_path / "died").exists()
+    assert results(tmp_path) == played
+
+
 @pytest.mark.parametrize("observations", ["default", "POMAPF", "MAPF"])
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
 def test_a_policy_that_stays_has_the_figures_of_the_one_built_in(on_target, observations, tmp_path):

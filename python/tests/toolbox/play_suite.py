@@ -1,7 +1,10 @@
 """Plays a suite with policies in Python: play_suite.py SUITE FOLDER BEGIN [ADDRESS]"""
 
+import os
+import signal
 import sys
 import time
+from pathlib import Path
 
 from pogema_rs import BatchAStarAgent
 from pogema_rs.toolbox.algorithm_config import AlgoBase
@@ -28,6 +31,27 @@ class Slow(BatchAStarAgent):
         return super().act(observations)
 
 
+class MortalConfig(AlgoBase):
+    """Where it is noted that a process died."""
+
+    mark: str
+
+
+class Mortal(BatchAStarAgent):
+    """POGEMA's A*, of which the first process dies."""
+
+    def __init__(self, config):
+        super().__init__()
+        self.mark = Path(config.mark)
+
+    def act(self, observations):
+        """Dies, or walks."""
+        if not self.mark.exists():
+            self.mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().act(observations)
+
+
 class Crowded:
     """Stays, and fails where there are many."""
 
@@ -45,6 +69,7 @@ def main():
     suite, folder, begin, *address = sys.argv[1:]
     ToolboxRegistry.setup_logger("INFO")
     ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
+    ToolboxRegistry.register_algorithm("Mortal", Mortal, MortalConfig)
     ToolboxRegistry.register_algorithm("Crowded", Crowded)
     ToolboxRegistry.register_maps({"hall": [[0] * 9 for _ in range(9)]})
     try:
