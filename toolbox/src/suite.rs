@@ -163,7 +163,8 @@ impl Algorithm {
     }
 }
 
-fn in_file(path: &Path, error: Error) -> Error {
+/// An error told with the file it is in.
+pub(crate) fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::Syntax { reason } | Error::State { reason } => Error::io(path, reason),
         error => Error::io(path, error),

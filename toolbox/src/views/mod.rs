@@ -35,7 +35,7 @@ pub use table::TableView;
 
 use crate::results::Results;
 use crate::six::Definition;
-use crate::suite::wrong;
+use crate::suite::{in_file, wrong};
 use crate::tree::Node;
 
 /// The field of a file that has the views by name.
@@ -80,10 +80,7 @@ pub struct Shown {
 /// One line with the file, the line and the key of what is wrong.
 pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let in_file = |error: Error| match error {
-        Error::Syntax { reason } | Error::State { reason } => Error::io(path, reason),
-        error => Error::io(path, error),
-    };
+    let in_file = |error: Error| in_file(path, error);
     let root = Node::parse(&text).map_err(in_file)?;
     let Some(node) = root.field(VIEWS) else {
         return Err(Error::io(path, format!("expected a field `{VIEWS}`")));
