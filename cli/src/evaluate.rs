@@ -7,10 +7,12 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_core::Error;
-use pogema_toolbox::{Begin, Environments, Event, Running, Store, Suite, Summary, built_in, run};
+use pogema_maps::files::write_whole;
+use pogema_toolbox::report::{Replay, SHOWN, page, picks};
+use pogema_toolbox::{Begin, Environments, Event, Results, Running, Store, Suite, Summary, built_in, run};
 
 use crate::maps::Sources;
-use crate::output::say;
+use crate::output::{check_writable, say};
 
 #[derive(Args, Debug)]
 pub struct Evaluate {
@@ -30,17 +32,22 @@ pub struct Evaluate {
     /// Delete the results that are in the folder
     #[arg(long)]
     force: bool,
+    /// Write a page with tables, plots and replays; `report.html` in the folder unless a file is named
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    html: Option<Vec<PathBuf>>,
 }
+
+/// The page in a folder of results.
+const REPORT: &str = "report.html";
 
 impl Evaluate {
     pub fn run(&self) -> Result<(), Error> {
         let suite = Suite::read(&self.suite)?;
         built_in(&suite)?;
-        let (library, warnings) = suite.library(self.sources.paths())?;
-        for warning in warnings {
-            eprintln!("warning: {warning}");
-        }
-        let environments = Environments::new(&suite, library)?;
+        let environments = environments(&suite, &self.sources)?;
+        let named = self.html.as_ref().and_then(|named| named.first());
+        named.map_or(Ok(()), |path| check_writable(path))?;
+        let report = self.html.as_ref().map(|_| named.cloned().unwrap_or_else(|| self.out.join(REPORT)));
         let begin = match (self.resume, self.force) {
             (true, _) => Begin::Resume,
             (_, true) => Begin::Anew,
@@ -54,8 +61,41 @@ impl Evaluate {
         let threads = self.threads.map_or(cores, usize::from);
         let running = Running { threads, stop: &stop, watch: &watch };
         let summary = run(&suite, &environments, &store, running)?;
+        if let Some(path) = &report {
+            write_report(path, &self.out, &suite, &environments, &store)?;
+        }
         tell(&self.out, &suite, &summary)
     }
+}
+
+/// The environments of a suite with maps of files, after all warnings.
+pub fn environments(suite: &Suite, sources: &Sources) -> Result<Environments, Error> {
+    let (environments, warnings) = suite.environments(sources.paths())?;
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(environments)
+}
+
+fn write_report(
+    path: &Path,
+    folder: &Path,
+    suite: &Suite,
+    environments: &Environments,
+    store: &Store,
+) -> Result<(), Error> {
+    let results = Results::read(&[folder.to_owned()])?;
+    let picks = picks(&results, SHOWN);
+    let bar = begin("replays", picks.len(), 0);
+    let replays: Vec<Replay> = picks
+        .into_iter()
+        .map(|pick| Replay::of(pick, &results, suite, environments))
+        .inspect(|_| bar.inc(1))
+        .collect();
+    bar.finish_and_clear();
+    write_whole(path, page(suite, &store.about(), &results, &replays)?.as_bytes())?;
+    eprintln!("wrote {}", path.display());
+    Ok(())
 }
 
 fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {

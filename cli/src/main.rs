@@ -8,6 +8,7 @@ mod output;
 mod plan;
 mod port;
 mod render;
+mod replay;
 mod run;
 mod views;
 
@@ -38,6 +39,8 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     /// Show results as tables and plots
     Views(views::Views),
+    /// Play an episode of results again: draw it, or write what happened
+    Replay(replay::Replay),
     /// Draw a recorded episode
     Render(render::Render),
     /// Check that all engines follow the rules; exit status 0 only if they do
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
         Command::Evaluate(evaluate) => evaluate.run().map(|()| ExitCode::SUCCESS),
         Command::Views(views) => views.run(),
+        Command::Replay(replay) => replay.run().map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use comfy_table::{CellAlignment, Table, presets};
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
 
 /// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
 pub fn say(text: &str) -> Result<(), Error> {
@@ -40,6 +40,16 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     }
     // A file without a name: nothing is left of it, however the run ends.
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
+}
+
+/// Writes what happened in an episode, compressed if the file's name ends in `.zst`.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_trace(path: &Path, trace: &Trace) -> Result<(), Error> {
+    let mut text = Vec::new();
+    trace.write(&mut text)?;
+    pogema_conformance::files::write(path, &text)
 }
 
 /// A table that is Markdown too, its numbers to the right of a first column of names.

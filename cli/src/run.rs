@@ -9,9 +9,10 @@ use std::path::PathBuf;
 use clap::Args;
 use pogema_core::{Error, Trace};
 use pogema_render::Film;
+use pogema_toolbox::short;
 use serde_json::json;
 
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, say, write_trace};
 use crate::plan::Thinking;
 use crate::render::Pictures;
 use episode::Episode;
@@ -77,9 +78,7 @@ impl Run {
     /// Writes and draws a recorded episode.
     fn keep(&self, trace: &Trace) -> Result<(), Error> {
         if let Some(path) = &self.trace {
-            let mut text = Vec::new();
-            trace.write(&mut text)?;
-            pogema_conformance::files::write(path, &text)?;
+            write_trace(path, trace)?;
         }
         if self.pictures.are_wanted() { self.pictures.draw(&Film::of(trace), &self.title()) } else { Ok(()) }
     }
@@ -110,10 +109,4 @@ impl Run {
             .collect();
         say(&format!("{} steps  {}", episode.num_steps(), figures.join("  ")))
     }
-}
-
-/// A figure with at most four decimals and no trailing zeros.
-fn short(value: f64) -> String {
-    let text = format!("{value:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

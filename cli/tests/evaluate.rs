@@ -62,8 +62,16 @@ fn results_are_those_of_the_suite_in_its_order() {
         });
         assert_eq!(order.collect::<Vec<_>>(), [(3, 4), (3, 8), (1, 4), (1, 8), (2, 4), (2, 8)]);
         assert!(rows.iter().all(|row| row["algorithm"] == algorithm));
-        let times = read(folder.path(), &format!("{algorithm}.times.json"));
-        assert_eq!(times.as_array().unwrap().len(), rows.len());
+        let episodes = read(folder.path(), &format!("{algorithm}.episodes.json"));
+        for (index, episode) in episodes.as_array().unwrap().iter().enumerate() {
+            assert_eq!(episode["episode"], index);
+            assert_eq!(episode["seed"], rows[index]["env_grid_search"]["seed"]);
+            assert_eq!(episode["config"]["num_agents"], rows[index]["env_grid_search"]["num_agents"]);
+            assert_eq!(episode["config"]["size"], 16);
+            assert!(episode["seconds"].as_f64().is_some_and(|seconds| seconds >= 0.0));
+            assert_eq!(episode["run"], 0);
+        }
+        assert_eq!(episodes.as_array().unwrap().len(), rows.len());
         assert!(!folder.path().join(format!("out/{algorithm}.jsonl")).exists());
     }
     // The figures are those of the same episodes played one by one on the reference.
@@ -84,13 +92,13 @@ fn results_are_those_of_the_suite_in_its_order() {
     }
 }
 
-/// All files of the results, but for run times.
+/// All files of the results, but for those that tell which run played what, and how long it took.
 fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder.join("out")).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     files.sort();
     let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
-    files.retain(|path| !name(path).ends_with(".times.json"));
+    files.retain(|path| !name(path).ends_with(".episodes.json") && name(path) != "about.json");
     files.iter().map(|path| (name(path), fs::read(path).unwrap())).collect()
 }
 
@@ -118,6 +126,26 @@ fn a_run_that_is_killed_anywhere_and_resumed_gives_the_same_bytes() {
     let (text, error, status) = run(broken.path(), &RESUME);
     assert_eq!(status, 0, "{text}{error}");
     assert_eq!(bytes(broken.path()), wanted);
+}
+
+/// A limit on the size of files stops a write half way, as a full disk does.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_loses_no_episode() {
+    let (whole, full) = (folder_with(SUITE), folder_with(SUITE));
+    assert_eq!(run(whole.path(), &EVALUATE).2, 0);
+    // The file of lines reaches this size, a kilobyte, after some of its episodes.
+    let mut limited = Command::new("bash");
+    limited.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"", PROGRAM]).args(EVALUATE);
+    let output = limited.current_dir(full.path()).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert!(error.contains("Dice.jsonl: File too large"), "{error}");
+    let lines = fs::read_to_string(full.path().join("out/Dice.jsonl")).unwrap();
+    assert!((1..6).contains(&lines.lines().count()) && lines.ends_with('\n'), "{lines}");
+    let (text, error, status) = run(full.path(), &RESUME);
+    assert_eq!(status, 0, "{text}{error}");
+    assert_eq!(bytes(full.path()), bytes(whole.path()));
 }
 
 #[test]

@@ -96,18 +96,20 @@ impl Evaluation {
     }
 
     /// Begins with an algorithm: the episodes that are to be played, the longest first; none if all are done.
-    fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
-        let opened = Progress::open(&self.store, key, self.environments.len());
+    /// `versions` are the releases of what plays them, by name.
+    fn begin(&self, key: &str, versions: Vec<(String, String)>) -> PyResult<Option<Vec<usize>>> {
+        let opened = Progress::open(&self.store, key, self.environments.len(), &versions);
         let progress = opened.map_err(|error| told(&error))?;
         let to_do = progress.as_ref().map(|progress| self.environments.by_cost(progress.to_do()));
         *self.progress()? = progress;
         Ok(to_do)
     }
 
-    /// Keeps an episode: its figures in JSON, and what the policy took of it in seconds.
-    fn keep(&self, index: usize, metrics: &str, runtime: f64) -> PyResult<()> {
+    /// Keeps an episode: its figures in JSON, what the policy took of it in seconds, and the machine that played it.
+    fn keep(&self, index: usize, metrics: &str, runtime: f64, machine: String) -> PyResult<()> {
         let metrics: Pairs = read_json(metrics)?;
-        self.with(|progress| progress.keep(&Done { index, metrics, runtime }))
+        let machine = (machine != pogema_toolbox::machine()).then_some(machine);
+        self.with(|progress| progress.keep(Done { index, metrics, runtime, machine, run: 0 }))
     }
 
     /// Notes an episode that could not be played.
@@ -120,7 +122,7 @@ impl Evaluation {
     /// Writes the results, if all episodes are done; says whether they are.
     fn finish(&self) -> PyResult<bool> {
         let progress = self.progress()?.take();
-        let finished = progress.map(|progress| progress.finish(|index| self.environments.changes(index)));
+        let finished = progress.map(|progress| progress.finish(&self.environments));
         finished.unwrap_or(Ok(true)).map_err(|error| told(&error))
     }
 
@@ -217,4 +219,10 @@ fn told(error: &Error) -> PyErr {
         Error::Io { .. } => pyo3::exceptions::PyOSError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
+}
+
+/// The processor of this machine and how many threads it has.
+#[pyfunction]
+pub fn machine() -> &'static str {
+    pogema_toolbox::machine()
 }

@@ -25,6 +25,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<planners::PlanFollower>()?;
     module.add_class::<evaluation::Evaluation>()?;
     module.add_class::<witness::Witness>()?;
+    module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;

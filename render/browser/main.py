@@ -13,6 +13,7 @@ import editor_files
 import pictures
 import replay
 import replay_film
+import report
 import speed
 from support import FLAGS, World
 
@@ -28,7 +29,7 @@ def main(folder, *wanted):
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in ((speed,) if wanted == ("speed",) else (replay_film, replay, editor, editor_files, pictures))
+            for module in ((speed,) if wanted == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report))
             for name, test in tests_of(module)
             if not wanted or any(part in f"{module.__name__}.{name}" for part in wanted)
         ]

@@ -72,6 +72,22 @@ impl Environments {
         variant.map(|variant| variant.fields).ok_or_else(out_of_range)
     }
 
+    /// All fields of an environment of a number below their count, with the name of the map that its seed chooses
+    /// where its file has a pattern.
+    ///
+    /// # Errors
+    /// If it is out of range.
+    pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
+        let mut fields = self.fields(index)?;
+        let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
+        let meant =
+            fields.get("map_name").and_then(Value::as_str).and_then(|name| self.meant(name, seed).ok());
+        if let Some(name) = meant.map(|(name, _)| Value::from(name)) {
+            fields.insert("map_name".into(), name);
+        }
+        Ok(fields)
+    }
+
     /// Number of environments.
     pub fn len(&self) -> usize {
         self.variants.len()

@@ -2,6 +2,8 @@
 //!
 //! A [`Suite`] is read from one YAML file: environments, of which fields may be varied, algorithms, and views.
 
+mod about;
+mod again;
 pub mod bootstrap;
 mod built_in;
 mod environments;
@@ -10,6 +12,8 @@ mod library;
 mod pairs;
 mod play;
 mod progress;
+#[cfg(feature = "views")]
+pub mod report;
 pub mod results;
 mod run;
 pub mod six;
@@ -21,14 +25,16 @@ mod variants;
 pub mod views;
 mod witness;
 
+pub use about::{About, Run, machine};
+pub use again::differences;
 pub use built_in::BuiltIn;
 pub use environments::{Environment, Environments};
 pub use pairs::Pairs;
-pub use play::{Played, play};
-pub use progress::{Done, Failed, Progress};
-pub use results::{Results, Row};
+pub use play::{Played, play, record};
+pub use progress::{Done, Episode, Failed, Progress};
+pub use results::{Results, Row, short};
 pub use run::{Event, Running, Summary, built_in, run, run_one};
-pub use store::{About, Begin, Store};
+pub use store::{Begin, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};

@@ -10,8 +10,8 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::Pairs;
-use crate::store::{FAILED, LINES, RESULTS, Store, TIMES, remove};
+use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
+use crate::{Environments, Pairs};
 
 /// An episode that is done.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,30 @@ pub struct Done {
     pub metrics: Pairs,
     /// What the policy took of it. Units: seconds.
     pub runtime: f64,
+    /// The machine, if it is not that of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<String>,
+    /// The number of the run that played it, which is set when it is kept.
+    #[serde(default)]
+    pub run: usize,
+}
+
+/// How an episode was played, which may differ where what came of it does not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Episode {
+    /// Its number.
+    pub episode: usize,
+    /// Its environment's seed.
+    pub seed: Value,
+    /// All fields of its environment.
+    pub config: Value,
+    /// What the policy took of it. Units: seconds.
+    pub seconds: Option<f64>,
+    /// The number of the run that played it.
+    pub run: usize,
+    /// The machine, if it is not that of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<String>,
 }
 
 /// An episode that could not be played.
@@ -46,6 +70,7 @@ pub struct Failed {
 pub struct Progress {
     store: Arc<Store>,
     key: String,
+    run: usize,
     path: PathBuf,
     file: File,
     done: Vec<bool>,
@@ -61,11 +86,17 @@ struct Row<'a> {
 }
 
 impl Progress {
-    /// Takes up what is done of so many episodes of an algorithm; none if all are.
+    /// Takes up what is done of so many episodes of an algorithm; none if all are. `versions` are the releases of what
+    /// plays them besides this program, by name.
     ///
     /// # Errors
     /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
-    pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
+    pub fn open(
+        store: &Arc<Store>,
+        key: &str,
+        num_episodes: usize,
+        versions: &[(String, String)],
+    ) -> Result<Option<Self>, Error> {
         if store.path(&format!("{key}.{RESULTS}")).exists() {
             // A run may have broken off after it had written all.
             remove(&store.path(&format!("{key}.{LINES}")))?;
@@ -81,7 +112,8 @@ impl Progress {
         for line in &lines {
             done[line.index] = true;
         }
-        Ok(Some(Self { store: Arc::clone(store), key: key.to_owned(), path, file, done, failed: None }))
+        let run = store.run(versions)?;
+        Ok(Some(Self { store: Arc::clone(store), key: key.to_owned(), run, path, file, done, failed: None }))
     }
 
     /// The episodes that are not done.
@@ -98,8 +130,9 @@ impl Progress {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn keep(&mut self, done: &Done) -> Result<(), Error> {
-        append(&mut self.file, &self.path, done)?;
+    pub fn keep(&mut self, mut done: Done) -> Result<(), Error> {
+        done.run = self.run;
+        append(&mut self.file, &self.path, &done)?;
         self.done[done.index] = true;
         Ok(())
     }
@@ -121,28 +154,39 @@ impl Progress {
     ///
     /// # Errors
     /// If they cannot be written; what is done stays kept then.
-    pub fn finish(self, changes: impl Fn(usize) -> Result<Pairs, Error>) -> Result<bool, Error> {
+    pub fn finish(self, environments: &Environments) -> Result<bool, Error> {
         if self.done.contains(&false) {
             return Ok(false);
         }
         let (lines, _) = read(&self.path, self.done.len())?;
-        let mut times = Vec::with_capacity(lines.len());
-        let mut text = String::from("[");
+        let (mut rows, mut episodes) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
         for line in sorted(lines) {
-            let env_grid_search = changes(line.index)?;
-            let row = Row { metrics: &line.metrics, env_grid_search, algorithm: &self.key };
-            let row = serde_json::to_string(&row).map_err(|error| Error::io(&self.path, error))?;
-            text.push_str(if times.is_empty() { "\n" } else { ",\n" });
-            text.push_str(&row);
-            times.push(line.runtime);
+            let env_grid_search = environments.changes(line.index)?;
+            rows.push(self.told(&Row { metrics: &line.metrics, env_grid_search, algorithm: &self.key })?);
+            let config = Value::Object(environments.named_fields(line.index)?);
+            episodes.push(self.told(&Episode {
+                episode: line.index,
+                seed: config.get("seed").cloned().unwrap_or_default(),
+                config,
+                seconds: Some(line.runtime),
+                run: line.run,
+                machine: line.machine,
+            })?);
         }
-        text.push_str("\n]\n");
-        let times = serde_json::to_string(&times).map_err(|error| Error::io(&self.path, error))?;
-        self.store.write(&format!("{}.{TIMES}", self.key), format!("{times}\n").as_bytes())?;
-        self.store.write(&format!("{}.{RESULTS}", self.key), text.as_bytes())?;
+        self.store.write(&format!("{}.{EPISODES}", self.key), list(&episodes).as_bytes())?;
+        self.store.write(&format!("{}.{RESULTS}", self.key), list(&rows).as_bytes())?;
         remove(&self.path)?;
         Ok(true)
     }
+
+    fn told(&self, value: &impl Serialize) -> Result<String, Error> {
+        serde_json::to_string(value).map_err(|error| Error::io(&self.path, error))
+    }
+}
+
+/// A list in JSON with a line for each of its elements.
+fn list(elements: &[String]) -> String {
+    format!("[\n{}\n]\n", elements.join(",\n"))
 }
 
 fn append(file: &mut File, path: &Path, value: &impl Serialize) -> Result<(), Error> {

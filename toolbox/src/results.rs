@@ -8,21 +8,20 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::pairs::Pairs;
+use crate::progress::Episode;
+use crate::store::ABOUT;
 
 /// The column of the algorithm's name.
 pub const ALGORITHM: &str = "algorithm";
 
-/// The metric that a file of times adds.
+/// The metric that a file of episodes adds.
 const RUNTIME: &str = "runtime";
 
-/// What is added to an algorithm's name for its file of times.
-const TIMES: &str = ".times.json";
+/// What is added to an algorithm's name for its file of how each episode was played.
+const EPISODES: &str = ".episodes.json";
 
 /// What is added to an algorithm's name for its file of episodes that could not be played.
 const FAILED: &str = ".failed.jsonl";
-
-/// What an evaluation says of how it was made.
-const ABOUT: &str = "about.json";
 
 /// What is larger is no figure.
 const LARGEST: f64 = 1e100;
@@ -66,6 +65,12 @@ pub(crate) fn figure(value: &Value) -> Option<f64> {
     number.filter(|number| number.abs() <= LARGEST)
 }
 
+/// A figure with at most four decimals and no trailing zeros.
+pub fn short(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 /// The rows of one or more folders.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
@@ -78,8 +83,8 @@ pub struct Results {
 impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
-    /// Each `<algorithm>.json` holds rows; `<algorithm>.times.json`, a list of seconds in their order, is read as their
-    /// metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm that is not finished.
+    /// Each `<algorithm>.json` holds rows; `<algorithm>.episodes.json` how they were played, in their order, of which
+    /// the seconds are read as their metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm that is not finished.
     ///
     /// # Errors
     /// One line with the file and the place in it for anything else, or if there are no rows at all.
@@ -108,7 +113,7 @@ impl Results {
                 self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
             } else if let Some(algorithm) = name.strip_suffix(".json").filter(|_| !is_apart(&name)) {
                 let mut rows = read_rows(&path, algorithm)?;
-                join_times(&mut rows, &folder.join(format!("{algorithm}{TIMES}")))?;
+                join_times(&mut rows, &folder.join(format!("{algorithm}{EPISODES}")))?;
                 if rows.is_empty() {
                     self.notes.push(format!("{}: no rows", path.display()));
                 }
@@ -142,7 +147,7 @@ impl Results {
 
 /// Whether a JSON file holds something else than rows.
 fn is_apart(name: &str) -> bool {
-    name == ABOUT || name.ends_with(TIMES)
+    name == ABOUT || name.ends_with(EPISODES)
 }
 
 fn first_appearances<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
@@ -196,15 +201,15 @@ fn join_times(rows: &mut [Row], path: &Path) -> Result<(), Error> {
         return Ok(());
     }
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let times: Vec<Option<f64>> = serde_json::from_str(&without_nan(&text))
-        .map_err(|error| Error::io(path, format!("expected a list of seconds: {error}")))?;
-    if times.len() != rows.len() {
-        let reason = format!("`{}` times, expected {}, one for each row", times.len(), rows.len());
+    let episodes: Vec<Episode> = serde_json::from_str(&without_nan(&text))
+        .map_err(|error| Error::io(path, format!("expected a list of episodes: {error}")))?;
+    if episodes.len() != rows.len() {
+        let reason = format!("`{}` episodes, expected {}, one for each row", episodes.len(), rows.len());
         return Err(Error::io(path, reason));
     }
-    for (row, time) in rows.iter_mut().zip(times) {
+    for (row, episode) in rows.iter_mut().zip(episodes) {
         if row.metrics.get(RUNTIME).is_none() {
-            row.metrics.set(RUNTIME, time.into());
+            row.metrics.set(RUNTIME, episode.seconds.into());
         }
     }
     Ok(())
@@ -249,8 +254,12 @@ mod tests {
     #[test]
     fn times_are_the_runtime_and_unfinished_algorithms_are_told() {
         let rows = format!("[{ROW}, {ROW}]");
-        let results =
-            read(&[("A.json", &rows), ("A.times.json", "[0.5, NaN]"), ("B.jsonl", "what")]).unwrap();
+        let how = |seconds: &str| {
+            format!(r#"{{"episode": 0, "seed": 1, "config": {{}}, "seconds": {seconds}, "run": 0}}"#)
+        };
+        let episodes = format!("[{}, {}]", how("0.5"), how("NaN"));
+        let files = [("A.json", rows.as_str()), ("A.episodes.json", &episodes), ("B.jsonl", "what")];
+        let results = read(&files).unwrap();
         assert_eq!(results.rows[0].metric("runtime"), Some(0.5));
         assert_eq!(results.rows[1].metric("runtime"), None);
         assert_eq!(results.metric_columns(), ["CSR", "runtime"]);
@@ -268,7 +277,10 @@ mod tests {
         assert!(told(&[("A.json", "{\"some\": 1}")]).contains("invalid type: map"));
         assert!(told(&[("A.json", "[{\"some\": 1}]")]).contains("missing field `metrics` at line 1"));
         assert!(told(&[("B.json", &whole)]).contains("row 1 is of algorithm `A`, expected `B`"));
-        assert!(told(&[("A.json", &whole), ("A.times.json", "[1, 2]")]).contains("`2` times, expected 1"));
+        let episodes = told(&[("A.json", &whole), ("A.episodes.json", "[]")]);
+        assert!(episodes.contains("`0` episodes, expected 1"), "{episodes}");
+        let episodes = told(&[("A.json", &whole), ("A.episodes.json", "[1]")]);
+        assert!(episodes.contains("expected a list of episodes: invalid type"), "{episodes}");
         assert!(told(&[]).contains("no results in"));
         assert!(told(&[("A.json", "[]")]).contains("no results in"));
     }

@@ -117,7 +117,7 @@ pub fn run_one(
     running: Running<'_>,
 ) -> Result<Summary, Error> {
     let total = environments.len();
-    let Some(progress) = Progress::open(store, &algorithm.key, total)? else {
+    let Some(progress) = Progress::open(store, &algorithm.key, total, &[])? else {
         return Ok(Summary { is_whole: true, ..Summary::default() });
     };
     (running.watch)(Event::Begin { algorithm: &algorithm.key, total, done: progress.num_done() });
@@ -132,7 +132,7 @@ pub fn run_one(
         let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
         match played {
             Ok(played) => {
-                progress.keep(&done(index, played))?;
+                progress.keep(done(index, played))?;
                 num_played.fetch_add(1, Relaxed);
                 (running.watch)(Event::Played);
             }
@@ -149,7 +149,7 @@ pub fn run_one(
     pool(threads)?.install(|| tasks.into_iter().par_bridge().try_for_each(one))?;
     (running.watch)(Event::End);
     let progress = progress.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let is_whole = progress.finish(|index| environments.changes(index))?;
+    let is_whole = progress.finish(environments)?;
     Ok(Summary { num_played: num_played.into_inner(), num_failed: num_failed.into_inner(), is_whole })
 }
 
@@ -170,15 +170,19 @@ fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Resu
     })
 }
 
-/// An episode as results have it: what POGEMA counts is whole, and a mean is not.
 fn done(index: usize, played: Played) -> Done {
+    let metrics = measured(&played);
+    Done { index, metrics, runtime: played.runtime.as_secs_f64(), machine: None, run: 0 }
+}
+
+/// The figures of an episode as results have them: what POGEMA counts is whole, and a mean is not.
+pub(crate) fn measured(played: &Played) -> Pairs {
     let has_one_goal_each = played.metrics.soc.is_some();
     let told = |(name, value): (&str, f64)| {
         let is_count = COUNTS.contains(&name) || name == "ep_length" && has_one_goal_each;
         (name.to_owned(), if is_count { (value as u64).into() } else { value.into() })
     };
-    let metrics = played.metrics.named().into_iter().map(told);
-    Done { index, metrics: Pairs(metrics.collect()), runtime: played.runtime.as_secs_f64() }
+    Pairs(played.metrics.named().into_iter().map(told).collect())
 }
 
 const COUNTS: [&str; 4] = ["SoC", "makespan", "a_collisions", "o_collisions"];

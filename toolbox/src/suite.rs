@@ -130,8 +130,8 @@ fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
         let is_plain = |letter: char| !letter.is_control() && !matches!(letter, '/' | '\\');
-        // Beside the results stands a file about them, and their times.
-        let is_taken = key == "about" || key.strip_suffix(".times").is_some();
+        // Beside the results stand files about them.
+        let is_taken = key == "about" || key.strip_suffix(".episodes").is_some();
         if key.is_empty() || key.starts_with('.') || is_taken || !key.chars().all(is_plain) {
             return Err(wrong(node, key, "a name that a file of results may have"));
         }

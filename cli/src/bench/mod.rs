@@ -131,7 +131,7 @@ impl Bench {
         }
         bar.finish_and_clear();
         let path = pogema_fast::Path::from_environment()?.to_string();
-        let report = Report { machine: machine(), path, bars: bars(&rows), rows };
+        let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
         say(&show::tell(&report.machine, &report.path, &report.rows, &report.bars))?;
         if let Some(path) = &self.json {
             let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
@@ -181,13 +181,4 @@ fn time_pogema(python: &Path, work: &Work) -> Result<Peer, Error> {
     }
     let output = child.wait_with_output().map_err(|error| failed(&error))?;
     serde_json::from_slice(&output.stdout).map_err(|error| failed(&error))
-}
-
-/// The processor and how many of it there are.
-fn machine() -> String {
-    let number = std::thread::available_parallelism().map_or(1, usize::from);
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    let model = model.map_or(std::env::consts::ARCH, |(_, model)| model.trim());
-    format!("{model}, {number} threads")
 }

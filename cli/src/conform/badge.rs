@@ -1,6 +1,7 @@
 //! The verdict as a small picture for a README.
 
 use pogema_conformance::port::PortReport;
+use pogema_core::Error;
 use serde::Serialize;
 
 use super::summary::{Verdict, name_of, score};
@@ -18,7 +19,7 @@ struct Holes<'a> {
 }
 
 /// The badge of a port, as SVG.
-pub fn badge(report: &PortReport) -> Result<String, minijinja::Error> {
+pub fn badge(report: &PortReport) -> Result<String, Error> {
     let score = score(report);
     let (word, colour) = match score.verdict() {
         Verdict::Conforms => ("conforms", "#2a7d33"),

@@ -2,7 +2,7 @@
 
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
 use pogema_conformance::{Record, play};
-use pogema_core::{Map, picture, shorten};
+use pogema_core::{Error, Map, picture, shorten};
 use serde::Serialize;
 
 use super::grid_svg::drawing;
@@ -102,7 +102,7 @@ struct Drawing {
 }
 
 /// The report as a page.
-pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, minijinja::Error> {
+pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error> {
     let names = names(reports);
     let page = Page {
         title: format!("{} and POGEMA 1.4.0", names.join(", ")),

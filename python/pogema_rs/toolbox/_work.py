@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
+from pogema_rs._engine import machine
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 
@@ -31,6 +32,8 @@ class Outcome:
     metrics: Optional[dict[str, Any]] = None
     #: Units: seconds, of the policy alone where the environment measures that.
     runtime: float = 0.0
+    #: Where it was played.
+    machine: str = ""
     error: str = ""
     traceback: str = ""
 
@@ -66,7 +69,7 @@ def _play(task: Task) -> Outcome:
     runtime = metrics.pop("runtime", time.perf_counter() - began)
     if task.environment.get("with_animation"):
         _draw(env, task)
-    return Outcome(task.index, {name: _plain(value) for name, value in metrics.items()}, float(runtime))
+    return Outcome(task.index, {name: _plain(value) for name, value in metrics.items()}, float(runtime), machine())
 
 
 def _algorithm(task: Task) -> tuple[Any, Any]:

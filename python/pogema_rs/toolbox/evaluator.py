@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import platform
+import sys
 import time
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import closing
@@ -76,7 +78,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
         if summary is not None:
             return summary[1]
     config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
-    to_do = suite.begin(key)
+    to_do = suite.begin(key, _versions())
     if to_do is None:
         return 0
     progress.begin(len(to_do))
@@ -88,7 +90,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
                 num_failed += 1
                 suite.note(outcome.index, suite.environment(outcome.index), outcome.error, outcome.traceback)
             else:
-                suite.keep(outcome.index, json.dumps(outcome.metrics), outcome.runtime)
+                suite.keep(outcome.index, json.dumps(outcome.metrics), outcome.runtime, outcome.machine)
             progress.step(outcome.index, outcome.error)
     suite.finish()
     return num_failed
@@ -124,10 +126,17 @@ def _results(folder: Path, key: str) -> list[dict[str, Any]]:
     path = folder / f"{key}.json"
     if not path.exists():
         return []
-    rows, times = json.loads(path.read_text()), json.loads((folder / f"{key}.times.json").read_text())
-    for row, runtime in zip(rows, times):
-        row["metrics"].setdefault("runtime", runtime)
+    rows, episodes = json.loads(path.read_text()), json.loads((folder / f"{key}.episodes.json").read_text())
+    for row, episode in zip(rows, episodes):
+        row["metrics"].setdefault("runtime", episode["seconds"])
     return rows
+
+
+def _versions() -> list[tuple[str, str]]:
+    """The releases of what plays in Python, as far as it is loaded."""
+    loaded = [(name, sys.modules.get(name)) for name in ("numpy", "gymnasium", "torch", "onnxruntime", "distributed")]
+    known = [(name, str(getattr(module, "__version__", ""))) for name, module in loaded if module is not None]
+    return [("Python", platform.python_version()), *known]
 
 
 class _Progress:

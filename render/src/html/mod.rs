@@ -1,14 +1,21 @@
-//! Pages that need nothing but a browser: a replay of an episode, and an editor of maps.
+//! Pages that need nothing but a browser: a replay of an episode, an editor of maps, and albums of replays.
 //!
 //! A page is one file with everything inside, and its content security policy forbids it any network.
 
+mod album;
 mod pack;
 mod page;
+mod template;
+
+use std::sync::LazyLock;
 
 use pogema_core::Error;
 
 use crate::Film;
+pub use album::Album;
+pub use pack::pack;
 use page::Page;
+pub use template::fill;
 
 const SHARED: [&str; 4] = [
     include_str!("shared/dom.js"),
@@ -41,14 +48,20 @@ const EDITOR: [&str; 8] = [
 /// If the lists of a step are not as long as there are agents, if a cell is off the map, or if an agent is not next
 /// to where it was a step before.
 pub fn replay(film: &Film, title: &str) -> Result<String, Error> {
-    let page = Page {
+    Ok(replay_page(title, &pack(film)?).text())
+}
+
+/// A replay page of what [`pack`] made.
+fn replay_page<'a>(title: &'a str, data: &'a str) -> Page<'a> {
+    static SCRIPT: LazyLock<String> = LazyLock::new(|| script(&[&SHARED, &REPLAY]));
+    Page {
         title,
         style: concat!(include_str!("shared/base.css"), include_str!("replay/replay.css")),
         body: include_str!("replay/replay.html"),
-        data: &pack::pack(film)?,
-        script: &script(&[&SHARED, &REPLAY]),
-    };
-    Ok(page.text())
+        data,
+        script: &SCRIPT,
+        inner: None,
+    }
 }
 
 /// The page that edits maps, as text and as POGEMA's config.
@@ -59,6 +72,7 @@ pub fn editor() -> String {
         body: include_str!("editor/editor.html"),
         data: "null",
         script: &script(&[&SHARED, &EDITOR]),
+        inner: None,
     };
     page.text()
 }

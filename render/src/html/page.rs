@@ -14,17 +14,24 @@ pub struct Page<'a> {
     /// JSON for the script, in which no `<` may stand.
     pub data: &'a str,
     pub script: &'a str,
+    /// The page that it may show inside of itself, whose style and script are allowed too.
+    pub inner: Option<&'a Self>,
 }
 
 impl Page<'_> {
     /// The page as one file. Its policy names its own style and script by their hashes, so that nothing else runs,
     /// whatever a title or a map might smuggle in.
     pub fn text(&self) -> String {
+        let all = |of: fn(&Self) -> &str| {
+            let pages = std::iter::once(self).chain(self.inner);
+            pages.map(|page| format!("'sha256-{}'", hash(of(page)))).collect::<Vec<_>>().join(" ")
+        };
         format!(
             include_str!("page.html"),
             title = HtmlEscape(self.title),
-            style_hash = hash(self.style),
-            script_hash = hash(self.script),
+            styles = all(|page| page.style),
+            scripts = all(|page| page.script),
+            frames = if self.inner.is_some() { " frame-src blob:;" } else { "" },
             style = self.style,
             body = self.body,
             data = self.data,

@@ -71,8 +71,13 @@ impl Table {
         format!("{table}{}", self.remark.as_ref().map(|remark| format!("{gap}{remark}")).unwrap_or_default())
     }
 
+    /// The texts of all cells.
+    pub fn texts(&self) -> Vec<Vec<String>> {
+        self.rows.iter().map(|row| row.iter().map(|cell| self.shown(cell)).collect()).collect()
+    }
+
     /// Whether a column holds figures.
-    fn is_figure(&self, column: usize) -> bool {
+    pub fn is_figure(&self, column: usize) -> bool {
         self.rows.iter().any(|row| !matches!(row.get(column), Some(Cell::Text(_)) | None))
     }
 

@@ -1,0 +1,115 @@
+//! `pogema replay` and the page of `pogema evaluate --html`.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+const SUITE: &str = "
+maps: own.map
+environment:
+  name: Environment
+  on_target: restart
+  collision_system: soft
+  max_episode_steps: 32
+  map_name: own
+  seed: {grid_search: [1, 2]}
+  num_agents: {grid_search: [2, 3]}
+algorithms:
+  RHCR: {name: RHCR, nodes: 100}
+  Dice: {name: random}
+";
+
+const MAP: &str = "type octile\nheight 4\nwidth 6\nmap\n......\n.@@.@.\n.@..@.\n......\n";
+
+fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
+    let output = Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output();
+    let output = output.unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
+    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+}
+
+fn evaluated(more: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("suites")).unwrap();
+    fs::write(folder.path().join("suites/small.yaml"), SUITE).unwrap();
+    fs::write(folder.path().join("suites/own.map"), MAP).unwrap();
+    let (text, error, status) =
+        run(folder.path(), &[&["evaluate", "suites/small.yaml", "--out", "out"], more].concat());
+    assert_eq!(status, 0, "{text}{error}");
+    folder
+}
+
+#[test]
+fn an_episode_is_played_again_by_its_number() {
+    let folder = evaluated(&[]);
+    let rows: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("out/RHCR.json")).unwrap()).unwrap();
+    let (text, error, status) =
+        run(folder.path(), &["replay", "out", "RHCR", "3", "--trace", "t.jsonl", "--svg", "t.svg"]);
+    assert_eq!((status, error.as_str()), (0, ""), "{text}");
+    let throughput = rows[3]["metrics"]["avg_throughput"].as_f64().unwrap();
+    assert!(throughput > 0.0 && text.contains(&format!("avg_throughput={throughput:.4}")[..20]), "{text}");
+    let trace = fs::read_to_string(folder.path().join("t.jsonl")).unwrap();
+    assert_eq!(trace.lines().count(), 2 + 32, "a header, the start and all steps");
+    assert!(fs::read_to_string(folder.path().join("t.svg")).unwrap().starts_with("<svg"));
+    let (_, error, status) = run(folder.path(), &["render", "t.jsonl", "--png", "t.png"]);
+    assert_eq!(status, 0, "{error}");
+    // Not from there alone: the results say where the suite was, beside which its maps are.
+    let (_, error, status) = run(&folder.path().join("out"), &["replay", ".", "Dice", "0"]);
+    assert_eq!((status, error.as_str()), (0, ""));
+}
+
+#[test]
+fn what_comes_out_otherwise_is_told() {
+    let folder = evaluated(&[]);
+    let path = folder.path().join("out/Dice.json");
+    let text = fs::read_to_string(&path).unwrap();
+    let at = text.find("\"a_collisions\":").unwrap();
+    fs::write(&path, format!("{}\"a_collisions\":9{}", &text[..at], &text[at + 15..])).unwrap();
+    let (_, error, status) = run(folder.path(), &["replay", "out", "Dice", "0"]);
+    assert_eq!(status, 0);
+    assert!(error.starts_with("note: it came out otherwise: a_collisions "), "{error}");
+    fs::remove_file(&path).unwrap();
+    let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
+    assert_eq!(error, "note: `Dice` is not finished, so there is nothing to compare it with");
+}
+
+#[test]
+fn what_cannot_be_replayed_is_told() {
+    let folder = evaluated(&[]);
+    for (arguments, told) in [
+        (["replay", "out", "RHCE", "0"], "`algorithm` is `RHCE`, expected one of the suite's: RHCR, Dice"),
+        (["replay", "out", "RHCR", "4"], "`episode` is `4`, expected below 4"),
+        (["replay", "suites", "RHCR", "0"], "suites: holds no results of `pogema evaluate`"),
+    ] {
+        let (text, error, status) = run(folder.path(), &arguments);
+        assert!(error.contains(told), "{error}");
+        assert_eq!((text.as_str(), error.lines().count(), status), ("", 1, 2));
+    }
+}
+
+#[test]
+fn the_page_holds_all_it_needs() {
+    let folder = evaluated(&["--html"]);
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    for place in ["http:", "https:", "src=\"/", "@import", "url("] {
+        assert!(!page.contains(place), "{place}");
+    }
+    assert_eq!(page.matches("data-replay=").count(), 2 * 6, "three of the worst and of the best of each");
+    assert!(page.contains("RHCR, nodes: 100") && page.contains("map_name: own"));
+    assert!(page.contains("frame-src blob:") && !page.contains("unsafe-"));
+    // A page of results that are there already, somewhere else; nothing is played.
+    let again = ["evaluate", "suites/small.yaml", "--out", "out", "--resume", "--html", "page.html"];
+    let (text, error, status) = run(folder.path(), &again);
+    assert!(text.starts_with("0 episodes played") && error.ends_with("wrote page.html"), "{text}{error}");
+    assert_eq!((status, fs::read_to_string(folder.path().join("page.html")).unwrap()), (0, page));
+    // One that cannot be written is told before anything is played.
+    let nowhere = ["evaluate", "suites/small.yaml", "--out", "new", "--html", "no/page.html"];
+    let (_, error, status) = run(folder.path(), &nowhere);
+    assert!(error.contains("no/page.html: `no`: No such file"), "{error}");
+    assert_eq!((status, folder.path().join("new").exists()), (2, false));
+}

@@ -1,0 +1,70 @@
+//! Episodes of results, played again.
+
+use std::path::{Path, PathBuf};
+
+use pogema_core::{Error, Trace};
+
+use crate::about::About;
+use crate::built_in::BuiltIn;
+use crate::environments::Environments;
+use crate::pairs::Pairs;
+use crate::play::record;
+use crate::results::{Row, figure};
+use crate::run::measured;
+use crate::store::SUITE;
+use crate::suite::Suite;
+
+impl Suite {
+    /// The suite whose results are in a folder.
+    ///
+    /// # Errors
+    /// If there are none, or the suite beside them is wrong.
+    pub fn of_results(folder: &Path) -> Result<Self, Error> {
+        let about = About::read(folder)?;
+        let about = about.ok_or_else(|| Error::io(folder, "holds no results of `pogema evaluate`"))?;
+        let text = pogema_maps::files::read_text(&folder.join(SUITE))?;
+        // What it names lies beside the file that it was read from.
+        Self::parse(&about.suite, &text)
+    }
+
+    /// Its environments, with the maps of further files.
+    ///
+    /// # Errors
+    /// As for [`Environments::new`], or if a file cannot be read.
+    pub fn environments(&self, further: &[PathBuf]) -> Result<(Environments, Vec<String>), Error> {
+        let (library, warnings) = self.library(further)?;
+        Ok((Environments::new(self, library)?, warnings))
+    }
+
+    /// Plays an episode of one of its algorithms, and keeps all of it.
+    ///
+    /// # Errors
+    /// If there is no such algorithm or episode, or the algorithm is played in Python.
+    pub fn play_again(
+        &self,
+        environments: &Environments,
+        key: &str,
+        index: usize,
+    ) -> Result<(Pairs, Trace), Error> {
+        let algorithm = self.algorithms.iter().find(|algorithm| algorithm.key == key);
+        let algorithm = algorithm.ok_or_else(|| {
+            let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
+            Error::config("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
+        })?;
+        let built_in = BuiltIn::of(algorithm).ok_or_else(|| {
+            let reason = format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it");
+            Error::State { reason }
+        })?;
+        let (played, trace) = record(&environments.at(index)?.config, &built_in?)?;
+        Ok((measured(&played), trace))
+    }
+}
+
+/// In what figures an episode that was played again differs from its row, each told in a few words.
+pub fn differences(row: &Row, metrics: &Pairs) -> Vec<String> {
+    let told = |(name, then): (&str, &serde_json::Value)| {
+        let (then, now) = (figure(then)?, figure(metrics.get(name)?)?);
+        (then.to_bits() != now.to_bits()).then(|| format!("{name} {now}, in the results {then}"))
+    };
+    row.metrics.iter().filter_map(told).collect()
+}

@@ -1,0 +1,159 @@
+//! The worst and the best episodes of each algorithm.
+
+use std::collections::HashMap;
+
+use crate::pairs::Pairs;
+use crate::results::{Results, Row, short};
+
+/// Figures by which episodes are judged, of which the first counts that all rows have, and whether less is better.
+const JUDGED_BY: [(&str, bool); 4] =
+    [("avg_throughput", false), ("SoC", true), ("makespan", true), ("ep_length", true)];
+
+/// The share of agents that came to their goals: whoever has less is worse, whatever it cost.
+const SOLVED: &str = "ISR";
+
+/// An episode to be shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pick {
+    /// Whose it is.
+    pub algorithm: String,
+    /// Its number, which is its row's place among those of the algorithm.
+    pub episode: usize,
+    /// The place of its row among all.
+    pub row: usize,
+    /// Whether it is one of the worst, and not one of the best.
+    pub is_worst: bool,
+    /// By what, in a few words.
+    pub why: String,
+}
+
+/// So many of the worst episodes of each algorithm, the worst first, then as many of its best; none if rows have no
+/// figure to judge them by.
+///
+/// An episode is the worse the fewer agents came to their goals; then, the larger its figure is in comparison with
+/// that of the best algorithm in the same environment; then, the worse the figure itself is.
+pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
+    let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
+    let Some(&(figure, is_less_better)) = JUDGED_BY.iter().find(|(name, _)| has(name)) else {
+        return Vec::new();
+    };
+    let best = best_of(results, figure, is_less_better);
+    let mut of_algorithms: Vec<(&str, Vec<Judged<'_>>)> = Vec::new();
+    for (at, row) in results.rows.iter().enumerate() {
+        let name = row.algorithm.as_str();
+        let place = of_algorithms.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+            of_algorithms.push((name, Vec::new()));
+            of_algorithms.len() - 1
+        });
+        let episodes = &mut of_algorithms[place].1;
+        let value = row.metric(figure).unwrap_or_default();
+        let (least, whose) = best.get(&told(&row.settings)).copied().unwrap_or((value, name));
+        let times = if is_less_better { value / least } else { least / value };
+        let times = if times.is_nan() { 1.0 } else { times };
+        let solved = row.metric(SOLVED);
+        let why = why(figure, value, solved, value / least, (whose != name && times > 1.0).then_some(whose));
+        let worth = if is_less_better { value } else { -value };
+        episodes.push(Judged {
+            at,
+            episode: episodes.len(),
+            bad: [-solved.unwrap_or(1.0), times, worth],
+            why,
+            name,
+        });
+    }
+    of_algorithms.into_iter().flat_map(|(_, episodes)| ends(episodes, number)).collect()
+}
+
+struct Judged<'a> {
+    at: usize,
+    episode: usize,
+    /// The larger the worse, the first first.
+    bad: [f64; 3],
+    why: String,
+    name: &'a str,
+}
+
+impl Judged<'_> {
+    fn pick(&self, is_worst: bool) -> Pick {
+        let (algorithm, why) = (self.name.to_owned(), self.why.clone());
+        Pick { algorithm, episode: self.episode, row: self.at, is_worst, why }
+    }
+}
+
+/// The best figure in each environment, and whose it is.
+fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> HashMap<String, (f64, &'a str)> {
+    let mut best: HashMap<String, (f64, &str)> = HashMap::new();
+    // Who left agents on their way has fewer costs than who brought all of them home.
+    let is_solved = |row: &&Row| row.metric(SOLVED).is_none_or(|share| share >= 1.0);
+    for row in results.rows.iter().filter(is_solved) {
+        let value = row.metric(figure).unwrap_or_default();
+        let place = best.entry(told(&row.settings)).or_insert((value, &row.algorithm));
+        if if is_less_better { value < place.0 } else { value > place.0 } {
+            *place = (value, &row.algorithm);
+        }
+    }
+    best
+}
+
+fn why(figure: &str, value: f64, solved: Option<f64>, times: f64, whose: Option<&str>) -> String {
+    let mut parts = vec![format!("{figure} {}", short(value))];
+    parts.extend(solved.map(|share| format!("{SOLVED} {}", short(share))));
+    parts.extend(whose.map(|whose| format!("{times:.2} × that of {whose}")));
+    parts.join(", ")
+}
+
+fn told(settings: &Pairs) -> String {
+    let mut parts: Vec<String> = settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    parts.sort();
+    parts.join("\n")
+}
+
+fn ends(mut episodes: Vec<Judged<'_>>, number: usize) -> Vec<Pick> {
+    let by_worth = |one: &Judged<'_>, other: &Judged<'_>| {
+        let pairs = one.bad.iter().zip(&other.bad);
+        let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
+        differs.unwrap_or_else(|| one.episode.cmp(&other.episode))
+    };
+    episodes.sort_by(by_worth);
+    let worst = episodes.iter().take(number).map(|episode| episode.pick(true));
+    let best = episodes.iter().rev().take(number).map(|episode| episode.pick(false));
+    worst.chain(best).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn results(rows: &[(&str, u64, f64, f64)]) -> Results {
+        let row = |&(algorithm, seed, soc, share): &(&str, u64, f64, f64)| Row {
+            metrics: Pairs(vec![("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
+            settings: Pairs(vec![("seed".into(), seed.into())]),
+            algorithm: algorithm.to_owned(),
+            set: String::new(),
+        };
+        Results { rows: rows.iter().map(row).collect(), notes: Vec::new() }
+    }
+
+    #[test]
+    fn unsolved_episodes_are_worst_then_those_that_another_solved_better() {
+        let rows = [("A", 0, 20.0, 1.0), ("A", 1, 12.0, 1.0), ("A", 2, 5.0, 0.5), ("A", 3, 50.0, 1.0)];
+        let of_b = [("B", 0, 10.0, 1.0), ("B", 1, 12.0, 1.0), ("B", 2, 40.0, 1.0), ("B", 3, 50.0, 1.0)];
+        let picks = picks(&results(&[rows, of_b].concat()), 2);
+        let told: Vec<_> =
+            picks.iter().map(|pick| (pick.algorithm.as_str(), pick.episode, pick.is_worst)).collect();
+        let of_a = [("A", 2, true), ("A", 0, true), ("A", 1, false), ("A", 3, false)];
+        // Nobody did better than B, so that its own costs decide.
+        let of_b = [("B", 3, true), ("B", 2, true), ("B", 0, false), ("B", 1, false)];
+        assert_eq!(told, [of_a, of_b].concat());
+        assert_eq!(picks[1].why, "SoC 20, ISR 1, 2.00 × that of B");
+        assert_eq!(picks[0].why, "SoC 5, ISR 0.5");
+        assert_eq!((picks[4].row, picks[5].row), (7, 6));
+    }
+
+    #[test]
+    fn rows_that_cannot_be_judged_are_not_picked() {
+        let mut results = results(&[("A", 0, 20.0, 1.0)]);
+        results.rows[0].metrics = Pairs(vec![("fun".into(), 1.0.into())]);
+        assert_eq!(picks(&results, 3), []);
+    }
+}
