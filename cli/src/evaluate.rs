@@ -9,7 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pogema_core::Error;
 use pogema_maps::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
-use pogema_toolbox::{Begin, Environments, Event, Results, Running, Store, Suite, Summary, built_in, run};
+use pogema_toolbox::{
+    Begin, Environments, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
+};
 
 use crate::maps::Sources;
 use crate::output::{check_writable, say};
@@ -36,9 +38,6 @@ pub struct Evaluate {
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     html: Option<Vec<PathBuf>>,
 }
-
-/// The page in a folder of results.
-const REPORT: &str = "report.html";
 
 impl Evaluate {
     pub fn run(&self) -> Result<(), Error> {

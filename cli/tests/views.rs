@@ -119,7 +119,10 @@ fn what_is_wrong_is_one_line() {
     write("none.yaml", "environment: 1\n");
     for (arguments, part) in [
         (vec!["nowhere", "--six", "paper"], "nowhere: No such file"),
-        (vec!["nowhere"], "no views: expected `nowhere/suite.yaml`, `nowhere/nowhere.yaml`, or `--config`"),
+        (
+            vec!["nowhere"],
+            "no views: expected `nowhere/suite.yaml`, `nowhere/nowhere.yaml`, or another file as `config`",
+        ),
         (vec!["empty"], "no results in `empty`"),
         (vec!["broken"], "EOF while parsing"),
         (vec!["foreign"], "foreign/One.json: expected a list of results"),

@@ -16,7 +16,7 @@ Modules of our own: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitat
 
 Evaluations, under the names of pogema-toolbox, in `pogema_rs.toolbox`: `pogema_rs.toolbox.evaluator`,
 `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`, `pogema_rs.toolbox.algorithm_config`,
-`pogema_rs.toolbox.run_episode` and `pogema_rs.toolbox.results_holder`.
+`pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder` and `pogema_rs.toolbox.views`.
 
 Frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
 `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib`,

@@ -242,6 +242,11 @@ impl Engine {
         Ok((py.import("pogema_rs._engine")?.getattr("restore_engine")?, (state::save(self, py)?,)))
     }
 
+    /// The film as a page with many replays wants it.
+    fn pack_film(&self, py: Python<'_>) -> PyResult<String> {
+        self.recorder.pack().map_err(|error| errors::call(py, &error))
+    }
+
     /// The film as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
         self.recorder.html(title).map_err(|error| errors::call(py, &error))

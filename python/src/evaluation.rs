@@ -5,10 +5,13 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pogema_core::Error;
+use pogema_maps::files::write_whole;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::parse_map_text;
+use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::{
-    Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Running, Store, Suite, run_one,
+    Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Results, Running, Store, Suite,
+    run_one,
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -16,12 +19,16 @@ use pyo3::prelude::*;
 /// An algorithm of a suite: the name of its results, its own name, its parameters in JSON, processes, backend.
 type Listed = (String, String, String, Option<usize>, String);
 
+/// An episode that was played again in Python: its figures in JSON, its film, and why there is none.
+type Again = (String, String, String);
+
 /// A suite, and the folder with what came of it.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Evaluation {
     suite: Suite,
     environments: Environments,
     store: Arc<Store>,
+    folder: PathBuf,
     progress: Mutex<Option<Progress>>,
 }
 
@@ -48,7 +55,7 @@ impl Evaluation {
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
         let store = Arc::new(Store::open(&folder, &suite, begin).map_err(|error| told(&error))?);
-        Ok(Self { suite, environments, store, progress: Mutex::new(None) })
+        Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
     }
 
     /// Number of episodes of each algorithm.
@@ -59,6 +66,11 @@ impl Evaluation {
     /// Whether the environments are others than POGEMA's.
     fn is_foreign(&self) -> bool {
         self.suite.is_foreign()
+    }
+
+    /// Whether the suite says what to show of its results.
+    fn has_views(&self) -> bool {
+        !self.suite.views.is_empty()
     }
 
     /// The address of a Dask scheduler that the suite names.
@@ -126,6 +138,30 @@ impl Evaluation {
         finished.unwrap_or(Ok(true)).map_err(|error| told(&error))
     }
 
+    /// The episodes that a page of the results shows: whose, and their numbers.
+    fn picks(&self) -> PyResult<Vec<(String, usize)>> {
+        let picks = picks(&self.results()?, SHOWN);
+        Ok(picks.into_iter().map(|pick| (pick.algorithm, pick.episode)).collect())
+    }
+
+    /// Writes the page of the results, with what came of those episodes of [`Self::picks`] that are not played by
+    /// algorithms that are built in.
+    fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Again>>) -> PyResult<()> {
+        let results = self.results()?;
+        let write = || {
+            let picks = picks(&results, SHOWN).into_iter();
+            let replay = |(pick, again): (Pick, Option<Again>)| match again {
+                None => Ok(Replay::of(pick, &results, &self.suite, &self.environments)),
+                Some((_, _, error)) if !error.is_empty() => Ok(Replay::failed(pick, error)),
+                Some((metrics, film, _)) => Ok(Replay::played(pick, &results, &from_json(&metrics)?, film)),
+            };
+            let replays = picks.zip(again).map(replay).collect::<Result<Vec<_>, Error>>()?;
+            let page = page(&self.suite, &self.store.about(), &results, &replays)?;
+            write_whole(&path, page.as_bytes())
+        };
+        py.detach(write).map_err(|error| told(&error))
+    }
+
     /// Plays all that is to be played of an algorithm that is built in; none if it is not. Tells `watch` of each
     /// episode: its number and the error, if it could not be played.
     ///
@@ -169,6 +205,10 @@ impl Evaluation {
 }
 
 impl Evaluation {
+    fn results(&self) -> PyResult<Results> {
+        Results::read(std::slice::from_ref(&self.folder)).map_err(|error| told(&error))
+    }
+
     fn progress(&self) -> PyResult<MutexGuard<'_, Option<Progress>>> {
         self.progress.try_lock().map_err(|_| {
             PyRuntimeError::new_err("another thread is using this evaluation, expected one at a time")
@@ -211,10 +251,14 @@ fn read_begin(name: &str) -> Result<Begin, Error> {
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {
-    serde_json::from_str(text).map_err(|error| PyValueError::new_err(error.to_string()))
+    from_json(text).map_err(|error| told(&error))
 }
 
-fn told(error: &Error) -> PyErr {
+fn from_json<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
+    serde_json::from_str(text).map_err(|error| Error::State { reason: error.to_string() })
+}
+
+pub fn told(error: &Error) -> PyErr {
     match error {
         Error::Io { .. } => pyo3::exceptions::PyOSError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),

@@ -71,6 +71,10 @@ impl Recorder {
         html::replay(self.shown()?, title)
     }
 
+    pub fn pack(&self) -> Result<String, Error> {
+        html::pack(self.shown()?)
+    }
+
     fn shown(&self) -> Result<&Film, Error> {
         let reason = || "no episode is filmed: ask for it before the reset".to_owned();
         self.film.as_ref().ok_or_else(|| Error::State { reason: reason() })

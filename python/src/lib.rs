@@ -13,6 +13,7 @@ mod planners;
 mod seeds;
 mod state;
 mod vec;
+mod views;
 mod witness;
 
 use pyo3::prelude::*;
@@ -26,6 +27,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<evaluation::Evaluation>()?;
     module.add_class::<witness::Witness>()?;
     module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;
+    module.add_function(wrap_pyfunction!(views::show_views, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;

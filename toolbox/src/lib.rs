@@ -34,7 +34,7 @@ pub use play::{Played, play, record};
 pub use progress::{Done, Episode, Failed, Progress};
 pub use results::{Results, Row, short};
 pub use run::{Event, Running, Summary, built_in, run, run_one};
-pub use store::{Begin, Store};
+pub use store::{Begin, REPORT, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};

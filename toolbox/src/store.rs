@@ -118,7 +118,7 @@ fn delete(folder: &Path, known: &About) -> Result<(), Error> {
             remove(&folder.join(format!("{key}.{ending}")))?;
         }
     }
-    Ok(())
+    remove(&folder.join(REPORT))
 }
 
 fn check_empty(folder: &Path) -> Result<(), Error> {
@@ -133,6 +133,9 @@ fn check_empty(folder: &Path) -> Result<(), Error> {
     }
     Ok(())
 }
+
+/// The page of the results.
+pub const REPORT: &str = "report.html";
 
 /// Endings of the files of an algorithm: its results, how each was played, the episodes done so far, and those that failed.
 pub(crate) const RESULTS: &str = "json";

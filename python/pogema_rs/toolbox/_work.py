@@ -36,16 +36,18 @@ class Outcome:
     machine: str = ""
     error: str = ""
     traceback: str = ""
+    #: The episode, packed for a page that replays it, if that was asked for.
+    film: str = ""
 
 
 #: The algorithm that this process played last: one may take minutes to load.
 _ready: dict[str, tuple[dict[str, Any], Any, Any]] = {}
 
 
-def play(task: Task) -> Outcome:
+def play(task: Task, is_filmed: bool = False) -> Outcome:
     """Plays an episode; whatever the policy or the environment raises is part of what comes of it."""
     try:
-        return _play(task)
+        return _play(task, is_filmed)
     except Exception as error:  # noqa: BLE001 - a policy may raise anything
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         return Outcome(task.index, error=reason, traceback=traceback.format_exc())
@@ -58,18 +60,22 @@ def play_with(state: dict[str, Any], task: Task) -> Outcome:
     return play(task)
 
 
-def _play(task: Task) -> Outcome:
+def _play(task: Task, is_filmed: bool) -> Outcome:
     ToolboxRegistry.register_maps(task.maps)
     algorithm, settings = _algorithm(task)
     env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)
     if settings.preprocessing:
         env = ToolboxRegistry.create_algorithm_preprocessing(env, task.settings["name"], **task.settings)
+    if is_filmed:
+        env.unwrapped.enable_animation()
     began = time.perf_counter()
     metrics = dict(ToolboxRegistry.run_episode(env, algorithm, settings.run_episode_func))
     runtime = metrics.pop("runtime", time.perf_counter() - began)
     if task.environment.get("with_animation"):
         _draw(env, task)
-    return Outcome(task.index, {name: _plain(value) for name, value in metrics.items()}, float(runtime), machine())
+    film = env.unwrapped._engine.pack_film() if is_filmed else ""
+    plain = {name: _plain(value) for name, value in metrics.items()}
+    return Outcome(task.index, plain, float(runtime), machine(), film=film)
 
 
 def _algorithm(task: Task) -> tuple[Any, Any]:

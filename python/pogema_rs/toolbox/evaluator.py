@@ -14,8 +14,9 @@ from typing import Any, Literal, Optional, Union
 
 from pogema_rs._engine import Evaluation, num_cores
 from pogema_rs.toolbox import _backends
-from pogema_rs.toolbox._work import Outcome, Task
+from pogema_rs.toolbox._work import Outcome, Task, play
 from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views import show
 
 __all__ = ["EvaluationError", "evaluation"]
 
@@ -33,6 +34,7 @@ def evaluation(
     begin: Literal["new", "resume", "anew"] = "new",
     maps: Sequence[_Path] = (),
     dask: Optional[str] = None,
+    html: Optional[_Path] = None,
 ) -> list[dict[str, Any]]:
     """Plays what is not played yet of a suite, and returns all results, in the layout of pogema-toolbox.
 
@@ -40,7 +42,9 @@ def evaluation(
     (`new`), those of a run of the same suite that broke off (`resume`), or any, which are deleted (`anew`). `maps` are
     files and folders with maps besides those that are registered. `dask` is the address of a scheduler, for
     algorithms whose `parallel_backend` is one of Dask; without one, and without `dask` in the suite, they get a
-    cluster of processes on this machine.
+    cluster of processes on this machine. Tables of `results_views` are printed in the end, and plots written to
+    `views` in the folder; `html` is the file for a page with all that, and with replays of the worst and best episodes,
+    which are played again for it.
 
     An algorithm that nobody registered is the planner or policy of that name that is built in.
 
@@ -58,21 +62,51 @@ def evaluation(
     address = dask or suite.dask()
     num_failed = 0
     results: list[dict[str, Any]] = []
-    for key, name, parameters, num_processes, backend in suite.algorithms():
-        settings = {"name": name, **json.loads(parameters), "parallel_backend": backend}
-        if num_processes is not None:
-            settings["num_process"] = num_processes
+    for key, settings in _algorithms(suite).items():
         num_failed += _run(suite, key, settings, address)
         results += _results(Path(eval_dir), key)
+    if results and suite.has_views():
+        for shown in show(eval_dir):
+            for table in shown.tables:
+                print(table)
+    if results and html is not None:
+        _write_page(suite, html)
     if num_failed:
         raise EvaluationError(f"{num_failed} episodes could not be played; see {Path(eval_dir)}/*.failed.jsonl")
     return results
 
 
+def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:
+    """The settings of the algorithms of a suite, by the names of their results."""
+    algorithms = {}
+    for key, name, parameters, num_processes, backend in suite.algorithms():
+        algorithms[key] = {"name": name, **json.loads(parameters), "parallel_backend": backend}
+        if num_processes is not None:
+            algorithms[key]["num_process"] = num_processes
+    return algorithms
+
+
+def _is_registered(settings: dict[str, Any]) -> bool:
+    return settings["name"] in ToolboxRegistry.get_state()["algorithms"]
+
+
+def _write_page(suite: Evaluation, path: _Path) -> None:
+    """Writes the page of the results; what is played in Python is played again here."""
+    algorithms = _algorithms(suite)
+    again: list[Optional[tuple[str, str, str]]] = []
+    for key, index in suite.picks():
+        if key not in algorithms or not _is_registered(algorithms[key]):
+            again.append(None)
+        else:
+            outcome = play(_task(suite, index, key, algorithms[key]), is_filmed=True)
+            again.append((json.dumps(outcome.metrics), outcome.film, outcome.error))
+    suite.write_report(os.fspath(path), again)
+
+
 def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str]) -> int:
     """Plays what is to be played of an algorithm; the number of episodes that could not be."""
     progress = _Progress(key, suite.num_episodes())
-    if settings["name"] not in ToolboxRegistry.get_state()["algorithms"]:
+    if not _is_registered(settings):
         threads = min(settings.get("num_process", num_cores()), num_cores())
         summary = suite.run_built_in(key, threads, progress.built_in)
         if summary is not None:

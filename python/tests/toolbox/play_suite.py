@@ -1,4 +1,4 @@
-"""Plays a suite with policies in Python: play_suite.py SUITE FOLDER BEGIN [ADDRESS]"""
+"""Plays a suite with policies in Python: play_suite.py SUITE FOLDER BEGIN [ADDRESS [PAGE]]"""
 
 import os
 import signal
@@ -66,14 +66,15 @@ class Crowded:
 
 
 def main():
-    suite, folder, begin, *address = sys.argv[1:]
+    suite, folder, begin, *more = sys.argv[1:]
+    address, page = (*more, "", "")[:2]
     ToolboxRegistry.setup_logger("INFO")
     ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
     ToolboxRegistry.register_algorithm("Mortal", Mortal, MortalConfig)
     ToolboxRegistry.register_algorithm("Crowded", Crowded)
     ToolboxRegistry.register_maps({"hall": [[0] * 9 for _ in range(9)]})
     try:
-        results = evaluation(suite, folder, begin=begin, dask=address[0] if address else None)
+        results = evaluation(suite, folder, begin=begin, dask=address or None, html=page or None)
     except (EvaluationError, ValueError, OSError) as error:
         sys.exit(f"{type(error).__name__}: {error}")
     print(len(results))

@@ -14,6 +14,7 @@ pub use picks::{Pick, picks};
 use crate::about::{About, Run};
 use crate::again::differences;
 use crate::environments::Environments;
+use crate::pairs::Pairs;
 use crate::results::{Results, Row};
 use crate::suite::Suite;
 use crate::tree::Node;
@@ -38,12 +39,20 @@ impl Replay {
     pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &Environments) -> Self {
         let again = suite.play_again(environments, &pick.algorithm, pick.episode);
         match again.and_then(|(metrics, trace)| Ok((metrics, pack(&pogema_render::Film::of(&trace))?))) {
-            Ok((metrics, film)) => {
-                let differences = differences(&results.rows[pick.row], &metrics);
-                Self { pick, film: Ok(film), differences }
-            }
-            Err(error) => Self { pick, film: Err(error.to_string()), differences: Vec::new() },
+            Ok((metrics, film)) => Self::played(pick, results, &metrics, film),
+            Err(error) => Self::failed(pick, error.to_string()),
         }
+    }
+
+    /// An episode that somebody played again.
+    pub fn played(pick: Pick, results: &Results, metrics: &Pairs, film: String) -> Self {
+        let differences = differences(&results.rows[pick.row], metrics);
+        Self { pick, film: Ok(film), differences }
+    }
+
+    /// An episode that cannot be replayed, and why.
+    pub fn failed(pick: Pick, why: String) -> Self {
+        Self { pick, film: Err(why), differences: Vec::new() }
     }
 }
 

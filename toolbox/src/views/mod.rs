@@ -1,11 +1,12 @@
 //! Tables and plots of results, as a file of views asks for them.
 //!
-//! [`read_views`] reads the file; [`View::show`] makes of [`Results`] what one view asks for.
+//! A [`Gallery`] shows all views of a file; [`View::show`] makes of [`Results`] what one view asks for.
 
 mod axes;
 mod boxes;
 mod cactus;
 mod compare;
+mod gallery;
 mod grid;
 mod legend;
 mod options;
@@ -26,6 +27,7 @@ use pogema_maps::nearest;
 pub use boxes::BoxView;
 pub use cactus::CactusView;
 pub use compare::CompareView;
+pub use gallery::{Gallery, Told};
 pub use grid::{Cell, Format, Table};
 pub use picture::{Kind, Picture};
 pub use plot::PlotView;

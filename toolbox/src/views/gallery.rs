@@ -1,0 +1,114 @@
+//! All views of results: their tables as text, their plots as files.
+
+use std::path::{Path, PathBuf};
+
+use pogema_core::Error;
+use pogema_maps::files::write_whole;
+use pogema_maps::nearest;
+
+use super::{Format, Kind, View, read_views};
+use crate::results::Results;
+use crate::six::Definition;
+use crate::store::SUITE;
+
+/// Views by name, and what holds for all of them.
+#[derive(Clone, Debug, Default)]
+pub struct Gallery {
+    /// The views.
+    pub views: Vec<(String, View)>,
+    /// The format of tables, whatever the views say.
+    pub format: Option<Format>,
+    /// The format of plots, whatever the views say.
+    pub kind: Option<Kind>,
+    /// The definition of the six metrics, whatever the views say.
+    pub definition: Option<Definition>,
+    /// The folder for plots; none are written without one.
+    pub folder: Option<PathBuf>,
+}
+
+/// What came of a view.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Told {
+    /// Its tables with its name above them.
+    pub tables: Vec<String>,
+    /// The files of its plots.
+    pub files: Vec<PathBuf>,
+    /// What was left out or looks wrong, a line each.
+    pub notes: Vec<String>,
+}
+
+impl Gallery {
+    /// The views of a file, by default of the one that is with the results; if names are given, only those.
+    ///
+    /// # Errors
+    /// If there is no such file or name, or the file is wrong.
+    pub fn of(folders: &[PathBuf], config: Option<&Path>, names: &[String]) -> Result<Self, Error> {
+        let path = config.map_or_else(|| own_config(folders), |path| Ok(path.to_owned()))?;
+        let views = read_views(&path)?;
+        let known = || views.iter().map(|(name, _)| name.as_str());
+        if let Some(name) = names.iter().find(|&name| !known().any(|known| known == name)) {
+            let hint = nearest(name, known()).map(|hint| format!("; the nearest one is `{hint}`"));
+            return Err(Error::io(&path, format!("no view `{name}`{}", hint.unwrap_or_default())));
+        }
+        let is_chosen = |name: &String| names.is_empty() || names.contains(name);
+        let views = views.into_iter().filter(|(name, _)| is_chosen(name)).collect();
+        Ok(Self { views, ..Self::default() })
+    }
+
+    /// Shows one of the views and writes its plots.
+    ///
+    /// # Errors
+    /// If it cannot be shown, or a file cannot be written.
+    pub fn show(&self, name: &str, view: &View, results: &Results) -> Result<Told, Error> {
+        let shown = view.show(name, results, self.definition)?;
+        let format = self.format.or(view.format()).unwrap_or(Format::Terminal);
+        let tables =
+            shown.tables.iter().map(|table| format!("{}{}", heading(name, format), table.text(format)));
+        let mut told = Told { tables: tables.collect(), files: Vec::new(), notes: shown.notes };
+        if let Some(folder) = &self.folder {
+            for picture in &shown.pictures {
+                let kind = self.kind.unwrap_or(picture.kind);
+                told.files.push(write(folder, name, kind, &picture.bytes(kind)?)?);
+            }
+        }
+        Ok(told)
+    }
+}
+
+fn heading(name: &str, format: Format) -> String {
+    match format {
+        Format::Terminal => format!("{name}\n"),
+        Format::Markdown => format!("**{name}**\n\n"),
+        Format::Latex => format!("% {name}\n"),
+        Format::Csv => String::new(),
+    }
+}
+
+/// The YAML file of the first folder that has one.
+fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
+    let named = |folder: &PathBuf| {
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        let name = whole.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        [folder.join(SUITE), folder.join(format!("{name}.yaml"))]
+    };
+    let all: Vec<PathBuf> = folders.iter().flat_map(named).collect();
+    let found = all.iter().find(|path| path.is_file()).cloned();
+    found.ok_or_else(|| {
+        let looked = all.iter().map(|path| format!("`{}`", path.display())).collect::<Vec<_>>().join(", ");
+        Error::State { reason: format!("no views: expected {looked}, or another file as `config`") }
+    })
+}
+
+fn write(folder: &Path, name: &str, kind: Kind, bytes: &[u8]) -> Result<PathBuf, Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    let path = folder.join(format!("{}.{}", file_name(name), kind.extension()));
+    write_whole(&path, bytes)?;
+    Ok(path)
+}
+
+/// A view's name with nothing in it that a file's name may not have.
+fn file_name(name: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_. ".contains(letter);
+    let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
+    plain.trim_start_matches('.').to_owned()
+}
