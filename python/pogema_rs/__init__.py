@@ -14,9 +14,10 @@ with `pogema_rs.wrappers.metrics` and `pogema_rs.wrappers.persistence`.
 Modules of our own: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
 `pogema_rs.errors`, `pogema_rs.install` and `pogema_rs.wrappers.forwarding`.
 
-Evaluations, under the names of pogema-toolbox, in `pogema_rs.toolbox`: `pogema_rs.toolbox.evaluator`,
-`pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`, `pogema_rs.toolbox.algorithm_config`,
-`pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder` and `pogema_rs.toolbox.views`.
+Evaluations, under the names of pogema-toolbox, in `pogema_rs.toolbox`, which `python -m` runs:
+`pogema_rs.toolbox.evaluator`, `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`,
+`pogema_rs.toolbox.algorithm_config`, `pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder` and
+`pogema_rs.toolbox.views`.
 
 Frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
 `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib`,

@@ -7,11 +7,11 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use pogema_core::Error;
 use pogema_maps::files::write_whole;
 use pogema_maps::formats::NamedMap;
-use pogema_maps::parse_map_text;
+use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::{
-    Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Results, Running, Store, Suite,
-    run_one,
+    Algorithm, Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Results, Running, Store,
+    Suite, run_one,
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -162,6 +162,11 @@ impl Evaluation {
         py.detach(write).map_err(|error| told(&error))
     }
 
+    /// Whether an algorithm of the suite is built in, with parameters as they have to be.
+    fn is_built_in(&self, key: &str) -> PyResult<bool> {
+        Ok(self.built_in(key)?.is_some())
+    }
+
     /// Plays all that is to be played of an algorithm that is built in; none if it is not. Tells `watch` of each
     /// episode: its number and the error, if it could not be played.
     ///
@@ -173,11 +178,7 @@ impl Evaluation {
         threads: usize,
         watch: Py<PyAny>,
     ) -> PyResult<Option<(usize, usize, bool)>> {
-        let algorithm = self.suite.algorithms.iter().find(|algorithm| algorithm.key == key);
-        let Some((algorithm, built_in)) = algorithm.and_then(|it| Some((it, BuiltIn::of(it)?))) else {
-            return Ok(None);
-        };
-        let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
+        let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
         let stop = AtomicBool::new(false);
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
         let tell = |event: Event<'_>| {
@@ -209,6 +210,15 @@ impl Evaluation {
         Results::read(std::slice::from_ref(&self.folder)).map_err(|error| told(&error))
     }
 
+    fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
+        let algorithm = self.suite.algorithms.iter().find(|algorithm| algorithm.key == key);
+        let Some((algorithm, built_in)) = algorithm.and_then(|it| Some((it, BuiltIn::of(it)?))) else {
+            return Ok(None);
+        };
+        let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
+        Ok(Some((algorithm, built_in)))
+    }
+
     fn progress(&self) -> PyResult<MutexGuard<'_, Option<Progress>>> {
         self.progress.try_lock().map_err(|_| {
             PyRuntimeError::new_err("another thread is using this evaluation, expected one at a time")
@@ -229,16 +239,22 @@ fn environments(
     maps: Vec<(String, String)>,
     files: &[PathBuf],
 ) -> Result<Environments, Error> {
+    let library = library(suite, maps, files)?;
+    if suite.is_foreign() {
+        return Ok(Environments::unchecked(suite, library));
+    }
+    Environments::new(suite, library)
+}
+
+/// The maps that a suite may name, those by name among them.
+fn library(suite: &Suite, maps: Vec<(String, String)>, files: &[PathBuf]) -> Result<Library, Error> {
     let (mut library, _) = suite.library(files)?;
     let read = |(name, text): (String, String)| {
         let text = parse_map_text(&text).map_err(|error| Error::io(&name, error))?;
         Ok(NamedMap { name, text })
     };
     library.register(maps.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
-    if suite.is_foreign() {
-        return Ok(Environments::unchecked(suite, library));
-    }
-    Environments::new(suite, library)
+    Ok(library)
 }
 
 fn read_begin(name: &str) -> Result<Begin, Error> {
@@ -269,4 +285,19 @@ pub fn told(error: &Error) -> PyErr {
 #[pyfunction]
 pub fn machine() -> &'static str {
     pogema_toolbox::machine()
+}
+
+/// Plays one episode of an algorithm that is built in: its figures in JSON, and what it took in seconds. The suite is
+/// of that episode alone, and `maps` are texts by name.
+#[pyfunction]
+pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
+    let play = || {
+        let suite = Suite::parse(std::path::Path::new("suite.yaml"), suite)?;
+        let environments = Environments::unchecked(&suite, library(&suite, maps, &[])?);
+        let (played, runtime) = suite.play_one(&environments)?;
+        let played =
+            serde_json::to_string(&played).map_err(|error| Error::State { reason: error.to_string() })?;
+        Ok((played, runtime.as_secs_f64()))
+    };
+    py.detach(play).map_err(|error: Error| told(&error))
 }

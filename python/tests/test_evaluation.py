@@ -160,6 +160,42 @@ def test_on_a_scheduler_of_which_a_worker_dies_nothing_is_lost(played, tmp_path)
     assert results(tmp_path) == played
 
 
+def test_from_the_command_line_built_in_algorithms_go_to_a_scheduler_too(tmp_path):
+    on_dask = {"name": "LaCAM", "nodes": 200, "parallel_backend": "balanced_dask"}
+    content = suite(num_seeds=2, **{"On Dask": on_dask, "Here": {"name": "LaCAM", "nodes": 200}})
+    content["algorithms"]["A star"]["parallel_backend"] = "balanced_dask"
+    write(tmp_path, content)
+    (tmp_path / "policies.py").write_text(f"import runpy\nrunpy.run_path({str(SCRIPT)!r})['register']()\n")
+    run = [sys.executable, "-B", "-m", "pogema_rs.toolbox", "suite.yaml", "--out", "out", "--register", "policies.py"]
+    with cluster(tmp_path) as (address, _):
+        done = subprocess.run([*run, "--dask", address], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+    of = {key: json.loads(results(tmp_path, key)) for key in ("On Dask", "Here")}
+    assert [row["metrics"] for row in of["On Dask"]] == [row["metrics"] for row in of["Here"]]
+    assert len(of["Here"]) == len(json.loads(results(tmp_path))) == 8
+    again = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert again.returncode == 1
+    assert again.stderr.startswith("error: out: has results already"), again.stderr
+
+
+def test_every_episode_says_how_it_was_played(played, tmp_path):
+    assert play(tmp_path, suite("multiprocessing"))[1] == 0
+    about = json.loads((tmp_path / "out" / "about.json").read_text())
+    episodes = json.loads((tmp_path / "out" / "A star.episodes.json").read_text())
+    rows = json.loads(results(tmp_path))
+    assert len(about["runs"]) == 1 and len(episodes) == len(rows)
+    versions = about["runs"][0]["versions"]
+    assert versions["Python"].startswith("3.") and {"pogema-rs", "POGEMA", "numpy"} <= set(versions)
+    for number, (episode, row) in enumerate(zip(episodes, rows)):
+        assert (episode["episode"], episode["run"]) == (number, 0) and episode["seconds"] > 0
+        assert "machine" not in episode
+        wanted = row["env_grid_search"]
+        assert episode["seed"] == episode["config"]["seed"] == wanted["seed"]
+        # A pattern is told with the map that the seed chose.
+        assert episode["config"]["map_name"].startswith(wanted["map_name"].split("[")[0])
+        assert "[" not in episode["config"]["map_name"]
+
+
 @pytest.mark.parametrize("backend", ["sequential", "multiprocessing", "dask"])
 def test_what_fails_is_told_and_the_rest_goes_on(backend, tmp_path):
     crowded = {"name": "Crowded", "parallel_backend": backend, "num_process": 2}

@@ -1,6 +1,7 @@
 //! Episodes of results, played again.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use pogema_core::{Error, Trace};
 
@@ -8,11 +9,11 @@ use crate::about::About;
 use crate::built_in::BuiltIn;
 use crate::environments::Environments;
 use crate::pairs::Pairs;
-use crate::play::record;
+use crate::play::{play, record};
 use crate::results::{Row, figure};
 use crate::run::measured;
 use crate::store::SUITE;
-use crate::suite::Suite;
+use crate::suite::{Algorithm, Suite};
 
 impl Suite {
     /// The suite whose results are in a folder.
@@ -51,13 +52,29 @@ impl Suite {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
             Error::config("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
-        let built_in = BuiltIn::of(algorithm).ok_or_else(|| {
-            let reason = format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it");
-            Error::State { reason }
-        })?;
-        let (played, trace) = record(&environments.at(index)?.config, &built_in?)?;
+        let (played, trace) = record(&environments.at(index)?.config, &built_in(algorithm)?)?;
         Ok((measured(&played), trace))
     }
+
+    /// Plays the first episode of its first algorithm, which is built in: its figures, and the time that it took.
+    ///
+    /// # Errors
+    /// If it cannot be played.
+    pub fn play_one(&self, environments: &Environments) -> Result<(Pairs, Duration), Error> {
+        let algorithm = self.algorithms.first();
+        let algorithm =
+            algorithm.ok_or_else(|| Error::State { reason: "the suite has no algorithm".into() })?;
+        let played = play(&environments.at(0)?.config, &built_in(algorithm)?)?;
+        Ok((measured(&played), played.runtime))
+    }
+}
+
+fn built_in(algorithm: &Algorithm) -> Result<BuiltIn, Error> {
+    BuiltIn::of(algorithm).unwrap_or_else(|| {
+        let key = &algorithm.key;
+        let reason = format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it");
+        Err(Error::State { reason })
+    })
 }
 
 /// In what figures an episode that was played again differs from its row, each told in a few words.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import time
 import traceback
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
-from pogema_rs._engine import machine
+from pogema_rs._engine import machine, play_built_in
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 
@@ -22,6 +23,8 @@ class Task:
     environment: dict[str, Any]
     #: The map that the environment names.
     maps: dict[str, str] = field(default_factory=dict)
+    #: Whether nobody registered the algorithm.
+    is_built_in: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ def play_with(state: dict[str, Any], task: Task) -> Outcome:
 
 
 def _play(task: Task, is_filmed: bool) -> Outcome:
+    if task.is_built_in:
+        content = {"environment": task.environment, "algorithms": {task.algorithm: task.settings}}
+        figures, runtime = play_built_in(json.dumps(content), list(task.maps.items()))
+        return Outcome(task.index, json.loads(figures), runtime, machine())
     ToolboxRegistry.register_maps(task.maps)
     algorithm, settings = _algorithm(task)
     env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)

@@ -9,12 +9,14 @@ import sys
 import time
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
 from pogema_rs._engine import Evaluation, num_cores
 from pogema_rs.toolbox import _backends
 from pogema_rs.toolbox._work import Outcome, Task, play
+from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
 
@@ -46,7 +48,8 @@ def evaluation(
     `views` in the folder; `html` is the file for a page with all that, and with replays of the worst and best episodes,
     which are played again for it.
 
-    An algorithm that nobody registered is the planner or policy of that name that is built in.
+    An algorithm that nobody registered is the planner or policy of that name that is built in, played by threads, or
+    on Dask if that is its `parallel_backend` and there is an address.
 
     Errors: ValueError for a suite that is wrong, with its line; OSError for a folder that cannot be used;
     `EvaluationError` if episodes could not be played, after all others were.
@@ -106,18 +109,21 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
 def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str]) -> int:
     """Plays what is to be played of an algorithm; the number of episodes that could not be."""
     progress = _Progress(key, suite.num_episodes())
-    if not _is_registered(settings):
+    is_remote = settings["parallel_backend"].endswith("dask") and address is not None
+    if not _is_registered(settings) and not is_remote:
         threads = min(settings.get("num_process", num_cores()), num_cores())
         summary = suite.run_built_in(key, threads, progress.built_in)
         if summary is not None:
             return summary[1]
-    config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
+    is_built_in = not _is_registered(settings) and suite.is_built_in(key)
+    make = AlgoBase if is_built_in else partial(ToolboxRegistry.create_algorithm_config, settings["name"])
+    config = make(**settings)
     to_do = suite.begin(key, _versions())
     if to_do is None:
         return 0
     progress.begin(len(to_do))
     num_failed = 0
-    tasks = (_task(suite, index, key, settings) for index in to_do)
+    tasks = (_task(suite, index, key, settings, is_built_in) for index in to_do)
     with closing(_outcomes(tasks, config, address)) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
@@ -140,13 +146,15 @@ def _outcomes(tasks: Iterable[Task], config: Any, address: Optional[str]) -> Gen
         yield from _backends.processes(tasks, num_processes)
 
 
-def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any]) -> Task:
+def _task(
+    suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_built_in: bool = False
+) -> Task:
     environment, maps = json.loads(suite.environment(index)), {}
     name = environment.get("map_name")
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
         environment["map_name"], maps = name, {name: text}
-    return Task(index, key, settings, environment, maps)
+    return Task(index, key, settings, environment, maps, is_built_in)
 
 
 def _map_text(grid: Any) -> str:

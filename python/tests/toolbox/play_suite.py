@@ -65,14 +65,19 @@ class Crowded:
         return [0] * len(observations)
 
 
-def main():
-    suite, folder, begin, *more = sys.argv[1:]
-    address, page = (*more, "", "")[:2]
-    ToolboxRegistry.setup_logger("INFO")
+def register():
+    """Registers all of them, and a map."""
     ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
     ToolboxRegistry.register_algorithm("Mortal", Mortal, MortalConfig)
     ToolboxRegistry.register_algorithm("Crowded", Crowded)
     ToolboxRegistry.register_maps({"hall": [[0] * 9 for _ in range(9)]})
+
+
+def main():
+    suite, folder, begin, *more = sys.argv[1:]
+    address, page = (*more, "", "")[:2]
+    ToolboxRegistry.setup_logger("INFO")
+    register()
     try:
         results = evaluation(suite, folder, begin=begin, dask=address or None, html=page or None)
     except (EvaluationError, ValueError, OSError) as error:
