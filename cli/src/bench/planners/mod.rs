@@ -53,7 +53,13 @@ pub struct Planners {
     #[arg(long, conflicts_with = "every")]
     quick: bool,
     /// Measure instead how long a first plan takes, and how many steps PIBT makes
-    #[arg(long, conflicts_with_all = ["setting", "planner", "sets", "num_agents", "records", "published", "episodes"])]
+    #[arg(
+        long,
+        conflicts_with_all = [
+            "setting", "planner", "sets", "num_agents", "records", "published", "episodes", "seconds", "nodes",
+            "threads", "planner_seed", "future_goals",
+        ]
+    )]
     speed: bool,
     /// The published means, a table with commas
     #[arg(long, value_name = "FILE")]
@@ -152,11 +158,13 @@ impl Planners {
     }
 
     fn tell_speed(&self, every: usize) -> Result<(), Error> {
-        let crowds = |index: usize, num_agents: usize| {
-            let set: &Set = &SETS[index];
+        let crowds = |name: &str, num_agents: usize| {
+            let set = SETS.iter().find(|set| set.name == name);
+            let set = set.ok_or_else(|| Error::config("set", name, "one of the paper's"))?;
             Ok(speed::Crowds { set, maps: set.maps(&self.suite)?, num_agents })
         };
-        say(&speed::table(&crowds(3, 256)?, &crowds(5, 1000)?, &crowds(2, 192)?, every)?.to_string())
+        let (squares, cities) = (crowds("04-movingai", 256)?, crowds("06-pathfinding", 1000)?);
+        say(&speed::table(&squares, &cities, &crowds("03-warehouse", 192)?, every)?.to_string())
     }
 
     fn planner(&self) -> &str {
