@@ -1,37 +1,59 @@
-//! An evaluation of the random policy, beside the same episodes without the toolbox: what measuring them costs.
+//! Suites of the random policy, whole, beside the same episodes on the engine alone: what an evaluation costs.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
 use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pogema_core::{Environment as _, StepOut};
 use pogema_fast::Engine;
 use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_planners::{NamedPolicy, PolicySettings, sample};
-use pogema_toolbox::{BuiltIn, play};
+use pogema_planners::sample;
+use pogema_toolbox::{Begin, Environments, Running, Store, Suite, run};
 
 const NUM_AGENTS: usize = 64;
 const NUM_STEPS: usize = 256;
+const NUM_EPISODES: usize = 32;
 
-fn config() -> GridConfig {
+/// A grid so large that only a suite that makes its environments one by one can begin with it.
+const MANY: usize = 100_000;
+
+fn suite(num_episodes: usize) -> Suite {
+    let seeds: Vec<String> = (0..num_episodes).map(|seed| seed.to_string()).collect();
     let text = format!(
-        "{{num_agents: {NUM_AGENTS}, size: 32, density: 0.3, obs_radius: 5, seed: 0, on_target: restart, \
-         collision_system: soft, max_episode_steps: {NUM_STEPS}}}"
+        "environment: {{num_agents: {NUM_AGENTS}, size: 32, density: 0.3, obs_radius: 5, on_target: restart, \
+         collision_system: soft, max_episode_steps: {NUM_STEPS}, seed: {{grid_search: [{}]}}}}\n\
+         algorithms: {{Random: {{name: random}}}}\n",
+        seeds.join(", ")
     );
-    GridConfig::from_yaml(&text).unwrap()
+    Suite::parse(Path::new("suite.yaml"), &text).unwrap()
+}
+
+fn environments(suite: &Suite) -> Environments {
+    suite.environments(&[]).unwrap().0
+}
+
+/// All episodes on one thread, kept in a folder.
+fn evaluated(suite: &Suite) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Arc::new(Store::open(folder.path(), suite, Begin::New).unwrap());
+    let running = Running { threads: 1, stop: &AtomicBool::new(false), watch: &|_| {} };
+    assert!(run(suite, &environments(suite), &store, running).unwrap().is_whole);
 }
 
 /// Instance, reset, and for each step actions, moves and what agents see.
-fn without(config: &GridConfig) -> f32 {
+fn played(config: &GridConfig) -> f32 {
     let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
     let mut engine = Engine::new(config.rules()).unwrap();
     engine.reset(&instance).unwrap();
     let mut observations = vec![0.0; config.rules().num_observed()];
     let (mut rewards, mut terminated, mut truncated) =
         ([0.0; NUM_AGENTS], [false; NUM_AGENTS], [false; NUM_AGENTS]);
-    let mut dice = Generator::seeded(0);
+    let mut dice = Generator::seeded(config.seed.unwrap());
     let mut total = 0.0;
     for _ in 0..NUM_STEPS {
         let actions = sample(&mut dice, NUM_AGENTS);
@@ -44,16 +66,30 @@ fn without(config: &GridConfig) -> f32 {
 }
 
 fn evaluation(criterion: &mut Criterion) {
-    let config = config();
-    let settings = PolicySettings::default();
-    let random = BuiltIn { name: "random".into(), settings };
-    assert!(NamedPolicy::all().iter().any(|(name, _)| *name == random.name));
-    let mut group = criterion.benchmark_group("episode of 64 agents, 256 steps");
-    group.throughput(Throughput::Elements((NUM_AGENTS * NUM_STEPS) as u64));
-    group.bench_function("engine, seen as f32", |bench| bench.iter(|| without(black_box(&config))));
-    group.bench_function("toolbox", |bench| bench.iter(|| play(black_box(&config), &random).unwrap()));
+    let suite = suite(NUM_EPISODES);
+    let all = environments(&suite);
+    let configs: Vec<GridConfig> = (0..all.len()).map(|index| all.at(index).unwrap().config).collect();
+    let mut group = criterion.benchmark_group("episodes of 64 agents, 256 steps");
+    group.throughput(Throughput::Elements((NUM_EPISODES * NUM_AGENTS * NUM_STEPS) as u64));
+    group.bench_function("engine, seen as f32", |bench| {
+        bench.iter(|| configs.iter().map(|config| played(black_box(config))).sum::<f32>());
+    });
+    group.bench_function("evaluation", |bench| bench.iter(|| evaluated(black_box(&suite))));
     group.finish();
 }
 
-criterion_group!(benches, evaluation);
+fn beginning(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("grid of 100,000 episodes");
+    group.sample_size(10);
+    let begun = || {
+        let suite = suite(MANY);
+        let environments = environments(&suite);
+        let to_do = environments.by_cost((0..environments.len()).collect());
+        environments.at(to_do[0]).unwrap()
+    };
+    group.bench_function("until its first episode", |bench| bench.iter(begun));
+    group.finish();
+}
+
+criterion_group!(benches, evaluation, beginning);
 criterion_main!(benches);

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use pogema_core::Error;
 use pogema_maps::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
@@ -111,21 +112,33 @@ fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
     say(&format!("{num_played} episodes played; {rest}: {}", folder.display()))
 }
 
-/// A bar for each algorithm.
+/// A bar for each algorithm, or a line now and then where there is no terminal.
 #[derive(Default)]
-struct Bar(Mutex<Option<ProgressBar>>);
+struct Bar(Mutex<Option<(ProgressBar, Instant)>>);
+
+/// How often a line is written.
+const EVERY: Duration = Duration::from_secs(30);
 
 impl Bar {
     fn show(&self, event: Event<'_>) {
         let mut bar = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        match (event, bar.as_ref()) {
-            (Event::Begin { algorithm, total, done }, _) => *bar = Some(begin(algorithm, total, done)),
-            (Event::Played, Some(bar)) => bar.inc(1),
-            (Event::Failed(failed), Some(bar)) => {
+        match (event, bar.as_mut()) {
+            (Event::Begin { algorithm, total, done }, _) => {
+                *bar = Some((begin(algorithm, total, done), Instant::now()));
+            }
+            (Event::Played, Some((bar, told))) => {
+                bar.inc(1);
+                if bar.is_hidden() && told.elapsed() >= EVERY {
+                    *told = Instant::now();
+                    let (name, done, all) = (bar.message(), bar.position(), bar.length().unwrap_or_default());
+                    eprintln!("{name}: {done} of {all} episodes, {} left", HumanDuration(bar.eta()));
+                }
+            }
+            (Event::Failed(failed), Some((bar, _))) => {
                 bar.suspend(|| eprintln!("warning: episode {}: {}", failed.index, failed.error));
                 bar.inc(1);
             }
-            (Event::End, Some(bar)) => bar.finish_and_clear(),
+            (Event::End, Some((bar, _))) => bar.finish_and_clear(),
             (_, None) => {}
         }
     }
