@@ -61,10 +61,10 @@ impl Evaluate {
         let threads = self.threads.map_or(cores, usize::from);
         let running = Running { threads, stop: &stop, watch: &watch };
         let summary = run(&suite, &environments, &store, running)?;
-        if let Some(path) = &report {
-            write_report(path, &self.out, &suite, &environments, &store)?;
-        }
-        tell(&self.out, &suite, &summary)
+        let write = |path: &PathBuf| write_report(path, &self.out, &suite, &environments, &store);
+        let written = report.as_ref().map_or(Ok(()), write);
+        // That nothing could be played is the reason why there is no page.
+        tell(&self.out, &suite, &summary).and(written)
     }
 }
 

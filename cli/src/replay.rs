@@ -52,7 +52,13 @@ impl Replay {
 
     /// Says in what the episode differs from what is in the results.
     fn compare(&self, metrics: &Pairs) {
-        let results = Results::read(std::slice::from_ref(&self.folder)).unwrap_or_default();
+        let results = match Results::read(std::slice::from_ref(&self.folder)) {
+            Ok(results) => results,
+            Err(error) => {
+                eprintln!("note: nothing to compare it with: {error}");
+                return;
+            }
+        };
         let row = results.rows.iter().filter(|row| row.algorithm == self.algorithm).nth(self.episode);
         let Some(row) = row else {
             eprintln!("note: `{}` is not finished, so there is nothing to compare it with", self.algorithm);

@@ -73,6 +73,9 @@ fn what_comes_out_otherwise_is_told() {
     let (_, error, status) = run(folder.path(), &["replay", "out", "Dice", "0"]);
     assert_eq!(status, 0);
     assert!(error.starts_with("note: it came out otherwise: a_collisions "), "{error}");
+    fs::write(&path, &text[..40]).unwrap();
+    let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
+    assert!(error.starts_with("note: nothing to compare it with: out/Dice.json: expected a list"), "{error}");
     fs::remove_file(&path).unwrap();
     let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
     assert_eq!(error, "note: `Dice` is not finished, so there is nothing to compare it with");

@@ -149,6 +149,9 @@ fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// What the name of a file begins with that a process was writing when it was killed.
+pub const UNFINISHED: &str = ".pogema-unfinished-";
+
 /// Writes a file under a temporary name and renames it.
 ///
 /// # Errors
@@ -157,6 +160,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let failed = |error: std::io::Error| Error::io(path, error);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
+    builder.prefix(UNFINISHED);
     // A temporary file is its owner's alone by default; what it becomes is for everybody the umask lets.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

@@ -34,7 +34,8 @@ pub struct Evaluation {
 
 #[pymethods]
 impl Evaluation {
-    /// Reads a suite and opens its folder; `begin` is `new`, `resume` or `anew`; `maps` are texts by name.
+    /// Reads a suite and opens its folder; `begin` is `new`, `resume` or `anew`; `maps` are texts by name, and
+    /// `versions` the releases of what plays in Python.
     #[new]
     fn new(
         path: PathBuf,
@@ -43,6 +44,7 @@ impl Evaluation {
         begin: &str,
         maps: Vec<(String, String)>,
         files: Vec<PathBuf>,
+        versions: Vec<(String, String)>,
     ) -> PyResult<Self> {
         let read = || {
             let suite = match text {
@@ -54,7 +56,8 @@ impl Evaluation {
         };
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
-        let store = Arc::new(Store::open(&folder, &suite, begin).map_err(|error| told(&error))?);
+        let store = Store::open(&folder, &suite, begin).map_err(|error| told(&error))?;
+        let store = Arc::new(store.with(versions));
         Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
     }
 
@@ -108,9 +111,8 @@ impl Evaluation {
     }
 
     /// Begins with an algorithm: the episodes that are to be played, the longest first; none if all are done.
-    /// `versions` are the releases of what plays them, by name.
-    fn begin(&self, key: &str, versions: Vec<(String, String)>) -> PyResult<Option<Vec<usize>>> {
-        let opened = Progress::open(&self.store, key, self.environments.len(), &versions);
+    fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
+        let opened = Progress::open(&self.store, key, self.environments.len());
         let progress = opened.map_err(|error| told(&error))?;
         let to_do = progress.as_ref().map(|progress| self.environments.by_cost(progress.to_do()));
         *self.progress()? = progress;

@@ -86,17 +86,11 @@ struct Row<'a> {
 }
 
 impl Progress {
-    /// Takes up what is done of so many episodes of an algorithm; none if all are. `versions` are the releases of what
-    /// plays them besides this program, by name.
+    /// Takes up what is done of so many episodes of an algorithm; none if all are.
     ///
     /// # Errors
     /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
-    pub fn open(
-        store: &Arc<Store>,
-        key: &str,
-        num_episodes: usize,
-        versions: &[(String, String)],
-    ) -> Result<Option<Self>, Error> {
+    pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
         if store.path(&format!("{key}.{RESULTS}")).exists() {
             // A run may have broken off after it had written all.
             remove(&store.path(&format!("{key}.{LINES}")))?;
@@ -112,7 +106,7 @@ impl Progress {
         for line in &lines {
             done[line.index] = true;
         }
-        let run = store.run(versions)?;
+        let run = store.run()?;
         Ok(Some(Self { store: Arc::clone(store), key: key.to_owned(), run, path, file, done, failed: None }))
     }
 

@@ -117,7 +117,7 @@ pub fn run_one(
     running: Running<'_>,
 ) -> Result<Summary, Error> {
     let total = environments.len();
-    let Some(progress) = Progress::open(store, &algorithm.key, total, &[])? else {
+    let Some(progress) = Progress::open(store, &algorithm.key, total)? else {
         return Ok(Summary { is_whole: true, ..Summary::default() });
     };
     (running.watch)(Event::Begin { algorithm: &algorithm.key, total, done: progress.num_done() });

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_maps::files::{UNFINISHED, write_whole};
 
 use crate::about::{About, Run};
 use crate::suite::Suite;
@@ -30,6 +30,8 @@ pub enum Begin {
 pub struct Store {
     folder: PathBuf,
     about: Mutex<About>,
+    /// Releases of what plays besides this program, by name.
+    versions: Vec<(String, String)>,
     /// Whether what this process plays is a run of its own already.
     has_begun: Mutex<bool>,
     /// Held until the end.
@@ -51,10 +53,16 @@ impl Store {
     pub fn open(folder: &Path, suite: &Suite, begin: Begin) -> Result<Self, Error> {
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let lock = lock(folder)?;
+        remove_unfinished(folder)?;
         let mut about = About::of(suite);
         let known = About::read(folder)?;
-        let store =
-            |about| Self { folder: folder.to_owned(), about, has_begun: Mutex::new(false), _lock: lock };
+        let store = |about| Self {
+            folder: folder.to_owned(),
+            about,
+            versions: Vec::new(),
+            has_begun: Mutex::new(false),
+            _lock: lock,
+        };
         match (begin, known) {
             (Begin::Resume, Some(known)) => about.go_on(known).map_err(|what| refused(folder, &what))?,
             (Begin::Anew, Some(known)) => delete(folder, &known)?,
@@ -65,9 +73,17 @@ impl Store {
             (_, None) => check_empty(folder)?,
         }
         let store = store(Mutex::new(about));
-        store.write(SUITE, suite.text.as_bytes())?;
+        // First what makes it a folder of results: a run may be killed between the two.
         store.tell(&store.about())?;
+        store.write(SUITE, suite.text.as_bytes())?;
         Ok(store)
+    }
+
+    /// The same for a process that plays with more than this program, whose releases are told by name.
+    #[must_use]
+    pub fn with(mut self, versions: Vec<(String, String)>) -> Self {
+        self.versions = versions;
+        self
     }
 
     /// How the results were made.
@@ -75,16 +91,15 @@ impl Store {
         self.about.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The number of the run that this process is, which is noted when it is asked for first; `versions` are those of
-    /// what plays besides this program, by name.
+    /// The number of the run that this process is, which is noted when it is asked for first.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn run(&self, versions: &[(String, String)]) -> Result<usize, Error> {
+    pub fn run(&self) -> Result<usize, Error> {
         let mut has_begun = self.has_begun.lock().unwrap_or_else(PoisonError::into_inner);
         let mut about = self.about.lock().unwrap_or_else(PoisonError::into_inner);
         if !*has_begun {
-            about.runs.push(Run::now(versions));
+            about.runs.push(Run::now(&self.versions));
             self.tell(&about)?;
             *has_begun = true;
         }
@@ -119,6 +134,18 @@ fn delete(folder: &Path, known: &About) -> Result<(), Error> {
         }
     }
     remove(&folder.join(REPORT))
+}
+
+/// Removes what runs were writing when they were killed; nobody else writes here now.
+fn remove_unfinished(folder: &Path) -> Result<(), Error> {
+    let failed = |error: std::io::Error| Error::io(folder, error);
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        if entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
+            remove(&entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 fn check_empty(folder: &Path) -> Result<(), Error> {

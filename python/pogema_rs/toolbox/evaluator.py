@@ -61,7 +61,8 @@ def evaluation(
     else:
         path, text = Path(evaluation_config), None
     grids = [(name, _map_text(grid)) for name, grid in ToolboxRegistry.get_maps().items()]
-    suite = Evaluation(str(path), text, str(eval_dir), begin, grids, [str(file) for file in maps])
+    files = [str(file) for file in maps]
+    suite = Evaluation(str(path), text, str(eval_dir), begin, grids, files, _versions())
     address = dask or suite.dask()
     num_failed = 0
     results: list[dict[str, Any]] = []
@@ -118,7 +119,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
     is_built_in = not _is_registered(settings) and suite.is_built_in(key)
     make = AlgoBase if is_built_in else partial(ToolboxRegistry.create_algorithm_config, settings["name"])
     config = make(**settings)
-    to_do = suite.begin(key, _versions())
+    to_do = suite.begin(key)
     if to_do is None:
         return 0
     progress.begin(len(to_do))
