@@ -6,7 +6,7 @@ use kuva::render::plots::Plot;
 use pogema_core::Error;
 use serde_json::Value;
 
-use super::axes::{Axis, Frame};
+use super::axes::Axis;
 use super::options::{Common, Options};
 use super::panel::framed;
 use super::picture::Picture;
@@ -89,16 +89,9 @@ impl BoxView {
             let dots = ScatterPlot::new().with_data(outliers).with_color("#555555").with_size(1.0);
             plots.push(Plot::Scatter(dots.with_marker_opacity(0.5)));
         }
-        let Style { width, height, font_size, .. } = self.style;
-        let frame = Frame {
-            width,
-            height,
-            font_size,
-            title: self.style.title().map(str::to_owned),
-            x: Axis::of_numbers(&self.common.title(&self.y), &all, is_log, self.style.ticks.as_deref()),
-            y: Axis::of_names(&self.common.title(&self.x), &names, 1.0),
-        };
-        Picture::new(framed(plots, &frame), &self.style)
+        let x = Axis::of_numbers(&self.common.title(&self.y), &all, is_log, self.style.ticks.as_deref());
+        let y = Axis::of_names(&self.common.title(&self.x), &names, 1.0);
+        Picture::new(framed(plots, &self.style.frame(x, y)), &self.style)
     }
 }
 

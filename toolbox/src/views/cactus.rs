@@ -4,7 +4,7 @@ use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
-use super::axes::{Axis, Frame};
+use super::axes::Axis;
 use super::legend::Legend;
 use super::options::{Common, Options};
 use super::panel::{framed, place_legend};
@@ -94,15 +94,9 @@ impl CactusView {
             entries.push(Series::entry(number, self.common.algorithm(name), &self.style));
             drawn.push(points);
         }
-        let Style { width, height, font_size, .. } = self.style;
-        let frame = Frame {
-            width,
-            height,
-            font_size,
-            title: self.style.title().map(str::to_owned),
-            x: Axis::of_numbers(&self.common.title(&self.x), &all, is_log, self.style.ticks.as_deref()),
-            y: Axis::of_numbers("Solved Instances", &[0.0, most], false, None),
-        };
+        let x = Axis::of_numbers(&self.common.title(&self.x), &all, is_log, self.style.ticks.as_deref());
+        let y = Axis::of_numbers("Solved Instances", &[0.0, most], false, None);
+        let frame = self.style.frame(x, y);
         let legend = Legend { title: None, entries, columns: 1, font_size: self.style.legend_font_size };
         let scene = framed(plots, &frame);
         let scene = place_legend(scene, &frame, legend, self.style.legend_place, &drawn);

@@ -7,7 +7,7 @@ use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
-use super::axes::{Axis, Frame};
+use super::axes::Axis;
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
 use super::panel::framed;
@@ -179,9 +179,7 @@ impl CompareView {
         let diagonal = LinePlot::new().with_data([(low, low), (high, high)]).with_color("#888888");
         let dots = ScatterPlot::new().with_data(both.to_vec()).with_color(self.style.colour(0));
         let dots = dots.with_size(1.6).with_marker_opacity(0.5);
-        let Style { width, height, font_size, .. } = self.style;
-        let frame = Frame { width, height, font_size, title: self.style.title().map(str::to_owned), x, y };
         let plots = vec![Plot::Line(diagonal.with_stroke_width(0.7)), Plot::Scatter(dots)];
-        Picture::new(framed(plots, &frame), &self.style)
+        Picture::new(framed(plots, &self.style.frame(x, y)), &self.style)
     }
 }

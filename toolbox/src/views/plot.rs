@@ -171,8 +171,7 @@ impl PlotView {
         };
         let is_log = self.style.log_y && ys.iter().all(|&y| y > 0.0);
         let y = Axis::of_numbers(&self.common.title(&self.y), &ys, is_log, None);
-        let Style { width, height, font_size, .. } = self.style;
-        Frame { width, height, font_size, title: content.title.clone(), x, y }
+        Frame { title: content.title.clone(), ..self.style.frame(x, y) }
     }
 
     fn draw(&self, contents: &[Content<'_>], names: &[Value], places: &Places) -> Scene {

@@ -3,6 +3,7 @@
 use pogema_core::Error;
 use serde_json::Value;
 
+use super::axes::{Axis, Frame};
 use super::options::Options;
 use super::picture::Kind;
 
@@ -137,6 +138,12 @@ impl Style {
     /// The title, if there is one to show.
     pub fn title(&self) -> Option<&str> {
         self.name.as_deref().filter(|_| self.has_title)
+    }
+
+    /// The frame of a plot that stands alone.
+    pub fn frame(&self, x: Axis, y: Axis) -> Frame {
+        let Self { width, height, font_size, .. } = *self;
+        Frame { width, height, font_size, title: self.title().map(str::to_owned), x, y }
     }
 }
 
