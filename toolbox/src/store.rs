@@ -6,7 +6,7 @@
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pogema_core::Error;
 use pogema_maps::files::{UNFINISHED, write_whole};
@@ -29,13 +29,19 @@ pub enum Begin {
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
-    about: Mutex<About>,
+    noted: Mutex<Noted>,
     /// Releases of what plays besides this program, by name.
     versions: Vec<(String, String)>,
-    /// Whether what this process plays is a run of its own already.
-    has_begun: Mutex<bool>,
     /// Held until the end.
     _lock: File,
+}
+
+/// What is noted of how the results are made.
+#[derive(Debug)]
+struct Noted {
+    about: About,
+    /// Whether what this process plays is a run of its own already.
+    has_begun: bool,
 }
 
 /// The file that tells how results were made.
@@ -56,13 +62,6 @@ impl Store {
         remove_unfinished(folder)?;
         let mut about = About::of(suite);
         let known = About::read(folder)?;
-        let store = |about| Self {
-            folder: folder.to_owned(),
-            about,
-            versions: Vec::new(),
-            has_begun: Mutex::new(false),
-            _lock: lock,
-        };
         match (begin, known) {
             (Begin::Resume, Some(known)) => about.go_on(known).map_err(|what| refused(folder, &what))?,
             (Begin::Anew, Some(known)) => delete(folder, &known)?,
@@ -72,9 +71,10 @@ impl Store {
             }
             (_, None) => check_empty(folder)?,
         }
-        let store = store(Mutex::new(about));
+        let noted = Mutex::new(Noted { about: about.clone(), has_begun: false });
+        let store = Self { folder: folder.to_owned(), noted, versions: Vec::new(), _lock: lock };
         // First what makes it a folder of results: a run may be killed between the two.
-        store.tell(&store.about())?;
+        store.tell(&about)?;
         store.write(SUITE, suite.text.as_bytes())?;
         Ok(store)
     }
@@ -88,7 +88,7 @@ impl Store {
 
     /// How the results were made.
     pub fn about(&self) -> About {
-        self.about.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.noted().about.clone()
     }
 
     /// The number of the run that this process is, which is noted when it is asked for first.
@@ -96,14 +96,17 @@ impl Store {
     /// # Errors
     /// If it cannot be written.
     pub fn run(&self) -> Result<usize, Error> {
-        let mut has_begun = self.has_begun.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut about = self.about.lock().unwrap_or_else(PoisonError::into_inner);
-        if !*has_begun {
-            about.runs.push(Run::now(&self.versions));
-            self.tell(&about)?;
-            *has_begun = true;
+        let mut noted = self.noted();
+        if !noted.has_begun {
+            noted.about.runs.push(Run::now(&self.versions));
+            self.tell(&noted.about)?;
+            noted.has_begun = true;
         }
-        Ok(about.runs.len() - 1)
+        Ok(noted.about.runs.len() - 1)
+    }
+
+    fn noted(&self) -> MutexGuard<'_, Noted> {
+        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn tell(&self, about: &About) -> Result<(), Error> {
