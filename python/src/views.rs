@@ -26,9 +26,9 @@ pub fn show_views(
 ) -> PyResult<(Vec<String>, Vec<Listed>)> {
     let show = || {
         let gallery = Gallery {
-            format: formats.0.as_deref().map(table_format).transpose()?,
-            kind: formats.1.as_deref().map(plot_format).transpose()?,
-            definition: six.as_deref().map(definition).transpose()?,
+            format: named("table_format", formats.0.as_deref(), &TABLE_FORMATS)?,
+            kind: named("plot_format", formats.1.as_deref(), &PLOT_FORMATS)?,
+            definition: named("six", six.as_deref(), &DEFINITIONS)?,
             folder: out,
             ..Gallery::of(&folders, config.as_deref(), &names)?
         };
@@ -46,29 +46,22 @@ pub fn show_views(
     py.detach(show).map_err(|error: Error| told(&error))
 }
 
-fn table_format(name: &str) -> Result<Format, Error> {
-    match name {
-        "terminal" => Ok(Format::Terminal),
-        "markdown" => Ok(Format::Markdown),
-        "latex" => Ok(Format::Latex),
-        "csv" => Ok(Format::Csv),
-        _ => Err(Error::config("table_format", name, "`terminal`, `markdown`, `latex` or `csv`")),
-    }
-}
+const TABLE_FORMATS: [(&str, Format); 4] = [
+    ("terminal", Format::Terminal),
+    ("markdown", Format::Markdown),
+    ("latex", Format::Latex),
+    ("csv", Format::Csv),
+];
+const PLOT_FORMATS: [(&str, Kind); 3] = [("svg", Kind::Svg), ("pdf", Kind::Pdf), ("png", Kind::Png)];
+const DEFINITIONS: [(&str, Definition); 2] =
+    [("published", Definition::Published), ("paper", Definition::Paper)];
 
-fn plot_format(name: &str) -> Result<Kind, Error> {
-    match name {
-        "svg" => Ok(Kind::Svg),
-        "pdf" => Ok(Kind::Pdf),
-        "png" => Ok(Kind::Png),
-        _ => Err(Error::config("plot_format", name, "`svg`, `pdf` or `png`")),
+/// What stands for one of some names, if it is said at all.
+fn named<T: Copy>(option: &str, name: Option<&str>, known: &[(&str, T)]) -> Result<Option<T>, Error> {
+    let Some(name) = name else { return Ok(None) };
+    if let Some(&(_, found)) = known.iter().find(|(known, _)| *known == name) {
+        return Ok(Some(found));
     }
-}
-
-fn definition(name: &str) -> Result<Definition, Error> {
-    match name {
-        "published" => Ok(Definition::Published),
-        "paper" => Ok(Definition::Paper),
-        _ => Err(Error::config("six", name, "`published` or `paper`")),
-    }
+    let names: Vec<String> = known.iter().map(|(name, _)| format!("`{name}`")).collect();
+    Err(Error::config(option, name, names.join(", ")))
 }
