@@ -2,8 +2,8 @@
 
 import random
 
-from maps import drag, drop, load, pairs, paste, press, rows, save
-from support import equal, settle, text
+from maps import drag, drop, load, pairs, paste, pick, press, rows, save
+from support import equal, text
 
 SETTINGS = """# a comment of somebody
 seed: 9007199254740993
@@ -33,8 +33,7 @@ def test_text_comes_back_unchanged(world):
         saved = save(world, page, "txt")
         equal(saved.read_text(), content + "\n")
         equal(*world.check(source, saved))
-        page.set_input_files("#picker", saved)
-        settle(page)
+        pick(page, saved)
         equal(save(world, page, "txt").read_bytes(), saved.read_bytes(), "saved again")
         [read] = world.check(save(world, page, "yaml"))
         equal([read["agents"], read["goals"]], [[[0, 0], [0, 3]], [[1, 3], [1, 0]]])
@@ -59,8 +58,7 @@ def test_yaml_keeps_what_it_does_not_edit(world):
         equal(read["rows"], ["..#.", ".#..", ".#.."])
         equal([read["agents"], read["goals"]], [[[0, 0], [2, 3], [1, 3]], [[2, 0], [0, 3], [1, 2]]])
         equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [9007199254740993, 3, "soft", 3])
-        page.set_input_files("#picker", changed)
-        settle(page)
+        pick(page, changed)
         equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
 
 

@@ -4,7 +4,7 @@ import random
 
 from playwright.sync_api import TimeoutError
 
-from support import on_screen, settle, text
+from support import on_screen, settle, text, wait
 
 
 def at(page, row, col):
@@ -53,9 +53,19 @@ def save(world, page, kind):
 def load(world, page, name, content):
     path = world.scratch / name
     path.write_text(content)
-    page.set_input_files("#picker", path)
-    settle(page)
+    pick(page, path)
     return path
+
+
+def pick(page, path):
+    page.set_input_files("#picker", path)
+    taken(page)
+
+
+def taken(page):
+    """Waits until a file that was given is read and drawn."""
+    wait(page, "!document.body.hasAttribute('aria-busy')")
+    settle(page)
 
 
 def paste(page, content):
@@ -81,5 +91,4 @@ def drop(page, name, content):
         }""",
         [name, content],
     )
-    page.wait_for_timeout(50)
-    settle(page)
+    taken(page)

@@ -71,8 +71,15 @@ class Files {
     text.setSelectionRange(before + this.wrong.column - 1, before + this.wrong.column);
   }
 
+  // The file that was given last is the one that stays, however long another takes to be read.
   async take(file) {
-    this.read(file.name, await file.text());
+    this.taking = file;
+    document.body.setAttribute("aria-busy", "true");
+    const text = await file.text().catch(() => null);
+    if (this.taking !== file) return;
+    document.body.removeAttribute("aria-busy");
+    if (text === null) this.say(`${file.name}: cannot be read`, true);
+    else this.read(file.name, text);
   }
 
   read(name, text) {
