@@ -56,8 +56,11 @@ fn without_a_plan_the_status_is_one_and_nothing_is_written() {
     assert!(text.starts_with("impossible: "), "{text}");
     assert_eq!(status, 1);
     assert!(!folder.path().join("plan.txt").exists());
-    let (text, _, status) = run(folder.path(), &[&["plan", "--nodes", "0"], TASK.as_slice()].concat());
-    assert!(text.starts_with("timed out"), "{text}");
+    let late = ["plan", "--nodes", "0", "--json"];
+    let (text, _, status) = run(folder.path(), &[&late, TASK.as_slice()].concat());
+    let told: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(told["outcome"], "timed_out");
+    assert!(told["lower_bound"].as_u64() > Some(0), "{told}");
     assert_eq!(status, 1);
 }
 

@@ -3,7 +3,8 @@
 //! Source: Sharon et al., "Conflict-based search for optimal multi-agent pathfinding", Artificial Intelligence 219,
 //! 2015; conflicts in an order and plans around them: Boyarski et al., "ICBS: Improved Conflict-Based Search
 //! Algorithm for Multi-Agent Pathfinding", IJCAI 2015; the bound from conflicts that cannot be avoided: Felner et
-//! al., "Adding Heuristics to Conflict-Based Search for Multi-Agent Path Finding", ICAPS 2018
+//! al., "Adding Heuristics to Conflict-Based Search for Multi-Agent Path Finding", ICAPS 2018. Agents are planned in
+//! the groups of `groups`.
 //!
 //! | paper | here |
 //! | --- | --- |
@@ -16,11 +17,12 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
-use crate::conflict::{Meeting, Setting, all_conflicts, one_leg_each};
-use crate::graph::Graph;
+use crate::conflict::{Meeting, Paths, Setting, all_conflicts};
+use crate::graph::{Graph, Vertex};
+use crate::groups::Groups;
 use crate::mdd::Mdd;
-use crate::problem::{Budget, Outcome, Planner, Problem};
-use crate::sipp::Sipp;
+use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
+use crate::sipp::{Leg, Sipp};
 use crate::tree::{Aim, Doubt, Low, Node, Room, split};
 
 /// How [`Cbs`] plans.
@@ -66,36 +68,74 @@ impl Planner for Cbs {
             Err(outcome) => return outcome,
         };
         if clock.count_node() {
-            return clock.unsolved(None);
+            return clock.unsolved(None, problem.lower_bound(&costs));
         }
-        let legs = one_leg_each(&costs);
-        let setting = Setting::one_shot(problem, &legs, self.params.seed);
-        let mut sipp = Sipp::new(problem.graph.clone());
-        let low = Low::new(&mut sipp, &problem.graph, &setting, Aim::Best);
-        let mut search = Search {
-            graph: &problem.graph,
-            setting: &setting,
-            low,
-            open: BinaryHeap::new(),
-            num_entries: 0,
-            room: Room::new(self.params.most_bytes),
-        };
-        let Some(root) = search.low.root(&mut clock) else { return clock.unsolved(None) };
-        let mut doubt = Doubt::default();
-        search.put(root, vec![None; problem.num_agents()]);
-        while let Some(entry) = search.open.pop() {
-            let Some(meeting) = entry.choice else { return entry.node.paths.outcome(problem, entry.bound) };
-            if clock.count_node() || clock.is_spent() || search.room.is_full() {
-                return clock.unsolved(None);
-            }
-            search.room.remove_node(&entry.node);
-            if let Some(reason) = doubt.count(problem, &mut clock) {
-                return Outcome::Impossible { reason };
-            }
-            search.expand(entry, &meeting);
-        }
-        Outcome::Impossible { reason: "no plan is as short as it has to be".to_owned() }
+        Groups::new(problem, &costs, &self.params).plan(&mut clock)
     }
+}
+
+/// What is asked of one search: best paths of some agents, as if there were no others but those to keep clear of.
+pub(crate) struct Task<'a> {
+    pub(crate) problem: &'a Problem,
+    pub(crate) legs: &'a [Vec<Leg>],
+    /// Paths of others that should rather not be met.
+    pub(crate) avoided: &'a [&'a [Vertex]],
+    /// Paths of others that must not be met.
+    pub(crate) kept_clear: &'a [&'a [Vertex]],
+    /// Plans that cost more are of no use.
+    pub(crate) most_cost: u64,
+    pub(crate) most_nodes: u64,
+}
+
+/// What came of a search.
+pub(crate) enum Found {
+    Best(Paths),
+    /// Nothing so far, but no plan costs less than this.
+    Unknown {
+        lower_bound: u64,
+        is_full: bool,
+    },
+    /// There is no plan, for this reason.
+    Nothing(String),
+}
+
+/// Goes through the constraint tree, the least bound first.
+pub(crate) fn search(task: &Task<'_>, sipp: &mut Sipp, params: &CbsParams, clock: &mut Clock) -> Found {
+    let problem = task.problem;
+    let setting = Setting::one_shot(problem, task.legs, params.seed);
+    let mut low = Low::new(sipp, &problem.graph, &setting, Aim::Best);
+    low.avoid(task.avoided);
+    low.keep_clear(task.kept_clear);
+    let Some(root) = low.root(clock) else { return Found::Unknown { lower_bound: 0, is_full: false } };
+    let mut search = Search {
+        graph: &problem.graph,
+        setting: &setting,
+        low,
+        open: BinaryHeap::new(),
+        num_entries: 0,
+        room: Room::new(params.most_bytes),
+    };
+    search.put(root, vec![None; problem.num_agents()]);
+    let (mut doubt, mut lower_bound) = (Doubt::default(), 0);
+    for num_nodes in 0.. {
+        let Some(entry) = search.open.pop() else { break };
+        // Bounds of nodes may fall from one to the next, but what was once proved stays true.
+        lower_bound = entry.bound.max(lower_bound);
+        let is_full = search.room.is_full();
+        if lower_bound > task.most_cost {
+            return Found::Unknown { lower_bound, is_full };
+        }
+        let Some(meeting) = entry.choice else { return Found::Best(entry.node.paths) };
+        if num_nodes >= task.most_nodes || is_full || clock.count_node() || clock.is_spent() {
+            return Found::Unknown { lower_bound, is_full };
+        }
+        search.room.remove_node(&entry.node);
+        if let Some(reason) = doubt.count(problem, clock) {
+            return Found::Nothing(reason);
+        }
+        search.expand(entry, &meeting);
+    }
+    Found::Nothing("no plan is as short as it has to be".to_owned())
 }
 
 /// A node and what is known of it.

@@ -78,6 +78,11 @@ impl Paths {
         self.costs[agent] = cost;
     }
 
+    /// Gives an agent the path that another has elsewhere.
+    pub(crate) fn take_from(&mut self, elsewhere: &Self, other: usize, agent: usize) {
+        self.set(agent, elsewhere.each[other].clone(), elsewhere.costs[other]);
+    }
+
     pub(crate) fn total_cost(&self) -> u64 {
         self.costs.iter().map(|&cost| u64::from(cost)).sum()
     }

@@ -71,7 +71,9 @@ impl Planner for Ecbs {
         let give_up = |clock: &mut Clock| doubt.count(problem, clock);
         match search(&mut sipp, &problem.graph, &setting, &self.params, &mut clock, give_up) {
             Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
-            Found::Nothing => clock.unsolved(None),
+            Found::Nothing { lower_bound } => {
+                clock.unsolved(None, lower_bound.max(problem.lower_bound(&costs)))
+            }
             Found::Proof(reason) => Outcome::Impossible { reason },
         }
     }
@@ -81,8 +83,8 @@ impl Planner for Ecbs {
 pub(crate) enum Found {
     /// Paths without conflict.
     Paths { paths: Paths, lower_bound: u64 },
-    /// Nothing before the time was up.
-    Nothing,
+    /// Nothing before the time was up, but no plan costs less than this.
+    Nothing { lower_bound: u64 },
     /// The reason why there are none.
     Proof(String),
 }
@@ -100,9 +102,9 @@ pub(crate) fn search(
     let weight = params.weight.max(1.0);
     let mut low = Low::new(sipp, graph, setting, Aim::Within(weight));
     if clock.count_node() {
-        return Found::Nothing;
+        return Found::Nothing { lower_bound: 0 };
     }
-    let Some(root) = low.root(clock) else { return Found::Nothing };
+    let Some(root) = low.root(clock) else { return Found::Nothing { lower_bound: 0 } };
     let mut queues = Queues::new(weight, graph.num_vertices(), Room::new(params.most_bytes));
     queues.put(root);
     while let Some((entry, lower_bound)) = queues.take() {
@@ -110,7 +112,7 @@ pub(crate) fn search(
             return Found::Paths { paths: entry.node.paths, lower_bound };
         };
         if clock.count_node() || clock.is_spent() || queues.room.is_full() {
-            return Found::Nothing;
+            return Found::Nothing { lower_bound };
         }
         if let Some(reason) = give_up(clock) {
             return Found::Proof(reason);

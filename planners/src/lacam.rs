@@ -128,7 +128,7 @@ impl<'a> Work<'a> {
             Found::Impossible => impossible(),
             Found::Spent => {
                 let best = self.problem.plan(&self.within_cap(self.search.closest())).ok();
-                self.clock.unsolved(best)
+                self.clock.unsolved(best, self.lower_bound)
             }
         }
     }
@@ -147,9 +147,9 @@ impl<'a> Work<'a> {
     fn answer(&mut self, steps: Steps) -> Outcome {
         let is_late = self.is_late(&steps);
         match self.problem.plan(&self.within_cap(steps)) {
-            Ok(plan) if is_late => self.clock.unsolved(Some(plan)),
+            Ok(plan) if is_late => self.clock.unsolved(Some(plan), self.lower_bound),
             Ok(plan) => Outcome::Solved { plan, lower_bound: self.lower_bound },
-            Err(_) => self.clock.unsolved(None),
+            Err(_) => self.clock.unsolved(None, self.lower_bound),
         }
     }
 

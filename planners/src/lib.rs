@@ -23,6 +23,7 @@ mod ecbs;
 mod flood;
 mod foresight;
 mod graph;
+mod groups;
 mod guide;
 mod heap;
 mod joint;

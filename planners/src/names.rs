@@ -36,7 +36,7 @@ pub const PLANNERS: [(&str, &str); 5] = [
     ("pibt", "a plan of any quality at once, or none"),
     ("pbs", "good plans for some dozens of agents"),
     ("ecbs", "plans that cost at most 1.2 times the least, for few agents"),
-    ("cbs", "the best plans, for very few agents"),
+    ("cbs", "the least cost for few agents or such as seldom meet, a bound on it for others"),
 ];
 
 /// The planners of agents that get goal after goal, and what each is good for.

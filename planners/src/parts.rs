@@ -31,10 +31,8 @@ pub(crate) fn small_parts(problem: &Problem, costs: &[CostToGo]) -> Vec<Part> {
         let agents = 0..problem.num_agents();
         let agents: Vec<usize> = agents.filter(|&agent| cells.contains(&problem.starts[agent])).collect();
         if (2..problem.num_agents()).contains(&agents.len()) {
-            let pick = |all: &[Vertex]| agents.iter().map(|&agent| all[agent]).collect();
-            let (starts, goals) = (pick(&problem.starts), pick(&problem.goals));
             let costs = agents.iter().map(|&agent| costs[agent].clone()).collect();
-            let problem = Problem { graph: problem.graph.clone(), starts, goals, most_steps: None };
+            let problem = Problem { most_steps: None, ..problem.only(&agents) };
             parts.push(Part { agents, problem, costs });
         }
         seen.extend(cells);

@@ -53,10 +53,11 @@ impl Planner for Pbs {
         let legs = one_leg_each(&costs);
         let setting = Setting::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
-        let Some(paths) = search(&mut sipp, &problem.graph, &setting, &mut clock) else {
-            return clock.unsolved(None);
-        };
-        paths.outcome(problem, problem.lower_bound(&costs))
+        let lower_bound = problem.lower_bound(&costs);
+        match search(&mut sipp, &problem.graph, &setting, &mut clock) {
+            Some(paths) => paths.outcome(problem, lower_bound),
+            None => clock.unsolved(None, lower_bound),
+        }
     }
 }
 

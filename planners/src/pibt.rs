@@ -95,7 +95,7 @@ impl Planner for Pibt {
         let is_solved = steps.last() == Some(&problem.goals);
         match problem.plan(&steps).ok() {
             Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
-            best => clock.unsolved(best),
+            best => clock.unsolved(best, lower_bound),
         }
     }
 }

@@ -54,6 +54,13 @@ impl Problem {
         self
     }
 
+    /// The same for some of the agents, as if there were no others.
+    pub(crate) fn only(&self, agents: &[usize]) -> Self {
+        let pick = |all: &[Vertex]| agents.iter().map(|&agent| all[agent]).collect();
+        let (starts, goals) = (pick(&self.starts), pick(&self.goals));
+        Self { graph: self.graph.clone(), starts, goals, most_steps: self.most_steps }
+    }
+
     /// Number of agents.
     pub fn num_agents(&self) -> usize {
         self.starts.len()
@@ -82,7 +89,7 @@ impl Problem {
         let mut costs = Vec::with_capacity(self.num_agents());
         for (agent, &goal) in self.goals.iter().enumerate() {
             if clock.is_spent() {
-                return Err(clock.unsolved(self.plan(std::slice::from_ref(&self.starts)).ok()));
+                return Err(clock.unsolved(self.plan(std::slice::from_ref(&self.starts)).ok(), 0));
             }
             let own: CostToGo = flood.costs_to_go(goal).collect();
             if let Some(reason) = self.obstruction(agent, &own) {
@@ -135,12 +142,16 @@ pub enum Outcome {
     TimedOut {
         /// The plan that came closest, if there is one.
         best: Option<Plan>,
+        /// The least that any plan's sum of costs can be, as far as it is known. Units: steps, summed over all agents.
+        lower_bound: u64,
     },
     /// The planner knows no better, though it had time left: others may find a plan. What was found is valid, but
     /// brings not all agents to their goals.
     GaveUp {
         /// The plan that came closest, if there is one.
         best: Option<Plan>,
+        /// The least that any plan's sum of costs can be, as far as it is known. Units: steps, summed over all agents.
+        lower_bound: u64,
     },
     /// There is no plan.
     Impossible {
@@ -158,11 +169,21 @@ impl Outcome {
         }
     }
 
+    /// The least that any plan's sum of costs can be, as far as it is known; none where there is no plan.
+    pub fn lower_bound(&self) -> Option<u64> {
+        match *self {
+            Self::Solved { lower_bound, .. }
+            | Self::TimedOut { lower_bound, .. }
+            | Self::GaveUp { lower_bound, .. } => Some(lower_bound),
+            Self::Impossible { .. } => None,
+        }
+    }
+
     /// The plan that solves the problem, or else the one that came closest.
     pub fn best(&self) -> Option<&Plan> {
         match self {
             Self::Solved { plan, .. } => Some(plan),
-            Self::TimedOut { best } | Self::GaveUp { best } => best.as_ref(),
+            Self::TimedOut { best, .. } | Self::GaveUp { best, .. } => best.as_ref(),
             Self::Impossible { .. } => None,
         }
     }
@@ -175,8 +196,8 @@ impl fmt::Display for Outcome {
                 let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
                 write!(f, "solved: sum of costs {cost}, at least {lower_bound}; makespan {makespan}")
             }
-            Self::TimedOut { .. } => write!(f, "timed out"),
-            Self::GaveUp { .. } => write!(f, "gave up"),
+            Self::TimedOut { lower_bound, .. } => write!(f, "timed out; sum of costs at least {lower_bound}"),
+            Self::GaveUp { lower_bound, .. } => write!(f, "gave up; sum of costs at least {lower_bound}"),
             Self::Impossible { reason } => write!(f, "impossible: {reason}"),
         }
     }
@@ -242,8 +263,12 @@ impl Clock {
     }
 
     /// What it came to if no plan was found.
-    pub(crate) fn unsolved(&mut self, best: Option<Plan>) -> Outcome {
-        if self.is_spent() { Outcome::TimedOut { best } } else { Outcome::GaveUp { best } }
+    pub(crate) fn unsolved(&mut self, best: Option<Plan>, lower_bound: u64) -> Outcome {
+        if self.is_spent() {
+            Outcome::TimedOut { best, lower_bound }
+        } else {
+            Outcome::GaveUp { best, lower_bound }
+        }
     }
 
     /// Nodes counted so far.

@@ -178,7 +178,7 @@ impl Rhcr {
                 let params = EcbsParams { weight, ..EcbsParams::default() };
                 match ecbs::search(&mut self.sipp, &graph, &setting, &params, clock, |_| None) {
                     Found::Paths { paths, .. } => Some(paths),
-                    Found::Nothing | Found::Proof(_) => None,
+                    Found::Nothing { .. } | Found::Proof(_) => None,
                 }
             }
             WindowSolver::Pbs | WindowSolver::Neighbourhoods => {

@@ -108,6 +108,9 @@ impl Room {
     }
 }
 
+/// Those of other searches are numbered from here: more than there are agents, or constraints of one.
+const OUTSIDE: usize = 1 << 24;
+
 /// How paths are found for a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Aim {
@@ -130,6 +133,20 @@ impl<'a> Low<'a> {
     pub(crate) fn new(sipp: &'a mut Sipp, graph: &Graph, setting: &'a Setting<'a>, aim: Aim) -> Self {
         let free = || Reservations::new(graph.num_vertices());
         Self { setting, sipp, forbidden: free(), others: free(), aim }
+    }
+
+    /// Paths of others that should rather not be met.
+    pub(crate) fn avoid(&mut self, paths: &[&[Vertex]]) {
+        for (number, path) in paths.iter().enumerate() {
+            self.others.add(OUTSIDE + number, path, true);
+        }
+    }
+
+    /// Paths of others that must not be met.
+    pub(crate) fn keep_clear(&mut self, paths: &[&[Vertex]]) {
+        for (number, path) in paths.iter().enumerate() {
+            self.forbidden.add(OUTSIDE + number, path, true);
+        }
     }
 
     /// The node without constraints, unless the time is up or an agent has no path.
@@ -220,8 +237,12 @@ impl Doubt {
     /// Counts a node; the reason why there is no plan, once it is found.
     pub(crate) fn count(&mut self, problem: &Problem, clock: &mut Clock) -> Option<String> {
         self.num_nodes += 1;
-        let has_none =
-            self.num_nodes == Self::AFTER && reach(problem, Self::MOST_PLACES, clock) == Reach::Unsolvable;
+        if self.num_nodes == Self::AFTER { Self::look(problem, clock) } else { None }
+    }
+
+    /// The reason why there is no plan, if it is soon found.
+    pub(crate) fn look(problem: &Problem, clock: &mut Clock) -> Option<String> {
+        let has_none = reach(problem, Self::MOST_PLACES, clock) == Reach::Unsolvable;
         has_none.then(|| "the agents cannot pass each other, whatever they do".to_owned())
     }
 }

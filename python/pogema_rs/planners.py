@@ -39,7 +39,7 @@ class Plan:
     sum_of_costs: Optional[int] = None
     #: The last step in which an agent moves.
     makespan: Optional[int] = None
-    #: The least that any plan's sum of costs can be; if it is reached, the plan is optimal.
+    #: The least that any plan's sum of costs can be, as far as it is known; if it is reached, the plan is optimal.
     lower_bound: Optional[int] = None
     #: Why there is no plan.
     reason: Optional[str] = None

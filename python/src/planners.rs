@@ -47,13 +47,15 @@ pub fn make_plan<'py>(
     let outcome = py.detach(|| planner.plan(&problem, &budget));
     let told = PyDict::new(py);
     told.set_item("seconds", began.elapsed().as_secs_f64())?;
+    if let Some(lower_bound) = outcome.lower_bound() {
+        told.set_item("lower_bound", lower_bound)?;
+    }
     match &outcome {
-        Outcome::Solved { plan, lower_bound } => {
+        Outcome::Solved { plan, .. } => {
             told.set_item("outcome", "solved")?;
-            told.set_item("lower_bound", lower_bound)?;
             tell(&told, plan)?;
         }
-        Outcome::TimedOut { best } | Outcome::GaveUp { best } => {
+        Outcome::TimedOut { best, .. } | Outcome::GaveUp { best, .. } => {
             let is_late = matches!(&outcome, Outcome::TimedOut { .. });
             told.set_item("outcome", if is_late { "timed_out" } else { "gave_up" })?;
             best.as_ref().map_or(Ok(()), |plan| tell(&told, plan))?;

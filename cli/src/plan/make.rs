@@ -134,8 +134,12 @@ fn as_json(outcome: &Outcome, seconds: f64) -> String {
             "makespan": plan.makespan(),
             "seconds": seconds,
         }),
-        Outcome::TimedOut { .. } => json!({"outcome": "timed_out", "seconds": seconds}),
-        Outcome::GaveUp { .. } => json!({"outcome": "gave_up", "seconds": seconds}),
+        Outcome::TimedOut { lower_bound, .. } => {
+            json!({"outcome": "timed_out", "lower_bound": lower_bound, "seconds": seconds})
+        }
+        Outcome::GaveUp { lower_bound, .. } => {
+            json!({"outcome": "gave_up", "lower_bound": lower_bound, "seconds": seconds})
+        }
         Outcome::Impossible { reason } => {
             json!({"outcome": "impossible", "reason": reason, "seconds": seconds})
         }

@@ -63,7 +63,7 @@ fn the_tree_takes_no_more_than_it_may() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
     let params = EcbsParams { weight: 1.0, most_bytes: 200_000, ..EcbsParams::default() };
     let outcome = Ecbs::new(params).plan(&case.problem(), &Budget::default());
-    assert_eq!(outcome, Outcome::GaveUp { best: None });
+    assert!(matches!(outcome, Outcome::GaveUp { best: None, .. }), "{outcome}");
 }
 
 #[test]

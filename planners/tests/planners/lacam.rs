@@ -275,7 +275,7 @@ fn a_budget_of_nothing_is_timed_out_with_a_valid_beginning() {
     for budget in
         [Budget::of_nodes(0), Budget::of_time(std::time::Duration::ZERO), cancelled, Budget::of_nodes(2)]
     {
-        let Outcome::TimedOut { best: Some(best) } = lacam(0).plan(&problem, &budget) else {
+        let Outcome::TimedOut { best: Some(best), .. } = lacam(0).plan(&problem, &budget) else {
             unreachable!("{budget:?}");
         };
         validate(&map, &[start], None, &best).unwrap();

@@ -34,7 +34,7 @@ fn a_result_is_read_as_it_was_written() {
     let read = PlanText::read(&text).unwrap();
     assert_eq!((read.plan, read.map_file.as_deref()), (plan(), Some("small.map")));
     assert_eq!((read.starts, read.goals), (Some(plan().cells()[0].clone()), Some(plan().cells()[2].clone())));
-    let none = write_result("small.map", "none", &problem, &Outcome::TimedOut { best: None });
+    let none = write_result("small.map", "none", &problem, &Outcome::TimedOut { best: None, lower_bound: 0 });
     assert!(none.contains("solved=0\n"));
     assert_eq!(PlanText::read(&none).unwrap_err().to_string(), "the result holds no solution");
 }

@@ -62,17 +62,22 @@ pub fn play_once(config: &GridConfig, name: &str, thinking: &Thinking) -> Result
     let mut task = None;
     let mut played = play(config, |instance, now| {
         task.get_or_insert_with(|| (instance.map().clone(), now.cells.clone(), now.goals.clone()));
+        // It is asked for one plan, which it either finds or not.
+        let has_none = |outcome: &Outcome| outcome.best().is_none();
+        if policy.outcomes().first().is_some_and(has_none) {
+            return Ok(vec![Action::Stay; now.cells.len()]);
+        }
         policy.act(instance.map(), now)
     })?;
     let outcome = policy.outcomes().first();
-    if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, lower_bound })) = (task, outcome) {
+    if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, .. })) = (task, outcome) {
         let wrong = |reason: String| Error::State { reason: format!("a plan is wrong: {reason}") };
         validate(&map, &starts, Some(&goals), plan).map_err(|conflict| wrong(conflict.to_string()))?;
         if played.num_reverted > 0 || policy.outcomes().len() > 1 {
             return Err(wrong(format!("the engine took {} moves back", played.num_reverted)));
         }
-        played.bound = Some(*lower_bound);
     }
+    played.bound = outcome.and_then(Outcome::lower_bound);
     if let Some(Outcome::Impossible { reason }) = outcome {
         played.impossible = Some(reason.clone());
     }

@@ -21,25 +21,19 @@ impl Crowd {
         mean(self.records.iter().filter_map(figure))
     }
 
-    /// Mean sums of costs, ours and published, and the bound of ours, over the episodes that both solved.
-    fn both(&self) -> Option<Both> {
-        let bound = |record: &Record| record.bound.map(|bound| bound as f64);
+    /// The means of a figure and of the published sums of costs, over the episodes that have both.
+    fn beside_published(&self, figure: impl Fn(&Record) -> Option<f64>) -> Option<Both> {
         let Some(solved) = &self.solved else {
             let published = self.mean.as_ref().filter(|mean| mean.csr == Some(1.0))?.soc?;
-            let all = self.records.iter().all(|record| record.csr == Some(1.0));
-            let ours = self.mean_of(Record::solved_soc).filter(|_| all)?;
-            return Some(Both { ours, published, bound: self.mean_of(bound) });
+            let all: Option<Vec<f64>> = self.records.iter().map(figure).collect();
+            return Some(Both { ours: mean(all?.into_iter())?, published });
         };
         let place = |record: &Record| (record.num_agents, record.map.clone(), record.seed);
-        let pairs = self.records.iter().filter_map(|record| {
-            record.solved_soc()?;
-            Some((record, *solved.get(&place(record))?))
-        });
-        let pairs: Vec<(&Record, f64)> = pairs.collect();
+        let pair = |record: &Record| Some((figure(record)?, *solved.get(&place(record))?));
+        let pairs: Vec<(f64, f64)> = self.records.iter().filter_map(pair).collect();
         Some(Both {
-            ours: mean(pairs.iter().filter_map(|(record, _)| record.solved_soc()))?,
+            ours: mean(pairs.iter().map(|pair| pair.0))?,
             published: mean(pairs.iter().map(|pair| pair.1))?,
-            bound: mean(pairs.iter().filter_map(|(record, _)| bound(record))),
         })
     }
 
@@ -48,12 +42,17 @@ impl Crowd {
     }
 }
 
-/// Mean figures over episodes that both solved.
+/// Means over the same episodes.
 #[derive(Clone, Copy)]
 struct Both {
     ours: f64,
     published: f64,
-    bound: Option<f64>,
+}
+
+impl Both {
+    fn ratio(self) -> f64 {
+        self.ours / self.published
+    }
 }
 
 fn mean(figures: impl Iterator<Item = f64>) -> Option<f64> {
@@ -95,7 +94,8 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
     ]);
     for crowd in crowds {
         let published = |figure: fn(&Mean) -> Option<f64>| crowd.mean.as_ref().and_then(figure);
-        let both = crowd.both();
+        let both = crowd.beside_published(Record::solved_soc);
+        let bound = crowd.beside_published(|record| record.bound.map(|bound| bound as f64));
         table.add_row([
             crowd.set.to_owned(),
             crowd.num_agents.to_string(),
@@ -105,8 +105,8 @@ fn mapf(crowds: &[Crowd]) -> comfy_table::Table {
             figure(crowd.mean_of(Record::solved_soc), 2),
             figure(both.map(|both| both.ours), 2),
             figure(both.map(|both| both.published), 2),
-            figure(both.map(|both| both.ours / both.published), 4),
-            figure(both.and_then(|both| Some(both.bound? / both.published)), 4),
+            figure(both.map(Both::ratio), 4),
+            figure(bound.map(Both::ratio), 4),
             figure(crowd.mean_of(|record| record.makespan), 2),
             figure(published(|mean| mean.makespan), 2),
             figure(crowd.mean_of(|record| Some(record.runtime)), 3),
