@@ -1,6 +1,6 @@
 //! Random calls, put to us and to a live NumPy 1.26.
 //!
-//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --features oracle --test numpy_live`
+//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --test numpy_live`
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
 

@@ -1,6 +1,6 @@
 //! The generators and the choice of a map, held against a live pogema-toolbox 0.1.1.
 //!
-//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --features oracle --test toolbox_live`
+//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --test toolbox_live`
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
 

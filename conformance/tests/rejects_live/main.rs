@@ -1,6 +1,6 @@
 //! What a live POGEMA 1.4.0 refuses, we refuse; what we refuse besides, we refuse for a reason that was decided on.
 //!
-//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-conformance --features oracle --test oracle_rejects`
+//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-conformance --test rejects_live`
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
 
