@@ -2,8 +2,8 @@
 
 import random
 
-from maps import drag, drop, load, pairs, paste, pick, press, rows, save
-from support import equal, text
+from maps import drag, drop, give, load, pairs, paste, pick, press, rows, save, taken
+from support import equal, text, wait
 
 SETTINGS = """# a comment of somebody
 seed: 9007199254740993
@@ -145,6 +145,29 @@ def test_errors_are_told_with_line_and_column(world):
         page.click("#source-load")
         assert page.locator("#source").is_hidden()
         equal(rows(page), ["..", ".#"])
+
+
+def test_files_read_slowly_or_not_at_all(world):
+    with world.open("editor") as page:
+        page.evaluate(
+            """() => {
+              const text = Blob.prototype.text;
+              Blob.prototype.text = async function () {
+                if (this.name === "gone.txt") throw new DOMException("gone", "NotFoundError");
+                if (this.name === "slow.txt") await new Promise((done) => { window.release = done; });
+                return text.call(this).finally(() => { window.numRead = (window.numRead ?? 0) + 1; });
+              };
+            }"""
+        )
+        give(page, "slow.txt", "....")
+        drop(page, "quick.txt", "..")
+        page.evaluate("window.release()")
+        wait(page, "window.numRead === 2")
+        taken(page)
+        equal(rows(page), [".."], "the file given last stays")
+        drop(page, "gone.txt", "...")
+        equal(text(page, "message"), "gone.txt: cannot be read")
+        equal(rows(page), [".."])
 
 
 def test_drop_and_paste(world):

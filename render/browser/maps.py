@@ -81,6 +81,12 @@ def paste(page, content):
 
 
 def drop(page, name, content):
+    give(page, name, content)
+    taken(page)
+
+
+def give(page, name, content):
+    """Drops a file, and does not wait until it is read."""
     page.evaluate(
         """([name, content]) => {
           const data = new DataTransfer();
@@ -91,4 +97,3 @@ def drop(page, name, content):
         }""",
         [name, content],
     )
-    taken(page)

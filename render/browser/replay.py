@@ -76,6 +76,7 @@ def test_agents_glide_between_steps(world):
         page.select_option("#speed", "1")
         page.uncheck("#numbers")
         page.uncheck("#goals")
+        settle(page)
         page.click("#play")
         # However slow the machine is, pictures of one step differ.
         page.evaluate("window.seen = []")
