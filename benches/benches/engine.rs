@@ -9,7 +9,7 @@ use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterio
 use pogema_benches::episode;
 use pogema_core::{Action, Environment, StepOut};
 use pogema_fast::{Batch, Engine, Observations, Path, words_per_agent};
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 use pogema_planners::sample;
 
 /// Side, agents.

@@ -10,8 +10,8 @@ use std::sync::atomic::AtomicBool;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pogema_core::{Environment as _, StepOut};
 use pogema_fast::Engine;
-use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_numpy::Generator;
 use pogema_planners::sample;
 use pogema_toolbox::{Begin, Environments, Running, Store, Suite, run};
 

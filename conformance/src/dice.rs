@@ -1,6 +1,6 @@
 //! Random choices for making test cases.
 
-use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_numpy::{Generator, SeedSequence};
 
 /// Random choices for making test cases.
 #[derive(Clone, Debug)]

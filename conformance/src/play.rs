@@ -5,8 +5,8 @@ use pogema_core::{
     MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Outside, Padded, Snapshot,
     StepOut, TraceStep, changes, states_at_every_step,
 };
-use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
+use pogema_numpy::Generator;
 use pogema_planners::{AStarTeam, Windows, pairs, pogema_team, sample};
 
 use crate::digits::pack;

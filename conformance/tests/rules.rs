@@ -11,9 +11,6 @@ use std::path::{Path, PathBuf};
 
 use pogema_conformance::{cases, golden, play};
 
-/// Crates whose sources may state rules.
-const SOURCES: [&str; 8] = ["core", "maps", "reference", "fast", "planners", "render", "conformance", "cli"];
-
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
 }
@@ -72,8 +69,9 @@ fn defined(wrong: &mut Vec<String>) -> BTreeMap<String, Rule> {
 /// The rules that sources cite, with the files that do.
 fn cited_in_code() -> Vec<(String, String)> {
     let mut cited = Vec::new();
-    for source in SOURCES {
-        for path in golden::files(&root().join(source).join("src"), ".rs").unwrap() {
+    for package in cargo_metadata::MetadataCommand::new().no_deps().exec().unwrap().packages {
+        let folder = Path::new(&package.manifest_path).parent().unwrap();
+        for path in golden::files(&folder.join("src"), ".rs").unwrap() {
             let text = std::fs::read_to_string(&path).unwrap();
             for line in text.lines().filter(|line| line.trim_start().starts_with("//")) {
                 let Some((_, ids)) = line.split_once("Rule: ") else { continue };

@@ -1,7 +1,7 @@
 //! From a config and a seed to an instance, bit for bit as POGEMA 1.4.0 makes it.
 //!
 //! [`GridConfig`] is POGEMA's config file. [`InstanceSource`] turns it into one [`pogema_core::Instance`] per
-//! reset, drawing the same random numbers as POGEMA does through NumPy ([`numpy`]).
+//! reset, drawing the same random numbers as POGEMA does through NumPy ([`pogema_numpy`]).
 //!
 //! ```
 //! use pogema_maps::{GridConfig, InstanceSource};
@@ -23,7 +23,6 @@ mod foretell;
 pub mod formats;
 pub mod generators;
 mod library;
-pub mod numpy;
 mod place;
 mod put;
 mod source;

@@ -8,8 +8,8 @@ use regex::Regex;
 use crate::catalogue::named_maps;
 use crate::config::nearest;
 use crate::formats::NamedMap;
-use crate::numpy::Generator;
 use crate::text::MapText;
+use pogema_numpy::Generator;
 
 /// Maps by name, in the order of their names.
 #[derive(Clone, Debug, Default)]

@@ -3,7 +3,7 @@
 use pogema_core::{Cell, Map};
 
 use crate::components::Components;
-use crate::numpy::Generator;
+use pogema_numpy::Generator;
 
 /// Draws starts and first goals: cell after cell of the shuffled free cells is a start, or the goal of the last
 /// start of its component. None if the map has no room for so many agents.

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::components::Components;
 use crate::config::{GridConfig, Targets};
-use crate::numpy::{Generator, SeedSequence};
 use crate::place::{capacity, place_at_random};
 use crate::streams::{ComponentSource, PoolSource, Reach};
+use pogema_numpy::{Generator, SeedSequence};
 
 /// How often POGEMA tries to place the agents before it gives up.
 const NUM_ATTEMPTS: usize = 11;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pogema_core::{Cell, GoalSource};
 
 use crate::components::{ComponentCells, Components};
-use crate::numpy::Generator;
+use pogema_numpy::Generator;
 
 /// Draws from the cells that the agent can reach, all but the one it stands on.
 ///

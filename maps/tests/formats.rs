@@ -29,7 +29,7 @@ fn any_text() -> impl Strategy<Value = MapText> {
             .filter(|&cell| !map.is_obstacle(cell))
             .collect();
         let mut mixed = free.clone();
-        pogema_maps::numpy::Generator::seeded(seed).shuffle(&mut mixed);
+        pogema_numpy::Generator::seeded(seed).shuffle(&mut mixed);
         let plain = MapText::from(map);
         match kind {
             0 => plain,
@@ -123,7 +123,7 @@ proptest! {
     #[test]
     fn tiles_hold_every_cell(side in 1_usize..5, down in 1_usize..4, across in 1_usize..4, seed in any::<u64>()) {
         let (height, width) = (side * down, side * across);
-        let mut rng = pogema_maps::numpy::Generator::seeded(seed);
+        let mut rng = pogema_numpy::Generator::seeded(seed);
         let cells = (0..height * width).map(|_| rng.integers(0, 2).unwrap() == 1).collect();
         let map = Map::new(height, width, cells).unwrap();
         let cut = tiles("city", &map, side).unwrap();

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Cell, Map, OnGoal};
-use pogema_maps::numpy::Generator;
 use pogema_maps::{Doubt, MapStats, PUZZLES, ScenarioStats, Verdict, search};
+use pogema_numpy::Generator;
 
 fn map(rows: &[&str]) -> Map {
     Map::from_rows(rows).unwrap()

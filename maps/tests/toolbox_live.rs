@@ -11,7 +11,7 @@ use pogema_maps::Library;
 use pogema_maps::MapText;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::generators::{Bays, Maze, MazeRanges, RandomMap, RandomRanges, Warehouse};
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! POGEMA's own policies, with the random numbers they draw.
 
 use pogema_core::Action;
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 
 use crate::AStarTeam;
 

@@ -1,7 +1,7 @@
 //! Policies by name: planners that drive an environment, and the simple ones.
 
 use pogema_core::{Action, Environment, Error, Instance, Map, OnGoal};
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 
 use crate::drawn::{pogema_team, sample};
 use crate::windows::Windows;

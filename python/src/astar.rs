@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use numpy::{AllowTypeChange, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
 use pogema_core::{Action, Error};
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 use pogema_planners::View;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

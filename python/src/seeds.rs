@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pogema_core::{Error, Instance, Map, Observation};
 use pogema_fast::Instances;
-use pogema_maps::numpy::SeedSequence;
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_numpy::SeedSequence;
 
 use crate::config;
 

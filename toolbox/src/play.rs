@@ -7,8 +7,8 @@ use pogema_core::{
     TraceStart, TraceStep,
 };
 use pogema_fast::Engine;
-use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_numpy::Generator;
 use pogema_planners::NamedPolicy;
 
 use crate::built_in::BuiltIn;

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use pogema_core::{Action, Environment, Error, StepOut};
 use pogema_fast::{Batch, Engine, Observations, words_per_agent};
-use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_numpy::Generator;
 use pogema_planners::sample;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;

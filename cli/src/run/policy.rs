@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_conformance::files;
 use pogema_core::{Action, Error, Trace, shorten};
 use pogema_maps::GridConfig;
-use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_numpy::{Generator, SeedSequence};
 use pogema_planners::{NamedPolicy, PolicySettings};
 
 use super::episode::Episode;

@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use pogema_core::{Error, Map};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::numpy::{Generator, SeedSequence};
 use pogema_maps::{GridConfig, InstanceSource, Library, MapText, put_map, put_scenario};
+use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::Sources;

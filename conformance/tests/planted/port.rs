@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use pogema_conformance::port::{Ask, Beginning, Hello, Key, Link, Misbehaviour, Reply, Server};
 use pogema_core::{Cell, GoalSource, GoalStream, Instance, Map, OnGoal};
-use pogema_maps::numpy::Generator;
 use pogema_maps::{Components, GridConfig, InstanceSource};
+use pogema_numpy::Generator;
 
 use crate::engine::Flawed;
 use crate::flaw::Flaw;

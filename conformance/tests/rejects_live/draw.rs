@@ -2,7 +2,7 @@
 
 use pogema_conformance::{Op, Request, draw_request};
 use pogema_maps::FIELDS;
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 use serde_json::{Map as Object, Value, json};
 
 /// The drawn configs are always the same.

@@ -3,7 +3,7 @@
 use pogema_core::{Error, Map};
 
 use super::{check_sides, draw_between, draw_share};
-use crate::numpy::Generator;
+use pogema_numpy::Generator;
 
 /// More wall pieces than this are refused: the largest maze is full long before.
 const MOST_PIECES: f64 = 1e9;

@@ -19,7 +19,7 @@ pub use warehouse::{Bays, Warehouse};
 
 use pogema_core::{Error, Map};
 
-use crate::numpy::Generator;
+use pogema_numpy::Generator;
 
 /// Passes if `width` and `height` are those of a map.
 fn check_sides(width: i64, height: i64) -> Result<(), Error> {

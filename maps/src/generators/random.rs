@@ -3,7 +3,7 @@
 use pogema_core::{Error, Map};
 
 use super::{check_sides, draw_between, draw_share};
-use crate::numpy::Generator;
+use pogema_numpy::Generator;
 
 /// What the settings of a random map are drawn from.
 ///

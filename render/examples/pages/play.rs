@@ -5,8 +5,8 @@ use std::collections::{HashMap, VecDeque};
 use pogema_core::{
     Action, Cell, Environment, Error, Map, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
 };
-use pogema_maps::numpy::{Generator, NumpyError};
 use pogema_maps::{GridConfig, InstanceSource};
+use pogema_numpy::{Generator, NumpyError};
 use pogema_reference::Reference;
 
 /// The episode of a config, up to its end; each agent walks to its goal, or at random with the chance `stray`.

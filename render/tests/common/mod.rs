@@ -3,8 +3,8 @@
 use pogema_core::{
     Action, Environment, Instance, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
 };
-use pogema_maps::numpy::Generator;
 use pogema_maps::{GridConfig, InstanceSource, value_from_yaml};
+use pogema_numpy::Generator;
 use pogema_planners::{Windows, pogema_team, sample};
 use pogema_reference::Reference;
 

@@ -1,6 +1,6 @@
 """Answers calls of a NumPy generator, given as JSON on standard input.
 
-The request has two lists. `runs` holds runs as `numpy_calls/mod.rs` describes them; each gets its list of
+The request has two lists. `runs` holds runs as `calls/mod.rs` describes them; each gets its list of
 answers. `near` holds calls that compare a double with thresholds; each gets runs of it, with answers, whose first
 double is at a threshold or beside it. A double is written as the 16 hexadecimal digits of its bits, an error as null.
 """

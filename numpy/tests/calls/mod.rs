@@ -1,6 +1,6 @@
 //! Calls of a generator as data, so that the same calls can be put to NumPy and to us.
 
-use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_numpy::{Generator, SeedSequence};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};

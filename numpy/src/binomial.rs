@@ -1,6 +1,6 @@
 //! Single trials: `binomial(1, p)`.
 
-use super::{Generator, NumpyError};
+use crate::{Generator, NumpyError};
 
 /// Trials of one probability, with everything that depends only on it worked out once.
 ///

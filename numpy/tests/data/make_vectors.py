@@ -1,4 +1,4 @@
-"""Writes numpy_vectors.json beside this file. Run it with NumPy 1.26.4."""
+"""Writes vectors.json beside this file. Run it with NumPy 1.26.4."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ HERE = Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(HERE.parent))
 
-from numpy_live import CALLS, answers, runs_near, to_bits  # noqa: E402
+from live import CALLS, answers, runs_near, to_bits  # noqa: E402
 
 SEEDS = [0, 1, 42, 2**31 - 1, 2**32, 2**63 - 2, 2**64 - 1, 2**64, 2**130, 2**200 + 3]
 LARGEST = 2**63 - 1
@@ -91,7 +91,7 @@ def main():
     entropies = [to_words(seed) for seed in SEEDS] + [[], [7, 0], [7, 0, 0, 0, 0], [*range(12)]]
     lines = ['{"seeding": [', to_lines(map(seeding, entropies)), '], "runs": {']
     lines.append(",\n".join(f'"{topic}": [\n{to_lines(made)}]' for topic, made in runs.items()))
-    (HERE / "numpy_vectors.json").write_text("\n".join(lines) + "}}\n")
+    (HERE / "vectors.json").write_text("\n".join(lines) + "}}\n")
 
 
 if __name__ == "__main__":

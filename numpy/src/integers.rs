@@ -1,6 +1,6 @@
 //! Integers from a range, by multiply-shift with rejection.
 
-use super::{Generator, NumpyError};
+use crate::{Generator, NumpyError};
 
 impl Generator {
     /// An integer of at least `lo` and below `hi`.

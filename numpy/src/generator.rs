@@ -4,7 +4,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::{NumpyError, SeedSequence};
+use crate::{NumpyError, SeedSequence};
 
 /// A stream of random numbers, drawn in NumPy's ways.
 ///

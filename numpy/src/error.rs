@@ -1,13 +1,11 @@
 //! What NumPy raises for.
 
-use std::error::Error;
-use std::fmt;
-
-/// Why numbers cannot be drawn; the generator is left as it was.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Why a draw is refused. The generator keeps its state.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {
     /// No integer lies in the half-open range.
+    #[error("no integer is at least `{lo}` and below `{hi}`")]
     EmptyRange {
         /// The lower end.
         lo: i64,
@@ -15,6 +13,7 @@ pub enum NumpyError {
         hi: i64,
     },
     /// The ends of a range of doubles are in the wrong order, not numbers, or too far apart.
+    #[error("range from `{lo}` to `{hi}`, expected ends in order and a finite width")]
     BadRange {
         /// The lower end.
         lo: f64,
@@ -22,8 +21,10 @@ pub enum NumpyError {
         hi: f64,
     },
     /// There is nothing to choose from.
+    #[error("cannot choose from `0` items")]
     EmptyChoice,
     /// A weight is negative or not a number.
+    #[error("weight `{weight}` at index `{index}`, expected 0 or more")]
     BadWeight {
         /// The weight's index.
         index: usize,
@@ -31,48 +32,26 @@ pub enum NumpyError {
         weight: f64,
     },
     /// The weights do not sum to one.
+    #[error("weights sum to `{sum}`, expected 1")]
     BadWeightSum {
         /// What they sum to.
         sum: f64,
     },
     /// A probability is below zero, above one or not a number.
+    #[error("probability is `{p}`, expected 0 to 1")]
     BadProbability {
         /// The probability.
         p: f64,
     },
     /// The operating system gave no entropy.
-    NoEntropy(getrandom::Error),
-}
-
-impl fmt::Display for NumpyError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::EmptyRange { lo, hi } => write!(f, "no integer is at least `{lo}` and below `{hi}`"),
-            Self::BadRange { lo, hi } => {
-                write!(f, "range from `{lo}` to `{hi}`, expected ends in order and a finite width")
-            }
-            Self::EmptyChoice => write!(f, "cannot choose from `0` items"),
-            Self::BadWeight { index, weight } => {
-                write!(f, "weight `{weight}` at index `{index}`, expected 0 or more")
-            }
-            Self::BadWeightSum { sum } => write!(f, "weights sum to `{sum}`, expected 1"),
-            Self::BadProbability { p } => write!(f, "probability is `{p}`, expected 0 to 1"),
-            Self::NoEntropy(reason) => write!(f, "no entropy from the operating system: `{reason}`"),
-        }
-    }
-}
-
-impl Error for NumpyError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match self {
-            Self::NoEntropy(reason) => Some(reason),
-            _ => None,
-        }
-    }
+    #[error("no entropy from the operating system: `{0}`")]
+    NoEntropy(#[source] getrandom::Error),
 }
 
 #[cfg(test)]
 mod tests {
+    use std::error::Error as _;
+
     use super::*;
 
     #[test]

@@ -1,6 +1,6 @@
 //! Random orders.
 
-use super::Generator;
+use crate::Generator;
 
 /// How many indices are drawn ahead of the exchanges.
 const BATCH: usize = 128;

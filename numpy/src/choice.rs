@@ -1,6 +1,6 @@
 //! One of several items, with and without weights.
 
-use super::{Generator, NumpyError};
+use crate::{Generator, NumpyError};
 
 /// How far from 1 the weights may sum: the square root of the double's epsilon, which is 2⁻²⁶.
 const SUM_TOLERANCE: f64 = 1.0 / (1_u64 << 26) as f64;

@@ -1,20 +1,20 @@
 //! Random calls, put to us and to a live NumPy 1.26.
 //!
-//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --test numpy_live`
+//! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-numpy --test numpy_live`
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail by panicking")]
 
-mod numpy_calls;
+mod calls;
 
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use pogema_maps::numpy::Generator;
+use pogema_numpy::Generator;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use numpy_calls::{Bits, Call, Run, Start};
+use calls::{Bits, Call, Run, Start};
 
 const RUNS: usize = 6_000;
 const CALLS_PER_RUN: usize = 40;
@@ -75,7 +75,7 @@ fn kind(call: &Call) -> String {
 fn ask_numpy(request: &Request) -> Reply {
     let hint = "set POGEMA_ORACLE_PYTHON to a Python that has NumPy 1.26";
     let Ok(python) = std::env::var("POGEMA_ORACLE_PYTHON") else { panic!("{hint}") };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/numpy_live.py");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live.py");
     let child = Command::new(&python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let mut child = child.unwrap_or_else(|error| panic!("cannot run `{python}`: {error}; {hint}"));
     // The script reads everything before it writes anything, and closes its end if it cannot start.

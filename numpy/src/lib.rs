@@ -4,7 +4,7 @@
 //! instance from the same seed must draw the same numbers, in the same order, from the same stream:
 //!
 //! ```
-//! use pogema_maps::numpy::{Generator, NumpyError};
+//! use pogema_numpy::{Generator, NumpyError};
 //!
 //! let mut generator = Generator::seeded(42);
 //! let mut order: Vec<usize> = (0..10).collect();

@@ -1,6 +1,6 @@
 //! From a seed of any size to the state of a generator.
 
-use super::NumpyError;
+use crate::NumpyError;
 
 const POOL_WORDS: usize = 4;
 

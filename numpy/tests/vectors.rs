@@ -1,15 +1,15 @@
-//! Values that NumPy 1.26.4 gave, kept in `data/numpy_vectors.json`.
+//! Values that NumPy 1.26.4 gave, kept in `data/vectors.json`.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
-mod numpy_calls;
+mod calls;
 
 use std::collections::BTreeMap;
 
-use pogema_maps::numpy::{Generator, SeedSequence};
+use pogema_numpy::{Generator, SeedSequence};
 use serde::Deserialize;
 
-use numpy_calls::Run;
+use calls::Run;
 
 #[derive(Deserialize)]
 struct Vectors {
@@ -26,7 +26,7 @@ struct Seeding {
 }
 
 fn vectors() -> Vectors {
-    serde_json::from_str(include_str!("data/numpy_vectors.json")).unwrap()
+    serde_json::from_str(include_str!("data/vectors.json")).unwrap()
 }
 
 #[test]
