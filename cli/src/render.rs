@@ -9,7 +9,7 @@ use std::str::FromStr;
 use clap::Args;
 use pogema_conformance::files;
 use pogema_core::{Error, Trace, shorten};
-use pogema_render::Film;
+use pogema_render::{Ground, check};
 
 pub use pictures::Pictures;
 
@@ -51,24 +51,27 @@ impl FromStr for Steps {
 impl Render {
     pub fn run(&self) -> Result<(), Error> {
         let trace = Trace::read(files::open(&self.trace)?).map_err(|error| Error::io(&self.trace, error))?;
-        let mut film = Film::of(&trace);
-        film.check().map_err(|error| Error::io(&self.trace, error))?;
-        self.pictures.check(film.config.num_agents)?;
-        if let Some(Steps { first, last }) = self.steps {
-            film = film.part(first..=last)?;
-        }
+        check(&trace).map_err(|error| Error::io(&self.trace, error))?;
+        self.pictures.check(trace.header.config.num_agents)?;
+        let (first, trace) = match self.steps {
+            Some(Steps { first, last }) => (first, trace.part(first..=last)?),
+            None => (0, trace),
+        };
         let name = self.trace.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         if self.text || !self.pictures.are_wanted() {
-            self.play(&film)?;
+            self.play(&trace, first)?;
         }
-        self.pictures.draw(&film, &name)
+        self.pictures.draw(&trace, &name)
     }
 
-    fn play(&self, film: &Film) -> Result<(), Error> {
-        let mut screen = self.pictures.screen();
+    /// Shows an episode in the terminal, or one frame of it; its first frame is the state after `first` steps.
+    fn play(&self, trace: &Trace, first: usize) -> Result<(), Error> {
+        let (mut screen, ground) = (self.pictures.screen(), Ground::of(trace));
         match self.pictures.frame() {
-            Some(frame) => screen.draw(film.ground(), film.state(frame)?),
-            None => film.states().try_for_each(|state| screen.draw(film.ground(), state)),
+            Some(frame) => screen.draw(ground, first + frame, trace.state(frame)?),
+            None => {
+                (first..).zip(trace.states()).try_for_each(|(step, state)| screen.draw(ground, step, state))
+            }
         }
     }
 }

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use pogema_core::Error;
-use pogema_render::Film;
 use pogema_toolbox::{Pairs, Results, Suite, differences, short};
 
 use crate::evaluate::environments;
@@ -41,7 +40,7 @@ impl Replay {
         }
         if self.pictures.are_wanted() {
             let title = format!("{}, episode {}", self.algorithm, self.episode);
-            self.pictures.draw(&Film::of(&trace), &title)?;
+            self.pictures.draw(&trace, &title)?;
         }
         let figures = metrics.iter().filter_map(|(name, value)| Some((name, value.as_f64()?)));
         let figures: Vec<String> = figures.map(|(name, value)| format!("{name}={}", short(value))).collect();

@@ -1,21 +1,21 @@
 //! `pogema run`: one episode.
 
-mod episode;
 mod policy;
 mod settings;
 
 use std::path::PathBuf;
 
 use clap::Args;
-use pogema_core::{Error, Trace};
-use pogema_render::Film;
+use pogema_core::{Episode, Error, Trace};
+use pogema_maps::{GridConfig, InstanceSource};
+use pogema_reference::Reference;
+use pogema_render::Ground;
 use pogema_toolbox::short;
 use serde_json::json;
 
 use crate::output::{check_writable, say, write_trace};
 use crate::plan::Thinking;
 use crate::render::Pictures;
-use episode::Episode;
 use policy::Policy;
 pub use settings::Settings;
 
@@ -53,26 +53,33 @@ impl Run {
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
         let settings = self.thinking.settings(self.future_goals)?;
-        let mut episode = Episode::start(config, self.trace.is_some() || self.pictures.are_wanted())?;
-        for warning in episode.warnings() {
+        let generated = InstanceSource::new(config.clone(), None)?.generate()?;
+        for warning in &generated.warnings {
             eprintln!("warning: {warning}");
         }
-        let mut policy = Policy::new(&self.policy, self.actions.as_deref(), &settings, &episode)?;
+        let rules = config.rules();
+        let mut episode = Episode::new(Reference::new(rules)?).with_density().with_collisions();
+        let is_recorded = self.trace.is_some() || self.pictures.are_wanted();
+        episode.record(is_recorded);
+        episode.start(generated.instance)?;
+        let instance = episode.instance()?;
+        let mut policy = Policy::new(&self.policy, self.actions.as_deref(), &settings, &config, instance)?;
         let mut screen = self.render.then(|| self.pictures.screen());
         loop {
             if let Some(screen) = &mut screen {
-                screen.draw(episode.ground(), &episode.snapshot())?;
+                let ground = Ground::new(episode.instance()?, rules.radius);
+                screen.draw(ground, episode.num_steps() as usize, &episode.snapshot())?;
             }
             if episode.is_over() {
                 break;
             }
             let Some(actions) = policy.act(&episode)? else { break };
-            episode.step(actions)?;
+            episode.step(&actions)?;
         }
-        if let Some(trace) = episode.trace() {
-            self.keep(&trace)?;
+        if is_recorded {
+            self.keep(&episode.trace()?)?;
         }
-        self.summarise(&episode)
+        self.summarise(&config, &generated.warnings, &episode)
     }
 
     /// Writes and draws a recorded episode.
@@ -80,7 +87,7 @@ impl Run {
         if let Some(path) = &self.trace {
             write_trace(path, trace)?;
         }
-        if self.pictures.are_wanted() { self.pictures.draw(&Film::of(trace), &self.title()) } else { Ok(()) }
+        if self.pictures.are_wanted() { self.pictures.draw(trace, &self.title()) } else { Ok(()) }
     }
 
     /// What was played, in a few words.
@@ -89,15 +96,20 @@ impl Run {
         words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
-    fn summarise(&self, episode: &Episode) -> Result<(), Error> {
+    fn summarise(
+        &self,
+        config: &GridConfig,
+        warnings: &[String],
+        episode: &Episode<Reference>,
+    ) -> Result<(), Error> {
         if self.json {
             let summary = json!({
-                "config": episode.config().to_value(),
+                "config": config.to_value(),
                 "policy": self.policy,
                 "steps": episode.num_steps(),
                 "ended": episode.is_over(),
                 "metrics": episode.metrics(),
-                "warnings": episode.warnings(),
+                "warnings": warnings,
             });
             return say(&summary.to_string());
         }

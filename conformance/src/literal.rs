@@ -6,8 +6,8 @@
 mod moves;
 
 use pogema_core::{
-    Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, MapfOut, Occupancy, OnGoal,
-    Outside, PomapfOut, Reward, Snapshot, StepOut,
+    Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, Occupancy, OnGoal, Outside,
+    Reward, Snapshot, State, StepOut,
 };
 
 /// A place in the map with its border, counted from the border's corner.
@@ -19,14 +19,15 @@ pub struct Literal {
     config: Config,
     obstacles: Vec<Vec<u8>>,
     positions: Vec<Vec<u8>>,
-    starts: Vec<Place>,
     places: Vec<Place>,
     goals: Vec<Place>,
+    /// The same places and goals without the border, as others see them.
+    cells: Vec<Cell>,
+    goal_cells: Vec<Cell>,
     active: Vec<bool>,
     was_on_goal: Vec<bool>,
     streams: Vec<GoalStream>,
     elapsed: u64,
-    kept: Vec<Snapshot>,
 }
 
 impl Literal {
@@ -40,14 +41,14 @@ impl Literal {
             config,
             obstacles: Vec::new(),
             positions: Vec::new(),
-            starts: Vec::new(),
             places: Vec::new(),
             goals: Vec::new(),
+            cells: Vec::new(),
+            goal_cells: Vec::new(),
             active: Vec::new(),
             was_on_goal: Vec::new(),
             streams: Vec::new(),
             elapsed: 0,
-            kept: Vec::new(),
         })
     }
 
@@ -57,6 +58,11 @@ impl Literal {
 
     fn unpad(&self, (row, col): Place) -> Cell {
         Cell::new((row - self.config.radius) as u16, (col - self.config.radius) as u16)
+    }
+
+    fn note_cells(&mut self) {
+        self.cells = self.places.iter().map(|&place| self.unpad(place)).collect();
+        self.goal_cells = self.goals.iter().map(|&place| self.unpad(place)).collect();
     }
 
     fn note_goals(&mut self) {
@@ -102,17 +108,16 @@ impl Environment for Literal {
         }
         self.obstacles = obstacles;
         self.positions = vec![vec![0; width]; height];
-        self.starts = instance.starts().iter().map(|&cell| self.pad(cell)).collect();
-        for &(row, col) in &self.starts {
+        self.places = instance.starts().iter().map(|&cell| self.pad(cell)).collect();
+        for &(row, col) in &self.places {
             self.positions[row][col] = 1;
         }
-        self.places.clone_from(&self.starts);
         self.goals = instance.first_goals().into_iter().map(|cell| self.pad(cell)).collect();
         self.streams = instance.goals().to_vec();
         self.active = vec![true; self.config.num_agents];
         self.elapsed = 0;
         self.note_goals();
-        self.kept = vec![self.snapshot()];
+        self.note_cells();
         Ok(())
     }
 
@@ -159,28 +164,41 @@ impl Environment for Literal {
         }
         self.elapsed += 1;
         out.truncated.fill(self.elapsed as i64 >= self.config.max_steps);
-        self.kept.push(self.snapshot());
+        self.note_cells();
         Ok(())
     }
 
-    fn step_back(&mut self) -> Result<bool, Error> {
-        if !self.config.persistent {
-            return Err(Error::State { reason: "steps are only kept with persistent: true".into() });
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
+        let border = 2 * self.config.radius;
+        let (height, width) = (self.obstacles.len(), self.obstacles.first().map_or(0, Vec::len));
+        if height == 0 {
+            return Err(Error::NotReset);
         }
-        if self.kept.len() < 2 {
-            return Ok(false);
-        }
-        self.kept.pop();
-        let Some(state) = self.kept.last().cloned() else { return Ok(false) };
+        state.check_fits(self.config.num_agents, (height - border, width - border))?;
         self.places = state.cells.iter().map(|&cell| self.pad(cell)).collect();
         self.goals = state.goals.iter().map(|&cell| self.pad(cell)).collect();
-        self.active = state.active;
-        self.elapsed = state.step;
+        self.active.clone_from(&state.active);
+        self.elapsed = step;
         self.positions.iter_mut().for_each(|row| row.fill(0));
-        for (row, col) in state.occupied.into_iter().map(|cell| self.pad(cell)).collect::<Vec<_>>() {
+        for (row, col) in state.occupied.iter().map(|&cell| self.pad(cell)).collect::<Vec<_>>() {
             self.positions[row][col] = 1;
         }
-        Ok(true)
+        self.note_cells();
+        Ok(())
+    }
+
+    fn state(&self) -> State<'_> {
+        let Self { elapsed, cells, goal_cells: goals, active, was_on_goal: on_goal, .. } = self;
+        State { step: *elapsed, cells, goals, active, on_goal }
+    }
+
+    fn occupied(&self) -> Vec<Cell> {
+        let mut occupied = Vec::new();
+        for (row, flags) in self.positions.iter().enumerate() {
+            let marked = flags.iter().enumerate().filter(|&(_, &flag)| flag == 1);
+            occupied.extend(marked.map(|(col, _)| self.unpad((row, col))));
+        }
+        occupied
     }
 
     fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
@@ -197,50 +215,9 @@ impl Environment for Literal {
         Ok(())
     }
 
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        let area = self.config.side() * self.config.side();
-        for agent in 0..self.config.num_agents {
-            let obstacles = out.obstacles[agent * area..].iter_mut().zip(self.window(&self.obstacles, agent));
-            obstacles.for_each(|(value, seen)| *value = seen);
-            let agents = out.agents[agent * area..].iter_mut().zip(self.window(&self.positions, agent));
-            agents.for_each(|(value, seen)| *value = seen);
-            let start = self.starts[agent];
-            for (values, place) in
-                [(&mut *out.cells, self.places[agent]), (&mut *out.goals, self.goals[agent])]
-            {
-                values[2 * agent] = place.0 as i32 - start.0 as i32;
-                values[2 * agent + 1] = place.1 as i32 - start.1 as i32;
-            }
-        }
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        let values = self.obstacles.iter().flatten();
+        out.iter_mut().zip(values).for_each(|(value, &flag)| *value = flag);
         Ok(())
-    }
-
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        out.obstacles
-            .iter_mut()
-            .zip(self.obstacles.iter().flatten())
-            .for_each(|(value, &flag)| *value = flag);
-        for (values, places) in [(out.cells, &self.places), (out.goals, &self.goals)] {
-            for (pair, place) in values.chunks_exact_mut(2).zip(places) {
-                pair.copy_from_slice(&[place.0 as i32, place.1 as i32]);
-            }
-        }
-        Ok(())
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        let mut occupied = Vec::new();
-        for (row, flags) in self.positions.iter().enumerate() {
-            let marked = flags.iter().enumerate().filter(|&(_, &flag)| flag == 1);
-            occupied.extend(marked.map(|(col, _)| self.unpad((row, col))));
-        }
-        Snapshot {
-            step: self.elapsed,
-            cells: self.places.iter().map(|&place| self.unpad(place)).collect(),
-            goals: self.goals.iter().map(|&place| self.unpad(place)).collect(),
-            active: self.active.clone(),
-            on_goal: self.was_on_goal.clone(),
-            occupied,
-        }
     }
 }

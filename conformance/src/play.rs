@@ -1,13 +1,13 @@
 //! Our own answers to a request.
 
 use pogema_core::{
-    Action, Change, CollisionMeter, Config, DensityMeter, Environment, EpisodeMeter, Error, Instance,
-    MapfOut, Metrics, Observation, Observed, ObservedMapf, ObservedPomapf, OnGoal, Outside, Padded, Snapshot,
-    StepOut, TraceStep, changes, states_at_every_step,
+    Action, Change, Config, Environment, Episode, Error, Instance, Metrics, Observation, Observed,
+    ObservedMapf, ObservedPomapf, OnGoal, Outside, Padded, Snapshot, TraceStep, changes, from_border,
+    states_at_every_step,
 };
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
 use pogema_numpy::Generator;
-use pogema_planners::{AStarTeam, Windows, pairs, pogema_team, sample};
+use pogema_planners::{AStarTeam, Windows, pogema_team, sample};
 
 use crate::digits::pack;
 use crate::request::{
@@ -85,16 +85,27 @@ impl Source {
     }
 }
 
+/// Which figures are measured beyond POGEMA's own.
+#[derive(Clone, Copy)]
+struct Measured {
+    density: bool,
+    collisions: bool,
+}
+
+impl Measured {
+    fn of(figures: &[String]) -> Self {
+        let has = |name: &str| figures.iter().any(|figure| figure == name);
+        Self { density: has("avg_agents_density"), collisions: has("a_collisions") || has("o_collisions") }
+    }
+}
+
 /// One request at work.
 pub(crate) struct Player {
     pub(crate) config: GridConfig,
     source: Source,
-    pub(crate) environment: Box<dyn Environment>,
-    pub(crate) instance: Option<Instance>,
+    pub(crate) episode: Episode<Box<dyn Environment>>,
     warnings: Vec<String>,
-    meter: EpisodeMeter,
-    density: Option<DensityMeter>,
-    collisions: Option<CollisionMeter>,
+    /// POGEMA answers for its history whether the config keeps steps or not.
     past: Vec<Snapshot>,
     team: AStarTeam,
     sampler: Generator,
@@ -107,14 +118,21 @@ impl Player {
         let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
         let registered = named.map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
         let source = Source::Drawn(Box::new(InstanceSource::new(config.clone(), registered)?));
-        let mut player = Self::with_source(make, config, source)?;
-        player.density = request.density.then(DensityMeter::default);
-        player.collisions = request.collisions.then(CollisionMeter::default);
-        Ok(player)
+        Self::with_source(
+            make,
+            config,
+            source,
+            Measured { density: request.density, collisions: request.collisions },
+        )
     }
 
-    /// A player of one instance, whose episodes all begin alike.
-    pub(crate) fn of_instance(make: &Make<'_>, rules: &Config, instance: Instance) -> Result<Self, Error> {
+    /// A player of one instance, whose episodes all begin alike. It measures the figures named.
+    pub(crate) fn of_instance(
+        make: &Make<'_>,
+        rules: &Config,
+        instance: Instance,
+        figures: &[String],
+    ) -> Result<Self, Error> {
         let config = GridConfig {
             num_agents: rules.num_agents,
             obs_radius: rules.radius,
@@ -128,32 +146,32 @@ impl Player {
             empty_outside: matches!(instance.outside(), Outside::Free),
             ..GridConfig::default()
         };
-        Self::with_source(make, config, Source::Given(Box::new(instance)))
+        Self::with_source(make, config, Source::Given(Box::new(instance)), Measured::of(figures))
     }
 
-    fn with_source(make: &Make<'_>, config: GridConfig, source: Source) -> Result<Self, Error> {
-        let rules = config.rules();
+    fn with_source(
+        make: &Make<'_>,
+        config: GridConfig,
+        source: Source,
+        measured: Measured,
+    ) -> Result<Self, Error> {
+        let mut episode = Episode::new(make(config.rules())?);
+        if measured.density {
+            episode = episode.with_density();
+        }
+        if measured.collisions {
+            episode = episode.with_collisions();
+        }
         Ok(Self {
             source,
-            environment: make(rules)?,
-            instance: None,
+            episode,
             warnings: Vec::new(),
-            meter: EpisodeMeter::new(&rules),
-            density: None,
-            collisions: None,
             past: Vec::new(),
             team: pogema_team(),
             sampler: Generator::seeded(config.seed.unwrap_or(0)),
             config,
             padded: None,
         })
-    }
-
-    /// Measures what is only measured on request.
-    pub(crate) fn measure(&mut self, figures: &[String]) {
-        let wants = |name: &str| figures.iter().any(|figure| figure == name);
-        self.density = wants("avg_agents_density").then(DensityMeter::default);
-        self.collisions = (wants("a_collisions") || wants("o_collisions")).then(CollisionMeter::default);
     }
 
     pub(crate) fn perform(&mut self, op: &Op) -> Result<Record, Error> {
@@ -174,11 +192,11 @@ impl Player {
                 self.step(actions).map(|record| Record::Sample(Box::new(record)))
             }
             Op::Back => {
-                let moved = self.environment.step_back()?;
+                let moved = self.episode.step_back()?;
                 if moved {
                     self.past.pop();
                 }
-                Ok(Record::Back(Back { moved, state: self.state() }))
+                Ok(Record::Back(Back { moved, state: self.episode.snapshot() }))
             }
             Op::History => Ok(Record::History(self.history())),
         }
@@ -187,21 +205,16 @@ impl Player {
     fn reset(&mut self) -> Result<ResetRecord, Error> {
         let (instance, warnings) = self.source.next()?;
         self.warnings.extend(warnings);
-        self.environment.reset(&instance)?;
-        self.meter.reset();
+        self.episode.start(instance)?;
         self.team.reset();
-        self.past = vec![self.environment.snapshot()];
-        let padded = self.padded(&instance)?;
+        self.past = vec![self.episode.snapshot()];
+        let instance = self.episode.instance()?;
+        let padded = self.padded(instance)?;
         self.padded = Some(padded.clone());
         let observations = self.observed(true)?;
-        if let Some(density) = &mut self.density {
-            density.reset();
-        }
-        self.collisions = self.collisions.map(|_| CollisionMeter::default());
-        self.feed_density()?;
         let may_foretell =
             self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MOST_FORETOLD_STEPS;
-        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, &instance)).flatten();
+        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, instance)).flatten();
         let record = ResetRecord {
             derived: Derived {
                 width: self.config.width,
@@ -212,40 +225,34 @@ impl Player {
             },
             map: instance.map().rows(),
             padded,
-            state: self.state(),
+            state: self.episode.snapshot(),
             observations: Some(observations),
             goal_lists,
             goal_lists_error: None,
         };
-        self.instance = Some(instance);
         Ok(record)
     }
 
     pub(crate) fn step(&mut self, actions: Vec<Action>) -> Result<StepRecord, Error> {
-        let num_agents = self.config.num_agents;
-        let before = self.state();
-        let mut rewards = vec![0.0; num_agents];
-        let mut terminated = vec![false; num_agents];
-        let mut truncated = vec![false; num_agents];
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        self.environment.step(&actions, out)?;
-        let state = self.state();
-        self.past.push(self.environment.snapshot());
-        self.feed_density()?;
-        self.count_collisions(&before, &actions, &state);
-        let metrics = self.metrics(&state, &terminated, &truncated);
+        let before = self.episode.snapshot();
+        self.episode.step(&actions)?;
+        let state = self.episode.snapshot();
+        self.past.push(state.clone());
         let observations = Some(self.observed(false)?);
         let actions_after = self.actions_after(&before, &actions, &state);
         Ok(StepRecord {
             infos_active: state.active.clone(),
-            step: TraceStep { actions, state, rewards, terminated, truncated, observations, metrics },
+            step: TraceStep {
+                actions,
+                state,
+                rewards: self.episode.rewards().to_vec(),
+                terminated: self.episode.terminated().to_vec(),
+                truncated: self.episode.truncated().to_vec(),
+                observations,
+                metrics: self.metrics(),
+            },
             actions_after,
         })
-    }
-
-    fn state(&self) -> Snapshot {
-        // The number of the step is not among what implementations answer.
-        Snapshot { step: 0, ..self.environment.snapshot() }
     }
 
     /// What POGEMA leaves of the caller's list: under `soft` a prevented move becomes a wait.
@@ -260,43 +267,25 @@ impl Player {
         actions.iter().enumerate().map(left).collect()
     }
 
-    fn metrics(&mut self, state: &Snapshot, terminated: &[bool], truncated: &[bool]) -> Option<Metrics> {
-        // POGEMA's persistent environments measure nothing but the density, which a wrapper outside adds.
-        let figures = self.meter.feed(&state.on_goal, terminated, truncated)?;
-        let figures = if self.config.persistent { Metrics::default() } else { figures };
-        let avg_agents_density = self.density.as_ref().map(DensityMeter::mean);
-        let collisions = self.collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
-        let (a_collisions, o_collisions) = collisions.unzip();
-        let metrics = Metrics { avg_agents_density, a_collisions, o_collisions, ..figures };
+    fn metrics(&self) -> Option<Metrics> {
+        let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
+        // POGEMA's persistent environments lack its own figures; only wrappers around them measure.
+        let metrics = if self.config.persistent {
+            let Metrics { avg_agents_density, a_collisions, o_collisions, .. } = metrics;
+            Metrics { avg_agents_density, a_collisions, o_collisions, ..Metrics::default() }
+        } else {
+            metrics
+        };
         (metrics != Metrics::default()).then_some(metrics)
     }
 
-    fn count_collisions(&mut self, before: &Snapshot, actions: &[Action], after: &Snapshot) {
-        if let (Some(meter), Some(instance)) = (&mut self.collisions, &self.instance) {
-            meter.feed(instance.map(), &before.cells, &before.active, actions, &after.cells);
-        }
-    }
-
-    fn feed_density(&mut self) -> Result<(), Error> {
-        if self.density.is_none() {
-            return Ok(());
-        }
-        let windows = Windows::of(&*self.environment)?;
-        let counts = windows.counts();
-        if let Some(density) = &mut self.density {
-            density.feed(counts.into_iter());
-        }
-        Ok(())
-    }
-
     fn plan(&mut self) -> Result<Vec<Action>, Error> {
-        let windows = Windows::of(&*self.environment)?;
-        self.team.act(windows.views())
+        self.team.act(Windows::of(&self.episode)?.views())
     }
 
     fn history(&self) -> History {
         let changes = changes(&self.past);
-        let last = self.past.last().map_or(0, |state| state.step);
+        let last = self.past.len().saturating_sub(1) as u64;
         let full = changes.iter().map(|agent: &Vec<Change>| states_at_every_step(agent, last)).collect();
         History { full, changes }
     }
@@ -304,9 +293,8 @@ impl Player {
     fn padded(&self, instance: &Instance) -> Result<Padded, Error> {
         let border = 2 * self.config.obs_radius;
         let (height, width) = (instance.map().height() + border, instance.map().width() + border);
-        let (mut obstacles, mut places) = (vec![0; height * width], vec![0; 4 * self.config.num_agents]);
-        let (cells, goals) = places.split_at_mut(2 * self.config.num_agents);
-        self.environment.observe_mapf(MapfOut { obstacles: &mut obstacles, cells, goals })?;
+        let mut obstacles = vec![0; height * width];
+        self.episode.engine().observe_map(&mut obstacles)?;
         let line = |row: &[u8]| row.iter().map(|&value| if value == 0 { '.' } else { '#' }).collect();
         let dtype = if self.config.empty_outside { "float64" } else { "int64" };
         Ok(Padded { dtype: dtype.into(), rows: obstacles.chunks(width).map(line).collect() })
@@ -315,31 +303,29 @@ impl Player {
     fn observed(&self, at_reset: bool) -> Result<Observed, Error> {
         let side = self.config.obs_radius * 2 + 1;
         if self.config.observation_type == Observation::Default {
-            let mut values = vec![0.0; self.environment.config().num_observed()];
-            self.environment.observe(&mut values)?;
+            let mut values = vec![0.0; self.episode.config().num_observed()];
+            self.episode.engine().observe(&mut values)?;
             let windows = values.chunks(3 * side * side).map(pack).collect();
             return Ok(Observed::Default { dtype: "float32".into(), windows, odd: Vec::new() });
         }
-        let windows = Windows::of(&*self.environment)?;
+        let windows = Windows::of(&self.episode)?;
         let pomapf = ObservedPomapf {
             dtype: "float32".into(),
             obstacles: windows.obstacles.chunks(side * side).map(pack).collect(),
             agents: windows.agents.chunks(side * side).map(pack).collect(),
-            xy: pairs(&windows.cells),
-            target_xy: pairs(&windows.goals),
+            xy: windows.cells,
+            target_xy: windows.goals,
             odd: Vec::new(),
         };
         if self.config.observation_type == Observation::Pomapf {
             return Ok(Observed::Pomapf(pomapf));
         }
-        let num_agents = self.config.num_agents;
-        let num_cells = self.padded.as_ref().map_or(0, |padded| padded.rows.iter().map(String::len).sum());
-        let (mut obstacles, mut cells, mut goals) =
-            (vec![0; num_cells], vec![0; 2 * num_agents], vec![0; 2 * num_agents]);
-        let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut goals };
-        self.environment.observe_mapf(out)?;
-        let global_obstacles = if at_reset { self.padded.clone() } else { None };
-        let (global_xy, global_target_xy) = (pairs(&cells), pairs(&goals));
-        Ok(Observed::Mapf(ObservedMapf { pomapf, global_obstacles, global_xy, global_target_xy }))
+        let (state, radius) = (self.episode.state(), self.config.obs_radius);
+        Ok(Observed::Mapf(ObservedMapf {
+            pomapf,
+            global_obstacles: if at_reset { self.padded.clone() } else { None },
+            global_xy: from_border(state.cells, radius).collect(),
+            global_target_xy: from_border(state.goals, radius).collect(),
+        }))
     }
 }

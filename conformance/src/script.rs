@@ -122,8 +122,8 @@ fn draw_script(dice: &mut Dice, player: &Player) -> Script {
 }
 
 fn choose(script: Script, player: &Player, dice: &mut Dice) -> Vec<i64> {
-    let state = player.environment.snapshot();
-    let Some(map) = player.instance.as_ref().map(pogema_core::Instance::map) else { return Vec::new() };
+    let state = player.episode.snapshot();
+    let Ok(map) = player.episode.instance().map(pogema_core::Instance::map) else { return Vec::new() };
     let common = dice.pick(&Action::ALL);
     let mut actions = Vec::with_capacity(state.cells.len());
     for agent in 0..state.cells.len() {

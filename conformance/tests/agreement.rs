@@ -5,7 +5,7 @@
 
 use pogema_conformance::{Engine, Report, golden};
 use pogema_core::{Action, Collision, Config, Environment, Error, OnGoal, Reward};
-use pogema_core::{Instance, MapfOut, Occupancy, PomapfOut, Snapshot, StepOut};
+use pogema_core::{Instance, Occupancy, Snapshot, State, StepOut};
 use pogema_reference::Reference;
 
 #[test]
@@ -72,22 +72,22 @@ impl Environment for Wrong {
         (self.after_step)(&mut out, &self.inner.snapshot());
         Ok(())
     }
-    fn step_back(&mut self) -> Result<bool, Error> {
-        self.inner.step_back()
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
+        self.inner.restore(step, state)
+    }
+    fn state(&self) -> State<'_> {
+        self.inner.state()
+    }
+    fn occupied(&self) -> Vec<pogema_core::Cell> {
+        self.inner.occupied()
     }
     fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
         self.inner.observe(out)?;
         (self.observe)(out);
         Ok(())
     }
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        self.inner.observe_pomapf(out)
-    }
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        self.inner.observe_mapf(out)
-    }
-    fn snapshot(&self) -> Snapshot {
-        self.inner.snapshot()
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        self.inner.observe_map(out)
     }
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_core::{Collision, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, StepOut};
+use pogema_core::{Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State};
 use pogema_maps::{GridConfig, InstanceSource, PUZZLES, Puzzle, named_map};
 use pogema_planners::{
     Budget, Choice, ConflictKind, LIFELONG, LifelongPolicy, PLANNERS, Plan, PlannerPolicy, Problem, planner,
@@ -25,17 +25,18 @@ fn made(fields: &serde_json::Value) -> (GridConfig, Instance) {
     (config, instance)
 }
 
-/// Plays a plan; says in which step the engine did anything else.
+fn started(config: &Config, instance: &Instance) -> Episode<Reference> {
+    let mut episode = Episode::new(Reference::new(*config).unwrap()).with_collisions();
+    episode.start(instance.clone()).unwrap();
+    episode
+}
+
+/// Plays a plan; returns the first step in which the engine deviates from it.
 fn surprise(config: &Config, instance: &Instance, plan: &Plan) -> Option<usize> {
-    let mut environment = Reference::new(*config).unwrap();
-    environment.reset(instance).unwrap();
-    let num_agents = plan.num_agents();
+    let mut episode = started(config, instance);
     (0..plan.num_steps()).find(|&step| {
-        let (mut rewards, mut terminated, mut truncated) =
-            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        environment.step(&plan.actions(step).unwrap(), out).unwrap();
-        environment.snapshot().cells != plan.cells()[step + 1]
+        episode.step(&plan.actions(step).unwrap()).unwrap();
+        episode.state().cells != plan.cells()[step + 1]
     })
 }
 
@@ -78,28 +79,19 @@ fn the_engine_notices_a_plan_that_is_wrong() {
     assert_eq!(conflict.kind, ConflictKind::Edge);
 }
 
-/// Plays an episode by a policy; returns how many goals were reached and how many moves were taken back.
+/// Plays an episode by a policy; returns how many goals were reached and how many moves were prevented.
 fn play(
     config: &Config,
     instance: &Instance,
-    mut act: impl FnMut(&Reference) -> Vec<pogema_core::Action>,
-) -> (f32, u64) {
-    let mut environment = Reference::new(*config).unwrap();
-    environment.reset(instance).unwrap();
-    let num_agents = config.num_agents;
-    let (mut num_reached, mut collisions) = (0.0, pogema_core::CollisionMeter::default());
+    mut act: impl FnMut(State<'_>) -> Vec<pogema_core::Action>,
+) -> (f32, f64) {
+    let (mut episode, mut num_reached) = (started(config, instance), 0.0);
     for _ in 0..config.max_steps {
-        let (mut rewards, mut terminated, mut truncated) =
-            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
-        let before = environment.snapshot();
-        let actions = act(&environment);
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        environment.step(&actions, out).unwrap();
-        let after = environment.snapshot().cells;
-        collisions.feed(instance.map(), &before.cells, &before.active, &actions, &after);
-        num_reached += rewards.iter().sum::<f32>();
+        episode.step(&act(episode.state())).unwrap();
+        num_reached += episode.rewards().iter().sum::<f32>();
     }
-    (num_reached, collisions.with_agents + collisions.with_obstacles)
+    let metrics = episode.metrics();
+    (num_reached, metrics.a_collisions.unwrap() + metrics.o_collisions.unwrap())
 }
 
 #[test]
@@ -109,10 +101,9 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
             let (config, instance) = drawn(seed, 12, 12, "restart");
             let mut policy =
                 LifelongPolicy::new(name, Choice { seed, threads: 1 }, Budget::of_nodes(200)).unwrap();
-            let (num_reached, num_reverted) = play(&config.rules(), &instance, |environment| {
-                policy.act(instance.map(), &environment.snapshot()).unwrap()
-            });
-            assert_eq!(num_reverted, 0, "{name}, seed {seed}");
+            let (num_reached, num_reverted) =
+                play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
+            assert_eq!(num_reverted, 0.0, "{name}, seed {seed}");
             assert!(num_reached > 40.0, "{name}, seed {seed}: {num_reached} goals");
         }
     }
@@ -126,10 +117,9 @@ fn reached_by_knowing(episodes: &[(GridConfig, Instance)]) -> [f32; 2] {
             policy.foresee(instance).unwrap();
         }
         // That a goal is another than the one foretold would be an error.
-        let (num_reached, num_reverted) = play(&config.rules(), instance, |environment| {
-            policy.act(instance.map(), &environment.snapshot()).unwrap()
-        });
-        assert_eq!(num_reverted, 0, "seed {:?}", config.seed);
+        let (num_reached, num_reverted) =
+            play(&config.rules(), instance, |state| policy.act(instance.map(), state).unwrap());
+        assert_eq!(num_reverted, 0.0, "seed {:?}", config.seed);
         num_reached
     };
     [false, true].map(|is_told| episodes.iter().map(|episode| reached(is_told, episode)).sum())
@@ -159,15 +149,13 @@ fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     assert!(new("pibt").foresee(&instance).is_err());
     let mut policy = new("rhcr");
     policy.foresee(&instance).unwrap();
-    let mut environment = Reference::new(config.rules()).unwrap();
-    environment.reset(&drawn(2, 12, 16, "restart").1).unwrap();
-    let other = environment.snapshot();
-    assert!(policy.act(instance.map(), &other).unwrap_err().to_string().contains("was not to come"));
+    let other = started(&config.rules(), &drawn(2, 12, 16, "restart").1);
+    assert!(policy.act(instance.map(), other.state()).unwrap_err().to_string().contains("was not to come"));
     policy.reset();
-    environment.reset(&instance).unwrap();
+    let episode = started(&config.rules(), &instance);
     policy.foresee(&instance).unwrap();
-    policy.act(instance.map(), &environment.snapshot()).unwrap();
-    let again = policy.act(instance.map(), &environment.snapshot()).unwrap_err().to_string();
+    policy.act(instance.map(), episode.state()).unwrap();
+    let again = policy.act(instance.map(), episode.state()).unwrap_err().to_string();
     assert_eq!(again, "the goals to come are known for step 1, not for 0");
 }
 
@@ -177,9 +165,8 @@ fn agents_that_finish_leave_and_the_others_go_on() {
         let (config, instance) = drawn(seed, 8, 8, "finish");
         let planner = planner("lacam", Choice::default()).unwrap();
         let mut policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(64));
-        let (num_reached, _) = play(&config.rules(), &instance, |environment| {
-            policy.act(instance.map(), &environment.snapshot()).unwrap()
-        });
+        let (num_reached, _) =
+            play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
         let is_solved = policy.outcomes()[0].solution().is_some();
         assert!(!is_solved || num_reached == 8.0, "seed {seed}: {num_reached} of 8");
         assert!(!is_solved || policy.outcomes().len() == 1, "seed {seed}: planned anew");
@@ -193,9 +180,9 @@ fn a_policy_plans_anew_when_the_world_is_another() {
     let mut policy =
         PlannerPolicy::new(planner("lacam", Choice::default()).unwrap(), Budget::of_nodes(300), Some(64));
     let mut count = 0;
-    play(&rules, &instance, |environment| {
+    play(&rules, &instance, |state| {
         count += 1;
-        let actions = policy.act(instance.map(), &environment.snapshot()).unwrap();
+        let actions = policy.act(instance.map(), state).unwrap();
         // Somebody else moves everyone in the fifth step.
         if count == 5 { vec![pogema_core::Action::Up; 4] } else { actions }
     });

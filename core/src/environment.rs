@@ -1,15 +1,20 @@
-//! What every engine can do.
+//! The contract of every engine.
+
+use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
+use crate::metrics::Seen;
 use crate::{Action, Cell, Config, Error, Instance};
 
-/// An implementation of the rules: one environment, its whole state inside.
+/// An implementation of the rules: one environment with its whole state.
 ///
 /// The caller owns every buffer. Lengths are checked before anything changes, and an `Err` leaves the state
 /// as it was. A step never resets; stepping on after the end is allowed (rule: end/after).
+///
+/// [`crate::Episode`] builds everything else on these methods.
 pub trait Environment {
-    /// The rules and sizes this environment was made for.
+    /// The rules and sizes of this environment.
     fn config(&self) -> &Config;
 
     /// Starts an episode.
@@ -24,13 +29,20 @@ pub trait Environment {
     /// Before the first reset, or for a buffer or action list of the wrong length.
     fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error>;
 
-    /// Takes the last step back; says whether there was one. Needs `persistent` in the config.
+    /// Returns to an earlier state of the episode, `step` steps after the reset: cells, goals, active agents, occupancy
+    /// and time. Goal streams and [`State::on_goal`] stay as they are, so playing a step again can lead to other goals.
     ///
     /// # Errors
-    /// Before the first reset, or if the config does not keep steps.
+    /// Before the first reset, or [`Error::ForeignState`] for a state of another episode.
     ///
     /// Rule: history/step-back
-    fn step_back(&mut self) -> Result<bool, Error>;
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error>;
+
+    /// The state of all agents. Before the first reset every list is empty.
+    fn state(&self) -> State<'_>;
+
+    /// The cells that the occupancy grid marks, row by row.
+    fn occupied(&self) -> Vec<Cell>;
 
     /// Writes the `default` observation of all agents.
     ///
@@ -42,24 +54,89 @@ pub trait Environment {
     /// Rule: observe/default
     fn observe(&self, out: &mut [f32]) -> Result<(), Error>;
 
-    /// Writes the `POMAPF` observation of all agents.
+    /// Writes the map with its border.
     ///
-    /// # Errors
-    /// Before the first reset, or for a buffer of the wrong length.
-    ///
-    /// Rule: observe/pomapf
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error>;
-
-    /// Writes what the `MAPF` observation adds to `POMAPF`.
+    /// Shape: `[height + 2 * radius, width + 2 * radius]`, 1 for an obstacle.
     ///
     /// # Errors
     /// Before the first reset, or for a buffer of the wrong length.
     ///
     /// Rule: observe/mapf
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error>;
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error>;
 
-    /// The whole visible state. Before the first reset everything is empty.
-    fn snapshot(&self) -> Snapshot;
+    /// Counts the agents and the free cells in the window of each agent.
+    ///
+    /// # Errors
+    /// Before the first reset.
+    ///
+    /// Rule: metrics/density
+    fn count_seen(&self, seen: &mut Vec<Seen>) -> Result<(), Error> {
+        let area = self.config().side() * self.config().side();
+        let mut values = vec![0.0; self.config().num_observed()];
+        self.observe(&mut values)?;
+        let count =
+            |window: &[f32], set: bool| window.iter().filter(|&&value| (value != 0.0) == set).count() as u32;
+        seen.clear();
+        seen.extend(values.chunks(3 * area).map(|channels| Seen {
+            agents: count(&channels[area..2 * area], true),
+            free_cells: count(&channels[..area], false),
+        }));
+        Ok(())
+    }
+
+    /// A copy of the visible state.
+    fn snapshot(&self) -> Snapshot {
+        let State { cells, goals, active, on_goal, .. } = self.state();
+        Snapshot {
+            cells: cells.to_vec(),
+            goals: goals.to_vec(),
+            active: active.to_vec(),
+            on_goal: on_goal.to_vec(),
+            occupied: self.occupied(),
+        }
+    }
+}
+
+impl<E: Environment + ?Sized> Environment for Box<E> {
+    fn config(&self) -> &Config {
+        (**self).config()
+    }
+
+    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
+        (**self).reset(instance)
+    }
+
+    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
+        (**self).step(actions, out)
+    }
+
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
+        (**self).restore(step, state)
+    }
+
+    fn state(&self) -> State<'_> {
+        (**self).state()
+    }
+
+    fn occupied(&self) -> Vec<Cell> {
+        (**self).occupied()
+    }
+
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        (**self).observe(out)
+    }
+
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        (**self).observe_map(out)
+    }
+
+    fn count_seen(&self, seen: &mut Vec<Seen>) -> Result<(), Error> {
+        (**self).count_seen(seen)
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        (**self).snapshot()
+    }
 }
 
 /// Where a step writes its results, one value per agent.
@@ -85,43 +162,27 @@ impl StepOut<'_> {
     }
 }
 
-/// Where the `POMAPF` observation goes.
-///
-/// Rule: observe/pomapf
-#[derive(Debug)]
-pub struct PomapfOut<'a> {
-    /// Shape: `[agents, side, side]`
-    pub obstacles: &'a mut [f32],
-    /// Shape: `[agents, side, side]`
-    pub agents: &'a mut [f32],
-    /// Shape: `[agents, 2]`, the cell minus the start, (row, col)
-    pub cells: &'a mut [i32],
-    /// Shape: `[agents, 2]`, the goal minus the start, (row, col)
-    pub goals: &'a mut [i32],
+/// The state of all agents between two steps, borrowed from the engine. One value per agent in every list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State<'a> {
+    /// Units: steps since the reset.
+    pub step: u64,
+    /// Current cells; a finished agent stays where it finished.
+    pub cells: &'a [Cell],
+    /// Current goals.
+    pub goals: &'a [Cell],
+    /// Which agents still take part.
+    pub active: &'a [bool],
+    /// Which active agents stood on their goals after the last move, before goals changed.
+    pub on_goal: &'a [bool],
 }
 
-/// Where the arrays go that `MAPF` adds to `POMAPF`.
-///
-/// Rule: observe/mapf
-#[derive(Debug)]
-pub struct MapfOut<'a> {
-    /// Shape: `[height + 2 * radius, width + 2 * radius]`, 1 for an obstacle
-    pub obstacles: &'a mut [u8],
-    /// Shape: `[agents, 2]`, the cell counted from the border's corner, (row, col)
-    pub cells: &'a mut [i32],
-    /// Shape: `[agents, 2]`, the goal counted from the border's corner, (row, col)
-    pub goals: &'a mut [i32],
-}
-
-/// The visible state between two steps.
+/// A copy of the visible state between two steps, as traces keep it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// Units: steps since the reset.
-    #[serde(default, skip_serializing)]
-    pub step: u64,
-    /// Where each agent is; a finished agent stays where it finished.
+    /// Current cells; a finished agent stays where it finished.
     pub cells: Vec<Cell>,
-    /// Where each agent wants to go now.
+    /// Current goals.
     pub goals: Vec<Cell>,
     /// Which agents still take part.
     pub active: Vec<bool>,
@@ -129,4 +190,26 @@ pub struct Snapshot {
     pub on_goal: Vec<bool>,
     /// The cells that the occupancy grid marks, row by row.
     pub occupied: Vec<Cell>,
+}
+
+impl Snapshot {
+    /// The state of the agents, `step` steps after the reset.
+    pub fn state(&self, step: u64) -> State<'_> {
+        State { step, cells: &self.cells, goals: &self.goals, active: &self.active, on_goal: &self.on_goal }
+    }
+
+    /// Passes if `num_agents` agents on a map of `height` rows and `width` columns can be in this state.
+    ///
+    /// # Errors
+    /// [`Error::ForeignState`] for a list of the wrong length, a cell outside the map or two active agents on one cell.
+    pub fn check_fits(&self, num_agents: usize, (height, width): (usize, usize)) -> Result<(), Error> {
+        let is_inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
+        let lengths = [self.cells.len(), self.goals.len(), self.active.len(), self.on_goal.len()];
+        let mut cells = self.cells.iter().chain(&self.goals).chain(&self.occupied);
+        let mut taken = HashSet::new();
+        let mut active = self.cells.iter().zip(&self.active).filter(|(_, active)| **active);
+        let fits =
+            lengths == [num_agents; 4] && cells.all(is_inside) && active.all(|(cell, _)| taken.insert(cell));
+        if fits { Ok(()) } else { Err(Error::ForeignState) }
+    }
 }

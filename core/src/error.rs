@@ -66,7 +66,32 @@ pub enum Error {
         /// The length that was given.
         got: usize,
     },
-    /// A call that the state does not allow, such as a step before the first reset.
+    /// A call that needs an episode, before the first reset.
+    #[error("the environment was not reset yet")]
+    NotReset,
+    /// A step back where the config keeps no steps.
+    ///
+    /// Rule: history/step-back
+    #[error("steps are only kept with persistent: true")]
+    StepsNotKept,
+    /// A trace of an episode that is not recorded.
+    #[error("the episode is not recorded: ask for the recording before the reset")]
+    NotRecorded,
+    /// A saved state that does not belong to the instance: wrong lengths, a cell outside the map, or two active agents on
+    /// one cell.
+    #[error("the state does not fit the map and its agents")]
+    ForeignState,
+    /// A request for something that does not exist, such as a frame after the end.
+    #[error("{}", one_line(format_args!("{what} is `{value}`, expected {expected}")))]
+    OutOfRange {
+        /// What was requested.
+        what: String,
+        /// The value given.
+        value: String,
+        /// The values that exist.
+        expected: String,
+    },
+    /// A call that the state does not allow.
     #[error("{}", one_line(reason))]
     State {
         /// What has to happen first.
@@ -102,6 +127,12 @@ impl Error {
     pub fn config(field: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::Config { field: field.into(), value, expected: expected.into() }
+    }
+
+    /// An error about a requested value that does not exist.
+    pub fn out_of_range(what: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
+        let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
+        Self::OutOfRange { what: what.into(), value, expected: expected.into() }
     }
 
     /// An error about an instance as a whole.

@@ -33,23 +33,24 @@ impl From<Change> for (u16, u16, u16, u16, u64, bool) {
     }
 }
 
-/// For each agent its first state and each later one that differs from the one before.
+/// For each agent its first state and each later one that differs from the one before, from the states after the reset
+/// and after each step.
 ///
 /// Rule: history/changes
 ///
 /// Source: POGEMA 1.4.0, `wrappers/persistence.py`, `PersistentWrapper`
 pub fn changes(past: &[Snapshot]) -> Vec<Vec<Change>> {
     let num_agents = past.first().map_or(0, |snapshot| snapshot.cells.len());
-    let state = |snapshot: &Snapshot, agent: usize| Change {
+    let state = |step: u64, snapshot: &Snapshot, agent: usize| Change {
         cell: snapshot.cells[agent],
         goal: snapshot.goals[agent],
-        step: snapshot.step,
+        step,
         active: snapshot.active[agent],
     };
     let of_agent = |agent: usize| {
         let mut kept: Vec<Change> = Vec::new();
-        for snapshot in past {
-            let now = state(snapshot, agent);
+        for (step, snapshot) in (0..).zip(past) {
+            let now = state(step, snapshot, agent);
             if kept
                 .last()
                 .is_none_or(|last| (last.cell, last.goal, last.active) != (now.cell, now.goal, now.active))

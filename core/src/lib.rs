@@ -10,7 +10,8 @@
 //! | [`Cell`], [`Action`] | places and moves, row first |
 //! | [`Map`], [`Instance`], [`Outside`], [`GoalStream`] | what is played on |
 //! | [`Config`] | which rules are played by |
-//! | [`Environment`], [`StepOut`], [`Snapshot`] | what an engine offers |
+//! | [`Environment`], [`StepOut`], [`State`], [`Snapshot`] | what an engine offers |
+//! | [`Episode`] | an engine at play, measured and recorded |
 //! | [`Trace`] | a recorded episode, as JSON lines |
 //! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
 //! | [`picture`] | text pictures of a state |
@@ -19,22 +20,26 @@
 mod cell;
 mod config;
 mod environment;
+mod episode;
 mod error;
 mod goals;
 mod history;
 mod instance;
 mod map;
 pub mod metrics;
+mod observe;
 pub mod picture;
 mod trace;
 
 pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
-pub use environment::{Environment, MapfOut, PomapfOut, Snapshot, StepOut};
+pub use environment::{Environment, Snapshot, State, StepOut};
+pub use episode::{Episode, Meters, Recording};
 pub use error::{Error, shorten};
 pub use goals::{GoalSource, GoalStream, StreamState};
 pub use history::{Change, changes, states_at_every_step};
 pub use instance::{Instance, Outside};
 pub use map::{Map, check_row_length};
-pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics};
+pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
+pub use observe::{from_border, from_starts};
 pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Config, OnGoal};
 
 pub use collisions::CollisionMeter;
-pub use density::{DensityMeter, pairwise_mean};
+pub use density::{DensityMeter, Seen, pairwise_mean};
 
 /// The figures of one episode, under POGEMA's names; a figure that its mode does not have is absent.
 ///

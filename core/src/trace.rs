@@ -1,6 +1,7 @@
 //! A recorded episode: the common currency of tests, reports, drawings and replays.
 
 use std::io::{BufRead, Write};
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
@@ -196,6 +197,51 @@ impl Versions {
 }
 
 impl Trace {
+    /// A trace of no steps: the instance before the first one.
+    pub fn still(config: Config, instance: &Instance) -> Self {
+        let num_agents = instance.starts().len();
+        let state = Snapshot {
+            cells: instance.starts().to_vec(),
+            goals: instance.first_goals(),
+            active: vec![true; num_agents],
+            on_goal: vec![false; num_agents],
+            occupied: Vec::new(),
+        };
+        let start = TraceStart { state, observations: None };
+        Self { header: TraceHeader::new(config, instance, 1), start, steps: Vec::new() }
+    }
+
+    /// The state after the reset and after each step, one more than there are steps.
+    pub fn states(&self) -> impl Iterator<Item = &Snapshot> {
+        std::iter::once(&self.start.state).chain(self.steps.iter().map(|step| &step.state))
+    }
+
+    /// The state at a frame: 0 is after the reset, 1 after the first step.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the episode ends earlier.
+    pub fn state(&self, frame: usize) -> Result<&Snapshot, Error> {
+        let state = match frame.checked_sub(1) {
+            None => Some(&self.start.state),
+            Some(step) => self.steps.get(step).map(|step| &step.state),
+        };
+        state.ok_or_else(|| Error::out_of_range("frame", frame, format!("0 to {}", self.steps.len())))
+    }
+
+    /// The part of the episode from one frame to another, both included.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the range is empty or the episode ends earlier.
+    pub fn part(&self, frames: RangeInclusive<usize>) -> Result<Self, Error> {
+        let (first, last) = (*frames.start(), *frames.end());
+        if first > last {
+            return Err(Error::out_of_range("range of steps", format!("{first}..{last}"), "first..last"));
+        }
+        self.state(last)?;
+        let start = TraceStart { state: self.state(first)?.clone(), observations: None };
+        Ok(Self { header: self.header.clone(), start, steps: self.steps[first..last].to_vec() })
+    }
+
     /// Reads a trace from JSON Lines.
     ///
     /// # Errors
@@ -213,16 +259,14 @@ impl Trace {
         header.check().map_err(|error| Error::Trace { line, reason: error.to_string() })?;
         let num_agents = header.config.num_agents;
         let (line, text) = lines.next().ok_or_else(ends_before(2, "the start"))??;
-        let mut start: TraceStart = parse(line, &text)?;
-        start.state.step = 0;
+        let start: TraceStart = parse(line, &text)?;
         check_state(line, num_agents, &start.state)?;
         let mut steps: Vec<TraceStep> = Vec::new();
         for line in lines {
             let (line, text) = line?;
             if !text.trim().is_empty() {
-                let mut step: TraceStep = parse(line, &text)?;
+                let step: TraceStep = parse(line, &text)?;
                 step.check(line, num_agents)?;
-                step.state.step = steps.len() as u64 + 1;
                 steps.push(step);
             }
         }

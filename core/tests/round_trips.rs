@@ -80,14 +80,7 @@ fn state(num_agents: usize) -> impl Strategy<Value = Snapshot> {
     let cells = || vec(any_cell(), num_agents);
     let flags = || vec(any::<bool>(), num_agents);
     (cells(), cells(), flags(), flags(), vec(any_cell(), 0..4)).prop_map(
-        |(cells, goals, active, on_goal, occupied)| Snapshot {
-            step: 0,
-            cells,
-            goals,
-            active,
-            on_goal,
-            occupied,
-        },
+        |(cells, goals, active, on_goal, occupied)| Snapshot { cells, goals, active, on_goal, occupied },
     )
 }
 
@@ -158,8 +151,7 @@ fn trace() -> impl Strategy<Value = Trace> {
         let num_agents = header.starts.len();
         let steps = vec(step(num_agents), 0..4);
         (Just(header), state(num_agents), of(observed(num_agents)), steps).prop_map(|parts| {
-            let (header, state, observations, mut steps) = parts;
-            (1..).zip(&mut steps).for_each(|(number, step)| step.state.step = number);
+            let (header, state, observations, steps) = parts;
             Trace { header, start: TraceStart { state, observations }, steps }
         })
     })

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use pogema_core::{Cell, Error, MapfOut, PomapfOut};
+use pogema_core::{Error, Seen};
 use rayon::prelude::*;
 
 use crate::Engine;
@@ -115,40 +115,66 @@ impl Engine {
         });
     }
 
-    /// Rule: observe/pomapf, observe/pomapf/relative
-    pub(crate) fn write_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+    /// Writes the windows of the `POMAPF` observation of all agents, obstacles and agents apart.
+    ///
+    /// Shape: both `[agents, side, side]`; every value 0 or 1.
+    ///
+    /// # Errors
+    /// Before the first reset, or for a buffer of the wrong length.
+    ///
+    /// Rule: observe/pomapf
+    pub fn observe_windows(&self, obstacles: &mut [f32], agents: &mut [f32]) -> Result<(), Error> {
+        self.check_started()?;
         let num_agents = self.config.num_agents;
         let num_values = num_agents * self.config.side() * self.config.side();
-        Error::check_length("obstacles", num_values, out.obstacles.len())?;
-        Error::check_length("agents", num_values, out.agents.len())?;
-        Error::check_length("cells", 2 * num_agents, out.cells.len())?;
-        Error::check_length("goals", 2 * num_agents, out.goals.len())?;
-        self.write_values(0..num_agents, Channels::Obstacles, out.obstacles, false);
-        self.write_values(0..num_agents, Channels::Agents, out.agents, false);
-        let from_start = |start: &Cell| (-i32::from(start.row), -i32::from(start.col));
-        write_places(out.cells, &self.cells, self.starts.iter().map(from_start));
-        write_places(out.goals, &self.goals, self.starts.iter().map(from_start));
+        Error::check_length("obstacles", num_values, obstacles.len())?;
+        Error::check_length("agents", num_values, agents.len())?;
+        self.write_values(0..num_agents, Channels::Obstacles, obstacles, false);
+        self.write_values(0..num_agents, Channels::Agents, agents, false);
         Ok(())
     }
 
-    /// Rule: observe/mapf, observe/mapf/global
-    pub(crate) fn write_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        let border = self.config.radius;
-        let (height, width) = (self.height + 2 * border, self.width + 2 * border);
-        let num_agents = self.config.num_agents;
-        Error::check_length("global obstacles", height * width, out.obstacles.len())?;
-        Error::check_length("global cells", 2 * num_agents, out.cells.len())?;
-        Error::check_length("global goals", 2 * num_agents, out.goals.len())?;
-        for (row, values) in out.obstacles.chunks_mut(width).enumerate() {
+    /// Rule: observe/mapf
+    pub(crate) fn write_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        let border = 2 * self.config.radius;
+        let (height, width) = (self.height + border, self.width + border);
+        Error::check_length("global obstacles", height * width, out.len())?;
+        for (row, values) in out.chunks_mut(width).enumerate() {
             for (col, value) in values.iter_mut().enumerate() {
                 *value = u8::from(self.obstacles.get(row, col));
             }
         }
-        let from_border = std::iter::repeat((border as i32, border as i32));
-        write_places(out.cells, &self.cells, from_border.clone());
-        write_places(out.goals, &self.goals, from_border);
         Ok(())
     }
+
+    /// Rule: metrics/density
+    pub(crate) fn count_in_windows(&self, seen: &mut Vec<Seen>) {
+        let (area, per_agent) =
+            (self.config.side() * self.config.side(), words_per_agent(self.config.radius));
+        let (num_agents, per_block) = (self.config.num_agents, NUM_WORDS / per_agent);
+        let scene = self.scene();
+        seen.clear();
+        WORDS.with_borrow_mut(|words| {
+            for first in (0..num_agents).step_by(per_block) {
+                let agents = first..num_agents.min(first + per_block);
+                let words = &mut words[..agents.len() * per_agent];
+                pack(self.path, &scene, agents, Channels::All, (0, true), words);
+                seen.extend(words.chunks_exact(per_agent).map(|words| Seen {
+                    agents: ones(words, area, 2 * area),
+                    free_cells: area as u32 - ones(words, 0, area),
+                }));
+            }
+        });
+    }
+}
+
+/// Number of set bits from `first` to before `end`.
+fn ones(words: &[u64], first: usize, end: usize) -> u32 {
+    let (head, tail) = (first / 64, end / 64);
+    let below = |bit: usize| (1u64 << (bit % 64)) - 1;
+    let whole: u32 = words[head..tail].iter().map(|word| word.count_ones()).sum();
+    let last = if end.is_multiple_of(64) { 0 } else { (words[tail] & below(end)).count_ones() };
+    whole + last - (words[head] & below(first)).count_ones()
 }
 
 /// Whether a buffer of so many bytes is better written around the cache.
@@ -191,8 +217,19 @@ fn write_blocks<V: Value>(
     }
 }
 
-fn write_places(out: &mut [i32], cells: &[Cell], offsets: impl Iterator<Item = (i32, i32)>) {
-    for ((place, cell), (down, right)) in out.chunks_mut(2).zip(cells).zip(offsets) {
-        place.copy_from_slice(&[i32::from(cell.row) + down, i32::from(cell.col) + right]);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ones_are_counted_within_their_bounds() {
+        let words = [u64::MAX, 0b1011, u64::MAX];
+        let is_set = |bit: usize| words[bit / 64] >> (bit % 64) & 1 == 1;
+        for first in 0..190 {
+            for end in first..=190 {
+                let expected = (first..end).filter(|&bit| is_set(bit)).count();
+                assert_eq!(ones(&words, first, end) as usize, expected, "{first}..{end}");
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance};
-use pogema_core::{MapfOut, PomapfOut, Snapshot, StepOut};
+use pogema_core::{Seen, Snapshot, State, StepOut};
 use rayon::ThreadPool;
 
 use crate::grid::{Board, FREE, Strips, num_bytes};
@@ -11,7 +11,7 @@ use crate::simd::Path;
 
 /// One environment that plays by POGEMA 1.4.0's rules, on bits.
 ///
-/// After a reset nothing is allocated, unless the config keeps steps.
+/// After a reset nothing is allocated.
 #[derive(Debug)]
 pub struct Engine {
     pub(crate) config: Config,
@@ -23,7 +23,6 @@ pub struct Engine {
     pub(crate) obstacles: Strips,
     pub(crate) occupied: Strips,
     pub(crate) board: Board,
-    pub(crate) starts: Vec<Cell>,
     pub(crate) streams: Vec<GoalStream>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) goals: Vec<Cell>,
@@ -35,7 +34,6 @@ pub struct Engine {
     /// While a step is played: what stood at that place before.
     pub(crate) ahead: Vec<u32>,
     pub(crate) step: u64,
-    pub(crate) past: Vec<Snapshot>,
 }
 
 impl Engine {
@@ -70,7 +68,6 @@ impl Engine {
             obstacles: Strips::default(),
             occupied: Strips::default(),
             board: Board::default(),
-            starts: Vec::new(),
             streams: Vec::new(),
             cells: Vec::new(),
             goals: Vec::new(),
@@ -80,7 +77,6 @@ impl Engine {
             targets: Vec::new(),
             ahead: Vec::new(),
             step: 0,
-            past: Vec::new(),
         })
     }
 
@@ -134,14 +130,12 @@ impl Engine {
         self.step
     }
 
-    /// Bytes that the environment holds, apart from what its goal streams hold behind pointers and from kept
-    /// steps.
+    /// Bytes that the environment holds, apart from what its goal streams hold behind pointers.
     pub fn num_bytes(&self) -> usize {
         let lists = [
             self.obstacles.num_bytes(),
             self.occupied.num_bytes(),
             self.board.num_bytes(),
-            num_bytes(&self.starts),
             num_bytes(&self.cells),
             num_bytes(&self.goals),
             num_bytes(&self.streams),
@@ -154,10 +148,7 @@ impl Engine {
     }
 
     pub(crate) fn check_started(&self) -> Result<(), Error> {
-        if self.cells.is_empty() {
-            return Err(Error::State { reason: "the environment was not reset yet".into() });
-        }
-        Ok(())
+        if self.cells.is_empty() { Err(Error::NotReset) } else { Ok(()) }
     }
 
     /// Makes room for a map of a size; the only place where memory is asked for.
@@ -182,9 +173,8 @@ impl Engine {
         let num_agents = self.config.num_agents;
         self.obstacles.write_obstacles(instance, self.config.radius);
         self.board.write_obstacles(instance.map().obstacles());
-        self.starts.clear();
-        self.starts.extend_from_slice(instance.starts());
-        self.cells.clone_from(&self.starts);
+        self.cells.clear();
+        self.cells.extend_from_slice(instance.starts());
         self.goals.clear();
         self.goals.extend(instance.goals().iter().map(GoalStream::first));
         self.active.clear();
@@ -194,12 +184,10 @@ impl Engine {
         self.step = 0;
         self.occupied.clear_all();
         self.take_squares();
-        for &start in &self.starts {
+        for &start in instance.starts() {
             self.mark(start);
         }
         self.mark_on_goal();
-        self.past.clear();
-        self.remember();
     }
 }
 
@@ -228,38 +216,41 @@ impl Environment for Engine {
         self.terminate(out.terminated);
         self.truncate(out.truncated);
         self.change_goals();
-        self.remember();
         Ok(())
     }
 
-    fn step_back(&mut self) -> Result<bool, Error> {
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         self.check_started()?;
-        self.take_back()
+        self.return_to(step, state)
+    }
+
+    fn state(&self) -> State<'_> {
+        let Self { step, cells, goals, active, on_goal, .. } = self;
+        State { step: *step, cells, goals, active, on_goal }
+    }
+
+    fn occupied(&self) -> Vec<Cell> {
+        let radius = self.config.radius;
+        let rows = 0..self.height as u16;
+        let cells = rows.flat_map(|row| (0..self.width as u16).map(move |col| Cell::new(row, col)));
+        cells
+            .filter(|cell| self.occupied.get(usize::from(cell.row) + radius, usize::from(cell.col) + radius))
+            .collect()
     }
 
     fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
         self.observe_agents(0..self.config.num_agents, out)
     }
 
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
         self.check_started()?;
-        self.write_pomapf(out)
+        self.write_map(out)
     }
 
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+    fn count_seen(&self, seen: &mut Vec<Seen>) -> Result<(), Error> {
         self.check_started()?;
-        self.write_mapf(out)
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            step: self.step,
-            cells: self.cells.clone(),
-            goals: self.goals.clone(),
-            active: self.active.clone(),
-            on_goal: self.on_goal.clone(),
-            occupied: self.occupied_cells(),
-        }
+        self.count_in_windows(seen);
+        Ok(())
     }
 }
 
@@ -268,14 +259,5 @@ impl Engine {
     pub(crate) fn mark(&self, cell: Cell) {
         let radius = self.config.radius;
         self.occupied.set(usize::from(cell.row) + radius, usize::from(cell.col) + radius, false);
-    }
-
-    fn occupied_cells(&self) -> Vec<Cell> {
-        let radius = self.config.radius;
-        let rows = 0..self.height as u16;
-        let cells = rows.flat_map(|row| (0..self.width as u16).map(move |col| Cell::new(row, col)));
-        cells
-            .filter(|cell| self.occupied.get(usize::from(cell.row) + radius, usize::from(cell.col) + radius))
-            .collect()
     }
 }

@@ -4,8 +4,8 @@
 
 use allocation_counter::measure;
 use pogema_core::{
-    Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, MapfOut, Occupancy, OnGoal,
-    Outside, PomapfOut, Reward, StepOut,
+    Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, Occupancy, OnGoal, Outside,
+    Reward, Seen, StepOut,
 };
 use pogema_fast::{Engine, Path, words_per_agent};
 
@@ -41,7 +41,7 @@ struct Buffers {
     words: Vec<u64>,
     windows: [Vec<f32>; 2],
     global_obstacles: Vec<u8>,
-    places: [Vec<i32>; 2],
+    seen: Vec<Seen>,
 }
 
 impl Buffers {
@@ -57,7 +57,7 @@ impl Buffers {
             words: vec![0; NUM_AGENTS * words_per_agent(config.radius)],
             windows: [windows.clone(), windows],
             global_obstacles: vec![0; padded * padded],
-            places: [vec![0; 2 * NUM_AGENTS], vec![0; 2 * NUM_AGENTS]],
+            seen: Vec::with_capacity(NUM_AGENTS),
         }
     }
 }
@@ -86,10 +86,10 @@ fn observe(engine: &Engine, buffers: &mut Buffers) {
     engine.observe_agents(3..5, &mut buffers.values[per_agent..3 * per_agent]).unwrap();
     engine.observe_agents(7..23, &mut buffers.bytes[1..=16 * per_agent]).unwrap();
     engine.observe_bits(1..2, &mut buffers.words[..words]).unwrap();
-    let ([obstacles, agents], [cells, goals]) = (&mut buffers.windows, &mut buffers.places);
-    engine.observe_pomapf(PomapfOut { obstacles, agents, cells, goals }).unwrap();
-    let ([cells, goals], obstacles) = (&mut buffers.places, &mut buffers.global_obstacles);
-    engine.observe_mapf(MapfOut { obstacles, cells, goals }).unwrap();
+    let [obstacles, agents] = &mut buffers.windows;
+    engine.observe_windows(obstacles, agents).unwrap();
+    engine.observe_map(&mut buffers.global_obstacles).unwrap();
+    engine.count_seen(&mut buffers.seen).unwrap();
 }
 
 fn check(config: Config, path: Path) {

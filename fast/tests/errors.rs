@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{
-    Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, Map, MapfOut, Outside,
-    PomapfOut, StepOut,
+    Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, Map, Outside, Snapshot,
+    StepOut,
 };
 use pogema_fast::{Engine, Path, words_per_agent};
 
@@ -75,8 +75,8 @@ fn wrong_steps_are_refused() {
         let outcome = step(&mut engine, lengths);
         check_refused(&mut engine, outcome, want);
     }
-    let outcome = engine.step_back().map(|_| ());
-    check_refused(&mut engine, outcome, "steps are only kept with persistent: true");
+    let outcome = engine.restore(0, &Snapshot::default());
+    check_refused(&mut engine, outcome, "the state does not fit the map and its agents");
 }
 
 #[test]
@@ -133,34 +133,16 @@ fn wrong_buffers_are_refused() {
 #[test]
 fn wrong_arrays_are_refused() {
     let mut engine = started();
-    for (which, want) in [
-        (0, "obstacles has length 74, expected 75"),
-        (1, "agents has length 74, expected 75"),
-        (2, "cells has length 5, expected 6"),
-        (3, "goals has length 5, expected 6"),
-    ] {
-        let mut windows = [vec![7.0; 75], vec![7.0; 75]];
-        let mut places = [vec![7; 6], vec![7; 6]];
-        if which < 2 {
-            windows[which].truncate(74);
-        } else {
-            places[which - 2].truncate(5);
-        }
-        let ([obstacles, agents], [cells, goals]) = (&mut windows, &mut places);
-        let outcome = engine.observe_pomapf(PomapfOut { obstacles, agents, cells, goals });
+    for (lengths, want) in
+        [([74, 75], "obstacles has length 74, expected 75"), ([75, 74], "agents has length 74, expected 75")]
+    {
+        let [mut obstacles, mut agents] = lengths.map(|length| vec![7.0; length]);
+        let outcome = engine.observe_windows(&mut obstacles, &mut agents);
+        assert!(obstacles.iter().chain(&agents).all(|&value| value == 7.0), "an error wrote");
         check_refused(&mut engine, outcome, want);
     }
-    for (lengths, want) in [
-        ([57, 6, 6], "global obstacles has length 57, expected 56"),
-        ([56, 4, 6], "global cells has length 4, expected 6"),
-        ([56, 6, 8], "global goals has length 8, expected 6"),
-    ] {
-        let [mut cells, mut goals] = [vec![7; lengths[1]], vec![7; lengths[2]]];
-        let mut obstacles = vec![7; lengths[0]];
-        let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut goals };
-        let outcome = engine.observe_mapf(out);
-        check_refused(&mut engine, outcome, want);
-    }
+    let outcome = engine.observe_map(&mut [7; 57]);
+    check_refused(&mut engine, outcome, "global obstacles has length 57, expected 56");
 }
 
 #[test]
@@ -185,7 +167,10 @@ fn nothing_is_played_before_a_reset() {
     let mut values = [7.0; 3 * PER_AGENT];
     let outcomes = [
         step(&mut engine, [3; 4]),
-        engine.step_back().map(|_| ()),
+        engine.restore(0, &Snapshot::default()),
+        engine.observe_windows(&mut [], &mut []),
+        engine.observe_map(&mut []),
+        engine.count_seen(&mut Vec::new()),
         engine.observe(&mut values),
         engine.observe_agents(0..0, &mut [0f32; 0]),
         engine.observe_bits(0..0, &mut []),

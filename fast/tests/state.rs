@@ -53,7 +53,7 @@ fn an_engine_tells_where_it_stands() {
         assert_eq!((engine.num_steps(), engine.active()), (step as u64, [true; 2].as_slice()));
         assert_eq!(engine.streams().len(), 2);
         let snapshot = engine.snapshot();
-        assert_eq!((snapshot.step, snapshot.cells), (step as u64, cells.to_vec()));
+        assert_eq!((engine.state().step, snapshot.cells), (step as u64, cells.to_vec()));
         let mut occupied = cells.to_vec();
         occupied.sort();
         assert_eq!(snapshot.occupied, occupied);

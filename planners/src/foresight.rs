@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use pogema_core::{Cell, Error, GoalStream, Instance, Snapshot};
+use pogema_core::{Cell, Error, GoalStream, Instance, State};
 
 /// What agents will want, told from their instance and kept in step with the episode.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ impl Foresight {
     ///
     /// # Errors
     /// [`Error::State`] for another step than the next one, or for goals of another episode.
-    pub fn follow(&mut self, now: &Snapshot) -> Result<(), Error> {
+    pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let strange = |reason: String| Error::State { reason };
         if now.step != self.step || now.goals.len() != self.ahead.len() {
             let reason = format!("the goals to come are known for step {}, not for {}", self.step, now.step);

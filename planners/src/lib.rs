@@ -73,4 +73,4 @@ pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub use stepper::PibtRules;
 pub use validate::{Conflict, ConflictKind, validate};
-pub use windows::{Windows, pairs};
+pub use windows::Windows;

@@ -1,6 +1,6 @@
 //! Policies by name: planners that drive an environment, and the simple ones.
 
-use pogema_core::{Action, Environment, Error, Instance, Map, OnGoal};
+use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal};
 use pogema_numpy::Generator;
 
 use crate::drawn::{pogema_team, sample};
@@ -89,15 +89,15 @@ impl NamedPolicy {
     /// The actions of the next step.
     ///
     /// # Errors
-    /// Before the first reset.
-    pub fn act(&mut self, environment: &dyn Environment, map: &Map) -> Result<Vec<Action>, Error> {
-        let num_agents = environment.config().num_agents;
+    /// Before the start of the episode.
+    pub fn act<E: Environment>(&mut self, episode: &Episode<E>) -> Result<Vec<Action>, Error> {
+        let (num_agents, map) = (episode.config().num_agents, episode.instance()?.map());
         match &mut self.0 {
             Kind::Random(generator) => Ok(sample(generator, num_agents)),
-            Kind::Astar(team) => team.act(Windows::of(environment)?.views()),
+            Kind::Astar(team) => team.act(Windows::of(episode)?.views()),
             Kind::Stay => Ok(vec![Action::Stay; num_agents]),
-            Kind::Planner(policy) => policy.act(map, &environment.snapshot()),
-            Kind::Lifelong(policy) => policy.act(map, &environment.snapshot()),
+            Kind::Planner(policy) => policy.act(map, episode.state()),
+            Kind::Lifelong(policy) => policy.act(map, episode.state()),
         }
     }
 }

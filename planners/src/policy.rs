@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Action, Cell, Error, Instance, Map, Snapshot};
+use pogema_core::{Action, Cell, Error, Instance, Map, State};
 
 use crate::foresight::Foresight;
 use crate::graph::Graph;
@@ -60,7 +60,7 @@ impl PlannerPolicy {
     ///
     /// # Errors
     /// [`Error::Agent`] for an agent or goal that is not on a free cell of the map.
-    pub fn act(&mut self, map: &Map, now: &Snapshot) -> Result<Vec<Action>, Error> {
+    pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         if !self.followed.as_ref().is_some_and(|followed| followed.goes_on(now)) {
             self.followed = Some(self.plan(map, now)?);
         }
@@ -74,10 +74,10 @@ impl PlannerPolicy {
         Ok(actions)
     }
 
-    fn plan(&mut self, map: &Map, now: &Snapshot) -> Result<Followed, Error> {
+    fn plan(&mut self, map: &Map, now: State<'_>) -> Result<Followed, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
-        let (cells, goals) = (of(&now.cells), of(&now.goals));
+        let (cells, goals) = (of(now.cells), of(now.goals));
         let graph = self.graph(map);
         let problem = Problem {
             starts: graph.vertices_of("the agent's cell", &cells)?,
@@ -107,7 +107,7 @@ impl PlannerPolicy {
 
 impl Followed {
     /// Whether the world is as planned, and the plan has not come to an end that leads nowhere.
-    fn goes_on(&self, now: &Snapshot) -> bool {
+    fn goes_on(&self, now: State<'_>) -> bool {
         let Some(step) = now.step.checked_sub(self.began).map(|step| step as usize) else { return false };
         if self.is_partial && step >= self.plan.num_steps().max(1) {
             return false;
@@ -171,7 +171,7 @@ impl LifelongPolicy {
     /// # Errors
     /// [`Error::Agent`] for an agent or goal that is not on a free cell of the map; [`Error::State`] if the goals to
     /// come are known and the state is not the next one of their episode.
-    pub fn act(&mut self, map: &Map, now: &Snapshot) -> Result<Vec<Action>, Error> {
+    pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let to_come = self.foresight.as_mut().map(|foresight| {
             foresight.follow(now)?;
@@ -181,13 +181,13 @@ impl LifelongPolicy {
         let budget = self.budget.clone();
         let (graph, planner) = self.planner_on(map)?;
         let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
-        let cells = graph.vertices_of("the agent's cell", &of(&now.cells))?;
+        let cells = graph.vertices_of("the agent's cell", &of(now.cells))?;
         let next = if let Some(goals) = to_come {
             let vertices = |goals: &Vec<Cell>| graph.vertices_of("goal", goals);
             let goals = goals.iter().map(vertices).collect::<Result<Vec<_>, _>>()?;
             planner.next_foreseeing(&cells, &goals, &budget)?
         } else {
-            planner.next(&cells, &graph.vertices_of("goal", &of(&now.goals))?, &budget)?
+            planner.next(&cells, &graph.vertices_of("goal", &of(now.goals))?, &budget)?
         };
         let mut actions = vec![Action::Stay; now.cells.len()];
         for (&agent, (&from, &to)) in agents.iter().zip(cells.iter().zip(&next)) {

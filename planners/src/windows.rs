@@ -1,6 +1,6 @@
 //! What agents see, as policies and meters want it.
 
-use pogema_core::{Environment, Error, PomapfOut};
+use pogema_core::{Environment, Episode, Error, from_starts};
 
 use crate::astar::View;
 
@@ -15,56 +15,44 @@ pub struct Windows {
     /// Where each agent is, counted from its start.
     ///
     /// Shape: `[agents, 2]`
-    pub cells: Vec<i32>,
+    pub cells: Vec<[i32; 2]>,
     /// Where each agent's goal is, counted from its start.
     ///
     /// Shape: `[agents, 2]`
-    pub goals: Vec<i32>,
+    pub goals: Vec<[i32; 2]>,
 }
 
 impl Windows {
-    /// Looks through the eyes of all agents.
+    /// The windows and positions of all agents.
     ///
     /// # Errors
-    /// Before the first reset.
-    pub fn of(environment: &dyn Environment) -> Result<Self, Error> {
-        let config = environment.config();
-        let (num_agents, side) = (config.num_agents, config.side());
-        let mut windows = Self {
+    /// Before the start of the episode.
+    pub fn of<E: Environment>(episode: &Episode<E>) -> Result<Self, Error> {
+        let (config, starts) = (episode.config(), episode.instance()?.starts());
+        let side = config.side();
+        let mut values = vec![0.0; config.num_observed()];
+        episode.engine().observe(&mut values)?;
+        let channel =
+            |index: usize| values.chunks(side * side).skip(index).step_by(3).flatten().copied().collect();
+        let state = episode.state();
+        Ok(Self {
             side,
-            obstacles: vec![0.0; num_agents * side * side],
-            agents: vec![0.0; num_agents * side * side],
-            cells: vec![0; 2 * num_agents],
-            goals: vec![0; 2 * num_agents],
-        };
-        environment.observe_pomapf(PomapfOut {
-            obstacles: &mut windows.obstacles,
-            agents: &mut windows.agents,
-            cells: &mut windows.cells,
-            goals: &mut windows.goals,
-        })?;
-        Ok(windows)
+            obstacles: channel(0),
+            agents: channel(1),
+            cells: from_starts(state.cells, starts).collect(),
+            goals: from_starts(state.goals, starts).collect(),
+        })
     }
 
     /// What each agent's A* is told.
     pub fn views(&self) -> impl Iterator<Item = View<'_>> {
         let obstacles = self.obstacles.chunks(self.side * self.side);
-        let places = pairs(&self.cells).into_iter().zip(pairs(&self.goals));
-        obstacles.zip(places).map(|(obstacles, (cell, goal))| View { cell, goal, obstacles, side: self.side })
+        let places = self.cells.iter().zip(&self.goals);
+        obstacles.zip(places).map(|(obstacles, (&cell, &goal))| View {
+            cell,
+            goal,
+            obstacles,
+            side: self.side,
+        })
     }
-
-    /// For each agent how many agents and how many free cells it sees.
-    pub fn counts(&self) -> Vec<(u32, u32)> {
-        let area = self.side * self.side;
-        let count =
-            |window: &[f32], wanted: bool| window.iter().filter(|&&value| (value != 0.0) == wanted).count();
-        let agents = self.agents.chunks(area).map(|window| count(window, true) as u32);
-        let free = self.obstacles.chunks(area).map(|window| count(window, false) as u32);
-        agents.zip(free).collect()
-    }
-}
-
-/// Values two by two.
-pub fn pairs(values: &[i32]) -> Vec<[i32; 2]> {
-    values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }

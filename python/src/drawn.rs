@@ -80,10 +80,10 @@ impl Engine {
         let is_lifelong = config.on_target == OnGoal::Restart;
         let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
         if is_lifelong && !has_sequences {
-            self.drawn.note(self.game.on_goal());
+            self.drawn.note(self.episode.state().on_goal);
         }
         if config.persistent {
-            self.drawn.remember(self.game.past());
+            self.drawn.remember(self.episode.past());
         }
     }
 
@@ -95,8 +95,8 @@ impl Engine {
         if self.source.config().on_target != OnGoal::Restart {
             return Ok(());
         }
-        for (agent, stream) in self.game.streams().iter().enumerate().filter(|(i, _)| self.game.on_goal()[*i])
-        {
+        let (streams, on_goal) = (self.episode.engine().streams(), self.episode.state().on_goal);
+        for (agent, stream) in streams.iter().enumerate().filter(|(agent, _)| on_goal[*agent]) {
             if let Some((num_goals, 0)) = stream.turn() {
                 let text = format!(
                     "agent {agent} has reached all {num_goals} goals of its sequence, which goes round to the first \

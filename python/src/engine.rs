@@ -2,15 +2,14 @@
 
 use numpy::PyArray2;
 use pogema_core::{
-    Action, Cell, Config, Environment, EpisodeMeter, Error, Instance, Metrics, Observation, Occupancy,
-    OnGoal, Outside, StepOut,
+    Action, Cell, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
+    Observation, Occupancy, OnGoal, Outside, Trace,
 };
 use pogema_maps::{InstanceSource, foretold_from};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::drawn::Drawn;
-use crate::film::Recorder;
 use crate::lists::{Pairs, infos, read_actions};
 use crate::{config, errors, state};
 
@@ -19,24 +18,20 @@ type Change = (u16, u16, u16, u16, u64, bool, bool);
 /// What a step returns.
 type Stepped<'py> = (Bound<'py, PyList>, Vec<f64>, Vec<bool>, Vec<bool>, Bound<'py, PyList>);
 
-/// One environment with its config, its metrics and, if wanted, its film.
+/// One environment with its config.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct Engine {
     pub(crate) source: InstanceSource,
     pub(crate) exact: bool,
     /// Steps after which an episode is cut off, whatever a later config says.
     pub(crate) time_limit: i64,
-    /// Steps that count towards the time limit.
-    pub(crate) elapsed: u64,
-    pub(crate) game: pogema_fast::Engine,
-    pub(crate) instance: Option<Instance>,
-    pub(crate) meter: EpisodeMeter,
-    pub(crate) recorder: Recorder,
+    pub(crate) episode: Episode<pogema_fast::Engine>,
+    /// Whether the episodes from the next reset on are recorded.
+    pub(crate) is_filmed: bool,
+    /// Whether density and collisions are measured from the next reset on.
+    pub(crate) is_measured: bool,
     pub(crate) drawn: Drawn,
     actions: Vec<Action>,
-    rewards: Vec<f32>,
-    terminated: Vec<bool>,
-    truncated: Vec<bool>,
 }
 
 #[pymethods]
@@ -71,7 +66,7 @@ impl Engine {
 
     /// Forgets what the metrics counted so far.
     fn clear_metrics(&mut self) {
-        self.meter.reset();
+        self.episode.meters_mut().episode.reset();
     }
 
     /// Plays one step: observations, rewards, terminated, truncated, infos.
@@ -89,7 +84,7 @@ impl Engine {
     /// The observations of all agents, of the type that the config names.
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.check_started(py)?;
-        match self.game.config().observation {
+        match self.episode.config().observation {
             Observation::Default => self.observe_default(py),
             Observation::Pomapf => self.observe_apart(py, false),
             Observation::Mapf => self.observe_apart(py, true),
@@ -98,67 +93,71 @@ impl Engine {
 
     /// A dictionary for each agent that says whether it takes part.
     fn infos<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        infos(py, self.game.active())
+        infos(py, self.episode.state().active)
     }
 
     /// Takes the last step back; says whether there was one.
     fn step_back(this: &Bound<'_, Self>) -> PyResult<bool> {
         let py = this.py();
         let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
-        let Self { game, drawn, elapsed, .. } = &mut *this;
-        let last_two = game.past().len().saturating_sub(2);
-        let before = game.past()[last_two..].to_vec();
-        let went_back = game.step_back().map_err(|error| errors::call(py, &error))?;
+        let Self { episode, drawn, .. } = &mut *this;
+        let last_two = episode.past().len().saturating_sub(2);
+        let before = episode.past()[last_two..].to_vec();
+        let went_back = episode.step_back().map_err(|error| errors::call(py, &error))?;
         if went_back {
             drawn.take_back(&before);
-            *elapsed = game.num_steps();
         }
         Ok(went_back)
     }
 
     /// Chooses how many steps count towards the time limit so far.
     #[setter]
-    fn set_elapsed(&mut self, elapsed: u64) {
-        self.elapsed = elapsed;
+    fn set_elapsed(&mut self, py: Python<'_>, elapsed: u64) -> PyResult<()> {
+        if self.episode.instance().is_err() {
+            return Ok(());
+        }
+        let state = self.episode.snapshot();
+        let restored = self.episode.engine_mut().restore(elapsed, &state);
+        restored.map_err(|error| errors::call(py, &error))
     }
 
     /// Whether agents take part.
     #[getter]
     fn active(&self) -> Vec<bool> {
-        self.game.active().to_vec()
+        self.episode.state().active.to_vec()
     }
 
     /// Which active agents stood on their goals after the last move, before goals changed.
     #[getter]
     fn on_goal(&self) -> Vec<bool> {
-        self.game.on_goal().to_vec()
+        self.episode.state().on_goal.to_vec()
     }
 
     /// Steps since the reset.
     #[getter]
     fn num_steps(&self) -> u64 {
-        self.game.num_steps()
+        self.episode.num_steps()
     }
 
     /// Size of the map without its border: rows, columns.
     #[getter]
     fn size(&self) -> (usize, usize) {
-        self.game.size()
+        self.episode.engine().size()
     }
 
     /// Where each agent is, so many rows and columns further down and right.
     fn cells(&self, shift: i64) -> Pairs {
-        pairs(self.game.cells(), shift)
+        pairs(self.episode.state().cells, shift)
     }
 
     /// Where each agent started.
     fn starts(&self, shift: i64) -> Pairs {
-        self.instance.as_ref().map_or_else(Vec::new, |instance| pairs(instance.starts(), shift))
+        self.episode.instance().map_or_else(|_| Vec::new(), |instance| pairs(instance.starts(), shift))
     }
 
     /// Where each agent wants to go.
     fn goals(&self, shift: i64) -> Pairs {
-        pairs(self.game.goals(), shift)
+        pairs(self.episode.state().goals, shift)
     }
 
     /// Whether each agent's goal was drawn since the reset.
@@ -177,23 +176,19 @@ impl Engine {
 
     /// The cells that are marked as occupied, in the coordinates of the map with its border.
     fn occupied(&self) -> Pairs {
-        pairs(&self.game.snapshot().occupied, self.game.config().radius as i64)
+        pairs(&self.episode.engine().occupied(), self.episode.config().radius as i64)
     }
 
     /// Whether what lies beyond the wall is free.
     #[getter]
     pub(crate) fn is_free_outside(&self) -> bool {
-        self.instance.as_ref().is_none_or(|instance| *instance.outside() == Outside::Free)
+        self.episode.instance().map_or(true, |instance| *instance.outside() == Outside::Free)
     }
 
     /// The goals that each agent is going to get, as POGEMA foretells them; none if the list would never end.
     fn foretold_goals(&self) -> Option<Vec<Pairs>> {
-        let goals = foretold_from(
-            self.source.config(),
-            self.instance.as_ref()?,
-            self.game.cells(),
-            self.game.goals(),
-        )?;
+        let (instance, state) = (self.episode.instance().ok()?, self.episode.state());
+        let goals = foretold_from(self.source.config(), instance, state.cells, state.goals)?;
         Some(goals.iter().map(|goals| pairs(goals, 0)).collect())
     }
 
@@ -205,7 +200,7 @@ impl Engine {
     /// For each agent its first state and each later one that differs: row, column, goal's row and column, step,
     /// whether it takes part, whether the goal was drawn.
     fn history(&self) -> Vec<Vec<Change>> {
-        let changes = pogema_core::changes(self.game.past());
+        let changes = pogema_core::changes(self.episode.past());
         let of_agent = |(agent, changes): (usize, Vec<pogema_core::Change>)| {
             let is_drawn = self.drawn.kept(agent).iter().chain(std::iter::repeat(&false));
             let change = |(change, &is_drawn): (pogema_core::Change, &bool)| {
@@ -217,9 +212,14 @@ impl Engine {
         changes.into_iter().enumerate().map(of_agent).collect()
     }
 
-    /// Whether the episodes from the next reset on are filmed.
+    /// Chooses whether the episodes from the next reset on are filmed.
     fn film(&mut self, is_wanted: bool) {
-        self.recorder.is_wanted = is_wanted;
+        self.is_filmed = is_wanted;
+    }
+
+    /// Measures density and collisions in the episodes from the next reset on, whatever else is measured.
+    fn measure(&mut self) {
+        self.is_measured = true;
     }
 
     /// The film as an animated SVG, or one frame of it.
@@ -234,7 +234,7 @@ impl Engine {
     ) -> PyResult<String> {
         let style =
             pogema_render::Style { egocentric, static_frame, show_agents, show_lines, ..Default::default() };
-        self.recorder.svg(&style).map_err(|error| errors::call(py, &error))
+        self.drawn_by(py, |trace| pogema_render::svg::draw(trace, &style))
     }
 
     /// What pickles and copies it: a function, and the bytes for it.
@@ -244,12 +244,12 @@ impl Engine {
 
     /// The film as a page with many replays wants it.
     fn pack_film(&self, py: Python<'_>) -> PyResult<String> {
-        self.recorder.pack().map_err(|error| errors::call(py, &error))
+        self.drawn_by(py, pogema_render::html::pack)
     }
 
     /// The film as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
-        self.recorder.html(title).map_err(|error| errors::call(py, &error))
+        self.drawn_by(py, |trace| pogema_render::html::replay(trace, title))
     }
 }
 
@@ -257,22 +257,25 @@ impl Engine {
     /// An environment that wants a reset.
     pub(crate) fn of(source: InstanceSource, exact: bool, time_limit: i64) -> Result<Self, Error> {
         let rules = rules(&source, exact, time_limit);
-        let num_agents = rules.num_agents;
         Ok(Self {
             source,
             exact,
             time_limit,
-            elapsed: 0,
-            game: pogema_fast::Engine::new(rules)?,
-            instance: None,
-            meter: EpisodeMeter::new(&rules),
-            recorder: Recorder::default(),
+            episode: Episode::new(pogema_fast::Engine::new(rules)?),
+            is_filmed: false,
+            is_measured: false,
             drawn: Drawn::default(),
-            actions: Vec::with_capacity(num_agents),
-            rewards: vec![0.0; num_agents],
-            terminated: vec![false; num_agents],
-            truncated: vec![false; num_agents],
+            actions: Vec::with_capacity(rules.num_agents),
         })
+    }
+
+    /// Draws the film.
+    fn drawn_by(
+        &self,
+        py: Python<'_>,
+        draw: impl FnOnce(&Trace) -> Result<String, Error>,
+    ) -> PyResult<String> {
+        self.episode.trace().and_then(|trace| draw(&trace)).map_err(|error| errors::call(py, &error))
     }
 
     fn begin(
@@ -287,26 +290,39 @@ impl Engine {
         };
         let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
         let rules = rules(&source, self.exact, self.time_limit);
-        if rules == *self.game.config() {
-            self.game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
-        } else {
-            let mut game = pogema_fast::Engine::new(rules).map_err(|error| errors::config(py, &error))?;
-            game.reset(&generated.instance).map_err(|error| errors::instance(py, &error))?;
-            self.game = game;
-            self.rewards = vec![0.0; rules.num_agents];
-            self.terminated = vec![false; rules.num_agents];
-            self.truncated = vec![false; rules.num_agents];
-        }
-        if self.meter.num_agents() != rules.num_agents {
-            self.meter = EpisodeMeter::new(&rules);
-        }
-        self.meter.measure_over(source.config().max_episode_steps);
+        self.start(rules, generated.instance).map_err(|error| match error {
+            Error::Config { .. } => errors::config(py, &error),
+            _ => errors::instance(py, &error),
+        })?;
+        self.episode.meters_mut().episode.measure_over(source.config().max_episode_steps);
         self.source = source;
-        self.elapsed = 0;
         self.drawn.begin(rules.num_agents, rules.persistent);
-        self.recorder.begin(&rules, &generated.instance, &self.game);
-        self.instance = Some(generated.instance);
         Ok(generated.warnings)
+    }
+
+    /// Starts an episode on the same engine if the rules allow that. POGEMA 1.4.0 does not clear its metrics at a reset.
+    fn start(&mut self, rules: Config, instance: Instance) -> Result<(), Error> {
+        let counted = self.episode.meters().episode.clone();
+        let mut fresh = if rules == *self.episode.config() {
+            None
+        } else {
+            Some(Episode::new(pogema_fast::Engine::new(rules)?))
+        };
+        let episode = fresh.as_mut().unwrap_or(&mut self.episode);
+        episode.record(self.is_filmed);
+        if self.is_measured {
+            let meters = episode.meters_mut();
+            meters.density.get_or_insert_with(DensityMeter::default);
+            meters.collisions.get_or_insert_with(CollisionMeter::default);
+        }
+        episode.start(instance)?;
+        if counted.num_agents() == rules.num_agents {
+            episode.meters_mut().episode = counted;
+        }
+        if let Some(episode) = fresh {
+            self.episode = episode;
+        }
+        Ok(())
     }
 
     fn play<'py>(
@@ -315,51 +331,50 @@ impl Engine {
         actions: &Bound<'py, PyAny>,
         has_metrics: bool,
     ) -> PyResult<Stepped<'py>> {
-        let (num_agents, got) = (self.game.config().num_agents, actions.len()?);
+        let (num_agents, got) = (self.episode.config().num_agents, actions.len()?);
         let fits = Error::check_length("actions", num_agents, got);
         fits.map_err(|error| errors::call(py, &error))?;
         self.check_started(py)?;
-        if let Some((agent, number)) = read_actions(actions, self.game.active(), &mut self.actions)? {
+        let active = self.episode.state().active;
+        if let Some((agent, number)) = read_actions(actions, active, &mut self.actions)? {
             let error = Error::Action { agent: Some(agent), number };
             return Err(errors::call(py, &error));
         }
-        let out = StepOut {
-            rewards: &mut self.rewards,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-        };
-        let (game, actions) = (&mut self.game, &self.actions);
-        py.detach(|| game.step(actions, out)).map_err(|error| errors::call(py, &error))?;
-        self.elapsed += 1;
-        let is_over = i64::try_from(self.elapsed).is_ok_and(|elapsed| elapsed >= self.time_limit);
-        self.truncated.fill(is_over);
+        let (episode, actions) = (&mut self.episode, &self.actions);
+        py.detach(|| episode.step(actions)).map_err(|error| errors::call(py, &error))?;
         self.note_goals();
-        self.recorder.step(&self.actions, &self.game, (&self.rewards, &self.terminated, &self.truncated));
-        let infos = infos(py, self.game.active())?;
-        let metrics =
-            has_metrics.then(|| self.meter.feed(self.game.on_goal(), &self.terminated, &self.truncated));
-        if let Some(metrics) = metrics.flatten() {
+        let infos = infos(py, self.episode.state().active)?;
+        if let Some(metrics) = self.metrics(has_metrics) {
             infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
         }
-        let rewards = self.rewards.iter().map(|&reward| f64::from(reward)).collect();
+        let rewards = self.episode.rewards().iter().map(|&reward| f64::from(reward)).collect();
         self.warn_of_turns(py)?;
-        Ok((self.observe(py)?, rewards, self.terminated.clone(), self.truncated.clone(), infos))
+        let (terminated, truncated) = (self.episode.terminated().to_vec(), self.episode.truncated().to_vec());
+        Ok((self.observe(py)?, rewards, terminated, truncated, infos))
     }
 
     pub(crate) fn check_started(&self, py: Python<'_>) -> PyResult<()> {
-        if self.instance.is_some() {
-            return Ok(());
+        self.episode.instance().map(|_| ()).map_err(|error| errors::call(py, &error))
+    }
+
+    /// The figures of an episode that the last step ended; without POGEMA's own, only what is measured besides.
+    fn metrics(&self, has_metrics: bool) -> Option<Metrics> {
+        let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
+        if has_metrics {
+            return Some(metrics);
         }
-        let reason = "the environment was not reset yet".to_owned();
-        Err(errors::call(py, &Error::State { reason }))
+        let Metrics { avg_agents_density, a_collisions, o_collisions, .. } = metrics;
+        let measured = Metrics { avg_agents_density, a_collisions, o_collisions, ..Metrics::default() };
+        (measured != Metrics::default()).then_some(measured)
     }
 
     /// POGEMA's figures; whole numbers where its are.
     fn named<'py>(&self, py: Python<'py>, metrics: &Metrics) -> PyResult<Bound<'py, PyDict>> {
         let named = PyDict::new(py);
-        let is_whole = self.game.config().on_goal == OnGoal::Nothing;
+        let is_nothing = self.episode.config().on_goal == OnGoal::Nothing;
         for (name, value) in metrics.named() {
-            if is_whole && matches!(name, "ep_length" | "SoC" | "makespan") {
+            let is_count = matches!(name, "a_collisions" | "o_collisions");
+            if is_count || is_nothing && matches!(name, "ep_length" | "SoC" | "makespan") {
                 named.set_item(name, value as u64)?;
             } else {
                 named.set_item(name, value)?;

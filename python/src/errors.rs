@@ -36,8 +36,8 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
     let class = match error {
         Error::Length { what: "actions", .. } => "ActionCountError",
         Error::Action { .. } => "ActionError",
-        Error::State { reason } if reason.contains("not reset") => "NotResetError",
-        Error::State { reason } if reason.contains("persistent") => "NotKeptError",
+        Error::NotReset => "NotResetError",
+        Error::StepsNotKept => "NotKeptError",
         _ => "StateError",
     };
     of_class(py, class, error)
@@ -57,7 +57,9 @@ pub fn astar(py: Python<'_>, error: &Error) -> PyErr {
 /// What a call of many environments raises.
 pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
     match error {
-        Error::Length { .. } | Error::Action { .. } | Error::State { .. } => call(py, error),
+        Error::Length { .. } | Error::Action { .. } | Error::NotReset | Error::State { .. } => {
+            call(py, error)
+        }
         _ => instance(py, error),
     }
 }

@@ -6,7 +6,6 @@ mod drawn;
 mod engine;
 mod errors;
 mod evaluation;
-mod film;
 mod lists;
 mod observe;
 mod planners;
@@ -14,7 +13,6 @@ mod seeds;
 mod state;
 mod vec;
 mod views;
-mod witness;
 
 use pyo3::prelude::*;
 
@@ -25,7 +23,6 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<astar::AStarAgent>()?;
     module.add_class::<planners::PlanFollower>()?;
     module.add_class::<evaluation::Evaluation>()?;
-    module.add_class::<witness::Witness>()?;
     module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
     module.add_function(wrap_pyfunction!(views::show_views, module)?)?;

@@ -1,7 +1,7 @@
 //! Observations as the arrays, tuples and dictionaries that POGEMA returns.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
-use pogema_core::{Environment, MapfOut, PomapfOut};
+use pogema_core::{Environment, Instance, from_border, from_starts};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -11,13 +11,13 @@ use crate::lists::{Pairs, tuples};
 
 impl Engine {
     pub(crate) fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let config = self.game.config();
+        let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
         let array = PyArray4::<f32>::zeros(py, [num_agents, 3, side, side], false);
         {
             let mut values = array.readwrite();
             let values = values.as_slice_mut()?;
-            py.detach(|| self.game.observe(values)).map_err(|error| errors::call(py, &error))?;
+            py.detach(|| self.episode.engine().observe(values)).map_err(|error| errors::call(py, &error))?;
         }
         split(py, array.as_any(), num_agents)
     }
@@ -27,21 +27,22 @@ impl Engine {
         py: Python<'py>,
         is_global: bool,
     ) -> PyResult<Bound<'py, PyList>> {
-        let config = self.game.config();
+        let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
         let obstacles = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
         let agents = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
-        let (mut cells, mut goals) = (vec![0; 2 * num_agents], vec![0; 2 * num_agents]);
         {
             let (mut obstacles, mut agents) = (obstacles.readwrite(), agents.readwrite());
             let (obstacles, agents) = (obstacles.as_slice_mut()?, agents.as_slice_mut()?);
-            let out = PomapfOut { obstacles, agents, cells: &mut cells, goals: &mut goals };
-            self.game.observe_pomapf(out).map_err(|error| errors::call(py, &error))?;
+            let seen = self.episode.engine().observe_windows(obstacles, agents);
+            seen.map_err(|error| errors::call(py, &error))?;
         }
+        let (state, starts) = (self.episode.state(), self.episode.instance().map(Instance::starts));
+        let starts = starts.map_err(|error| errors::call(py, &error))?;
         let (obstacles, agents) =
             (split(py, obstacles.as_any(), num_agents)?, split(py, agents.as_any(), num_agents)?);
-        let xy = tuples(py, &chunks(&cells))?;
-        let target_xy = self.goal_tuples(py, &chunks(&goals))?;
+        let xy = tuples(py, &wide(from_starts(state.cells, starts)))?;
+        let target_xy = self.goal_tuples(py, &wide(from_starts(state.goals, starts)))?;
         let global = if is_global { Some(self.global_lists(py)?) } else { None };
         let all = PyList::empty(py);
         for agent in 0..num_agents {
@@ -74,17 +75,17 @@ impl Engine {
     /// The map with its border, and all cells and goals in its coordinates.
     pub(crate) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
         self.check_started(py)?;
-        let config = self.game.config();
-        let (height, width) = self.game.size();
+        let config = self.episode.config();
+        let (height, width) = self.episode.engine().size();
         let padded =
             PyArray2::<u8>::zeros(py, [height + 2 * config.radius, width + 2 * config.radius], false);
-        let (mut cells, mut goals) = (vec![0; 2 * config.num_agents], vec![0; 2 * config.num_agents]);
         {
             let mut obstacles = padded.readwrite();
-            let out = MapfOut { obstacles: obstacles.as_slice_mut()?, cells: &mut cells, goals: &mut goals };
-            self.game.observe_mapf(out).map_err(|error| errors::call(py, &error))?;
+            let written = self.episode.engine().observe_map(obstacles.as_slice_mut()?);
+            written.map_err(|error| errors::call(py, &error))?;
         }
-        Ok((padded, chunks(&cells), chunks(&goals)))
+        let (state, radius) = (self.episode.state(), config.radius);
+        Ok((padded, wide(from_border(state.cells, radius)), wide(from_border(state.goals, radius))))
     }
 
     fn global_lists<'py>(
@@ -107,6 +108,6 @@ fn split<'py>(py: Python<'py>, array: &Bound<'py, PyAny>, num_agents: usize) -> 
     Ok(parts)
 }
 
-fn chunks(numbers: &[i32]) -> Pairs {
-    numbers.chunks_exact(2).map(|pair| (i64::from(pair[0]), i64::from(pair[1]))).collect()
+fn wide(pairs: impl Iterator<Item = [i32; 2]>) -> Pairs {
+    pairs.map(|[row, col]| (i64::from(row), i64::from(col))).collect()
 }

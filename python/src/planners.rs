@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Cell, Error, Map, Snapshot};
+use pogema_core::{Action, Cell, Error, Map, State};
 use pogema_planners::{
     Budget, Choice, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, Problem,
 };
@@ -147,7 +147,7 @@ enum Policy {
 }
 
 impl Policy {
-    fn act(&mut self, map: &Map, now: &Snapshot) -> Result<Vec<Action>, Error> {
+    fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         match self {
             Self::Once(policy) => policy.act(map, now),
             Self::Lifelong(policy) => policy.act(map, now),
@@ -201,9 +201,10 @@ impl PlanFollower {
         let (map, cells, goals) = seen().map_err(|error: Error| errors::plan(&error))?;
         let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
         let active = vec![true; cells.len()];
-        let now = Snapshot { step: inner.step, cells, goals, active, ..Snapshot::default() };
         let follower = &mut *inner;
-        let actions = py.detach(|| follower.policy.act(&map, &now)).map_err(|error| errors::plan(&error))?;
+        let step = follower.step;
+        let now = State { step, cells: &cells, goals: &goals, active: &active, on_goal: &[] };
+        let actions = py.detach(|| follower.policy.act(&map, now)).map_err(|error| errors::plan(&error))?;
         follower.step += 1;
         Ok(actions.into_iter().map(u8::from).collect())
     }

@@ -1,6 +1,8 @@
 //! An environment as bytes, so that it can be pickled and copied in the middle of an episode.
 
-use pogema_core::{Environment, EpisodeMeter, Error, GoalStream, Map, Snapshot, StreamState};
+use pogema_core::{
+    CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, Map, Recording, Snapshot, StreamState,
+};
 use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -10,7 +12,6 @@ use serde_json::{Value, json};
 use crate::drawn::Drawn;
 use crate::engine::Engine;
 use crate::errors;
-use crate::film::{Kept, Recorder};
 
 const FORMAT: &str = "pogema-rs environment";
 const VERSION: u32 = 1;
@@ -30,7 +31,13 @@ struct Saved {
     drawn: Drawn,
     episode: Option<Episode>,
     is_filmed: bool,
-    film: Option<Kept>,
+    film: Option<Recording>,
+    #[serde(default)]
+    is_measured: bool,
+    #[serde(default)]
+    density: Option<DensityMeter>,
+    #[serde(default)]
+    collisions: Option<CollisionMeter>,
 }
 
 /// An episode that has begun.
@@ -67,13 +74,14 @@ impl Engine {
             config["possible_agents_xy"] = json!(starts);
             config["possible_targets_xy"] = json!(goals);
         }
-        let episode = self.instance.as_ref().map(|instance| {
+        let Self { episode, .. } = self;
+        let begun = episode.instance().ok().map(|instance| {
             Ok::<_, Error>(Episode {
                 instance: MadeInstance::of(instance)?,
-                step: self.game.num_steps(),
-                now: self.game.snapshot(),
-                past: self.game.past().to_vec(),
-                streams: self.game.streams().iter().map(GoalStream::save).collect::<Result<_, _>>()?,
+                step: episode.num_steps(),
+                now: episode.snapshot(),
+                past: episode.past().to_vec(),
+                streams: episode.engine().streams().iter().map(GoalStream::save).collect::<Result<_, _>>()?,
             })
         });
         let saved = Saved {
@@ -83,12 +91,15 @@ impl Engine {
             registered: self.source.registered().cloned(),
             exact: self.exact,
             time_limit: self.time_limit,
-            elapsed: self.elapsed,
-            meter: self.meter.clone(),
+            elapsed: episode.state().step,
+            meter: episode.meters().episode.clone(),
             drawn: self.drawn.clone(),
-            episode: episode.transpose()?,
-            is_filmed: self.recorder.is_wanted,
-            film: self.recorder.kept(),
+            episode: begun.transpose()?,
+            is_filmed: self.is_filmed,
+            film: episode.recording().cloned(),
+            is_measured: self.is_measured,
+            density: episode.meters().density.clone(),
+            collisions: episode.meters().collisions,
         };
         serde_json::to_string(&saved).map_err(|error| foreign(&error.to_string()))
     }
@@ -106,27 +117,29 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
     let saved: Saved = serde_json::from_value(saved).map_err(|error| foreign(&error.to_string()))?;
     let source = InstanceSource::new(GridConfig::from_value(&saved.config)?, saved.registered)?;
     let mut engine = Engine::of(source, saved.exact, saved.time_limit)?;
-    let rules = *engine.game.config();
+    let rules = *engine.episode.config();
     let fits = saved.meter.num_agents() == rules.num_agents
         && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent);
     if !fits {
         return Err(foreign("the number of agents is another one than the config's"));
     }
-    engine.elapsed = saved.elapsed;
-    engine.meter = saved.meter;
     engine.drawn = saved.drawn;
-    engine.recorder = Recorder::default();
-    engine.recorder.is_wanted = saved.is_filmed;
+    (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);
+    let meters = engine.episode.meters_mut();
+    meters.episode = saved.meter;
+    (meters.density, meters.collisions) = (saved.density, saved.collisions);
     if let Some(episode) = saved.episode {
-        resume(&mut engine, episode)?;
-        if let (Some(kept), Some(instance)) = (saved.film, &engine.instance) {
-            engine.recorder.resume(&rules, instance, kept);
-        }
+        resume(&mut engine, episode, saved.elapsed, saved.film)?;
     }
     Ok(engine)
 }
 
-fn resume(engine: &mut Engine, episode: Episode) -> Result<(), Error> {
+fn resume(
+    engine: &mut Engine,
+    episode: Episode,
+    elapsed: u64,
+    recording: Option<Recording>,
+) -> Result<(), Error> {
     let Episode { instance, step, now, past, streams: states } = episode;
     let instance = engine.source.remake(instance)?;
     let mut streams = instance.goals().to_vec();
@@ -134,10 +147,6 @@ fn resume(engine: &mut Engine, episode: Episode) -> Result<(), Error> {
     for (stream, state) in streams.iter_mut().zip(&states) {
         stream.restore(state)?;
     }
-    // A snapshot does not hold its step; the kept ones are those of all steps.
-    let now = Snapshot { step, ..now };
-    let past = (0..).zip(past).map(|(step, snapshot)| Snapshot { step, ..snapshot }).collect();
-    engine.game.resume(&instance, streams, now, past)?;
-    engine.instance = Some(instance);
-    Ok(())
+    engine.episode.engine_mut().resume(&instance, streams, elapsed, &now)?;
+    engine.episode.resume(instance, step, past, recording)
 }

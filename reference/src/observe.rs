@@ -1,6 +1,6 @@
 //! What agents see.
 
-use pogema_core::{Cell, Error, MapfOut, PomapfOut};
+use pogema_core::Error;
 
 use crate::Reference;
 use crate::grid::{Grid, place};
@@ -47,49 +47,15 @@ impl Reference {
         window[down as usize * self.config.side() + right as usize] = 1.0;
     }
 
-    /// Rule: observe/pomapf, observe/pomapf/relative
-    ///
-    /// Source: POGEMA 1.4.0, `envs.py`, `Pogema._pomapf_obs`
-    pub(crate) fn write_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        let area = self.config.side() * self.config.side();
-        let num_agents = self.config.num_agents;
-        Error::check_length("obstacles", num_agents * area, out.obstacles.len())?;
-        Error::check_length("agents", num_agents * area, out.agents.len())?;
-        Error::check_length("cells", 2 * num_agents, out.cells.len())?;
-        Error::check_length("goals", 2 * num_agents, out.goals.len())?;
-        for agent in 0..num_agents {
-            self.write_window(&self.obstacles, agent, &mut out.obstacles[agent * area..][..area]);
-            self.write_window(&self.occupied, agent, &mut out.agents[agent * area..][..area]);
-            let (row, col) = place(self.starts[agent]);
-            write_place(&mut out.cells[2 * agent..], self.cells[agent], (-row, -col));
-            write_place(&mut out.goals[2 * agent..], self.goals[agent], (-row, -col));
-        }
-        Ok(())
-    }
-
-    /// Rule: observe/mapf, observe/mapf/global
+    /// Rule: observe/mapf
     ///
     /// Source: POGEMA 1.4.0, `envs.py`, `Pogema._obs`
-    pub(crate) fn write_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        let rows = self.obstacles.rows();
-        let num_agents = self.config.num_agents;
-        Error::check_length("global obstacles", rows.iter().map(Vec::len).sum(), out.obstacles.len())?;
-        Error::check_length("global cells", 2 * num_agents, out.cells.len())?;
-        Error::check_length("global goals", 2 * num_agents, out.goals.len())?;
-        for (value, &obstacle) in out.obstacles.iter_mut().zip(rows.iter().flatten()) {
+    pub(crate) fn write_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        let cells = || self.obstacles.rows().iter().flatten();
+        Error::check_length("global obstacles", cells().count(), out.len())?;
+        for (value, &obstacle) in out.iter_mut().zip(cells()) {
             *value = u8::from(obstacle);
-        }
-        let border = self.config.radius as i32;
-        for agent in 0..num_agents {
-            write_place(&mut out.cells[2 * agent..], self.cells[agent], (border, border));
-            write_place(&mut out.goals[2 * agent..], self.goals[agent], (border, border));
         }
         Ok(())
     }
-}
-
-fn write_place(out: &mut [i32], cell: Cell, (down, right): (i32, i32)) {
-    let (row, col) = place(cell);
-    out[0] = row + down;
-    out[1] = col + right;
 }

@@ -1,7 +1,7 @@
 //! One environment and one step of it, as a table of contents.
 
-use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, MapfOut, PomapfOut};
-use pogema_core::{Snapshot, StepOut};
+use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance};
+use pogema_core::{Snapshot, State, StepOut};
 
 use crate::grid::{Grid, obstacles_with_border, place};
 
@@ -11,14 +11,12 @@ pub struct Reference {
     pub(crate) config: Config,
     pub(crate) obstacles: Grid,
     pub(crate) occupied: Grid,
-    pub(crate) starts: Vec<Cell>,
     pub(crate) streams: Vec<GoalStream>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) goals: Vec<Cell>,
     pub(crate) active: Vec<bool>,
     pub(crate) on_goal: Vec<bool>,
     pub(crate) step: u64,
-    pub(crate) past: Vec<Snapshot>,
 }
 
 impl Reference {
@@ -32,22 +30,17 @@ impl Reference {
             config,
             obstacles: Grid::default(),
             occupied: Grid::default(),
-            starts: Vec::new(),
             streams: Vec::new(),
             cells: Vec::new(),
             goals: Vec::new(),
             active: Vec::new(),
             on_goal: Vec::new(),
             step: 0,
-            past: Vec::new(),
         })
     }
 
     pub(crate) fn check_started(&self) -> Result<(), Error> {
-        if self.cells.is_empty() {
-            return Err(Error::State { reason: "the environment was not reset yet".into() });
-        }
-        Ok(())
+        if self.cells.is_empty() { Err(Error::NotReset) } else { Ok(()) }
     }
 
     /// The indices of the agents that take part.
@@ -72,15 +65,12 @@ impl Environment for Reference {
         for &start in instance.starts() {
             self.occupied.set(place(start), true);
         }
-        self.starts = instance.starts().to_vec();
         self.streams = instance.goals().to_vec();
         self.cells = instance.starts().to_vec();
         self.goals = instance.first_goals();
         self.active = vec![true; self.config.num_agents];
         self.step = 0;
         self.mark_on_goal();
-        self.past.clear();
-        self.remember();
         Ok(())
     }
 
@@ -96,44 +86,23 @@ impl Environment for Reference {
         self.terminate(out.terminated);
         self.truncate(out.truncated);
         self.change_goals();
-        self.remember();
         Ok(())
     }
 
-    fn step_back(&mut self) -> Result<bool, Error> {
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         self.check_started()?;
-        self.take_back()
+        let (rows, border) = (self.obstacles.rows(), 2 * self.config.radius);
+        state.check_fits(self.config.num_agents, (rows.len() - border, rows[0].len() - border))?;
+        self.return_to(step, state);
+        Ok(())
     }
 
-    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
-        self.check_started()?;
-        self.write_default(out)
+    fn state(&self) -> State<'_> {
+        let Self { step, cells, goals, active, on_goal, .. } = self;
+        State { step: *step, cells, goals, active, on_goal }
     }
 
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        self.check_started()?;
-        self.write_pomapf(out)
-    }
-
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        self.check_started()?;
-        self.write_mapf(out)
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            step: self.step,
-            cells: self.cells.clone(),
-            goals: self.goals.clone(),
-            active: self.active.clone(),
-            on_goal: self.on_goal.clone(),
-            occupied: self.occupied_cells(),
-        }
-    }
-}
-
-impl Reference {
-    fn occupied_cells(&self) -> Vec<Cell> {
+    fn occupied(&self) -> Vec<Cell> {
         let border = self.config.radius;
         let mut cells = Vec::new();
         for (row, flags) in self.occupied.rows().iter().enumerate() {
@@ -142,5 +111,15 @@ impl Reference {
             }
         }
         cells
+    }
+
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        self.check_started()?;
+        self.write_default(out)
+    }
+
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        self.check_started()?;
+        self.write_map(out)
     }
 }

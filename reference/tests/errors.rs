@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, MapfOut, OnGoal};
-use pogema_core::{Outside, PomapfOut, StepOut};
+use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, OnGoal};
+use pogema_core::{Outside, Snapshot, StepOut};
 use pogema_reference::Reference;
 
 fn config() -> Config {
@@ -37,7 +37,8 @@ fn nothing_works_before_the_first_reset() {
     let wanted = "the environment was not reset yet";
     assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), wanted);
     assert_eq!(environment.observe(&mut [0.0; 54]).unwrap_err().to_string(), wanted);
-    assert_eq!(environment.step_back().unwrap_err().to_string(), wanted);
+    assert_eq!(environment.observe_map(&mut [0; 20]).unwrap_err().to_string(), wanted);
+    assert_eq!(environment.restore(0, &Snapshot::default()).unwrap_err().to_string(), wanted);
     assert!(environment.snapshot().cells.is_empty());
 }
 
@@ -59,7 +60,7 @@ fn a_refused_step_leaves_state_and_buffers_as_they_were() {
         assert_eq!(error.to_string(), wanted);
         assert_eq!(environment.snapshot(), before);
     }
-    assert_eq!(environment.step_back().unwrap_err().to_string(), "steps are only kept with persistent: true");
+    assert_eq!(environment.restore(0, &Snapshot::default()), Err(Error::ForeignState));
     assert_eq!(environment.snapshot(), before);
 }
 
@@ -92,14 +93,10 @@ fn a_buffer_of_the_wrong_length_is_not_written() {
         "observations has length 53, expected 54"
     );
     assert!(short.iter().all(|&value| value == 0.5));
-    let (mut windows, mut agents, mut cells, mut goals) = ([0.0; 18], [0.0; 18], [0; 4], [0; 3]);
-    let out =
-        PomapfOut { obstacles: &mut windows, agents: &mut agents, cells: &mut cells, goals: &mut goals };
-    assert_eq!(environment.observe_pomapf(out).unwrap_err().to_string(), "goals has length 3, expected 4");
-    let mut obstacles = [0; 19];
-    let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut [0; 4] };
+    let mut obstacles = [7; 19];
     let wanted = "global obstacles has length 19, expected 20";
-    assert_eq!(environment.observe_mapf(out).unwrap_err().to_string(), wanted);
+    assert_eq!(environment.observe_map(&mut obstacles).unwrap_err().to_string(), wanted);
+    assert_eq!(obstacles, [7; 19]);
 }
 
 #[test]

@@ -4,10 +4,9 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
 use tiny_skia::Pixmap;
 
-use crate::film::Film;
 use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::{Color, Style};
@@ -29,13 +28,13 @@ const UNCHANGED: u8 = u8::MAX;
 /// As for [`crate::svg::draw`], and if there were more frames or pixels than [`crate::MOST_FRAMES`] and
 /// [`crate::MOST_FRAME_PIXELS`].
 pub fn encode(
-    film: &Film,
+    trace: &Trace,
     style: &Style,
     width: u32,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: None, ..style.clone() };
-    let scene = Scene::new(film, &style)?;
+    let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 1)?;
     let first = motion.frame(0);
     let too_wide = |_| Error::State { reason: "GIF: a picture has at most 65535 pixels a side".into() };

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use pogema_core::{Cell, Map, Outside};
+use pogema_core::{Cell, Instance, Map, Outside, Trace};
 
 /// How much of the border is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,7 +28,18 @@ pub struct Ground<'a> {
     pub radius: usize,
 }
 
-impl Ground<'_> {
+impl<'a> Ground<'a> {
+    /// The ground of an instance, for agents of this radius.
+    pub fn new(instance: &'a Instance, radius: usize) -> Self {
+        Self { map: instance.map(), outside: instance.outside(), radius }
+    }
+
+    /// The ground of a recorded episode.
+    pub fn of(trace: &'a Trace) -> Self {
+        let header = &trace.header;
+        Self { map: &header.map, outside: &header.outside, radius: header.config.radius }
+    }
+
     /// Whether a cell of the map or its border holds an obstacle.
     pub fn is_obstacle(&self, row: i32, col: i32) -> bool {
         if let Some(cell) = cell(row, col).filter(|&cell| self.map.contains(cell)) {

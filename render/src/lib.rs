@@ -1,7 +1,7 @@
 //! Pictures of episodes.
 //!
-//! [`Film`] is what every picture is made from: a map, and the state after the reset and after each step. A
-//! [`Style`] says how it is drawn.
+//! Every picture is drawn from a [`pogema_core::Trace`]; a [`Style`] says how. Frame 0 is the state after the reset, frame
+//! 1 the state after the first step.
 //!
 //! | module | what it makes |
 //! | --- | --- |
@@ -13,7 +13,7 @@
 //! | [`html`] | a page that replays an episode, and one that edits maps |
 //! | [`stays`] | which rule reverted which move |
 
-mod film;
+mod check;
 pub mod gif;
 mod ground;
 pub mod html;
@@ -26,7 +26,7 @@ pub mod svg;
 pub mod text;
 pub mod video;
 
-pub use film::Film;
+pub use check::check;
 pub use ground::{Border, Ground};
 pub use motion::{MOST_FRAMES, MOST_PIXELS as MOST_FRAME_PIXELS};
 pub use style::{Color, Colors, Style};

@@ -3,7 +3,7 @@
 use pogema_core::Error;
 use tiny_skia::Pixmap;
 
-use crate::film::refused;
+use crate::check::refused;
 use crate::raster::Painter;
 use crate::scene::Scene;
 

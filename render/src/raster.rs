@@ -1,9 +1,10 @@
 //! Pictures of pixels, and the frames of moving ones.
 
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
 use tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
-use crate::film::{Film, refused};
+use crate::check::refused;
+use crate::ground::Ground;
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 
@@ -16,9 +17,9 @@ pub const MOST_PIXELS: usize = 1 << 26;
 ///
 /// # Errors
 /// As for [`crate::svg::draw`], and if the picture had no pixels or more than [`MOST_PIXELS`].
-pub fn png(film: &Film, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
+pub fn png(trace: &Trace, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: style.static_frame.or(Some(0)), ..style.clone() };
-    let scene = Scene::new(film, &style)?;
+    let scene = Scene::new(trace, &style)?;
     let canvas = Painter::new(&scene, width, MOST_PIXELS, 1)?.paint(0.0);
     canvas.encode_png().map_err(|error| Error::State { reason: format!("PNG: {error}") })
 }
@@ -27,8 +28,8 @@ pub fn png(film: &Film, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
 /// all look the same.
 ///
 /// Units: pixels.
-pub fn width_for(film: &Film, style: &Style, longer: u32) -> u32 {
-    let ground = film.ground();
+pub fn width_for(trace: &Trace, style: &Style, longer: u32) -> u32 {
+    let ground = Ground::of(trace);
     let (height, width) = (ground.rows(style.border).len() + 1, ground.cols(style.border).len() + 1);
     let cell = f64::from(longer) / height.max(width) as f64;
     let cell = if cell >= 1.0 { cell.floor() } else { cell };
@@ -129,7 +130,7 @@ impl<'a> Painter<'a> {
     fn paint_window(&self, canvas: &mut Pixmap, time: f64) {
         let place = self.scene.window().and_then(|agent| self.place(agent, Scene::agent, time));
         let Some(([col, row], _)) = place else { return };
-        let reach = self.scene.film.config.radius as f32 + size::WINDOW as f32;
+        let reach = self.scene.trace.header.config.radius as f32 + size::WINDOW as f32;
         let corner = size::CORNER as f32;
         let dash = StrokeDash::new(vec![size::DASH as f32; 2], 0.0);
         if let Some(path) = rounded_square(col - reach, row - reach, 2.0 * reach, corner) {

@@ -1,8 +1,9 @@
 //! What is to be seen of an episode at each frame, whatever it is drawn with.
 
-use pogema_core::{Cell, Config, Error, OnGoal, Snapshot};
+use pogema_core::{Cell, Config, Error, OnGoal, Snapshot, Trace};
 
-use crate::film::{Film, refused};
+use crate::check::{check, check_agent, refused};
+use crate::ground::Ground;
 use crate::style::{Color, Style};
 
 /// How strongly things are drawn that the agent whose view it is does not see.
@@ -46,7 +47,7 @@ pub struct Obstacles {
 
 /// A style applied to an episode; both are known to fit.
 pub struct Scene<'a> {
-    pub film: &'a Film,
+    pub trace: &'a Trace,
     pub style: &'a Style,
     /// The states that are drawn.
     pub states: Vec<&'a Snapshot>,
@@ -57,31 +58,31 @@ pub struct Scene<'a> {
 impl<'a> Scene<'a> {
     /// # Errors
     /// If the style names an agent or frame that there is not, or an agent is not on the map.
-    pub fn new(film: &'a Film, style: &'a Style) -> Result<Self, Error> {
-        film.check()?;
+    pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {
+        check(trace)?;
         if style.colors.agents.is_empty() {
             return Err(refused("number of agents' colours", 0, "at least 1"));
         }
         if !(style.step_time > 0.0 && style.step_time.is_finite()) {
             return Err(refused("time of a step", style.step_time, "more than 0 seconds"));
         }
-        let mut states: Vec<&Snapshot> = film.states().collect();
+        let mut states: Vec<&Snapshot> = trace.states().collect();
         if let Some(agent) = style.egocentric {
-            film.check_agent(agent)?;
-            states.truncate(num_frames_of(&film.config, agent, &states));
+            check_agent(agent, trace.start.state.cells.len())?;
+            states.truncate(num_frames_of(&trace.header.config, agent, &states));
         }
         let Some(frame) = style.static_frame else {
             let before = states[..1].to_vec();
-            return Ok(Self { film, style, states, before });
+            return Ok(Self { trace, style, states, before });
         };
-        let state = film.state(frame)?;
-        let before = film.states().take(frame + 1).collect();
-        Ok(Self { film, style, states: vec![state], before })
+        let state = trace.state(frame)?;
+        let before = trace.states().take(frame + 1).collect();
+        Ok(Self { trace, style, states: vec![state], before })
     }
 
     /// The left, upper edge of the picture and its width and height. Units: cells, from the centre of (0, 0).
     pub fn view_box(&self) -> [i32; 4] {
-        let ground = self.film.ground();
+        let ground = Ground::of(self.trace);
         let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
         let margin = size::MARGIN as i32;
         [
@@ -95,7 +96,7 @@ impl<'a> Scene<'a> {
     /// All obstacles, grouped by when they are first seen; those never seen come last. Without a view all are
     /// seen at once.
     pub fn obstacles(&self) -> Vec<Obstacles> {
-        let ground = self.film.ground();
+        let ground = Ground::of(self.trace);
         let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
         let num_cols = cols.len();
         let first_seen = self.first_seen();
@@ -116,7 +117,7 @@ impl<'a> Scene<'a> {
     /// The frame at which each cell is first seen, row by row; `usize::MAX` for never.
     fn first_seen(&self) -> Option<Vec<usize>> {
         let agent = self.style.egocentric?;
-        let ground = self.film.ground();
+        let ground = Ground::of(self.trace);
         let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
         let mut first = vec![usize::MAX; rows.len() * cols.len()];
         let past = self.before.iter().map(|state| (0, state));
@@ -146,7 +147,7 @@ impl<'a> Scene<'a> {
             return Vec::new();
         }
         let takes_part = |&agent: &usize| self.states.iter().any(|state| state.active[agent]);
-        (0..self.film.start.cells.len()).filter(takes_part).collect()
+        (0..self.trace.start.state.cells.len()).filter(takes_part).collect()
     }
 
     /// The agents whose goals are drawn: in an agent's view its own alone.
@@ -158,7 +159,7 @@ impl<'a> Scene<'a> {
     /// An agent at a frame.
     pub fn agent(&self, agent: usize, frame: usize) -> Look {
         let state = self.states[frame];
-        let (cell, ground) = (state.cells[agent], self.film.ground());
+        let (cell, ground) = (state.cells[agent], Ground::of(self.trace));
         let is_seen = |own: usize| ground.sees(state.cells[own], cell.row.into(), cell.col.into());
         let opacity = if self.style.egocentric.is_none_or(is_seen) { 1.0 } else { SHADED };
         Look { cell, is_visible: state.active[agent], opacity }

@@ -4,9 +4,8 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use pogema_core::{Error, shorten};
+use pogema_core::{Error, Trace, shorten};
 
-use crate::film::Film;
 use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::Style;
@@ -79,7 +78,7 @@ impl Format {
 /// # Errors
 /// As for [`crate::gif::encode`], and [`Error::Io`] if ffmpeg is missing or fails.
 pub fn write(
-    film: &Film,
+    trace: &Trace,
     style: &Style,
     width: u32,
     path: &Path,
@@ -87,7 +86,7 @@ pub fn write(
 ) -> Result<(), Error> {
     let format = Format::of(path)?;
     let style = Style { static_frame: None, ..style.clone() };
-    let scene = Scene::new(film, &style)?;
+    let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 2)?;
     let failed = |error: std::io::Error| Error::io(path, error);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -23,7 +23,6 @@ mod tree;
 mod variants;
 #[cfg(feature = "views")]
 pub mod views;
-mod witness;
 
 pub use about::{About, Run, machine};
 pub use again::differences;
@@ -38,4 +37,3 @@ pub use store::{Begin, REPORT, Store};
 pub use suite::{Algorithm, BACKENDS, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};
-pub use witness::Witness;

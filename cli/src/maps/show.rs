@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::CellAlignment;
-use pogema_core::{Config, Error, Map, Outside, Snapshot};
+use pogema_core::{Config, Error, GoalStream, Instance, Map, Outside, Trace};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
-use pogema_render::{Film, Style, html, raster, svg};
+use pogema_render::{Style, html, raster, svg};
 
 use super::{Sources, write_out};
 use crate::output::{markdown_table, say};
@@ -103,13 +103,13 @@ impl Show {
             let reason = format!("`{}` means {} maps, a picture is of one", self.map, maps.len());
             return Err(Error::State { reason });
         };
-        let (film, style) = (still(text), Style { static_frame: Some(0), ..Style::default() });
+        let (trace, style) = (still(text)?, Style { static_frame: Some(0), ..Style::default() });
         if let Some(path) = &self.svg {
-            write_out(Some(path), svg::draw(&film, &style)?.as_bytes())?;
+            write_out(Some(path), svg::draw(&trace, &style)?.as_bytes())?;
         }
         if let Some(path) = &self.png {
-            let width = raster::width_for(&film, &style, LONGER_SIDE);
-            write_out(Some(path), &raster::png(&film, &style, width)?)?;
+            let width = raster::width_for(&trace, &style, LONGER_SIDE);
+            write_out(Some(path), &raster::png(&trace, &style, width)?)?;
         }
         Ok(())
     }
@@ -118,18 +118,12 @@ impl Show {
 /// The longer side of a PNG. Units: pixels.
 const LONGER_SIDE: u32 = 1024;
 
-/// The map and its agents before anybody has moved.
-fn still(text: &MapText) -> Film {
-    let num_agents = text.starts.len();
-    let start = Snapshot {
-        cells: text.starts.clone(),
-        goals: text.goals.clone(),
-        active: vec![true; num_agents],
-        on_goal: vec![false; num_agents],
-        ..Snapshot::default()
-    };
-    let config = Config { num_agents, ..GridConfig::default().rules() };
-    Film { config, map: text.map.clone(), outside: Outside::Free, start, steps: Vec::new() }
+/// The map and its agents before the first step.
+fn still(text: &MapText) -> Result<Trace, Error> {
+    let goals = text.goals.iter().map(|&goal| GoalStream::single(goal)).collect();
+    let instance = Instance::new(text.map.clone(), Outside::Free, text.starts.clone(), goals)?;
+    let config = Config { num_agents: text.starts.len(), ..GridConfig::default().rules() };
+    Ok(Trace::still(config, &instance))
 }
 
 #[derive(Args, Debug)]

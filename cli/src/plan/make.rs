@@ -6,11 +6,10 @@ use std::time::Instant;
 
 use clap::Args;
 use pogema_conformance::files;
-use pogema_core::{Environment, Error, Instance, StepOut, Trace, TraceHeader, TraceStart, TraceStep};
+use pogema_core::{Episode, Error, Instance, Trace};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_planners::{Outcome, PLANNERS, Plan, Problem, planner, validate, write_plan, write_result};
 use pogema_reference::Reference;
-use pogema_render::Film;
 use serde_json::json;
 
 use crate::output::{check_writable, say};
@@ -94,7 +93,7 @@ impl MakePlan {
             return Ok(());
         }
         let what = self.settings.what().unwrap_or_else(|| "a drawn map".into());
-        self.pictures.draw(&Film::of(&trace), &format!("{what}, planned by {}", self.planner))
+        self.pictures.draw(&trace, &format!("{what}, planned by {}", self.planner))
     }
 }
 
@@ -106,23 +105,12 @@ fn replay(config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<Trace
         max_steps: plan.num_steps() as i64,
         ..config.rules()
     };
-    let mut environment = Reference::new(rules)?;
-    environment.reset(instance)?;
-    let header = TraceHeader::new(rules, instance, plan.num_steps() + 1);
-    let start = TraceStart { state: environment.snapshot(), observations: None };
-    let mut steps = Vec::with_capacity(plan.num_steps());
+    let mut episode = Episode::new(Reference::new(rules)?).with_recording();
+    episode.start(instance.clone())?;
     for step in 0..plan.num_steps() {
-        let actions = plan.actions(step)?;
-        let num_agents = actions.len();
-        let (mut rewards, mut terminated, mut truncated) =
-            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        environment.step(&actions, out)?;
-        let state = environment.snapshot();
-        let observations = None;
-        steps.push(TraceStep { actions, state, rewards, terminated, truncated, observations, metrics: None });
+        episode.step(&plan.actions(step)?)?;
     }
-    Ok(Trace { header, start, steps })
+    episode.trace()
 }
 
 fn as_json(outcome: &Outcome, seconds: f64) -> String {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::files;
-use pogema_core::Error;
-use pogema_render::{Border, Color, Colors, Film, Style, gif, html, raster, svg, text, video};
+use pogema_core::{Error, Trace};
+use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, video};
 
 use super::screen::Screen;
 use crate::output::check_writable;
@@ -124,24 +124,24 @@ impl Pictures {
     }
 
     /// Draws and writes all that is asked for; the page of a replay has a title.
-    pub fn draw(&self, film: &Film, title: &str) -> Result<(), Error> {
+    pub fn draw(&self, trace: &Trace, title: &str) -> Result<(), Error> {
         let style = self.style();
-        let width = |longer| self.width.unwrap_or_else(|| raster::width_for(film, &style, longer));
+        let width = |longer| self.width.unwrap_or_else(|| raster::width_for(trace, &style, longer));
         if let Some(path) = &self.svg {
-            files::write(path, svg::draw(film, &style)?.as_bytes())?;
+            files::write(path, svg::draw(trace, &style)?.as_bytes())?;
         }
         if let Some(path) = &self.html {
-            files::write(path, html::replay(film, title)?.as_bytes())?;
+            files::write(path, html::replay(trace, title)?.as_bytes())?;
         }
         if let Some(path) = &self.png {
-            files::write(path, &raster::png(film, &style, width(LONGER_SIDE_OF_PNG))?)?;
+            files::write(path, &raster::png(trace, &style, width(LONGER_SIDE_OF_PNG))?)?;
         }
         if let Some(path) = &self.gif {
-            let bytes = gif::encode(film, &style, width(LONGER_SIDE_OF_GIF), &mut progress("GIF"))?;
+            let bytes = gif::encode(trace, &style, width(LONGER_SIDE_OF_GIF), &mut progress("GIF"))?;
             files::write(path, &bytes)?;
         }
         if let Some(path) = &self.video {
-            video::write(film, &style, width(LONGER_SIDE_OF_VIDEO), path, &mut progress("video"))?;
+            video::write(trace, &style, width(LONGER_SIDE_OF_VIDEO), path, &mut progress("video"))?;
         }
         Ok(())
     }

@@ -28,15 +28,15 @@ impl Screen {
         Self { terminal: Term::stdout(), style, pause, num_lines: 0 }
     }
 
-    pub fn draw(&mut self, ground: Ground<'_>, state: &Snapshot) -> Result<(), Error> {
+    pub fn draw(&mut self, ground: Ground<'_>, step: usize, state: &Snapshot) -> Result<(), Error> {
         if !self.terminal.is_term() {
-            return say(&text::frame(ground, state, &self.style)?);
+            return say(&text::frame(ground, step, state, &self.style)?);
         }
         // The cursor waits on a line of its own. A frame is as large as the terminal is now.
         let size = self.terminal.size_checked();
         let most =
             size.map(|(rows, cols)| (usize::from(rows).saturating_sub(1).max(1), usize::from(cols).max(1)));
-        let frame = text::frame(ground, state, &text::Style { most, ..self.style })?;
+        let frame = text::frame(ground, step, state, &text::Style { most, ..self.style })?;
         said(self.terminal.clear_last_lines(self.num_lines))?;
         self.num_lines = frame.lines().count();
         said(self.terminal.write_line(&frame))?;

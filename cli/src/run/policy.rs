@@ -5,12 +5,10 @@ use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_conformance::files;
-use pogema_core::{Action, Error, Trace, shorten};
+use pogema_core::{Action, Environment, Episode, Error, Instance, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_numpy::{Generator, SeedSequence};
 use pogema_planners::{NamedPolicy, PolicySettings};
-
-use super::episode::Episode;
 
 /// The name for actions from a file.
 pub const FILE: &str = "file";
@@ -28,30 +26,30 @@ pub enum Policy {
 }
 
 impl Policy {
-    /// The policy of a name for an episode.
+    /// The policy of a name for the episode of an instance.
     pub fn new(
         name: &str,
         file: Option<&Path>,
         settings: &PolicySettings,
-        episode: &Episode,
+        config: &GridConfig,
+        instance: &Instance,
     ) -> Result<Self, Error> {
-        let config = episode.config();
         match (name, file) {
             (FILE, Some(path)) => Ok(Self::File(read_actions(path, config.num_agents)?.into_iter())),
             (FILE, None) => Err(Error::State { reason: "`--policy file` needs `--actions FILE`".into() }),
             (_, Some(_)) => Err(Error::State { reason: "`--actions` needs `--policy file`".into() }),
             (_, None) => {
                 let (rules, dice) = (config.rules(), generator(config)?);
-                let policy = NamedPolicy::new(name, settings, &rules, episode.instance(), dice)?;
+                let policy = NamedPolicy::new(name, settings, &rules, instance, dice)?;
                 Ok(Self::Named(Box::new(policy)))
             }
         }
     }
 
     /// The actions of the next step; none when a file has no more.
-    pub fn act(&mut self, episode: &Episode) -> Result<Option<Vec<Action>>, Error> {
+    pub fn act<E: Environment>(&mut self, episode: &Episode<E>) -> Result<Option<Vec<Action>>, Error> {
         match self {
-            Self::Named(policy) => episode.ask(policy).map(Some),
+            Self::Named(policy) => policy.act(episode).map(Some),
             Self::File(steps) => Ok(steps.next()),
         }
     }

@@ -1,6 +1,6 @@
 //! A port's answer to a whole request, in the form of every other answer.
 
-use pogema_core::{Action, Environment, Error, Map, Metrics, Padded, Snapshot, TraceStep};
+use pogema_core::{Action, Error, Map, Metrics, Padded, TraceStep};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
 
@@ -126,7 +126,7 @@ impl<'l> PortPlay<'l> {
             Op::Sample => self.act(Policy::Sample, index, Record::Sample),
             Op::Back => {
                 let moved = self.port.step_back()?;
-                Ok(Record::Back(Back { moved, state: self.state() }))
+                Ok(Record::Back(Back { moved, state: self.port.snapshot() }))
             }
             Op::History => {
                 let kept = self.port.history()?;
@@ -157,7 +157,7 @@ impl<'l> PortPlay<'l> {
             padded,
             goal_lists: reply.foretold.clone().given(),
             goal_lists_error: None,
-            state: self.state(),
+            state: self.port.snapshot(),
             observations: self.port.observed().cloned(),
         })
     }
@@ -196,7 +196,7 @@ impl<'l> PortPlay<'l> {
 
     fn step(&mut self, ask: &Ask, kind: Kind) -> Result<Record, Error> {
         self.port.advance(ask)?;
-        let state = self.state();
+        let state = self.port.snapshot();
         let reply = self.port.reply().clone();
         let numbers = match ask {
             Ask::Step { actions } => actions.clone(),
@@ -219,10 +219,5 @@ impl<'l> PortPlay<'l> {
         let infos_active = step.state.active.clone();
         let actions_after = reply.actions_after.unwrap_or_default();
         Ok(kind(Box::new(StepRecord { step, actions_after, infos_active })))
-    }
-
-    fn state(&self) -> Snapshot {
-        // The number of the step is not among what implementations answer.
-        Snapshot { step: 0, ..self.port.snapshot() }
     }
 }

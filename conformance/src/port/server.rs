@@ -33,7 +33,7 @@ impl Server {
     /// # Errors
     /// If the instance does not fit the rules.
     pub fn begin_with(&mut self, rules: &Config, instance: Instance) -> Result<Reply, Error> {
-        let player = self.player.insert(Player::of_instance(&self.make, rules, instance)?);
+        let player = self.player.insert(Player::of_instance(&self.make, rules, instance, &[])?);
         player.perform(&Op::Reset(None)).map(reply_of)
     }
 
@@ -53,8 +53,8 @@ impl Server {
 
     fn begin(&mut self, beginning: &Beginning) -> Result<Reply, Error> {
         if let Some(header) = &beginning.instance {
-            let mut player = Player::of_instance(&self.make, &header.config, header.instance()?)?;
-            player.measure(&beginning.measure);
+            let instance = header.instance()?;
+            let player = Player::of_instance(&self.make, &header.config, instance, &beginning.measure)?;
             self.player = Some(player);
         } else if let Some(config) = &beginning.config {
             let measures = |name: &str| beginning.measure.iter().any(|wanted| wanted == name);

@@ -1,20 +1,14 @@
-//! A port as an environment.
+//! A conversation with a port about one config.
 
-use pogema_core::{
-    Action, Cell, Config, Environment, Error, Instance, MapfOut, Observed, PomapfOut, Snapshot, StepOut,
-    TraceHeader,
-};
+use pogema_core::{Cell, Config, Error, Instance, Observed, Snapshot, TraceHeader};
 
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
-use crate::digits::unpack;
-use crate::request::numbers;
 
 /// A port at work on one config.
 ///
-/// As an [`Environment`] it plays instances; [`Port::begin`] begins an episode from a config too. Whatever keeps
-/// to no form is an error, and [`Port::fault`] then tells more.
+/// An answer that breaks the protocol is an error; [`Port::fault`] then has the details.
 pub struct Port<'l> {
     link: &'l mut dyn Link,
     hello: &'l Hello,
@@ -23,7 +17,6 @@ pub struct Port<'l> {
     num_goals: usize,
     reply: Reply,
     observed: Option<Observed>,
-    elapsed: u64,
     fault: Option<Misbehaviour>,
 }
 
@@ -33,17 +26,7 @@ impl<'l> Port<'l> {
         // An instance lists so many goals for each agent: one is reached in a step at most.
         let num_goals = usize::try_from(config.max_steps).unwrap_or(0) + 2;
         let (reply, observed) = (Reply::default(), None);
-        Self {
-            link,
-            hello,
-            config,
-            padded_dtype: "float64",
-            num_goals,
-            reply,
-            observed,
-            elapsed: 0,
-            fault: None,
-        }
+        Self { link, hello, config, padded_dtype: "float64", num_goals, reply, observed, fault: None }
     }
 
     /// The element type to put down for maps with their border, which the protocol does not tell.
@@ -90,7 +73,6 @@ impl<'l> Port<'l> {
         self.check_state(&reply)?;
         self.observed = None;
         self.take_observations(reply)?;
-        self.elapsed = 0;
         Ok(())
     }
 
@@ -115,7 +97,6 @@ impl<'l> Port<'l> {
             self.need("metrics", (!reply.metrics.is_left_out()).then_some(&()))?;
         }
         self.take_observations(reply)?;
-        self.elapsed += 1;
         Ok(())
     }
 
@@ -128,6 +109,40 @@ impl<'l> Port<'l> {
         self.need_list("full", reply.full.as_ref())?;
         self.need_list("changes", reply.changes.as_ref())?;
         Ok(reply)
+    }
+
+    /// Takes the last step back; returns whether there was one.
+    ///
+    /// # Errors
+    /// If the port refuses, or breaks the protocol.
+    pub fn step_back(&mut self) -> Result<bool, Error> {
+        let reply = self.ask(&Ask::Back)?;
+        self.check_state(&reply)?;
+        self.need("moved", reply.moved.as_ref())?;
+        let moved = reply.moved == Some(true);
+        self.reply = reply;
+        Ok(moved)
+    }
+
+    /// The state after the last answer. A port that does not report it gets `on_goal` false for every agent, and one mark
+    /// for every active agent.
+    pub fn snapshot(&self) -> Snapshot {
+        let reply = &self.reply;
+        let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();
+        let active = reply.active.clone().unwrap_or_default();
+        let occupied = as_cells(reply.occupied.as_ref()).unwrap_or_else(|| {
+            let mut marked: Vec<Cell> =
+                cells.iter().zip(&active).filter(|(_, active)| **active).map(|(cell, _)| *cell).collect();
+            marked.sort_by_key(|cell| (cell.row, cell.col));
+            marked
+        });
+        Snapshot {
+            goals: as_cells(reply.goals.as_ref()).unwrap_or_default(),
+            on_goal: reply.on_goal.clone().unwrap_or_else(|| vec![false; cells.len()]),
+            cells,
+            active,
+            occupied,
+        }
     }
 
     fn claims(&self, profile: Profile) -> bool {
@@ -220,11 +235,6 @@ impl<'l> Port<'l> {
         self.reply = reply;
         Ok(())
     }
-
-    fn arrays(&self) -> Result<&Observed, Error> {
-        let reason = || Error::State { reason: "the port tells no observations".into() };
-        self.observed.as_ref().ok_or_else(reason)
-    }
 }
 
 /// A cell that may be on a map.
@@ -234,105 +244,4 @@ fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
 
 fn as_cells(told: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {
     told?.iter().map(as_cell).collect()
-}
-
-impl Environment for Port<'_> {
-    fn config(&self) -> &Config {
-        &self.config
-    }
-
-    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
-        instance.check_fits(&self.config)?;
-        let instance = Some(self.header(instance));
-        self.begin(Beginning { instance, ..Beginning::default() })
-    }
-
-    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
-        out.check(self.config.num_agents)?;
-        let actions = numbers(actions);
-        self.advance(&Ask::Step { actions })?;
-        out.rewards.copy_from_slice(self.reply.rewards.as_deref().unwrap_or_default());
-        out.terminated.copy_from_slice(self.reply.terminated.as_deref().unwrap_or_default());
-        out.truncated.copy_from_slice(self.reply.truncated.as_deref().unwrap_or_default());
-        Ok(())
-    }
-
-    fn step_back(&mut self) -> Result<bool, Error> {
-        let reply = self.ask(&Ask::Back)?;
-        self.check_state(&reply)?;
-        self.need("moved", reply.moved.as_ref())?;
-        let moved = reply.moved == Some(true);
-        self.elapsed -= u64::from(moved && self.elapsed > 0);
-        self.reply = reply;
-        Ok(moved)
-    }
-
-    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
-        let Observed::Default { windows, .. } = self.arrays()? else { return Err(other_arrays()) };
-        Error::check_length("observations", self.config.num_observed(), out.len())?;
-        copy_windows(windows, out)
-    }
-
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        let pomapf = match self.arrays()? {
-            Observed::Default { .. } => return Err(other_arrays()),
-            Observed::Pomapf(pomapf) => pomapf,
-            Observed::Mapf(mapf) => &mapf.pomapf,
-        };
-        copy_windows(&pomapf.obstacles, out.obstacles)?;
-        copy_windows(&pomapf.agents, out.agents)?;
-        copy_pairs(&pomapf.xy, out.cells);
-        copy_pairs(&pomapf.target_xy, out.goals);
-        Ok(())
-    }
-
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
-        let Observed::Mapf(mapf) = self.arrays()? else { return Err(other_arrays()) };
-        let rows = mapf.global_obstacles.iter().flat_map(|padded| padded.rows.iter());
-        let flags = rows.flat_map(|row| row.bytes()).map(|letter| u8::from(letter == b'#'));
-        out.obstacles.iter_mut().zip(flags).for_each(|(value, flag)| *value = flag);
-        copy_pairs(&mapf.global_xy, out.cells);
-        copy_pairs(&mapf.global_target_xy, out.goals);
-        Ok(())
-    }
-
-    /// What the port does not tell is put down as if nobody were on a goal and every active agent had its mark.
-    fn snapshot(&self) -> Snapshot {
-        let reply = &self.reply;
-        let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();
-        let active = reply.active.clone().unwrap_or_default();
-        let occupied = as_cells(reply.occupied.as_ref()).unwrap_or_else(|| {
-            let mut marked: Vec<Cell> =
-                cells.iter().zip(&active).filter(|(_, active)| **active).map(|(cell, _)| *cell).collect();
-            marked.sort_by_key(|cell| (cell.row, cell.col));
-            marked
-        });
-        Snapshot {
-            step: self.elapsed,
-            goals: as_cells(reply.goals.as_ref()).unwrap_or_default(),
-            on_goal: reply.on_goal.clone().unwrap_or_else(|| vec![false; cells.len()]),
-            cells,
-            active,
-            occupied,
-        }
-    }
-}
-
-fn other_arrays() -> Error {
-    Error::State { reason: "the port was asked for other observations".into() }
-}
-
-fn copy_windows(windows: &[String], out: &mut [f32]) -> Result<(), Error> {
-    let size = out.len() / windows.len().max(1);
-    for (window, values) in windows.iter().zip(out.chunks_mut(size.max(1))) {
-        if window.contains(':') {
-            return Err(Error::State { reason: "the port tells hashes of observations only".into() });
-        }
-        values.iter_mut().zip(unpack(window)).for_each(|(value, bit)| *value = f32::from(u8::from(bit)));
-    }
-    Ok(())
-}
-
-fn copy_pairs(pairs: &[[i32; 2]], out: &mut [i32]) {
-    out.chunks_exact_mut(2).zip(pairs).for_each(|(values, pair)| values.copy_from_slice(pair));
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use pogema_core::{Error, Snapshot, Trace, TraceStep};
+use pogema_core::{Error, Trace, TraceStep};
 
 use super::claims::{Mode, Scope};
 use super::judge::Judged;
@@ -41,15 +41,14 @@ pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
 }
 
 fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
-    let mut player =
-        Player::of_instance(&Engine::REFERENCE.make, &trace.header.config, trace.header.instance()?)?;
-    player.measure(&figures(trace));
+    let (config, instance) = (&trace.header.config, trace.header.instance()?);
+    let mut player = Player::of_instance(&Engine::REFERENCE.make, config, instance, &figures(trace))?;
     let mut request = Request { config: player.config.to_value(), ..Request::default() };
     let (mut expected, mut got) = (Response::default(), Response::default());
     request.ops.push(Op::Reset(None));
     let begun = player.perform(&Op::Reset(None))?;
     let Record::Reset(reset) = &begun else { return Ok(Judged::default()) };
-    let state = unnumbered(&trace.start.state);
+    let state = trace.start.state.clone();
     let observations = trace.start.observations.clone();
     got.records.push(Record::Reset(Box::new(ResetRecord { state, observations, ..reset.as_ref().clone() })));
     expected.records.push(begun);
@@ -67,13 +66,7 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
 }
 
 fn record_of(step: &TraceStep) -> StepRecord {
-    let step = TraceStep { state: unnumbered(&step.state), ..step.clone() };
-    StepRecord { infos_active: step.state.active.clone(), actions_after: Vec::new(), step }
-}
-
-/// The number of the step is not among what is compared.
-fn unnumbered(state: &Snapshot) -> Snapshot {
-    Snapshot { step: 0, ..state.clone() }
+    StepRecord { infos_active: step.state.active.clone(), actions_after: Vec::new(), step: step.clone() }
 }
 
 /// The figures that a trace gives anywhere.

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use pogema_core::{Action, Config, Environment, Error, Instance, MapfOut, PomapfOut, Snapshot, StepOut};
+use pogema_core::{Action, Config, Environment, Error, Instance, Seen, Snapshot, StepOut};
 use pogema_fast::{Engine, Path, words_per_agent};
 use pogema_reference::Reference;
 
@@ -19,6 +19,8 @@ pub struct Pair {
     pub engines: Vec<(Path, Engine)>,
     /// Rows and columns of the map; 0 before the first reset.
     size: (usize, usize),
+    /// The states since the reset.
+    past: Vec<Snapshot>,
 }
 
 /// What a step gives besides the state.
@@ -29,20 +31,11 @@ pub struct Results {
     pub truncated: Vec<bool>,
 }
 
-/// All arrays of `POMAPF` and `MAPF`.
-#[derive(Clone, Debug, PartialEq)]
-struct Arrays {
-    obstacles: Vec<f32>,
-    agents: Vec<f32>,
-    places: [Vec<i32>; 4],
-    global_obstacles: Vec<u8>,
-}
-
 impl Pair {
     pub fn new(config: Config) -> Self {
         let available = Path::ALL.into_iter().filter(|path| path.is_available());
         let engines = available.map(|path| (path, Engine::with_path(config, path).unwrap())).collect();
-        Self { reference: Reference::new(config).unwrap(), engines, size: (0, 0) }
+        Self { reference: Reference::new(config).unwrap(), engines, size: (0, 0), past: Vec::new() }
     }
 
     pub fn config(&self) -> Config {
@@ -55,7 +48,11 @@ impl Pair {
         for (path, engine) in &mut self.engines {
             same(*path, "reset", &want, &engine.reset(instance))?;
         }
-        self.check_state().map(|_| ())
+        let state = self.check_state()?;
+        if want.is_ok() {
+            self.past = vec![state];
+        }
+        Ok(())
     }
 
     pub fn step(&mut self, actions: &[Action]) -> Outcome<(Snapshot, Results)> {
@@ -64,23 +61,30 @@ impl Pair {
             same(*path, "results of the step", &want, &results(engine, actions))?;
         }
         let results = want.map_err(|error| error.to_string())?;
-        Ok((self.check_state()?, results))
+        let state = self.check_state()?;
+        self.past.push(state.clone());
+        Ok((state, results))
     }
 
     pub fn step_back(&mut self) -> Outcome<()> {
-        let want = self.reference.step_back();
+        if self.past.len() > 1 {
+            self.past.pop();
+        }
+        let before = self.past.last().cloned().unwrap_or_default();
+        let step = self.past.len().saturating_sub(1) as u64;
+        let want = self.reference.restore(step, &before);
         for (path, engine) in &mut self.engines {
-            same(*path, "step back", &want, &engine.step_back())?;
+            same(*path, "step back", &want, &engine.restore(step, &before))?;
         }
         self.check_state().map(|_| ())
     }
 
-    /// Compares the states and what is kept of earlier ones.
+    /// Compares the states.
     pub fn check_state(&self) -> Outcome<Snapshot> {
         let want = self.reference.snapshot();
         for (path, engine) in &self.engines {
             same(*path, "state", &want, &engine.snapshot())?;
-            same(*path, "past", &self.reference.past(), &engine.past())?;
+            same(*path, "step", &self.reference.state().step, &engine.state().step)?;
         }
         Ok(want)
     }
@@ -98,9 +102,14 @@ impl Pair {
         if outcome.is_ok() {
             self.check_ranges(&want, &[0..config.num_agents, some])?;
         }
-        let want = arrays(&self.reference, config, self.size);
+        let want_map = map_of(&self.reference, config, self.size);
+        let want_seen = seen_by(&self.reference);
         for (path, engine) in &self.engines {
-            same(*path, "arrays of POMAPF and MAPF", &want, &arrays(engine, config, self.size))?;
+            same(*path, "map with its border", &want_map, &map_of(engine, config, self.size))?;
+            same(*path, "counts of what is seen", &want_seen, &seen_by(engine))?;
+            if outcome.is_ok() {
+                check_windows(*path, engine, config, &want)?;
+            }
         }
         Ok(())
     }
@@ -152,26 +161,31 @@ fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<Res
     Ok(results)
 }
 
-fn arrays(
+fn map_of(
     environment: &impl Environment,
     config: Config,
     (height, width): (usize, usize),
-) -> Result<Arrays, Error> {
-    let (num_agents, border) = (config.num_agents, 2 * config.radius);
-    let windows = vec![f32::from(UNWRITTEN); num_agents * config.side() * config.side()];
-    let places = vec![i32::MIN; 2 * num_agents];
-    let mut out = Arrays {
-        obstacles: windows.clone(),
-        agents: windows,
-        places: [places.clone(), places.clone(), places.clone(), places],
-        global_obstacles: vec![UNWRITTEN; (height + border) * (width + border)],
-    };
-    let [cells, goals, global_cells, global_goals] = &mut out.places;
-    let (obstacles, agents) = (&mut out.obstacles, &mut out.agents);
-    environment.observe_pomapf(PomapfOut { obstacles, agents, cells, goals })?;
-    let obstacles = &mut out.global_obstacles;
-    environment.observe_mapf(MapfOut { obstacles, cells: global_cells, goals: global_goals })?;
-    Ok(out)
+) -> Result<Vec<u8>, Error> {
+    let border = 2 * config.radius;
+    let mut obstacles = vec![UNWRITTEN; (height + border) * (width + border)];
+    environment.observe_map(&mut obstacles).map(|()| obstacles)
+}
+
+fn seen_by(environment: &impl Environment) -> Result<Vec<Seen>, Error> {
+    let mut seen = Vec::new();
+    environment.count_seen(&mut seen).map(|()| seen)
+}
+
+/// Passes if the windows that `POMAPF` has apart are those of the `default` observation.
+fn check_windows(path: Path, engine: &Engine, config: Config, default: &[f32]) -> Outcome<()> {
+    let area = config.side() * config.side();
+    let channel =
+        |index: usize| default.chunks(area).skip(index).step_by(3).flatten().copied().collect::<Vec<f32>>();
+    let want = [channel(0), channel(1)];
+    let mut got = want.clone().map(|values| vec![f32::from(UNWRITTEN); values.len()]);
+    let [obstacles, agents] = &mut got;
+    engine.observe_windows(obstacles, agents).map_err(|error| error.to_string())?;
+    same(path, "windows of POMAPF", &want, &got)
 }
 
 /// Tells 0 from -0.

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 
 use pogema_core::{
-    Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, MapfOut, Occupancy, OnGoal, Outside,
-    PomapfOut, Reward, Snapshot, StepOut,
+    Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, Occupancy, OnGoal, Outside, Reward,
+    Snapshot, State, StepOut,
 };
 
 use crate::flaw::Flaw;
@@ -22,7 +22,8 @@ pub struct Flawed {
     on_goal: Vec<bool>,
     pub occupied: HashSet<Place>,
     elapsed: i64,
-    past: Vec<Snapshot>,
+    /// Cells and goals as others see them.
+    seen: [Vec<Cell>; 2],
 }
 
 pub fn place(cell: Cell) -> Place {
@@ -48,7 +49,7 @@ impl Flawed {
             on_goal: Vec::new(),
             occupied: HashSet::new(),
             elapsed: 0,
-            past: Vec::new(),
+            seen: [Vec::new(), Vec::new()],
         }))
     }
 
@@ -169,6 +170,10 @@ impl Flawed {
         }
     }
 
+    fn note_cells(&mut self) {
+        self.seen = [&self.cells, &self.goals].map(|places| places.iter().copied().map(cell).collect());
+    }
+
     fn mark_on_goal(&mut self) {
         let reached = |agent: usize| self.active[agent] && self.cells[agent] == self.goals[agent];
         self.on_goal = (0..self.cells.len()).map(reached).collect();
@@ -221,13 +226,6 @@ impl Flawed {
     }
 }
 
-fn write_places(out: &mut [i32], places: &[Place], origin: impl Fn(usize) -> Place) {
-    for (agent, (pair, &(row, col))) in out.chunks_exact_mut(2).zip(places).enumerate() {
-        let (first_row, first_col) = origin(agent);
-        pair.copy_from_slice(&[row - first_row, col - first_col]);
-    }
-}
-
 impl Environment for Flawed {
     fn config(&self) -> &Config {
         &self.config
@@ -246,7 +244,7 @@ impl Environment for Flawed {
         if self.has(Flaw::StartOnGoalFinishes) && self.config.on_goal == OnGoal::Finish {
             self.change_goals();
         }
-        self.past = vec![self.snapshot()];
+        self.note_cells();
         Ok(())
     }
 
@@ -270,29 +268,36 @@ impl Environment for Flawed {
             self.pay_and_end(&mut out);
             self.change_goals();
         }
-        self.past.push(self.snapshot());
+        self.note_cells();
         Ok(())
     }
 
-    fn step_back(&mut self) -> Result<bool, Error> {
-        if !self.config.persistent {
-            return Err(Error::State { reason: "steps are not kept".into() });
-        }
-        if self.past.len() < 2 {
-            return Ok(false);
-        }
-        self.past.pop();
-        let Some(state) = self.past.last().cloned() else { return Ok(false) };
-        self.cells = state.cells.into_iter().map(place).collect();
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
+        let map = self.instance.map();
+        state.check_fits(self.config.num_agents, (map.height(), map.width()))?;
+        self.cells = state.cells.iter().copied().map(place).collect();
         if !self.has(Flaw::BackKeepsGoals) {
-            self.goals = state.goals.into_iter().map(place).collect();
+            self.goals = state.goals.iter().copied().map(place).collect();
         }
-        self.active = state.active;
-        self.occupied = state.occupied.into_iter().map(place).collect();
+        self.active.clone_from(&state.active);
+        self.occupied = state.occupied.iter().copied().map(place).collect();
         if !self.has(Flaw::BackKeepsTime) {
-            self.elapsed = state.step as i64;
+            self.elapsed = step as i64;
         }
-        Ok(true)
+        self.note_cells();
+        Ok(())
+    }
+
+    fn state(&self) -> State<'_> {
+        let [cells, goals] = &self.seen;
+        let Self { active, on_goal, .. } = self;
+        State { step: self.elapsed as u64, cells, goals, active, on_goal }
+    }
+
+    fn occupied(&self) -> Vec<Cell> {
+        let mut occupied: Vec<Cell> = self.occupied.iter().copied().map(cell).collect();
+        occupied.sort_by_key(|cell| (cell.row, cell.col));
+        occupied
     }
 
     fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
@@ -304,42 +309,13 @@ impl Environment for Flawed {
         Ok(())
     }
 
-    fn observe_pomapf(&self, out: PomapfOut<'_>) -> Result<(), Error> {
-        self.write(out.obstacles, |this, agent| this.window(agent, |at| this.looks_blocked(at)));
-        self.write(out.agents, Self::agents_window);
-        let starts: Vec<Place> = self.instance.starts().iter().copied().map(place).collect();
-        let origin = |agent: usize| if self.has(Flaw::PositionsFromCorner) { (0, 0) } else { starts[agent] };
-        write_places(out.cells, &self.cells, origin);
-        write_places(out.goals, &self.goals, origin);
-        Ok(())
-    }
-
-    fn observe_mapf(&self, out: MapfOut<'_>) -> Result<(), Error> {
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
         let radius = self.config.radius as i32;
         let map = self.instance.map();
         let (height, width) = (map.height() as i32, map.width() as i32);
         let rows = -radius..height + radius;
         let places = rows.flat_map(|row| (-radius..width + radius).map(move |col| (row, col)));
-        out.obstacles
-            .iter_mut()
-            .zip(places)
-            .for_each(|(value, at)| *value = u8::from(self.looks_blocked(at)));
-        let border = if self.has(Flaw::GlobalPositionsWithoutBorder) { 0 } else { radius };
-        write_places(out.cells, &self.cells, |_| (-border, -border));
-        write_places(out.goals, &self.goals, |_| (-border, -border));
+        out.iter_mut().zip(places).for_each(|(value, at)| *value = u8::from(self.looks_blocked(at)));
         Ok(())
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        let mut occupied: Vec<Cell> = self.occupied.iter().copied().map(cell).collect();
-        occupied.sort_by_key(|cell| (cell.row, cell.col));
-        Snapshot {
-            step: self.elapsed as u64,
-            cells: self.cells.iter().copied().map(cell).collect(),
-            goals: self.goals.iter().copied().map(cell).collect(),
-            active: self.active.clone(),
-            on_goal: self.on_goal.clone(),
-            occupied,
-        }
     }
 }

@@ -6,6 +6,7 @@ use pogema_conformance::port::{Ask, Beginning, Hello, Key, Link, Misbehaviour, R
 use pogema_core::{Cell, GoalSource, GoalStream, Instance, Map, OnGoal};
 use pogema_maps::{Components, GridConfig, InstanceSource};
 use pogema_numpy::Generator;
+use serde_json::{Value, json};
 
 use crate::engine::Flawed;
 use crate::flaw::Flaw;
@@ -14,13 +15,15 @@ pub struct Planted {
     flaw: Flaw,
     server: Server,
     num_agents: usize,
+    radius: i64,
+    starts: Vec<[i64; 2]>,
     elapsed: u64,
 }
 
 impl Planted {
     pub fn new(flaw: Flaw) -> Self {
         let server = Server::with(&format!("{flaw:?}"), move |config| Flawed::make(flaw, config));
-        Self { flaw, server, num_agents: 0, elapsed: 0 }
+        Self { flaw, server, num_agents: 0, radius: 0, starts: Vec::new(), elapsed: 0 }
     }
 
     /// Draws the instance itself where the bug is in the drawing.
@@ -33,6 +36,35 @@ impl Planted {
         reply.foretold = Key::LeftOut;
         reply.derived = None;
         Some(reply)
+    }
+
+    /// Notes what positions are counted from.
+    fn note_origins(&mut self, beginning: &Beginning, reply: &Reply) {
+        let config = beginning.config.as_ref().and_then(|config| GridConfig::from_value(config).ok());
+        let told = beginning.instance.as_ref().map(|header| header.config.radius);
+        if let Some(radius) = told.or(config.map(|config| config.obs_radius)) {
+            self.radius = radius as i64;
+        }
+        self.starts = reply.cells.clone().unwrap_or_default();
+    }
+
+    fn spoil_positions(&self, observations: &mut Value) {
+        let mut add = |name: &str, origin: &dyn Fn(usize) -> [i64; 2]| {
+            let Some(pairs) = observations.get_mut(name).and_then(Value::as_array_mut) else { return };
+            for (agent, pair) in pairs.iter_mut().enumerate() {
+                let [down, right] = origin(agent);
+                *pair = json!([pair[0].as_i64().unwrap() + down, pair[1].as_i64().unwrap() + right]);
+            }
+        };
+        match self.flaw {
+            Flaw::PositionsFromCorner => {
+                ["xy", "target_xy"].map(|name| add(name, &|agent| self.starts[agent]))
+            }
+            Flaw::GlobalPositionsWithoutBorder => {
+                ["global_xy", "global_target_xy"].map(|name| add(name, &|_| [-self.radius; 2]))
+            }
+            _ => return,
+        };
     }
 
     fn spoil_figures(&self, reply: &mut Reply) {
@@ -74,6 +106,12 @@ impl Link for Planted {
         let mut reply = self.server.ask(ask)?;
         self.num_agents = reply.cells.as_ref().map_or(self.num_agents, Vec::len);
         self.elapsed += u64::from(reply.rewards.is_some());
+        if let Ask::Reset(beginning) = ask {
+            self.note_origins(beginning, &reply);
+        }
+        if let Some(observations) = &mut reply.observations {
+            self.spoil_positions(observations);
+        }
         self.spoil_figures(&mut reply);
         if let (Flaw::CallersListUntouched, Ask::Step { actions }) = (self.flaw, ask) {
             reply.actions_after = reply.actions_after.map(|_| actions.clone());

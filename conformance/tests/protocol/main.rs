@@ -7,15 +7,12 @@ mod schema;
 mod traces;
 mod validate;
 
-use std::fmt::Write as _;
-
-use pogema_conformance::Engine;
 use pogema_conformance::port::{
-    Ask, Hello, Link, Part, Plan, Port, PortReport, Profile, Reply, Server, Subject, Told as Key, check_ports,
+    Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
+    check_ports, play_on_port,
 };
-use pogema_core::{Action, Collision, Environment, Observation, OnGoal, StepOut};
-use pogema_maps::{GridConfig, InstanceSource};
-use pogema_reference::Reference;
+use pogema_conformance::{Engine, Op, Request};
+use pogema_core::{Collision, Observation, OnGoal};
 use serde_json::json;
 
 use links::{Told, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
@@ -120,7 +117,7 @@ fn a_key_that_is_claimed_must_be_there() {
     assert_eq!(whats(&report), [""; 0]);
 }
 
-/// A port is an environment like any other.
+/// A port that plays an instance gives what the reference gives.
 #[test]
 fn a_port_steps_in_lockstep_with_the_reference() {
     for observation in ["default", "POMAPF", "MAPF"] {
@@ -128,42 +125,19 @@ fn a_port_steps_in_lockstep_with_the_reference() {
             "size": 6, "num_agents": 5, "density": 0.2, "seed": 3, "collision_system": "soft",
             "on_target": "restart", "observation_type": observation, "obs_radius": 2, "max_episode_steps": 30,
         });
-        let config = GridConfig::from_value(&config).unwrap();
-        let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
+        let actions =
+            |step: usize| (0..5).map(|agent| ((step * 7 + agent * 3 + step / 3) % 5) as i64).collect();
+        let steps = (0..30).map(|step| Op::Step(actions(step)));
+        let ops = std::iter::once(Op::Reset(None)).chain(steps).collect();
+        let request = Request { config, ops, ..Request::default() };
+        let expected = pogema_conformance::play(&request);
         let mut server = Server::new(Engine::LITERAL);
         let hello = server.hello().unwrap();
-        let mut port = Port::new(&mut server, &hello, config.rules());
-        let mut reference = Reference::new(config.rules()).unwrap();
-        let mut pair: [&mut dyn Environment; 2] = [&mut port, &mut reference];
-        let mut outcomes = Vec::new();
-        for environment in &mut pair {
-            environment.reset(&instance).unwrap();
-            outcomes.push(play(&mut **environment));
+        let answered = play_on_port(&mut server, &hello, Mode::Instance, &request, &expected);
+        assert_eq!(answered.fault, None);
+        assert_eq!(answered.response.records.len(), 31);
+        for (want, got) in expected.records.iter().zip(&answered.response.records).skip(1) {
+            assert_eq!(want, got, "{observation}");
         }
-        assert_eq!(outcomes[0], outcomes[1]);
     }
-}
-
-/// Everything that an environment says in thirty steps.
-fn play(environment: &mut dyn Environment) -> String {
-    let num_agents = environment.config().num_agents;
-    let mut told = String::new();
-    for step in 0..30 {
-        let actions: Vec<Action> =
-            (0..num_agents).map(|agent| Action::ALL[(step * 7 + agent * 3 + step / 3) % 5]).collect();
-        let (mut rewards, mut terminated, mut truncated) =
-            (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        environment.step(&actions, out).unwrap();
-        let mut seen = vec![0.0; environment.config().num_observed()];
-        if environment.config().observation == Observation::Default {
-            environment.observe(&mut seen).unwrap();
-        } else {
-            let windows = pogema_planners::Windows::of(environment).unwrap();
-            let _ = write!(told, "{windows:?}");
-        }
-        let state = environment.snapshot();
-        let _ = write!(told, "{state:?} {rewards:?} {terminated:?} {truncated:?} {seen:?}");
-    }
-    told
 }

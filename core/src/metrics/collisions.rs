@@ -1,5 +1,7 @@
 //! Moves that came to nothing.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Action, Cell, Map};
 
 /// Counts moves that an obstacle or another agent prevented.
@@ -7,7 +9,8 @@ use crate::{Action, Cell, Map};
 /// Rule: metrics/collisions
 ///
 /// Source: the paper's Coordination metric; POGEMA 1.4.0 itself counts no collisions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CollisionMeter {
     /// Moves that an obstacle or the wall prevented.
     pub with_obstacles: u64,

@@ -1,11 +1,23 @@
 //! How crowded agents find it.
 
+use serde::{Deserialize, Serialize};
+
+/// What one agent sees in its window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seen {
+    /// Agents, itself included.
+    pub agents: u32,
+    /// Cells without an obstacle.
+    pub free_cells: u32,
+}
+
 /// Averages the share of free window cells that hold an agent, over agents and then over time.
 ///
 /// Rule: metrics/density
 ///
 /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `AgentsDensityWrapper`
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DensityMeter {
     means: Vec<f64>,
 }
@@ -16,12 +28,14 @@ impl DensityMeter {
         self.means.clear();
     }
 
-    /// Takes one moment in (the one after the reset too): for each agent how many agents and how many free
-    /// cells its window holds. A window without a free cell counts as empty; POGEMA divides by zero there.
-    pub fn feed(&mut self, windows: impl Iterator<Item = (u32, u32)>) {
-        let share =
-            |(agents, free): (u32, u32)| if free == 0 { 0.0 } else { f64::from(agents) / f64::from(free) };
-        let shares: Vec<f64> = windows.map(share).collect();
+    /// Adds one moment, the one after the reset included. A window without a free cell counts as empty; POGEMA divides
+    /// by zero there.
+    pub fn feed(&mut self, seen: &[Seen]) {
+        let share = |&Seen { agents, free_cells }: &Seen| match free_cells {
+            0 => 0.0,
+            free_cells => f64::from(agents) / f64::from(free_cells),
+        };
+        let shares: Vec<f64> = seen.iter().map(share).collect();
         self.means.push(pairwise_mean(&shares));
     }
 

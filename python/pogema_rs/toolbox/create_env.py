@@ -7,7 +7,6 @@ from typing import Any, Optional
 
 import numpy as np
 
-from pogema_rs._engine import Witness
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.integrations.make_pogema import pogema_v0
 from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
@@ -15,7 +14,7 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.wrappers import Wrapper
 from pogema_rs.wrappers.metrics import RuntimeMetricWrapper
 
-__all__ = ["Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "WitnessWrapper", "create_env_base"]
+__all__ = ["Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "create_env_base"]
 
 
 class Environment(GridConfig):
@@ -76,45 +75,15 @@ class MultiMapWrapper(Wrapper):
         return self.env.reset(seed=seed, **kwargs)
 
 
-class WitnessWrapper(Wrapper):
-    """Adds `avg_agents_density`, `a_collisions` and `o_collisions`, for which every step has to be seen.
-
-    Collisions are moves that another agent, or an obstacle, prevented.
-
-    Rule: metrics/density, metrics/collisions
-    """
-
-    def reset(self, **kwargs: Any) -> tuple[Any, Any]:
-        """Begins an episode."""
-        result = self.env.reset(**kwargs)
-        self._witness = Witness()
-        self._witness.begin(self.unwrapped._engine)
-        return result
-
-    def step(self, action: Any) -> Any:
-        """Plays a step and looks at it."""
-        engine, witness = self.unwrapped._engine, self._witness
-        # The environment may change the list that it is given.
-        wanted = list(action)
-        witness.before(engine)
-        result = self.env.step(action)
-        witness.after(engine, wanted)
-        _, _, terminated, truncated, infos = result
-        if all(terminated) or all(truncated):
-            density, with_agents, with_obstacles = witness.figures()
-            figures = {"avg_agents_density": density, "a_collisions": with_agents, "o_collisions": with_obstacles}
-            infos[0].setdefault("metrics", {}).update(figures)
-        return result
-
-
 def create_env_base(config: Environment) -> Any:
     """The environment of a suite, which measures all that results hold.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `create_env_base`
     """
     env: Wrapper = ProvideGlobalObstacles(pogema_v0(grid_config=config))
+    env.unwrapped._engine.measure()
     if config.use_maps:
         env = MultiMapWrapper(env)
     if config.with_animation:
         env = AnimationMonitor(env, AnimationConfig(save_every_idx_episode=None))
-    return RuntimeMetricWrapper(WitnessWrapper(env))
+    return RuntimeMetricWrapper(env)

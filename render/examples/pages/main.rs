@@ -9,8 +9,8 @@ use std::path::Path;
 
 use pogema_core::{Error, Trace};
 use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
+use pogema_render::html;
 use pogema_render::stays::{Cause, Stay, stays};
-use pogema_render::{Film, html};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Error> {
@@ -60,12 +60,12 @@ fn write_all(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
     for (name, title, yaml, stray) in EPISODES {
         let trace = play::play(yaml, stray)?;
-        write(&folder.join(format!("{name}.html")), &html::replay(&Film::of(&trace), title)?)?;
+        write(&folder.join(format!("{name}.html")), &html::replay(&trace, title)?)?;
         write(&folder.join(format!("{name}.json")), &expected(&trace, title)?)?;
     }
     let mut empty = play::play("{size: 4, density: 0, seed: 1}", 0.0)?;
     empty.steps.clear();
-    write(&folder.join("empty.html"), &html::replay(&Film::of(&empty), "Before the first step")?)?;
+    write(&folder.join("empty.html"), &html::replay(&empty, "Before the first step")?)?;
     write(&folder.join("editor.html"), &html::editor())
 }
 

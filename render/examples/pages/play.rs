@@ -2,9 +2,7 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use pogema_core::{
-    Action, Cell, Environment, Error, Map, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
-};
+use pogema_core::{Action, Cell, Environment, Episode, Error, Map, Snapshot, Trace};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::{Generator, NumpyError};
 use pogema_reference::Reference;
@@ -14,40 +12,14 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
     let config = GridConfig::from_yaml(yaml)?;
     let (seed, rules) = (config.seed.unwrap_or_default(), config.rules());
     let instance = InstanceSource::new(config, None)?.generate()?.instance;
-    // The instance may bring the number of agents.
-    let num_agents = rules.num_agents;
-    let mut environment = Reference::new(rules)?;
-    environment.reset(&instance)?;
-    let start = TraceStart { state: environment.snapshot(), observations: None };
-    let mut trace = Trace {
-        header: TraceHeader::new(rules, &instance, rules.max_steps.max(1) as usize),
-        start,
-        steps: Vec::new(),
-    };
+    let mut episode = Episode::new(Reference::new(rules)?).with_recording();
+    episode.start(instance)?;
     let mut walkers = Walkers { generator: Generator::seeded(seed), stray, ways: HashMap::new() };
-    for _ in 0..rules.max_steps.max(1) {
-        let actions = walkers
-            .act(instance.map(), &environment.snapshot())
-            .map_err(|error| Error::State { reason: error.to_string() })?;
-        let mut step = TraceStep {
-            actions,
-            state: Snapshot::default(),
-            rewards: vec![0.0; num_agents],
-            terminated: vec![false; num_agents],
-            truncated: vec![false; num_agents],
-            observations: None,
-            metrics: None,
-        };
-        let TraceStep { actions, rewards, terminated, truncated, .. } = &mut step;
-        environment.step(actions, StepOut { rewards, terminated, truncated })?;
-        step.state = environment.snapshot();
-        let is_over = step.terminated.iter().all(|&flag| flag);
-        trace.steps.push(step);
-        if is_over {
-            break;
-        }
+    while !episode.is_over() {
+        let actions = walkers.act(episode.instance()?.map(), &episode.snapshot());
+        episode.step(&actions.map_err(|error| Error::State { reason: error.to_string() })?)?;
     }
-    Ok(trace)
+    episode.trace()
 }
 
 /// What the reference observes after the reset and each step of an episode: for each agent its three windows, one
@@ -55,18 +27,15 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
 #[allow(dead_code, reason = "the unit tests, which share this file, observe nothing")]
 pub fn observe(trace: &Trace) -> Result<Vec<Vec<String>>, Error> {
     let config = trace.header.config;
-    let mut environment = Reference::new(config)?;
-    environment.reset(&trace.header.instance()?)?;
-    let (mut rewards, mut flags, mut others) =
-        (vec![0.0; config.num_agents], vec![false; config.num_agents], vec![false; config.num_agents]);
+    let mut episode = Episode::new(Reference::new(config)?);
+    episode.start(trace.header.instance()?)?;
     let mut values = vec![0.0; config.num_observed()];
     let mut all = Vec::new();
     for actions in std::iter::once(None).chain(trace.steps.iter().map(|step| Some(&step.actions))) {
         if let Some(actions) = actions {
-            let out = StepOut { rewards: &mut rewards, terminated: &mut flags, truncated: &mut others };
-            environment.step(actions, out)?;
+            episode.step(actions)?;
         }
-        environment.observe(&mut values)?;
+        episode.engine().observe(&mut values)?;
         let window =
             |values: &[f32]| values.iter().map(|&value| if value == 0.0 { '0' } else { '1' }).collect();
         all.push(values.chunks(values.len() / config.num_agents).map(window).collect());

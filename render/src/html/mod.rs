@@ -9,9 +9,8 @@ mod template;
 
 use std::sync::LazyLock;
 
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
 
-use crate::Film;
 pub use album::Album;
 pub use pack::pack;
 use page::Page;
@@ -47,8 +46,8 @@ const EDITOR: [&str; 8] = [
 /// # Errors
 /// If the lists of a step are not as long as there are agents, if a cell is off the map, or if an agent is not next
 /// to where it was a step before.
-pub fn replay(film: &Film, title: &str) -> Result<String, Error> {
-    Ok(replay_page(title, &pack(film)?).text())
+pub fn replay(trace: &Trace, title: &str) -> Result<String, Error> {
+    Ok(replay_page(title, &pack(trace)?).text())
 }
 
 /// A replay page of what [`pack`] made.

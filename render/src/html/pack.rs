@@ -6,10 +6,10 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use miniz_oxide::deflate::compress_to_vec_zlib;
-use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, TraceStep};
+use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace, TraceStep};
 use serde::Serialize;
 
-use crate::Film;
+use crate::check::check;
 use crate::stays::{Cause, Stay, stays};
 
 /// Levels above this take longer and save nearly nothing.
@@ -67,22 +67,22 @@ struct Parts {
 ///
 /// # Errors
 /// As [`super::replay`].
-pub fn pack(film: &Film) -> Result<String, Error> {
-    let num_agents = film.config.num_agents;
-    film.check()?;
-    Error::check_length("cells", num_agents, film.start.cells.len())?;
-    Error::check_length("on_goal", num_agents, film.start.on_goal.len())?;
+pub fn pack(trace: &Trace) -> Result<String, Error> {
+    let num_agents = trace.header.config.num_agents;
+    check(trace)?;
+    Error::check_length("cells", num_agents, trace.start.state.cells.len())?;
+    Error::check_length("on_goal", num_agents, trace.start.state.on_goal.len())?;
     let mut parts = Parts::default();
-    parts.add_start(film);
-    let mut before = &film.start;
-    for (step, after) in (1..).zip(&film.steps) {
+    parts.add_start(trace);
+    let mut before = &trace.start.state;
+    for (step, after) in (1..).zip(&trace.steps) {
         check_step(after, num_agents)?;
-        parts.add_step(film, before, after, step)?;
+        parts.add_step(trace, before, after, step)?;
         before = &after.state;
     }
-    let mut bytes = bits(film.map.obstacles());
+    let mut bytes = bits(trace.header.map.obstacles());
     let Parts { starts, flags, moves, rewards, ended, goals, reverted, others, marks, reasons } = parts;
-    let beyond = match &film.outside {
+    let beyond = match &trace.header.outside {
         Outside::Free => Vec::new(),
         Outside::Noise(noise) => bits(noise.obstacles()),
     };
@@ -90,13 +90,13 @@ pub fn pack(film: &Film) -> Result<String, Error> {
         bytes.extend_from_slice(part);
     }
     let header = Header {
-        height: film.map.height(),
-        width: film.map.width(),
+        height: trace.header.map.height(),
+        width: trace.header.map.width(),
         num_agents,
-        num_steps: film.steps.len(),
+        num_steps: trace.steps.len(),
         has_noise: !beyond.is_empty(),
-        config: film.config,
-        metrics: film.steps.iter().rev().find_map(|step| step.metrics.as_ref()),
+        config: trace.header.config,
+        metrics: trace.steps.iter().rev().find_map(|step| step.metrics.as_ref()),
         reasons,
         num_goals: goals.len() / 12,
         num_reverted: reverted.len(),
@@ -109,18 +109,18 @@ pub fn pack(film: &Film) -> Result<String, Error> {
 }
 
 impl Parts {
-    fn add_start(&mut self, film: &Film) {
-        let start = &film.start;
+    fn add_start(&mut self, trace: &Trace) {
+        let start = &trace.start.state;
         for (cell, goal) in start.cells.iter().zip(&start.goals) {
             put_cell(&mut self.starts, *cell);
             put_cell(&mut self.starts, *goal);
         }
         let flags = start.active.iter().zip(&start.on_goal);
         self.flags = flags.map(|(&active, &on_goal)| u8::from(active) | u8::from(on_goal) << 1).collect();
-        self.add_marks(film, start, 0);
+        self.add_marks(trace, start, 0);
     }
 
-    fn add_step(&mut self, film: &Film, before: &Snapshot, step: &TraceStep, at: u32) -> Result<(), Error> {
+    fn add_step(&mut self, trace: &Trace, before: &Snapshot, step: &TraceStep, at: u32) -> Result<(), Error> {
         let after = &step.state;
         for (agent, &action) in step.actions.iter().enumerate() {
             let moved = direction(before.cells[agent], after.cells[agent]).ok_or_else(|| {
@@ -137,10 +137,10 @@ impl Parts {
                 put_cell(&mut self.goals, after.goals[agent]);
             }
         }
-        for stay in stays(&film.config, &film.map, before, &step.actions, after) {
+        for stay in stays(&trace.header.config, &trace.header.map, before, &step.actions, after) {
             self.add_stay(stay);
         }
-        self.add_marks(film, after, at);
+        self.add_marks(trace, after, at);
         Ok(())
     }
 
@@ -163,18 +163,18 @@ impl Parts {
     }
 
     /// Rule: occupancy/as-released
-    fn add_marks(&mut self, film: &Film, state: &Snapshot, at: u32) {
-        let mut differs = vec![false; film.map.obstacles().len()];
+    fn add_marks(&mut self, trace: &Trace, state: &Snapshot, at: u32) {
+        let mut differs = vec![false; trace.header.map.obstacles().len()];
         let active = state.cells.iter().zip(&state.active).filter(|&(_, &active)| active);
         for (&cell, _) in active {
-            differs[film.map.index(cell)] = true;
+            differs[trace.header.map.index(cell)] = true;
         }
-        for &cell in state.occupied.iter().filter(|&&cell| film.map.contains(cell)) {
-            differs[film.map.index(cell)] ^= true;
+        for &cell in state.occupied.iter().filter(|&&cell| trace.header.map.contains(cell)) {
+            differs[trace.header.map.index(cell)] ^= true;
         }
         for (index, _) in differs.iter().enumerate().filter(|&(_, &differs)| differs) {
             self.marks.extend(at.to_le_bytes());
-            put_cell(&mut self.marks, film.map.cell_at(index));
+            put_cell(&mut self.marks, trace.header.map.cell_at(index));
         }
     }
 }

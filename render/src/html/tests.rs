@@ -3,7 +3,6 @@
 use pogema_core::{Cell, Error, Trace};
 
 use super::{editor, replay};
-use crate::Film;
 use crate::stays::play::play;
 
 fn trace() -> Trace {
@@ -12,12 +11,12 @@ fn trace() -> Trace {
 }
 
 fn reason(trace: &Trace) -> String {
-    replay(&Film::of(trace), "wrong").unwrap_err().to_string()
+    replay(&trace, "wrong").unwrap_err().to_string()
 }
 
 #[test]
 fn titles_stay_text() {
-    let page = replay(&Film::of(&trace()), "</title><script>alert(1)</script>&\"").unwrap();
+    let page = replay(&trace(), "</title><script>alert(1)</script>&\"").unwrap();
     let title = "&lt;&#x2f;title&gt;&lt;script&gt;alert(1)&lt;&#x2f;script&gt;&amp;&quot;";
     assert!(page.contains(&format!("<title>{title}</title>")), "{}", &page[..600]);
     assert!(page.contains(&format!("<h1 id=\"title\">{title}</h1>")));
@@ -26,7 +25,7 @@ fn titles_stay_text() {
 
 #[test]
 fn pages_name_no_other_place() {
-    for page in [editor(), replay(&Film::of(&trace()), "t").unwrap()] {
+    for page in [editor(), replay(&trace(), "t").unwrap()] {
         for place in ["http:", "https:", "//www", "@import", "url("] {
             assert!(!page.contains(place), "{place}");
         }
@@ -39,7 +38,7 @@ fn pages_name_no_other_place() {
 fn a_film_without_steps_is_shown() {
     let mut trace = trace();
     trace.steps.clear();
-    let page = replay(&Film::of(&trace), "start").unwrap();
+    let page = replay(&trace, "start").unwrap();
     assert!(page.contains("\"num_steps\":0,"));
 }
 
@@ -47,10 +46,10 @@ fn a_film_without_steps_is_shown() {
 fn lists_of_another_length_are_refused() {
     let mut short = trace();
     short.steps[2].rewards.pop();
-    assert_eq!(replay(&Film::of(&short), "t"), Err(Error::Length { what: "rewards", want: 3, got: 2 }));
+    assert_eq!(replay(&short, "t"), Err(Error::Length { what: "rewards", want: 3, got: 2 }));
     let mut short = trace();
     short.start.state.goals.pop();
-    assert_eq!(replay(&Film::of(&short), "t"), Err(Error::Length { what: "goals", want: 3, got: 2 }));
+    assert_eq!(replay(&short, "t"), Err(Error::Length { what: "goals", want: 3, got: 2 }));
 }
 
 #[test]

@@ -7,9 +7,8 @@ mod timing;
 
 use std::fmt::Write as _;
 
-use pogema_core::Error;
+use pogema_core::{Error, Trace};
 
-use crate::film::Film;
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::Style;
 use timing::{Timing, number};
@@ -23,8 +22,8 @@ const LONGER_SIDE: f64 = 512.0;
 ///
 /// # Errors
 /// If the style names an agent or frame that there is not, or an agent is not on the map.
-pub fn draw(film: &Film, style: &Style) -> Result<String, Error> {
-    let scene = Scene::new(film, style)?;
+pub fn draw(trace: &Trace, style: &Style) -> Result<String, Error> {
+    let scene = Scene::new(trace, style)?;
     let timing =
         style.static_frame.is_none().then(|| Timing::new(scene.states.len(), style.step_time)).flatten();
     let mut picture = Picture { scene: &scene, timing, text: String::new() };
@@ -142,7 +141,7 @@ impl Picture<'_> {
     fn window(&mut self) {
         let Some(agent) = self.scene.window() else { return };
         let (first, color) = (self.scene.agent(agent, 0), self.scene.style.colors.own);
-        let reach = self.scene.film.config.radius as f64 + size::WINDOW;
+        let reach = self.scene.trace.header.config.radius as f64 + size::WINDOW;
         let side = number(2.0 * reach);
         self.put(format_args!(
             "<rect class=\"window\" x=\"{}\" y=\"{}\" width=\"{side}\" height=\"{side}\" rx=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\" stroke-dasharray=\"{}\"{}",

@@ -6,7 +6,7 @@ use console::{Style as Paint, truncate_str};
 use pogema_core::picture::agent_letter;
 use pogema_core::{Cell, Error, Snapshot};
 
-use crate::film::{check_agent, refused};
+use crate::check::{check_agent, refused};
 use crate::ground::{Border, Ground};
 use part::Part;
 
@@ -33,14 +33,14 @@ impl Default for Style {
     }
 }
 
-/// Draws a state as lines of text, the first of which tells the step and what is cut off.
+/// Draws a state as lines of text. The first line gives the step and, if the map is cut off, which part is shown.
 ///
 /// Agents are letters and their goals the same letters in capitals; of more than 26 agents all are numbers, and
 /// their goals have a `*`.
 ///
 /// # Errors
 /// [`Error::State`] if there is no such agent; [`Error::Length`] if the state's lists do not fit each other.
-pub fn frame(ground: Ground<'_>, state: &Snapshot, style: &Style) -> Result<String, Error> {
+pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -> Result<String, Error> {
     let num_agents = state.cells.len();
     Error::check_length("goals", num_agents, state.goals.len())?;
     Error::check_length("active", num_agents, state.active.len())?;
@@ -52,7 +52,7 @@ pub fn frame(ground: Ground<'_>, state: &Snapshot, style: &Style) -> Result<Stri
     }
     let cell_width = if num_agents > MOST_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
     let part = Part::of(ground, state, style, cell_width);
-    let drawing = Drawing { ground, state, style, cell_width, part };
+    let drawing = Drawing { ground, step, state, style, cell_width, part };
     let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));
     let lines = drawing.lines();
     Ok(lines
@@ -75,6 +75,7 @@ enum Mark {
 
 struct Drawing<'a> {
     ground: Ground<'a>,
+    step: usize,
     state: &'a Snapshot,
     style: &'a Style,
     cell_width: usize,
@@ -86,7 +87,7 @@ impl Drawing<'_> {
         let part = &self.part;
         let edge = "─".repeat(part.cols.len() * (self.cell_width + 1) + 1);
         let is_framed = self.style.border == Border::Thin;
-        let mut lines = vec![format!("step {}{}", self.state.step, part.cut())];
+        let mut lines = vec![format!("step {}{}", self.step, part.cut())];
         if is_framed {
             lines.push(format!("┌{edge}┐"));
         }

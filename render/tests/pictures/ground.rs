@@ -1,8 +1,8 @@
 //! The border is the one that agents see.
 
-use pogema_core::{Environment, MapfOut};
+use pogema_core::Environment;
 use pogema_reference::Reference;
-use pogema_render::{Border, Film};
+use pogema_render::{Border, Ground};
 
 use crate::common::{Policy, config, trace};
 
@@ -17,12 +17,10 @@ fn the_full_border_is_the_one_of_the_engine() {
             let mut environment = Reference::new(trace.header.config).unwrap();
             environment.reset(&trace.header.instance().unwrap()).unwrap();
             let side = 7 + 2 * radius;
-            let (mut obstacles, mut cells, mut goals) = (vec![0; side * side], [0; 4], [0; 4]);
-            let out = MapfOut { obstacles: &mut obstacles, cells: &mut cells, goals: &mut goals };
-            environment.observe_mapf(out).unwrap();
+            let mut obstacles = vec![0; side * side];
+            environment.observe_map(&mut obstacles).unwrap();
 
-            let film = Film::of(&trace);
-            let ground = film.ground();
+            let ground = Ground::of(&trace);
             let (rows, cols) = (ground.rows(Border::Full), ground.cols(Border::Full));
             let drawn: Vec<u8> = rows
                 .flat_map(|row| cols.clone().map(move |col| u8::from(ground.is_obstacle(row, col))))

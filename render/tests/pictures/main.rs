@@ -14,29 +14,25 @@ mod svg_facts;
 mod text_frames;
 
 use common::{Policy, config, trace};
-use pogema_core::{Cell, Config, Map, Outside, Snapshot};
-use pogema_render::Film;
+use pogema_core::{Cell, Config, Instance, Map, Outside, Snapshot, Trace};
 
-/// The film of an episode of POGEMA's A*, from a YAML text.
-fn film(text: &str) -> Film {
-    Film::of(&trace(&config(text), Policy::AStar))
+/// An episode of POGEMA's A*, from a YAML text.
+fn played(text: &str) -> Trace {
+    trace(&config(text), Policy::AStar)
 }
 
-/// A film of one frame: a map, and for each agent its cell and its goal.
-fn still(rows: &[&str], agents: &[([u16; 2], [u16; 2])]) -> Film {
-    let start = Snapshot {
-        step: 0,
+/// A trace of one frame: a map, and for each agent its cell and its goal.
+fn still(rows: &[&str], agents: &[([u16; 2], [u16; 2])]) -> Trace {
+    let config = Config { num_agents: agents.len(), radius: 2, ..Config::default() };
+    let nobody = Instance::new(Map::from_rows(rows).unwrap(), Outside::Free, Vec::new(), Vec::new()).unwrap();
+    let mut trace = Trace::still(config, &nobody);
+    // Also what no instance can be.
+    trace.start.state = Snapshot {
         cells: agents.iter().map(|&(cell, _)| Cell::from(cell)).collect(),
         goals: agents.iter().map(|&(_, goal)| Cell::from(goal)).collect(),
         active: vec![true; agents.len()],
         on_goal: vec![false; agents.len()],
         occupied: Vec::new(),
     };
-    Film {
-        config: Config { num_agents: agents.len(), radius: 2, ..Config::default() },
-        map: Map::from_rows(rows).unwrap(),
-        outside: Outside::Free,
-        start,
-        steps: Vec::new(),
-    }
+    trace
 }

@@ -1,9 +1,10 @@
 //! GIFs show every state at its time.
 
 use gif::{ColorOutput, DecodeOptions};
-use pogema_render::{Color, Colors, Film, Style, gif as gifs};
+use pogema_core::Trace;
+use pogema_render::{Color, Colors, Ground, Style, gif as gifs};
 
-use crate::{film, still};
+use crate::{played, still};
 
 /// Every picture of a GIF as a viewer shows it, with how long. Units: hundredths of a second.
 struct Shown {
@@ -51,9 +52,9 @@ impl Shown {
     }
 }
 
-fn encode(film: &Film, style: &Style, width: u32) -> Shown {
+fn encode(trace: &Trace, style: &Style, width: u32) -> Shown {
     let (mut told, mut all) = (0, 0);
-    let bytes = gifs::encode(film, style, width, &mut |done, of| {
+    let bytes = gifs::encode(trace, style, width, &mut |done, of| {
         assert_eq!(done, told + 1);
         (told, all) = (done, of);
     });
@@ -64,13 +65,13 @@ fn encode(film: &Film, style: &Style, width: u32) -> Shown {
 #[test]
 fn every_state_is_shown_at_its_time() {
     for (on_target, step_time) in [("finish", 0.25), ("nothing", 0.1), ("restart", 0.13)] {
-        let film = film(&format!(
+        let trace = played(&format!(
             "{{size: 7, num_agents: 5, seed: 3, on_target: {on_target}, max_episode_steps: 20}}"
         ));
-        let shown = encode(&film, &Style { step_time, ..Style::default() }, 200);
+        let shown = encode(&trace, &Style { step_time, ..Style::default() }, 200);
         let duration: u32 = shown.frames.iter().map(|(_, delay)| u32::from(*delay)).sum();
-        assert_eq!(duration, ((film.steps.len() + 2) as f64 * step_time * 100.0).round() as u32);
-        for (frame, state) in film.states().enumerate() {
+        assert_eq!(duration, ((trace.steps.len() + 2) as f64 * step_time * 100.0).round() as u32);
+        for (frame, state) in trace.states().enumerate() {
             let time = ((frame + 1) as f64 * step_time * 100.0).round() as u32;
             for agent in 0..5 {
                 let cell = state.cells[agent];
@@ -89,10 +90,10 @@ fn every_state_is_shown_at_its_time() {
 
 #[test]
 fn agents_go_smoothly_from_cell_to_cell() {
-    let mut film = still(&["..", ".."], &[([0, 0], [1, 0])]);
-    let mut state = film.start.clone();
+    let mut trace = still(&["..", ".."], &[([0, 0], [1, 0])]);
+    let mut state = trace.start.state.clone();
     state.cells[0] = [0, 1].into();
-    film.steps.push(pogema_core::TraceStep {
+    trace.steps.push(pogema_core::TraceStep {
         actions: vec![pogema_core::Action::Right],
         state,
         rewards: vec![0.0],
@@ -101,7 +102,7 @@ fn agents_go_smoothly_from_cell_to_cell() {
         observations: None,
         metrics: None,
     });
-    let shown = encode(&film, &Style { show_lines: false, ..Style::default() }, 100);
+    let shown = encode(&trace, &Style { show_lines: false, ..Style::default() }, 100);
     // Five frames to a step, of which the first and the last are held: the start, four between, and the end.
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [30, 5, 5, 5, 5, 25]);
     let centre = |time: u32| {
@@ -114,18 +115,18 @@ fn agents_go_smoothly_from_cell_to_cell() {
 
 #[test]
 fn what_stands_still_is_one_frame() {
-    let film = film("{size: 5, num_agents: 2, seed: 1}").part(0..=0).unwrap();
-    let shown = encode(&film, &Style::default(), 100);
+    let trace = played("{size: 5, num_agents: 2, seed: 1}").part(0..=0).unwrap();
+    let shown = encode(&trace, &Style::default(), 100);
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [50]);
 }
 
 #[test]
 fn every_agent_may_have_a_color_of_its_own() {
     let agents: Vec<_> = (0..64).map(|at| (([at / 8, at % 8]), [0, 0])).collect();
-    let film = still(&["........"; 8], &agents);
+    let trace = still(&["........"; 8], &agents);
     let colors = (0..64_u8).map(|at| Color([at * 4, 255 - at * 4, 128])).collect();
     let style = Style { colors: Colors { agents: colors, ..Colors::default() }, ..Style::default() };
-    let shown = encode(&film, &style, 220);
+    let shown = encode(&trace, &style, 220);
     for (agent, expected) in style.colors.agents.iter().enumerate() {
         let found = shown.pixel(0, (agent / 8 + 2) * 20, (agent % 8 + 2) * 20);
         let distance = (0..3).map(|at| found.0[at].abs_diff(expected.0[at])).max().unwrap();
@@ -135,15 +136,16 @@ fn every_agent_may_have_a_color_of_its_own() {
 
 #[test]
 fn a_view_keeps_what_it_has_seen() {
-    let film =
-        film("{size: 12, num_agents: 3, seed: 3, obs_radius: 2, on_target: restart, max_episode_steps: 20}");
-    let shown = encode(&film, &Style { egocentric: Some(1), ..Style::default() }, 15 * 20);
-    let ground = film.ground();
+    let trace = played(
+        "{size: 12, num_agents: 3, seed: 3, obs_radius: 2, on_target: restart, max_episode_steps: 20}",
+    );
+    let shown = encode(&trace, &Style { egocentric: Some(1), ..Style::default() }, 15 * 20);
+    let ground = Ground::of(&trace);
     let cells: Vec<_> = (-1..13).flat_map(|row| (-1..13).map(move |col| (row, col))).collect();
     let mut num_seen = Vec::new();
-    for frame in 0..=film.steps.len() {
+    for frame in 0..=trace.steps.len() {
         let sees =
-            |row, col| film.states().take(frame + 1).any(|state| ground.sees(state.cells[1], row, col));
+            |row, col| trace.states().take(frame + 1).any(|state| ground.sees(state.cells[1], row, col));
         let obstacles = cells.iter().filter(|(row, col)| ground.is_obstacle(*row, *col));
         let mut count = 0;
         for &(row, col) in obstacles {
@@ -156,5 +158,5 @@ fn a_view_keeps_what_it_has_seen() {
         }
         num_seen.push(count);
     }
-    assert!(num_seen[0] < num_seen[film.steps.len()]);
+    assert!(num_seen[0] < num_seen[trace.steps.len()]);
 }

@@ -1,11 +1,11 @@
 //! PNG shows what the state says, and looks like the SVG.
 
-use pogema_core::Cell;
-use pogema_render::{Border, Color, Colors, Film, Style, raster, svg};
+use pogema_core::{Cell, Trace};
+use pogema_render::{Border, Color, Colors, Ground, Style, raster, svg};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg;
 
-use crate::{film, still};
+use crate::{played, still};
 
 struct Picture {
     width: usize,
@@ -32,17 +32,17 @@ impl Picture {
 /// Pixels of a cell.
 const CELL: f64 = 20.0;
 
-fn draw(film: &Film, style: &Style) -> Picture {
-    let cols = film.ground().cols(style.border).len() + 1;
-    Picture::of(&raster::png(film, style, (cols as f64 * CELL) as u32).unwrap())
+fn draw(trace: &Trace, style: &Style) -> Picture {
+    let cols = Ground::of(&trace).cols(style.border).len() + 1;
+    Picture::of(&raster::png(trace, style, (cols as f64 * CELL) as u32).unwrap())
 }
 
 #[test]
 fn the_middle_of_a_cell_and_its_edge_tell_what_is_there() {
     for (seed, frame) in [(1, 0), (2, 3), (3, 9)] {
-        let film = film(&format!("{{size: 9, num_agents: 12, seed: {seed}, density: 0.2}}"));
+        let trace = played(&format!("{{size: 9, num_agents: 12, seed: {seed}, density: 0.2}}"));
         let style = Style { static_frame: Some(frame), ..Style::default() };
-        let (picture, state) = (draw(&film, &style), film.state(frame).unwrap());
+        let (picture, state) = (draw(&trace, &style), trace.state(frame).unwrap());
         assert_eq!((picture.width, picture.height), (240, 240));
         let colors = Colors::default();
         let color_of = |agent: usize| colors.agents[agent % 7];
@@ -59,7 +59,7 @@ fn the_middle_of_a_cell_and_its_edge_tell_what_is_there() {
             };
             let middle = match here(&state.cells) {
                 Some(agent) => color_of(agent),
-                None if film.ground().is_obstacle(row, col) => colors.obstacle,
+                None if Ground::of(&trace).is_obstacle(row, col) => colors.obstacle,
                 None => Color::WHITE,
             };
             assert_eq!(picture.pixel(y, x), middle, "({row}, {col})");
@@ -89,16 +89,19 @@ fn rendered(svg: &str, width: u32, height: u32) -> Vec<u8> {
 
 #[test]
 fn png_and_svg_look_alike() {
-    let film =
-        film("{size: 8, num_agents: 6, seed: 4, obs_radius: 2, on_target: nothing, max_episode_steps: 12}");
+    let trace =
+        played("{size: 8, num_agents: 6, seed: 4, obs_radius: 2, on_target: nothing, max_episode_steps: 12}");
     for frame in [0, 7] {
         for egocentric in [None, Some(2)] {
             for (border, show_lines) in [(Border::None, true), (Border::Thin, false), (Border::Full, true)] {
                 let style =
                     Style { static_frame: Some(frame), egocentric, border, show_lines, ..Style::default() };
-                let picture = draw(&film, &style);
-                let other =
-                    rendered(&svg::draw(&film, &style).unwrap(), picture.width as u32, picture.height as u32);
+                let picture = draw(&trace, &style);
+                let other = rendered(
+                    &svg::draw(&trace, &style).unwrap(),
+                    picture.width as u32,
+                    picture.height as u32,
+                );
                 let far =
                     picture.data.iter().zip(&other).filter(|(one, other)| one.abs_diff(**other) > 40).count();
                 // Edges are smoothed a little differently.
@@ -110,21 +113,21 @@ fn png_and_svg_look_alike() {
 
 #[test]
 fn one_cell_and_no_agents_can_be_drawn() {
-    let mut film = still(&["."], &[([0, 0], [0, 0])]);
-    assert_eq!(draw(&film, &Style { border: Border::None, ..Style::default() }).height, 40);
-    film.start.active[0] = false;
-    let empty = draw(&film, &Style::default());
+    let mut trace = still(&["."], &[([0, 0], [0, 0])]);
+    assert_eq!(draw(&trace, &Style { border: Border::None, ..Style::default() }).height, 40);
+    trace.start.state.active[0] = false;
+    let empty = draw(&trace, &Style::default());
     assert_eq!(empty.pixel(2.0 * CELL, 2.0 * CELL), Color::WHITE);
 }
 
 #[test]
 fn a_picture_is_as_wide_as_asked_and_as_high_as_its_map() {
-    let film = still(&["....", "...."], &[([0, 0], [0, 1])]);
+    let trace = still(&["....", "...."], &[([0, 0], [0, 1])]);
     for width in [1, 7, 700] {
-        let picture = Picture::of(&raster::png(&film, &Style::default(), width).unwrap());
+        let picture = Picture::of(&raster::png(&trace, &Style::default(), width).unwrap());
         assert_eq!((picture.width, picture.height), (width as usize, (width as usize * 5).div_ceil(7)));
     }
-    let width_for = |longer| raster::width_for(&film, &Style::default(), longer);
+    let width_for = |longer| raster::width_for(&trace, &Style::default(), longer);
     assert_eq!([700, 699, 13, 7, 6, 1].map(width_for), [700, 693, 7, 7, 6, 1]);
     let high = still(&["..", "..", "..", ".."], &[([0, 0], [0, 1])]);
     assert_eq!(raster::width_for(&high, &Style::default(), 700), 500);

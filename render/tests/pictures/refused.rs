@@ -2,55 +2,55 @@
 
 use std::path::Path;
 
-use pogema_core::Error;
-use pogema_render::{Color, Colors, Film, Style, gif, raster, svg, video};
+use pogema_core::{Error, Trace};
+use pogema_render::{Color, Colors, Style, gif, raster, svg, video};
 
-use crate::{film, still};
+use crate::{played, still};
 
-fn refused(film: &Film, style: Style) -> String {
-    let error = svg::draw(film, &style).unwrap_err();
-    assert_eq!(raster::png(film, &style, 100).unwrap_err(), error);
+fn refused(trace: &Trace, style: Style) -> String {
+    let error = svg::draw(trace, &style).unwrap_err();
+    assert_eq!(raster::png(trace, &style, 100).unwrap_err(), error);
     error.to_string()
 }
 
 #[test]
 fn agents_frames_and_times_that_are_not_there() {
-    let film = still(&[".."], &[([0, 0], [0, 1])]);
+    let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let usual = Style::default;
-    assert_eq!(refused(&film, Style { egocentric: Some(1), ..usual() }), "agent is `1`, expected 0 to 0");
-    assert_eq!(refused(&film, Style { static_frame: Some(1), ..usual() }), "frame is `1`, expected 0 to 0");
+    assert_eq!(refused(&trace, Style { egocentric: Some(1), ..usual() }), "agent is `1`, expected 0 to 0");
+    assert_eq!(refused(&trace, Style { static_frame: Some(1), ..usual() }), "frame is `1`, expected 0 to 0");
     for step_time in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let text = refused(&film, Style { step_time, ..usual() });
+        let text = refused(&trace, Style { step_time, ..usual() });
         assert_eq!(text, format!("time of a step is `{step_time}`, expected more than 0 seconds"));
     }
     let colors = Colors { agents: Vec::new(), ..Colors::default() };
-    let text = refused(&film, Style { colors, ..usual() });
+    let text = refused(&trace, Style { colors, ..usual() });
     assert_eq!(text, "number of agents' colours is `0`, expected at least 1");
 }
 
 #[test]
 fn parts_that_are_not_there() {
-    let film = film("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
-    let refused = |first: usize, last: usize| film.part(first..=last).unwrap_err().to_string();
+    let trace = played("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
+    let refused = |first: usize, last: usize| trace.part(first..=last).unwrap_err().to_string();
     assert_eq!(refused(2, 1), "range of steps is `2..1`, expected first..last");
-    let num_steps = film.steps.len();
+    let num_steps = trace.steps.len();
     assert_eq!(refused(0, num_steps + 1), format!("frame is `{}`, expected 0 to {num_steps}", num_steps + 1));
 }
 
 #[test]
 fn agents_off_the_map_and_lists_that_do_not_fit() {
-    let film = still(&[".."], &[([0, 5], [0, 1])]);
-    let text = refused(&film, Style::default());
+    let trace = still(&[".."], &[([0, 5], [0, 1])]);
+    let text = refused(&trace, Style::default());
     assert_eq!(text, "a cell of frame 0 is `(0, 5)`, expected a cell of the map of 1 rows and 2 columns");
-    let mut film = still(&[".."], &[([0, 0], [0, 1])]);
-    film.start.active.clear();
-    assert_eq!(refused(&film, Style::default()), "active has length 0, expected 1");
+    let mut trace = still(&[".."], &[([0, 0], [0, 1])]);
+    trace.start.state.active.clear();
+    assert_eq!(refused(&trace, Style::default()), "active has length 0, expected 1");
 }
 
 #[test]
 fn pictures_of_no_pixels_or_too_many() {
-    let film = still(&[".."], &[([0, 0], [0, 1])]);
-    let draw = |width| raster::png(&film, &Style::default(), width).unwrap_err().to_string();
+    let trace = still(&[".."], &[([0, 0], [0, 1])]);
+    let draw = |width| raster::png(&trace, &Style::default(), width).unwrap_err().to_string();
     assert_eq!(
         draw(0),
         "size of the picture is `0 x 0 pixels`, expected 1 to 67108864 pixels in all: choose another width"
@@ -61,7 +61,7 @@ fn pictures_of_no_pixels_or_too_many() {
     );
     assert!(draw(u32::MAX).starts_with("size of the picture is `4294967295 x "));
     let moving =
-        |style: &Style, width| gif::encode(&film, style, width, &mut |_, _| ()).unwrap_err().to_string();
+        |style: &Style, width| gif::encode(&trace, style, width, &mut |_, _| ()).unwrap_err().to_string();
     assert_eq!(
         moving(&Style::default(), 4000),
         "size of the picture is `4000 x 3200 pixels`, expected 1 to 8388608 pixels in all: choose another width"
@@ -74,9 +74,10 @@ fn pictures_of_no_pixels_or_too_many() {
 
 #[test]
 fn videos_of_unknown_kinds() {
-    let film = still(&[".."], &[([0, 0], [0, 1])]);
+    let trace = still(&[".."], &[([0, 0], [0, 1])]);
     for name in ["a.avi", "a", "mp4"] {
-        let error = video::write(&film, &Style::default(), 100, Path::new(name), &mut |_, _| ()).unwrap_err();
+        let error =
+            video::write(&trace, &Style::default(), 100, Path::new(name), &mut |_, _| ()).unwrap_err();
         assert_eq!(error, Error::io(name, "the name of a video ends in `.mp4` or `.webm`"));
     }
 }

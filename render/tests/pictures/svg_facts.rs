@@ -2,19 +2,19 @@
 
 use std::collections::BTreeSet;
 
-use pogema_core::{Cell, OnGoal, Snapshot};
-use pogema_render::{Border, Colors, Film, Style, svg};
+use pogema_core::{Cell, OnGoal, Snapshot, Trace};
+use pogema_render::{Border, Colors, Ground, Style, svg};
 use roxmltree::Document;
 
 use crate::common::{Policy, config, trace};
 use crate::drawn::{Circle, attribute, elements, ids, squares};
-use crate::{film, still};
+use crate::{played, still};
 
 /// Digits of a drawing are enough for so much. Units: cells.
 const NEAR: f64 = 0.02;
 
-fn episodes() -> Vec<Film> {
-    let mut films = Vec::new();
+fn episodes() -> Vec<Trace> {
+    let mut traces = Vec::new();
     for on_target in ["finish", "nothing", "restart"] {
         for collision in ["priority", "soft"] {
             for (seed, policy) in [(1, Policy::AStar), (2, Policy::Random), (3, Policy::AStar)] {
@@ -23,13 +23,13 @@ fn episodes() -> Vec<Film> {
                     7 + seed,
                     20 * seed
                 );
-                films.push(Film::of(&trace(&config(&text), policy)));
+                traces.push(trace(&config(&text), policy));
             }
         }
     }
     // The shortest that moves.
-    films.push(films[0].part(0..=1).unwrap());
-    films
+    traces.push(traces[0].part(0..=1).unwrap());
+    traces
 }
 
 /// The time of a frame as a share of the whole.
@@ -51,10 +51,10 @@ fn assert_follows(circle: &Circle, states: &[&Snapshot], cell: impl Fn(&Snapshot
 
 #[test]
 fn agents_and_goals_are_where_the_states_say() {
-    for film in episodes() {
-        let text = svg::draw(&film, &Style::default()).unwrap();
+    for trace in episodes() {
+        let text = svg::draw(&trace, &Style::default()).unwrap();
         let document = Document::parse(&text).unwrap();
-        let states: Vec<_> = film.states().collect();
+        let states: Vec<_> = trace.states().collect();
         for (class, prefix) in [("agents", 'a'), ("goals", 'g')] {
             let circles = elements(&document, class, "circle");
             let taking_part = (0..9).filter(|&agent| states.iter().any(|state| state.active[agent]));
@@ -76,8 +76,8 @@ fn agents_and_goals_are_where_the_states_say() {
 
 #[test]
 fn every_animation_repeats_forever_and_takes_as_long() {
-    for film in episodes() {
-        let text = svg::draw(&film, &Style { egocentric: Some(0), ..Style::default() }).unwrap();
+    for trace in episodes() {
+        let text = svg::draw(&trace, &Style { egocentric: Some(0), ..Style::default() }).unwrap();
         let document = Document::parse(&text).unwrap();
         let is_animated = |node: &roxmltree::Node<'_, '_>| node.tag_name().name().starts_with("animate");
         let all: BTreeSet<_> = document
@@ -85,9 +85,9 @@ fn every_animation_repeats_forever_and_takes_as_long() {
             .filter(is_animated)
             .map(|node| (node.attribute("dur"), node.attribute("repeatCount")))
             .collect();
-        let ends = film.states().position(|state| !state.active[0]);
-        let is_cut = film.config.on_goal == OnGoal::Finish;
-        let num_frames = ends.filter(|_| is_cut).map_or(film.steps.len() + 1, |end| end + 1);
+        let ends = trace.states().position(|state| !state.active[0]);
+        let is_cut = trace.header.config.on_goal == OnGoal::Finish;
+        let num_frames = ends.filter(|_| is_cut).map_or(trace.steps.len() + 1, |end| end + 1);
         let duration = (num_frames as f64 * 0.25).to_string();
         let duration = format!("{}s", duration.trim_start_matches('0'));
         assert_eq!(all, BTreeSet::from([(Some(duration.as_str()), Some("indefinite"))]));
@@ -96,9 +96,9 @@ fn every_animation_repeats_forever_and_takes_as_long() {
 
 #[test]
 fn obstacles_are_those_of_the_map_and_its_border() {
-    for film in episodes() {
+    for trace in episodes() {
         for border in [Border::None, Border::Thin, Border::Full] {
-            let text = svg::draw(&film, &Style { border, ..Style::default() }).unwrap();
+            let text = svg::draw(&trace, &Style { border, ..Style::default() }).unwrap();
             let document = Document::parse(&text).unwrap();
             let shift = 0.2;
             let found: BTreeSet<_> = elements(&document, "obstacles", "path")
@@ -106,13 +106,13 @@ fn obstacles_are_those_of_the_map_and_its_border() {
                 .flat_map(|path| squares(path.attribute("d").unwrap()))
                 .map(|at| at.map(|middle| (middle - shift).round() as i32))
                 .collect();
-            let ground = film.ground();
+            let ground = Ground::of(&trace);
             let all = ground.rows(border).flat_map(|row| ground.cols(border).map(move |col| [row, col]));
             let expected: BTreeSet<_> = all.filter(|&[row, col]| ground.is_obstacle(row, col)).collect();
             assert_eq!(found, expected);
-            let (height, width) = (film.map.height() as i32, film.map.width() as i32);
+            let (height, width) = (trace.header.map.height() as i32, trace.header.map.width() as i32);
             let ring = usize::from(border != Border::None) * (2 * (height + width) + 4) as usize;
-            assert_eq!(found.len(), film.map.obstacles().iter().filter(|&&it| it).count() + ring);
+            assert_eq!(found.len(), trace.header.map.obstacles().iter().filter(|&&it| it).count() + ring);
             let view_box: Vec<i32> = document
                 .root_element()
                 .attribute("viewBox")
@@ -130,9 +130,9 @@ fn obstacles_are_those_of_the_map_and_its_border() {
 }
 
 /// The states that the view of an agent shows.
-fn states_of(film: &Film, own: usize) -> Vec<&Snapshot> {
-    let mut states: Vec<_> = film.states().collect();
-    if film.config.on_goal == OnGoal::Finish
+fn states_of(trace: &Trace, own: usize) -> Vec<&Snapshot> {
+    let mut states: Vec<_> = trace.states().collect();
+    if trace.header.config.on_goal == OnGoal::Finish
         && let Some(end) = states.iter().position(|state| !state.active[own])
     {
         states.truncate(end + 1);
@@ -142,10 +142,10 @@ fn states_of(film: &Film, own: usize) -> Vec<&Snapshot> {
 
 #[test]
 fn a_view_shades_agents_that_its_agent_does_not_see() {
-    for (film, own) in episodes().iter().flat_map(|film| [(film, 0), (film, 5)]) {
-        let text = svg::draw(film, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
+    for (trace, own) in episodes().iter().flat_map(|trace| [(trace, 0), (trace, 5)]) {
+        let text = svg::draw(trace, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
         let document = Document::parse(&text).unwrap();
-        let states = states_of(film, own);
+        let states = states_of(trace, own);
         for node in elements(&document, "agents", "circle") {
             let agent: usize = node.attribute("id").unwrap()[1..].parse().unwrap();
             let circle = Circle::of(node);
@@ -153,7 +153,7 @@ fn a_view_shades_agents_that_its_agent_does_not_see() {
             assert_follows(&circle, &states, |state| state.cells[agent], agent);
             for (frame, state) in states.iter().enumerate() {
                 let Cell { row, col } = state.cells[agent];
-                let is_seen = film.ground().sees(state.cells[own], row.into(), col.into());
+                let is_seen = Ground::of(&trace).sees(state.cells[own], row.into(), col.into());
                 let found = circle.opacity_at(time_of(frame, states.len()));
                 let expected = if is_seen { 1.0 } else { 0.2 };
                 assert!((found - expected).abs() < NEAR, "agent {agent} frame {frame}");
@@ -167,10 +167,10 @@ fn a_view_shades_agents_that_its_agent_does_not_see() {
 
 #[test]
 fn a_view_shades_obstacles_until_its_agent_sees_them() {
-    for (film, own) in episodes().iter().flat_map(|film| [(film, 0), (film, 5)]) {
-        let text = svg::draw(film, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
+    for (trace, own) in episodes().iter().flat_map(|trace| [(trace, 0), (trace, 5)]) {
+        let text = svg::draw(trace, &Style { egocentric: Some(own), ..Style::default() }).unwrap();
         let document = Document::parse(&text).unwrap();
-        let states = states_of(film, own);
+        let states = states_of(trace, own);
         for path in elements(&document, "obstacles", "path") {
             let fade = path.children().find(|child| child.has_tag_name("animate"));
             let told = fade.map(|node| {
@@ -180,7 +180,8 @@ fn a_view_shades_obstacles_until_its_agent_sees_them() {
             let is_shaded = path.attribute("opacity") == Some(".2");
             for at in squares(path.attribute("d").unwrap()) {
                 let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
-                let first = states.iter().position(|state| film.ground().sees(state.cells[own], row, col));
+                let first =
+                    states.iter().position(|state| Ground::of(&trace).sees(state.cells[own], row, col));
                 assert_eq!(told.or((!is_shaded).then_some(0)), first, "({row}, {col})");
             }
         }
@@ -189,13 +190,13 @@ fn a_view_shades_obstacles_until_its_agent_sees_them() {
 
 #[test]
 fn a_frame_stands_still_and_shows_its_state() {
-    for film in episodes() {
-        let frame = film.steps.len() / 2;
+    for trace in episodes() {
+        let frame = trace.steps.len() / 2;
         let style = Style { static_frame: Some(frame), ..Style::default() };
-        let text = svg::draw(&film, &style).unwrap();
+        let text = svg::draw(&trace, &style).unwrap();
         assert!(!text.contains("<animate"));
         let document = Document::parse(&text).unwrap();
-        let state = film.state(frame).unwrap();
+        let state = trace.state(frame).unwrap();
         let found: Vec<_> = elements(&document, "agents", "circle")
             .iter()
             .map(|node| [attribute(*node, "cy") as u16, attribute(*node, "cx") as u16])
@@ -208,16 +209,16 @@ fn a_frame_stands_still_and_shows_its_state() {
 
 #[test]
 fn a_frame_of_a_view_shows_all_that_was_seen_until_then() {
-    for film in episodes() {
-        let frame = film.steps.len() / 2;
+    for trace in episodes() {
+        let frame = trace.steps.len() / 2;
         let style = Style { static_frame: Some(frame), egocentric: Some(2), ..Style::default() };
-        let text = svg::draw(&film, &style).unwrap();
+        let text = svg::draw(&trace, &style).unwrap();
         let document = Document::parse(&text).unwrap();
         for path in elements(&document, "obstacles", "path") {
             for at in squares(path.attribute("d").unwrap()) {
                 let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
-                let sees = |state: &Snapshot| film.ground().sees(state.cells[2], row, col);
-                let is_seen = film.states().take(frame + 1).any(sees);
+                let sees = |state: &Snapshot| Ground::of(&trace).sees(state.cells[2], row, col);
+                let is_seen = trace.states().take(frame + 1).any(sees);
                 assert_eq!(path.attribute("opacity"), (!is_seen).then_some(".2"), "({row}, {col})");
             }
         }
@@ -226,9 +227,9 @@ fn a_frame_of_a_view_shows_all_that_was_seen_until_then() {
 
 #[test]
 fn agents_keep_their_colors_though_others_have_finished() {
-    let mut film = still(&["..."], &[([0, 0], [0, 1]), ([0, 1], [0, 2]), ([0, 2], [0, 0])]);
-    film.start.active[0] = false;
-    let text = svg::draw(&film, &Style::default()).unwrap();
+    let mut trace = still(&["..."], &[([0, 0], [0, 1]), ([0, 1], [0, 2]), ([0, 2], [0, 0])]);
+    trace.start.state.active[0] = false;
+    let text = svg::draw(&trace, &Style::default()).unwrap();
     let document = Document::parse(&text).unwrap();
     let colors: Vec<_> =
         elements(&document, "agents", "circle").into_iter().map(|node| Circle::of(node).color).collect();
@@ -237,16 +238,16 @@ fn agents_keep_their_colors_though_others_have_finished() {
 
 #[test]
 fn agents_lines_and_colors_can_be_chosen() {
-    let film = film("{size: 6, num_agents: 3, seed: 1}");
+    let trace = played("{size: 6, num_agents: 3, seed: 1}");
     let none =
-        svg::draw(&film, &Style { show_agents: false, egocentric: Some(1), ..Style::default() }).unwrap();
+        svg::draw(&trace, &Style { show_agents: false, egocentric: Some(1), ..Style::default() }).unwrap();
     assert!(ids(&Document::parse(&none).unwrap()).is_empty());
     assert!(!none.contains("window"));
-    let plain = svg::draw(&film, &Style { show_lines: false, ..Style::default() }).unwrap();
-    assert!(!plain.contains("lines") && svg::draw(&film, &Style::default()).unwrap().contains("lines"));
+    let plain = svg::draw(&trace, &Style { show_lines: false, ..Style::default() }).unwrap();
+    assert!(!plain.contains("lines") && svg::draw(&trace, &Style::default()).unwrap().contains("lines"));
     let agents = vec!["#ff0000".parse().unwrap(), "#00ff00".parse().unwrap()];
     let style = Style { colors: Colors { agents, ..Colors::default() }, ..Style::default() };
-    let text = svg::draw(&film, &style).unwrap();
+    let text = svg::draw(&trace, &style).unwrap();
     let document = Document::parse(&text).unwrap();
     let colors: Vec<_> =
         elements(&document, "goals", "circle").into_iter().map(|node| Circle::of(node).color).collect();
@@ -255,9 +256,9 @@ fn agents_lines_and_colors_can_be_chosen() {
 
 #[test]
 fn a_part_of_an_episode_shows_its_frames() {
-    let film = film("{size: 8, num_agents: 4, seed: 3, on_target: restart, max_episode_steps: 30}");
-    let part = film.part(10..=20).unwrap();
-    let whole: Vec<_> = film.states().collect();
+    let trace = played("{size: 8, num_agents: 4, seed: 3, on_target: restart, max_episode_steps: 30}");
+    let part = trace.part(10..=20).unwrap();
+    let whole: Vec<_> = trace.states().collect();
     assert_eq!(part.states().collect::<Vec<_>>(), whole[10..=20]);
-    assert_eq!(film.part(7..=7).unwrap().states().collect::<Vec<_>>(), [whole[7]]);
+    assert_eq!(trace.part(7..=7).unwrap().states().collect::<Vec<_>>(), [whole[7]]);
 }

@@ -1,19 +1,19 @@
 //! Frames of text show the state, and fit.
 
-use pogema_core::Error;
-use pogema_render::{Border, Film, text};
+use pogema_core::{Error, Trace};
+use pogema_render::{Border, Ground, text};
 
-use crate::{film, still};
+use crate::{played, still};
 
-fn frame(film: &Film, style: text::Style) -> String {
-    text::frame(film.ground(), &film.start, &style).unwrap()
+fn frame(trace: &Trace, style: text::Style) -> String {
+    text::frame(Ground::of(trace), 0, &trace.start.state, &style).unwrap()
 }
 
 #[test]
 fn many_agents_are_numbers_and_their_goals_have_a_star() {
-    let film = film("{size: 12, num_agents: 40, seed: 2, density: 0.1}");
+    let trace = played("{size: 12, num_agents: 40, seed: 2, density: 0.1}");
     let style = text::Style { border: Border::None, ..text::Style::default() };
-    let text = frame(&film, style);
+    let text = frame(&trace, style);
     for (row, line) in text.lines().skip(1).enumerate() {
         assert_eq!(line.chars().count(), 12 * 4 - 1);
         let cells: Vec<String> =
@@ -22,10 +22,10 @@ fn many_agents_are_numbers_and_their_goals_have_a_star() {
             let here = |cells: &[pogema_core::Cell]| {
                 cells.iter().position(|cell| usize::from(cell.row) == row && usize::from(cell.col) == col)
             };
-            let expected = match (here(&film.start.cells), here(&film.start.goals)) {
+            let expected = match (here(&trace.start.state.cells), here(&trace.start.state.goals)) {
                 (Some(agent), _) => agent.to_string(),
                 (None, Some(agent)) => format!("*{agent}"),
-                _ if film.ground().is_obstacle(row as i32, col as i32) => "███".into(),
+                _ if Ground::of(&trace).is_obstacle(row as i32, col as i32) => "███".into(),
                 _ => "·".into(),
             };
             assert_eq!(shown.trim(), expected);
@@ -35,9 +35,9 @@ fn many_agents_are_numbers_and_their_goals_have_a_star() {
 
 #[test]
 fn colors_change_nothing_but_colors() {
-    let film = film("{size: 8, num_agents: 4, seed: 2}");
-    let plain = frame(&film, text::Style::default());
-    let colored = frame(&film, text::Style { is_colored: true, ..text::Style::default() });
+    let trace = played("{size: 8, num_agents: 4, seed: 2}");
+    let plain = frame(&trace, text::Style::default());
+    let colored = frame(&trace, text::Style { is_colored: true, ..text::Style::default() });
     assert_ne!(colored, plain);
     assert_eq!(console::strip_ansi_codes(&colored), plain);
 }
@@ -45,13 +45,13 @@ fn colors_change_nothing_but_colors() {
 #[test]
 fn a_frame_is_never_larger_than_the_terminal() {
     for (size, num_agents) in [(3, 1), (20, 5), (64, 64)] {
-        let film = film(&format!("{{size: {size}, num_agents: {num_agents}, seed: 2, density: 0.2}}"));
+        let trace = played(&format!("{{size: {size}, num_agents: {num_agents}, seed: 2, density: 0.2}}"));
         for rows in [1, 2, 3, 4, 10, 24, 100] {
             for cols in [1, 2, 5, 20, 79, 300] {
                 for border in [Border::None, Border::Thin, Border::Full] {
                     for view in [None, Some(num_agents - 1)] {
                         let style = text::Style { view, border, is_colored: true, most: Some((rows, cols)) };
-                        let text = frame(&film, style);
+                        let text = frame(&trace, style);
                         assert!(text.lines().count() <= rows, "{style:?}");
                         assert!(
                             text.lines().all(|line| console::measure_text_width(line) <= cols),
@@ -66,10 +66,10 @@ fn a_frame_is_never_larger_than_the_terminal() {
 
 #[test]
 fn a_cut_map_says_so_and_shows_the_agent_it_is_about() {
-    let film = film("{size: 64, num_agents: 20, seed: 2}");
+    let trace = played("{size: 64, num_agents: 20, seed: 2}");
     for view in 0..20 {
         let style = text::Style { view: Some(view), most: Some((12, 40)), ..text::Style::default() };
-        let text = frame(&film, style);
+        let text = frame(&trace, style);
         let (first, rest) = text.split_once('\n').unwrap();
         assert!(first.contains(" of 64") && first.contains("rows ") && first.contains("columns "), "{first}");
         let letter = pogema_core::picture::agent_letter(view);
@@ -81,31 +81,32 @@ fn a_cut_map_says_so_and_shows_the_agent_it_is_about() {
 #[test]
 fn a_view_shows_its_window_and_its_own_goal_alone() {
     // The radius is 2: agent 1 is just seen, agent 2 and its goal are not.
-    let film = still(&[".......#", "........"], &[([0, 0], [1, 6]), ([0, 2], [1, 0]), ([0, 3], [1, 1])]);
+    let trace = still(&[".......#", "........"], &[([0, 0], [1, 6]), ([0, 2], [1, 0]), ([0, 3], [1, 1])]);
     let style = text::Style { view: Some(0), border: Border::None, ..text::Style::default() };
-    assert_eq!(frame(&film, style), "step 0\na · b          \n· · ·       A  ");
+    assert_eq!(frame(&trace, style), "step 0\na · b          \n· · ·       A  ");
 }
 
 #[test]
 fn an_agent_hides_a_goal_and_a_lower_index_a_higher_one() {
-    let film = still(&["...."], &[([0, 0], [0, 3]), ([0, 1], [0, 3]), ([0, 0], [0, 1])]);
+    let trace = still(&["...."], &[([0, 0], [0, 3]), ([0, 1], [0, 3]), ([0, 0], [0, 1])]);
     let style = text::Style { border: Border::None, ..text::Style::default() };
-    assert_eq!(frame(&film, style), "step 0\na b · A");
+    assert_eq!(frame(&trace, style), "step 0\na b · A");
 }
 
 #[test]
 fn what_makes_no_sense_is_refused_in_one_line() {
-    let film = still(&[".."], &[([0, 0], [0, 1])]);
-    let refused =
-        |style: text::Style| text::frame(film.ground(), &film.start, &style).unwrap_err().to_string();
+    let trace = still(&[".."], &[([0, 0], [0, 1])]);
+    let refused = |style: text::Style| {
+        text::frame(Ground::of(&trace), 0, &trace.start.state, &style).unwrap_err().to_string()
+    };
     assert_eq!(
         refused(text::Style { view: Some(1), ..text::Style::default() }),
         "agent is `1`, expected 0 to 0"
     );
     let nothing = refused(text::Style { most: Some((0, 5)), ..text::Style::default() });
     assert_eq!(nothing, "size of the terminal is `0`, expected at least one row and one column");
-    let mut state = film.start.clone();
+    let mut state = trace.start.state.clone();
     state.goals.clear();
-    let error = text::frame(film.ground(), &state, &text::Style::default()).unwrap_err();
+    let error = text::frame(Ground::of(&trace), 0, &state, &text::Style::default()).unwrap_err();
     assert_eq!(error, Error::Length { what: "goals", want: 1, got: 0 });
 }

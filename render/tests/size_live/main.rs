@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 
 use common::{Policy, config, trace};
 use pogema_core::Trace;
-use pogema_render::{Film, Style, svg};
+use pogema_render::{Style, svg};
 
 /// Plays the actions on standard input, and prints its drawing below the cells and goals at the end.
 const SCRIPT: &str = r#"
@@ -71,7 +71,7 @@ fn a_drawing_is_at_most_half_as_large_as_pogemas() {
                 let trace = trace(&config(&text), policy);
                 let theirs = drawn_by_pogema(&text, &trace, egocentric).len();
                 let style = Style { egocentric, ..Style::default() };
-                let ours = svg::draw(&Film::of(&trace), &style).unwrap().len();
+                let ours = svg::draw(&trace, &style).unwrap().len();
                 let ratio = ours as f64 / theirs as f64;
                 println!(
                     "{size:>2} x {size:<2}  {num_agents:>2} agents  {:>3} steps  {on_target:<8}  {policy:?} {egocentric:?}: {ours} / {theirs} = {ratio:.3}",

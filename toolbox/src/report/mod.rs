@@ -38,7 +38,7 @@ impl Replay {
     /// Plays an episode again, if its algorithm is built in.
     pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &Environments) -> Self {
         let again = suite.play_again(environments, &pick.algorithm, pick.episode);
-        match again.and_then(|(metrics, trace)| Ok((metrics, pack(&pogema_render::Film::of(&trace))?))) {
+        match again.and_then(|(metrics, trace)| Ok((metrics, pack(&trace)?))) {
             Ok((metrics, film)) => Self::played(pick, results, &metrics, film),
             Err(error) => Self::failed(pick, error.to_string()),
         }

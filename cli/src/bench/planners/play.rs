@@ -2,9 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use pogema_core::{
-    Action, CollisionMeter, Environment, EpisodeMeter, Error, Instance, Metrics, Snapshot, StepOut,
-};
+use pogema_core::{Action, Episode, Error, Instance, Metrics, State};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_planners::{LifelongPolicy, Outcome, PlannerPolicy, planner, validate};
 use pogema_reference::Reference;
@@ -27,32 +25,22 @@ pub struct Played {
 /// Plays an episode to its end.
 pub fn play(
     config: &GridConfig,
-    mut act: impl FnMut(&Instance, &Snapshot) -> Result<Vec<Action>, Error>,
+    mut act: impl FnMut(&Instance, State<'_>) -> Result<Vec<Action>, Error>,
 ) -> Result<Played, Error> {
     let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
-    let rules = config.rules();
-    let mut environment = Reference::new(rules)?;
-    environment.reset(&instance)?;
-    let (mut meter, mut collisions) = (EpisodeMeter::new(&rules), CollisionMeter::default());
-    let num_agents = rules.num_agents;
-    let (mut rewards, mut terminated, mut truncated) =
-        (vec![0.0; num_agents], vec![false; num_agents], vec![false; num_agents]);
+    let mut episode = Episode::new(Reference::new(config.rules())?).with_collisions();
+    episode.start(instance)?;
     let mut runtime = Duration::ZERO;
-    let mut now = environment.snapshot();
-    loop {
+    while !episode.is_over() {
         let began = Instant::now();
-        let actions = act(&instance, &now)?;
+        let actions = act(episode.instance()?, episode.state())?;
         runtime += began.elapsed();
-        let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-        environment.step(&actions, out)?;
-        let next = environment.snapshot();
-        collisions.feed(instance.map(), &now.cells, &now.active, &actions, &next.cells);
-        now = next;
-        if let Some(metrics) = meter.feed(&now.on_goal, &terminated, &truncated) {
-            let num_reverted = collisions.with_agents + collisions.with_obstacles;
-            return Ok(Played { metrics, runtime, num_reverted, bound: None, impossible: None });
-        }
+        episode.step(&actions)?;
     }
+    let metrics = episode.metrics();
+    let num_reverted = (metrics.a_collisions.unwrap_or(0.0) + metrics.o_collisions.unwrap_or(0.0)) as u64;
+    let metrics = Metrics { a_collisions: None, o_collisions: None, ..metrics };
+    Ok(Played { metrics, runtime, num_reverted, bound: None, impossible: None })
 }
 
 /// Plays an episode of one goal for each agent; its plan, if it is whole, has to be valid and to come true.
@@ -61,7 +49,7 @@ pub fn play_once(config: &GridConfig, name: &str, thinking: &Thinking) -> Result
     let mut policy = PlannerPolicy::new(planner(name, thinking.choice())?, thinking.budget()?, most_steps);
     let mut task = None;
     let mut played = play(config, |instance, now| {
-        task.get_or_insert_with(|| (instance.map().clone(), now.cells.clone(), now.goals.clone()));
+        task.get_or_insert_with(|| (instance.map().clone(), now.cells.to_vec(), now.goals.to_vec()));
         // It is asked for one plan, which it either finds or not.
         let has_none = |outcome: &Outcome| outcome.best().is_none();
         if policy.outcomes().first().is_some_and(has_none) {

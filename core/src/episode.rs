@@ -1,0 +1,358 @@
+//! One episode: the only loop that plays, measures and records.
+
+use serde::{Deserialize, Serialize};
+
+use crate::metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
+use crate::{
+    Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut, Trace, TraceHeader,
+    TraceStart, TraceStep,
+};
+
+/// An engine at play: owns the instance, the results of the last step, the meters and, on request, a recording.
+///
+/// Playing on after the end is allowed (rule: end/after). An `Err` leaves the episode as it was.
+///
+/// ```
+/// # use pogema_core::{Config, Environment, Episode, Error, Instance};
+/// fn wait<E: Environment>(engine: E, instance: Instance) -> Result<f64, Error> {
+///     let mut episode = Episode::new(engine).with_collisions();
+///     episode.start(instance)?;
+///     while !episode.is_over() {
+///         episode.step(&vec![pogema_core::Action::Stay; episode.config().num_agents])?;
+///     }
+///     Ok(episode.metrics().a_collisions.unwrap_or_default())
+/// }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Episode<E> {
+    engine: E,
+    instance: Option<Instance>,
+    num_steps: u64,
+    rewards: Vec<f32>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+    meters: Meters,
+    /// The figures of the episode, if the last step ended it.
+    figures: Option<Metrics>,
+    /// All states since the reset, if the config keeps them.
+    past: Vec<Snapshot>,
+    is_recorded: bool,
+    recording: Option<Recording>,
+    scratch: Scratch,
+}
+
+/// What an episode measures.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Meters {
+    /// POGEMA's own figures.
+    pub episode: EpisodeMeter,
+    /// How crowded agents find it, if that is measured.
+    pub density: Option<DensityMeter>,
+    /// Prevented moves, if they are counted.
+    pub collisions: Option<CollisionMeter>,
+}
+
+/// The states and steps of an episode so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recording {
+    /// The state after the reset.
+    pub start: Snapshot,
+    /// Every step, those that were taken back included.
+    pub steps: Vec<TraceStep>,
+}
+
+/// Buffers kept from step to step, so that a step allocates nothing.
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    cells: Vec<Cell>,
+    active: Vec<bool>,
+    seen: Vec<Seen>,
+}
+
+impl Meters {
+    fn reset(&mut self) {
+        self.episode.reset();
+        if let Some(density) = &mut self.density {
+            density.reset();
+        }
+        if let Some(collisions) = &mut self.collisions {
+            *collisions = CollisionMeter::default();
+        }
+    }
+}
+
+impl<E: Environment> Episode<E> {
+    /// An episode that has not started. It measures POGEMA's own figures alone and records nothing.
+    pub fn new(engine: E) -> Self {
+        let config = *engine.config();
+        Self {
+            engine,
+            instance: None,
+            num_steps: 0,
+            rewards: vec![0.0; config.num_agents],
+            terminated: vec![false; config.num_agents],
+            truncated: vec![false; config.num_agents],
+            meters: Meters { episode: EpisodeMeter::new(&config), density: None, collisions: None },
+            figures: None,
+            past: Vec::new(),
+            is_recorded: false,
+            recording: None,
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Also measures how crowded agents find it.
+    ///
+    /// Rule: metrics/density
+    #[must_use]
+    pub fn with_density(mut self) -> Self {
+        self.meters.density = Some(DensityMeter::default());
+        self
+    }
+
+    /// Also counts prevented moves.
+    ///
+    /// Rule: metrics/collisions
+    #[must_use]
+    pub fn with_collisions(mut self) -> Self {
+        self.meters.collisions = Some(CollisionMeter::default());
+        self
+    }
+
+    /// Also keeps every step, for [`Episode::trace`].
+    #[must_use]
+    pub fn with_recording(mut self) -> Self {
+        self.is_recorded = true;
+        self
+    }
+
+    /// Chooses whether episodes are recorded, from the next start on.
+    pub fn record(&mut self, is_recorded: bool) {
+        self.is_recorded = is_recorded;
+    }
+
+    /// Starts the episode, or the next one.
+    ///
+    /// # Errors
+    /// If the instance does not fit the config.
+    pub fn start(&mut self, instance: Instance) -> Result<(), Error> {
+        self.engine.reset(&instance)?;
+        self.instance = Some(instance);
+        self.num_steps = 0;
+        self.figures = None;
+        self.meters.reset();
+        self.feed_density()?;
+        let is_kept = self.config().persistent;
+        self.past = if is_kept { vec![self.engine.snapshot()] } else { Vec::new() };
+        let recording = || Recording { start: self.engine.snapshot(), steps: Vec::new() };
+        self.recording = self.is_recorded.then(recording);
+        Ok(())
+    }
+
+    /// Continues an episode whose engine is already in the right state; `past` holds the kept states.
+    ///
+    /// # Errors
+    /// [`Error::ForeignState`] if a state does not fit the instance.
+    pub fn resume(
+        &mut self,
+        instance: Instance,
+        num_steps: u64,
+        past: Vec<Snapshot>,
+        recording: Option<Recording>,
+    ) -> Result<(), Error> {
+        let size = (instance.map().height(), instance.map().width());
+        past.iter().try_for_each(|state| state.check_fits(self.config().num_agents, size))?;
+        self.instance = Some(instance);
+        self.num_steps = num_steps;
+        self.past = past;
+        self.recording = recording;
+        Ok(())
+    }
+
+    /// Plays one step.
+    ///
+    /// # Errors
+    /// Before the start, or for an action list of the wrong length.
+    pub fn step(&mut self, actions: &[Action]) -> Result<(), Error> {
+        if self.instance.is_none() {
+            return Err(Error::NotReset);
+        }
+        if self.meters.collisions.is_some() {
+            let State { cells, active, .. } = self.engine.state();
+            self.scratch.cells.clear();
+            self.scratch.cells.extend_from_slice(cells);
+            self.scratch.active.clear();
+            self.scratch.active.extend_from_slice(active);
+        }
+        let Self { rewards, terminated, truncated, .. } = self;
+        self.engine.step(actions, StepOut { rewards, terminated, truncated })?;
+        self.num_steps += 1;
+        self.measure(actions)?;
+        if self.config().persistent {
+            self.past.push(self.engine.snapshot());
+        }
+        if self.recording.is_some() {
+            self.keep(actions);
+        }
+        Ok(())
+    }
+
+    fn measure(&mut self, actions: &[Action]) -> Result<(), Error> {
+        let state = self.engine.state();
+        if let (Some(collisions), Some(instance)) = (&mut self.meters.collisions, &self.instance) {
+            let Scratch { cells, active, .. } = &self.scratch;
+            collisions.feed(instance.map(), cells, active, actions, state.cells);
+        }
+        self.figures = self.meters.episode.feed(state.on_goal, &self.terminated, &self.truncated);
+        self.feed_density()
+    }
+
+    fn feed_density(&mut self) -> Result<(), Error> {
+        if let Some(density) = &mut self.meters.density {
+            self.engine.count_seen(&mut self.scratch.seen)?;
+            density.feed(&self.scratch.seen);
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, actions: &[Action]) {
+        let step = TraceStep {
+            actions: actions.to_vec(),
+            state: self.engine.snapshot(),
+            rewards: self.rewards.clone(),
+            terminated: self.terminated.clone(),
+            truncated: self.truncated.clone(),
+            observations: None,
+            metrics: self.is_over().then(|| self.metrics()),
+        };
+        if let Some(recording) = &mut self.recording {
+            recording.steps.push(step);
+        }
+    }
+
+    /// Takes the last step back; returns whether there was one. Needs `persistent` in the config. Metrics and the
+    /// recording keep the step.
+    ///
+    /// # Errors
+    /// Before the start, or [`Error::StepsNotKept`].
+    ///
+    /// Rule: history/step-back
+    ///
+    /// Source: POGEMA 1.4.0, `wrappers/persistence.py`, `PersistentWrapper.step_back`
+    pub fn step_back(&mut self) -> Result<bool, Error> {
+        if self.instance.is_none() {
+            return Err(Error::NotReset);
+        }
+        if !self.config().persistent {
+            return Err(Error::StepsNotKept);
+        }
+        let [.., before, _] = &self.past[..] else { return Ok(false) };
+        self.engine.restore(self.num_steps - 1, before)?;
+        self.past.pop();
+        self.num_steps -= 1;
+        Ok(true)
+    }
+
+    /// The engine.
+    pub fn engine(&self) -> &E {
+        &self.engine
+    }
+
+    /// The engine, to change its state between steps.
+    pub fn engine_mut(&mut self) -> &mut E {
+        &mut self.engine
+    }
+
+    /// The rules and sizes.
+    pub fn config(&self) -> &Config {
+        self.engine.config()
+    }
+
+    /// The instance being played.
+    ///
+    /// # Errors
+    /// [`Error::NotReset`] before the start.
+    pub fn instance(&self) -> Result<&Instance, Error> {
+        self.instance.as_ref().ok_or(Error::NotReset)
+    }
+
+    /// Steps since the start, without those taken back.
+    pub fn num_steps(&self) -> u64 {
+        self.num_steps
+    }
+
+    /// The state of all agents.
+    pub fn state(&self) -> State<'_> {
+        self.engine.state()
+    }
+
+    /// A copy of the visible state.
+    pub fn snapshot(&self) -> Snapshot {
+        self.engine.snapshot()
+    }
+
+    /// The rewards of the last step.
+    pub fn rewards(&self) -> &[f32] {
+        &self.rewards
+    }
+
+    /// Which agents the last step terminated.
+    pub fn terminated(&self) -> &[bool] {
+        &self.terminated
+    }
+
+    /// Which agents the last step truncated.
+    pub fn truncated(&self) -> &[bool] {
+        &self.truncated
+    }
+
+    /// Whether the last step ended the episode: all agents are terminated, or all are truncated.
+    pub fn is_over(&self) -> bool {
+        self.figures.is_some()
+    }
+
+    /// The figures so far. POGEMA's own are present if the last step ended the episode, the others if they are measured.
+    pub fn metrics(&self) -> Metrics {
+        let Meters { density, collisions, .. } = &self.meters;
+        let counted = collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
+        let (a_collisions, o_collisions) = counted.unzip();
+        let avg_agents_density = density.as_ref().map(DensityMeter::mean);
+        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.figures.unwrap_or_default() }
+    }
+
+    /// The meters.
+    pub fn meters(&self) -> &Meters {
+        &self.meters
+    }
+
+    /// The meters, to change what is measured: from the next start on, or from a saved state.
+    pub fn meters_mut(&mut self) -> &mut Meters {
+        &mut self.meters
+    }
+
+    /// All states since the start, if the config keeps them.
+    ///
+    /// Rule: history/changes
+    pub fn past(&self) -> &[Snapshot] {
+        &self.past
+    }
+
+    /// The recording so far, if there is one.
+    pub fn recording(&self) -> Option<&Recording> {
+        self.recording.as_ref()
+    }
+
+    /// The episode so far as a trace.
+    ///
+    /// # Errors
+    /// [`Error::NotRecorded`] unless the episode is recorded.
+    pub fn trace(&self) -> Result<Trace, Error> {
+        let (Some(instance), Some(recording)) = (&self.instance, &self.recording) else {
+            return Err(Error::NotRecorded);
+        };
+        // An agent can reach at most one goal in a step.
+        let header = TraceHeader::new(*self.config(), instance, recording.steps.len() + 1);
+        let start = TraceStart { state: recording.start.clone(), observations: None };
+        Ok(Trace { header, start, steps: recording.steps.clone() })
+    }
+}

@@ -1,0 +1,187 @@
+//! An episode plays, measures, records, goes back and continues.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use pogema_core::{
+    Action, Cell, Collision, CollisionMeter, Config, DensityMeter, Environment, Episode, EpisodeMeter, Error,
+    GoalStream, Instance, Map, Metrics, OnGoal, Outside, Snapshot, StepOut, Trace,
+};
+use pogema_reference::Reference;
+
+const NUM_AGENTS: usize = 3;
+
+fn instance() -> Instance {
+    let map = Map::from_rows(&[".....", "..#..", "....."]).unwrap();
+    let starts = vec![Cell::new(0, 0), Cell::new(0, 1), Cell::new(2, 4)];
+    let stream = |&start: &Cell| GoalStream::sequence(Cell::new(0, 2), vec![Cell::new(0, 2), start].into());
+    let goals = starts.iter().map(stream).collect();
+    Instance::new(map, Outside::Free, starts, goals).unwrap()
+}
+
+fn config(on_goal: OnGoal) -> Config {
+    Config {
+        num_agents: NUM_AGENTS,
+        radius: 2,
+        max_steps: 12,
+        on_goal,
+        persistent: true,
+        ..Config::default()
+    }
+}
+
+fn episode(config: Config) -> Episode<Reference> {
+    let mut episode =
+        Episode::new(Reference::new(config).unwrap()).with_density().with_collisions().with_recording();
+    episode.start(instance()).unwrap();
+    episode
+}
+
+fn actions(step: usize) -> Vec<Action> {
+    (0..NUM_AGENTS).map(|agent| Action::ALL[(step * 7 + agent * 3 + step / 4) % 5]).collect()
+}
+
+#[test]
+fn nothing_works_before_the_start() {
+    let mut episode = Episode::new(Reference::new(config(OnGoal::Finish)).unwrap());
+    assert_eq!(episode.step(&actions(0)), Err(Error::NotReset));
+    assert_eq!(episode.step_back(), Err(Error::NotReset));
+    assert_eq!(episode.instance().map(|_| ()), Err(Error::NotReset));
+    assert_eq!(episode.trace(), Err(Error::NotRecorded));
+    assert!(!episode.is_over() && episode.num_steps() == 0 && episode.snapshot() == Snapshot::default());
+}
+
+#[test]
+fn a_refused_call_leaves_the_episode_as_it_was() {
+    let mut episode = episode(Config { persistent: false, ..config(OnGoal::Nothing) });
+    episode.step(&actions(0)).unwrap();
+    let before = (episode.snapshot(), episode.metrics(), episode.trace().unwrap(), episode.num_steps());
+    let lonely = Instance::new(instance().map().clone(), Outside::Free, Vec::new(), Vec::new()).unwrap();
+    assert_eq!(episode.step(&[Action::Stay]), Err(Error::Length { what: "actions", want: 3, got: 1 }));
+    assert_eq!(episode.step_back(), Err(Error::StepsNotKept));
+    assert_eq!(episode.start(lonely), Err(Error::Length { what: "starts", want: 3, got: 0 }));
+    let now = (episode.snapshot(), episode.metrics(), episode.trace().unwrap(), episode.num_steps());
+    assert_eq!(now, before);
+}
+
+/// The same episode by hand.
+#[test]
+fn results_figures_and_trace_are_those_of_the_engine_and_the_meters() {
+    for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
+        for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
+            let config = Config { collision, ..config(on_goal) };
+            let mut episode = episode(config);
+            let mut engine = Reference::new(config).unwrap();
+            engine.reset(&instance()).unwrap();
+            let (mut meter, mut density) = (EpisodeMeter::new(&config), DensityMeter::default());
+            let (mut collisions, mut seen) = (CollisionMeter::default(), Vec::new());
+            engine.count_seen(&mut seen).unwrap();
+            density.feed(&seen);
+            for step in 0.. {
+                let before = engine.snapshot();
+                let (mut rewards, mut terminated, mut truncated) = ([0.5; 3], [true; 3], [true; 3]);
+                let out =
+                    StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+                engine.step(&actions(step), out).unwrap();
+                episode.step(&actions(step)).unwrap();
+                let after = engine.snapshot();
+                assert_eq!((episode.snapshot(), episode.num_steps()), (after.clone(), step as u64 + 1));
+                assert_eq!(episode.rewards(), rewards);
+                assert_eq!((episode.terminated(), episode.truncated()), (&terminated[..], &truncated[..]));
+                collisions.feed(
+                    instance().map(),
+                    &before.cells,
+                    &before.active,
+                    &actions(step),
+                    &after.cells,
+                );
+                engine.count_seen(&mut seen).unwrap();
+                density.feed(&seen);
+                let figures = meter.feed(&after.on_goal, &terminated, &truncated);
+                let expected = Metrics {
+                    avg_agents_density: Some(density.mean()),
+                    a_collisions: Some(collisions.with_agents as f64),
+                    o_collisions: Some(collisions.with_obstacles as f64),
+                    ..figures.unwrap_or_default()
+                };
+                assert_eq!((episode.metrics(), episode.is_over()), (expected, figures.is_some()));
+                let trace = episode.trace().unwrap();
+                let last = &trace.steps[step];
+                assert_eq!((&last.actions, &last.state), (&actions(step), &after));
+                assert_eq!(last.metrics, figures.map(|_| expected));
+                if episode.is_over() {
+                    break;
+                }
+            }
+            let mut text = Vec::new();
+            episode.trace().unwrap().write(&mut text).unwrap();
+            assert_eq!(Trace::read(&text[..]).unwrap(), episode.trace().unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_figure_that_is_not_measured_is_absent() {
+    let mut episode = Episode::new(Reference::new(config(OnGoal::Restart)).unwrap());
+    episode.start(instance()).unwrap();
+    while !episode.is_over() {
+        episode.step(&actions(0)).unwrap();
+    }
+    let names: Vec<&str> = episode.metrics().named().into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names, ["avg_throughput"]);
+}
+
+#[test]
+fn a_second_start_measures_and_records_anew() {
+    let mut second = episode(config(OnGoal::Nothing));
+    (0..5).for_each(|step| second.step(&actions(step)).unwrap());
+    second.start(instance()).unwrap();
+    let mut first = episode(config(OnGoal::Nothing));
+    for step in 0..12 {
+        for episode in [&mut first, &mut second] {
+            episode.step(&actions(step)).unwrap();
+        }
+        assert_eq!((first.metrics(), first.trace()), (second.metrics(), second.trace()));
+    }
+    second.record(false);
+    assert!(second.trace().is_ok(), "the recording at work goes on");
+    second.start(instance()).unwrap();
+    assert_eq!(second.trace(), Err(Error::NotRecorded));
+}
+
+#[test]
+fn steps_are_taken_back_one_by_one() {
+    let mut episode = episode(config(OnGoal::Finish));
+    let mut states = vec![episode.snapshot()];
+    for step in 0..12 {
+        episode.step(&actions(step)).unwrap();
+        states.push(episode.snapshot());
+    }
+    assert_eq!(episode.past(), states);
+    for (step, state) in states.iter().enumerate().rev().skip(1) {
+        assert_eq!(episode.step_back(), Ok(true));
+        assert_eq!((episode.num_steps(), episode.state().step), (step as u64, step as u64));
+        // Which agents stood on their goals is not restored.
+        let now = Snapshot { on_goal: state.on_goal.clone(), ..episode.snapshot() };
+        assert_eq!(&now, state);
+    }
+    assert_eq!(episode.step_back(), Ok(false));
+}
+
+#[test]
+fn a_resumed_episode_continues_like_the_original() {
+    let mut first = episode(config(OnGoal::Nothing));
+    (0..5).for_each(|step| first.step(&actions(step)).unwrap());
+    let mut second = Episode::new(first.engine().clone());
+    *second.meters_mut() = first.meters().clone();
+    let recording = first.recording().cloned();
+    second.resume(instance(), first.num_steps(), first.past().to_vec(), recording).unwrap();
+    for step in 5..12 {
+        for episode in [&mut first, &mut second] {
+            episode.step(&actions(step)).unwrap();
+        }
+        assert_eq!((first.metrics(), first.trace()), (second.metrics(), second.trace()));
+    }
+    assert_eq!(second.step_back(), Ok(true));
+    let foreign = vec![Snapshot { cells: vec![Cell::new(9, 9); 3], ..first.snapshot() }];
+    assert_eq!(second.resume(instance(), 0, foreign, None), Err(Error::ForeignState));
+}

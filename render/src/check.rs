@@ -1,0 +1,36 @@
+//! What can be drawn.
+
+use pogema_core::{Cell, Error, Trace};
+
+/// Passes if every state has as many agents as the first, all of them and their goals on the map.
+///
+/// # Errors
+/// [`Error::Length`] or [`Error::OutOfRange`] about the first state that cannot be drawn.
+pub fn check(trace: &Trace) -> Result<(), Error> {
+    let (map, num_agents) = (&trace.header.map, trace.start.state.cells.len());
+    for (frame, state) in trace.states().enumerate() {
+        Error::check_length("cells", num_agents, state.cells.len())?;
+        Error::check_length("goals", num_agents, state.goals.len())?;
+        Error::check_length("active", num_agents, state.active.len())?;
+        let is_off = |cell: &&Cell| !map.contains(**cell);
+        if let Some(cell) = state.cells.iter().chain(&state.goals).find(is_off) {
+            let expected = format!("a cell of the map of {} rows and {} columns", map.height(), map.width());
+            return Err(refused(&format!("a cell of frame {frame}"), cell, &expected));
+        }
+    }
+    Ok(())
+}
+
+/// Passes if `agent` is one of `num_agents`.
+pub(crate) fn check_agent(agent: usize, num_agents: usize) -> Result<(), Error> {
+    match num_agents.checked_sub(1) {
+        Some(last) if agent <= last => Ok(()),
+        Some(last) => Err(refused("agent", agent, &format!("0 to {last}"))),
+        None => Err(refused("agent", agent, "none, the episode has no agents")),
+    }
+}
+
+/// An error about one requested value.
+pub(crate) fn refused(what: &str, value: impl std::fmt::Display, expected: &str) -> Error {
+    Error::out_of_range(what, value, expected)
+}
