@@ -164,7 +164,7 @@ fn wrong_calls_name_both_numbers_and_change_nothing() {
     assert_eq!(new(2, 3), "config: `num_threads` is `3`, expected 1 to 2, the number of lanes");
     assert_eq!(new(2, 0), "config: `num_threads` is `0`, expected 1 to 2, the number of lanes");
     let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
-    assert_eq!(refusal(batch.observe(Observations::None)), "the batch was not reset yet");
+    assert_eq!(refusal(batch.observe(Observations::None)), "the environment was not reset yet");
     batch.reset().unwrap();
     let before = [0, 1].map(|lane| batch.lane(lane).unwrap().snapshot());
     let mut step = |num_actions: usize, num_rewards: usize, num_observed: usize| {

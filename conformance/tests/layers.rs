@@ -43,6 +43,34 @@ fn crates_use_lower_layers_only() {
     assert_eq!(metadata.packages.len(), LAYERS.len());
 }
 
+/// The features of each dependency, as a set of packages asks for them, except those of the workspace.
+fn features(selection: &[&str]) -> BTreeMap<String, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut command = std::process::Command::new(env!("CARGO"));
+    command.args(["tree", "--offline", "--prefix", "none", "--format", "{p}|{f}"]).args(selection);
+    let output = command.current_dir(root).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let pairs = text.lines().filter_map(|line| line.trim_end_matches(" (*)").split_once('|'));
+    let is_foreign = |package: &str| !package.contains(&*root.to_string_lossy());
+    pairs.filter(|(package, _)| is_foreign(package)).map(|(one, other)| (one.into(), other.into())).collect()
+}
+
+/// What asks for other features is built a second time, and everything above it.
+#[test]
+fn the_program_and_the_wheel_ask_for_the_features_of_the_tests() {
+    let tests = features(&["--edges", "all"]);
+    let program = features(&["--package", "pogema", "--edges", "normal,build"]);
+    let wheel =
+        ["--package", "pogema-python", "--features", "pyo3/extension-module", "--edges", "normal,build"];
+    for (what, theirs) in [("program", program), ("wheel", features(&wheel))] {
+        for (package, features) in theirs {
+            let of_tests = tests.get(&package).unwrap_or(&features);
+            assert_eq!(&features, of_tests, "{package} of the {what}: add its features to workspace-hack");
+        }
+    }
+}
+
 /// Everywhere else the compiler refuses it.
 const MAY_BE_UNSAFE: [&str; 1] = ["fast/src/simd/mod.rs"];
 

@@ -150,7 +150,7 @@ def test_films(tmp_path):
 def test_an_episode_that_is_not_filmed_cannot_be_drawn(tmp_path):
     env = pogema_v0(GridConfig())
     env.reset()
-    with pytest.raises(ValueError, match="filmed"):
+    with pytest.raises(ValueError, match="not recorded"):
         env.save_animation(tmp_path / "one.svg")
     assert not (tmp_path / "one.svg").exists()
 

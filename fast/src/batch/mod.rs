@@ -262,7 +262,7 @@ impl Batch {
         if self.is_started {
             return Ok(());
         }
-        Err(Error::State { reason: "the batch was not reset yet".into() })
+        Err(Error::NotReset)
     }
 
     fn check_chosen(&self, chosen: &[bool]) -> Result<(), Error> {
