@@ -9,7 +9,7 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 use pogema_conformance::golden;
 
 /// A crate uses lower layers only, never its own.
-const LAYERS: [(&str, u8); 13] = [
+const LAYERS: [(&str, u8); 14] = [
     ("pogema-core", 0),
     ("workspace-hack", 0),
     ("pogema-numpy", 0),
@@ -21,8 +21,9 @@ const LAYERS: [(&str, u8); 13] = [
     ("pogema-conformance", 3),
     ("pogema-toolbox", 3),
     ("pogema", 4),
-    ("pogema-benches", 4),
-    ("pogema-python", 4),
+    ("pogema-cli", 5),
+    ("pogema-benches", 5),
+    ("pogema-python", 5),
 ];
 
 #[test]
@@ -60,7 +61,7 @@ fn features(selection: &[&str]) -> BTreeMap<String, String> {
 #[test]
 fn the_program_and_the_wheel_ask_for_the_features_of_the_tests() {
     let tests = features(&["--edges", "all"]);
-    let program = features(&["--package", "pogema", "--edges", "normal,build"]);
+    let program = features(&["--package", "pogema-cli", "--edges", "normal,build"]);
     let wheel =
         ["--package", "pogema-python", "--features", "pyo3/extension-module", "--edges", "normal,build"];
     for (what, theirs) in [("program", program), ("wheel", features(&wheel))] {

@@ -162,6 +162,34 @@ impl StepOut<'_> {
     }
 }
 
+/// Owned buffers for the results of a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepResults {
+    /// Rule: reward/own, reward/shared
+    pub rewards: Vec<f32>,
+    /// Rule: end/terminated
+    pub terminated: Vec<bool>,
+    /// Rule: end/truncated
+    pub truncated: Vec<bool>,
+}
+
+impl StepResults {
+    /// Buffers for this many agents, all environments together.
+    pub fn new(num_agents: usize) -> Self {
+        Self {
+            rewards: vec![0.0; num_agents],
+            terminated: vec![false; num_agents],
+            truncated: vec![false; num_agents],
+        }
+    }
+
+    /// The buffers, for an engine to write to.
+    pub fn out(&mut self) -> StepOut<'_> {
+        let Self { rewards, terminated, truncated } = self;
+        StepOut { rewards, terminated, truncated }
+    }
+}
+
 /// The state of all agents between two steps, borrowed from the engine. One value per agent in every list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State<'a> {

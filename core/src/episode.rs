@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 use crate::{
-    Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut, Trace, TraceHeader,
+    Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepResults, Trace, TraceHeader,
     TraceStart, TraceStep,
 };
 
@@ -28,9 +28,7 @@ pub struct Episode<E> {
     engine: E,
     instance: Option<Instance>,
     num_steps: u64,
-    rewards: Vec<f32>,
-    terminated: Vec<bool>,
-    truncated: Vec<bool>,
+    results: StepResults,
     meters: Meters,
     /// The figures of the episode, if the last step ended it.
     figures: Option<Metrics>,
@@ -89,9 +87,7 @@ impl<E: Environment> Episode<E> {
             engine,
             instance: None,
             num_steps: 0,
-            rewards: vec![0.0; config.num_agents],
-            terminated: vec![false; config.num_agents],
-            truncated: vec![false; config.num_agents],
+            results: StepResults::new(config.num_agents),
             meters: Meters { episode: EpisodeMeter::new(&config), density: None, collisions: None },
             figures: None,
             past: Vec::new(),
@@ -184,8 +180,7 @@ impl<E: Environment> Episode<E> {
             self.scratch.active.clear();
             self.scratch.active.extend_from_slice(active);
         }
-        let Self { rewards, terminated, truncated, .. } = self;
-        self.engine.step(actions, StepOut { rewards, terminated, truncated })?;
+        self.engine.step(actions, self.results.out())?;
         self.num_steps += 1;
         self.measure(actions)?;
         if self.config().persistent {
@@ -203,7 +198,8 @@ impl<E: Environment> Episode<E> {
             let Scratch { cells, active, .. } = &self.scratch;
             collisions.feed(instance.map(), cells, active, actions, state.cells);
         }
-        self.figures = self.meters.episode.feed(state.on_goal, &self.terminated, &self.truncated);
+        self.figures =
+            self.meters.episode.feed(state.on_goal, &self.results.terminated, &self.results.truncated);
         self.feed_density()
     }
 
@@ -216,12 +212,13 @@ impl<E: Environment> Episode<E> {
     }
 
     fn keep(&mut self, actions: &[Action]) {
+        let StepResults { rewards, terminated, truncated } = self.results.clone();
         let step = TraceStep {
             actions: actions.to_vec(),
             state: self.engine.snapshot(),
-            rewards: self.rewards.clone(),
-            terminated: self.terminated.clone(),
-            truncated: self.truncated.clone(),
+            rewards,
+            terminated,
+            truncated,
             observations: None,
             metrics: self.is_over().then(|| self.metrics()),
         };
@@ -293,17 +290,17 @@ impl<E: Environment> Episode<E> {
 
     /// The rewards of the last step.
     pub fn rewards(&self) -> &[f32] {
-        &self.rewards
+        &self.results.rewards
     }
 
     /// Which agents the last step terminated.
     pub fn terminated(&self) -> &[bool] {
-        &self.terminated
+        &self.results.terminated
     }
 
     /// Which agents the last step truncated.
     pub fn truncated(&self) -> &[bool] {
-        &self.truncated
+        &self.results.truncated
     }
 
     /// Whether the last step ended the episode: all agents are terminated, or all are truncated.

@@ -33,7 +33,7 @@ mod trace;
 
 pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
-pub use environment::{Environment, Snapshot, State, StepOut};
+pub use environment::{Environment, Snapshot, State, StepOut, StepResults};
 pub use episode::{Episode, Meters, Recording};
 pub use error::{Error, shorten};
 pub use goals::{GoalSource, GoalStream, StreamState};

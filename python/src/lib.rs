@@ -9,7 +9,6 @@ mod evaluation;
 mod lists;
 mod observe;
 mod planners;
-mod seeds;
 mod state;
 mod vec;
 mod views;

@@ -6,14 +6,14 @@ use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3,
     PyReadwriteArrayDyn,
 };
+use pogema::{EnvSource, Seed};
 use pogema_core::{Action, Config, Error, Occupancy, StepOut};
 use pogema_fast::{Autoreset, Observations, View};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors;
-use crate::seeds::{Seed, Source};
+use crate::{config, errors};
 
 /// Where a step's rewards and ends go: rewards, terminated, truncated.
 ///
@@ -36,7 +36,7 @@ pub struct Batch {
 
 struct Game {
     batch: pogema_fast::Batch,
-    source: Source,
+    source: EnvSource,
     actions: Vec<Action>,
 }
 
@@ -160,11 +160,10 @@ impl Batch {
         let game = Self::open(&mut guard)?;
         let seed = |(env, seed): (usize, &Seed)| {
             let episode = game.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
-            let not_reset = || Error::State { reason: "the environments were not reset yet".into() };
-            let episode = episode.ok_or_else(|| errors::batch(py, &not_reset()))?;
+            let episode = episode.ok_or_else(|| errors::batch(py, &Error::NotReset))?;
             Ok(seed.of_episode(env, episode))
         };
-        game.source.seeds.iter().enumerate().map(seed).collect()
+        game.source.seeds().iter().enumerate().map(seed).collect()
     }
 
     /// Number of agents of each environment, and how far they see.
@@ -233,7 +232,8 @@ impl Game {
         if num_envs == 0 {
             return Err(Error::config("num_envs", num_envs, "at least 1"));
         }
-        let source = Source::new(configs, of_env)?;
+        let read = |(config, map): &(String, Option<String>)| config::read(config, map.as_deref());
+        let source = EnvSource::new(configs.iter().map(read).collect::<Result<_, _>>()?, of_env)?;
         let rules = source.config(0).rules();
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
         let rules = Config { occupancy, ..rules };
@@ -257,7 +257,7 @@ impl Game {
         };
         Error::check_length("seeds", num_envs, given.len())?;
         let mut source = self.source.clone();
-        for ((seed, given), chosen) in source.seeds.iter_mut().zip(given).zip(&chosen) {
+        for ((seed, given), chosen) in source.seeds_mut().iter_mut().zip(given).zip(&chosen) {
             *seed = if *chosen { given } else { *seed };
         }
         self.batch.reset_with(source.clone(), &chosen)?;

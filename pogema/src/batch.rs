@@ -1,78 +1,46 @@
-//! Which instance each episode of each environment of a `VecEnv` plays.
+//! From a config to a batch.
 
 use std::sync::Arc;
 
 use pogema_core::{Error, Instance, Map, Observation};
-use pogema_fast::Instances;
+use pogema_fast::{Batch, Instances};
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_numpy::SeedSequence;
 
-use crate::config;
+use crate::seeds::Seed;
 
-/// Seeds are below this, as POGEMA wants them.
-const SEEDS: u64 = i64::MAX as u64;
-
-/// Where the seeds of an environment's episodes come from.
+/// Makes a batch of environments of a config, with one thread for each core. Call [`Batch::reset`] before the first
+/// step; an episode that ends is followed by the next one.
 ///
-/// They depend on the seed given, the environment's number and the episode's, and on nothing else. With NumPy, where
-/// `first(key)` is `int(SeedSequence(seed, spawn_key=key).generate_state(1, uint64)[0]) % (2**63 - 1)`:
+/// Each environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]).
 ///
-/// | seed given | episode 0 | episode e |
-/// | --- | --- | --- |
-/// | one for all | `first((env, 0))` | `first((env, e))` |
-/// | one of its own | the seed itself | `first((e,))` |
-#[derive(Clone, Copy, Debug)]
-pub enum Seed {
-    /// One for all environments.
-    Shared(u64),
-    /// One of its own.
-    Own(u64),
-}
-
-impl Seed {
-    /// A seed for all that nobody can foresee.
-    pub fn from_os() -> Result<Self, Error> {
-        let sequence = SeedSequence::from_os()
-            .map_err(|error| Error::instance(format!("the system gives no random seed: {error}")))?;
-        Ok(Self::Shared(first(&sequence)))
-    }
-
-    /// POGEMA's seed of an episode.
-    pub fn of_episode(self, env: usize, episode: u64) -> u64 {
-        match self {
-            Self::Shared(seed) => first(&SeedSequence::spawned(seed, &[env as u64, episode])),
-            Self::Own(seed) if episode == 0 => seed,
-            Self::Own(seed) => first(&SeedSequence::spawned(seed, &[episode])),
-        }
-    }
-}
-
-fn first(sequence: &SeedSequence) -> u64 {
-    let [state] = sequence.generate_state_u64();
-    state % SEEDS
+/// # Errors
+/// If the config is out of range or does not fit a batch, or for no environments.
+pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, Error> {
+    let source = EnvSource::new(vec![(config.clone(), None)], vec![0; num_envs])?;
+    let source = source.with_seeds(vec![Seed::Shared(seed); num_envs])?;
+    let num_cores = std::thread::available_parallelism().map_or(1, usize::from);
+    Batch::new(config.rules(), num_envs, num_cores.clamp(1, num_envs.max(1)), source)
 }
 
 /// A config with the map that it names.
 type Named = (GridConfig, Option<Map>);
 
-/// The instances of all environments.
-#[derive(Clone)]
-pub struct Source {
+/// The instances of many environments that share rules and shapes, but not maps.
+#[derive(Clone, Debug)]
+pub struct EnvSource {
     configs: Arc<[Named]>,
     /// Which config each environment has.
     of_env: Arc<[usize]>,
-    /// Where each environment's seeds come from.
-    pub seeds: Vec<Seed>,
+    seeds: Vec<Seed>,
 }
 
-impl Source {
-    /// A source for environments of some configs in JSON, each with the text of the map that it names.
+impl EnvSource {
+    /// A source for environments of some configs, each with the map that its `map_name` names; `of_env` chooses a config
+    /// for each environment.
     ///
     /// # Errors
-    /// If a config is wrong or no config of a `VecEnv`; if two differ in what the environments have to share.
-    pub fn new(configs: &[(String, Option<String>)], of_env: Vec<usize>) -> Result<Self, Error> {
-        let read = |(config, map): &(String, Option<String>)| config::read(config, map.as_deref());
-        let configs = configs.iter().map(read).collect::<Result<Arc<[Named]>, _>>()?;
+    /// [`Error::Config`] for a config that does not fit a batch, or differs from another in what they have to share.
+    pub fn new(configs: Vec<(GridConfig, Option<Map>)>, of_env: Vec<usize>) -> Result<Self, Error> {
         let shared = Seed::from_os()?;
         let mut seeds = Vec::with_capacity(of_env.len());
         for (env, &index) in of_env.iter().enumerate() {
@@ -82,7 +50,26 @@ impl Source {
             check_alike(env, config, &configs[of_env[0]].0)?;
             seeds.push(config.seed.map_or(shared, Seed::Shared));
         }
-        Ok(Self { configs, of_env: of_env.into(), seeds })
+        Ok(Self { configs: configs.into(), of_env: of_env.into(), seeds })
+    }
+
+    /// The same source with other seeds, one for each environment.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of seeds.
+    pub fn with_seeds(self, seeds: Vec<Seed>) -> Result<Self, Error> {
+        Error::check_length("seeds", self.of_env.len(), seeds.len())?;
+        Ok(Self { seeds, ..self })
+    }
+
+    /// The source of each environment's seeds.
+    pub fn seeds(&self) -> &[Seed] {
+        &self.seeds
+    }
+
+    /// The source of each environment's seeds, to choose others.
+    pub fn seeds_mut(&mut self) -> &mut [Seed] {
+        &mut self.seeds
     }
 
     /// The config of an environment.
@@ -91,7 +78,7 @@ impl Source {
     }
 }
 
-impl Instances for Source {
+impl Instances for EnvSource {
     fn instance(&self, env: usize, episode: u64) -> Result<Instance, Error> {
         let (config, registered) = &self.configs[self.of_env[env]];
         let seed = self.seeds[env].of_episode(env, episode);
@@ -107,10 +94,14 @@ impl Instances for Source {
 fn check_playable(config: &GridConfig) -> Result<(), Error> {
     if config.observation_type != Observation::Default {
         let value = config.to_value()["observation_type"].to_string();
-        return Err(Error::config("observation_type", value, "`default`, which a VecEnv observes"));
+        return Err(Error::config(
+            "observation_type",
+            value,
+            "`default`, the only one that a batch observes",
+        ));
     }
     if config.persistent {
-        return Err(Error::config("persistent", true, "false, since a VecEnv keeps no steps"));
+        return Err(Error::config("persistent", true, "false, since a batch keeps no steps"));
     }
     Ok(())
 }

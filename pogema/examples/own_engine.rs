@@ -1,0 +1,80 @@
+//! Checks an engine of your own with the kit: it plays drawn episodes beside the reference, and every array is compared.
+
+use pogema::reference::Reference;
+use pogema::{Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut};
+use pogema_conformance::{Engine, Report};
+
+/// Your engine. This one borrows everything from the reference, but for the bug that `is_wrong` switches on: the first
+/// agent never moves up.
+struct Mine {
+    inner: Reference,
+    is_wrong: bool,
+}
+
+impl Environment for Mine {
+    fn config(&self) -> &Config {
+        self.inner.config()
+    }
+
+    fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
+        self.inner.reset(instance)
+    }
+
+    fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
+        let mut actions = actions.to_vec();
+        match actions.first_mut() {
+            Some(action) if self.is_wrong && *action == Action::Up => *action = Action::Stay,
+            _ => {}
+        }
+        self.inner.step(&actions, out)
+    }
+
+    fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
+        self.inner.restore(step, state)
+    }
+
+    fn state(&self) -> State<'_> {
+        self.inner.state()
+    }
+
+    fn occupied(&self) -> Vec<Cell> {
+        self.inner.occupied()
+    }
+
+    fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        self.inner.observe(out)
+    }
+
+    fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        self.inner.observe_map(out)
+    }
+}
+
+/// Plays 200 drawn episodes; counterexamples are kept in a folder.
+fn check(engine: Engine) -> Result<Report, Error> {
+    let mut report = Report::default();
+    let folder = std::env::temp_dir().join("pogema-found");
+    report.check_fresh(&[Engine::REFERENCE, engine], 200, 1, &folder, &|| ())?;
+    Ok(report)
+}
+
+pub(crate) fn main() -> Result<(), Error> {
+    let make = |config| {
+        Ok(Box::new(Mine { inner: Reference::new(config)?, is_wrong: false }) as Box<dyn Environment>)
+    };
+    let report = check(Engine { name: "mine", make })?;
+    println!("right: {} of 200 episodes differ", report.failures.len());
+    assert!(report.agrees());
+
+    let make = |config| {
+        Ok(Box::new(Mine { inner: Reference::new(config)?, is_wrong: true }) as Box<dyn Environment>)
+    };
+    let report = check(Engine { name: "mine", make })?;
+    println!(
+        "wrong: {} of 200 episodes differ; the first:\n{}",
+        report.failures.len(),
+        report.failures[0].text
+    );
+    assert!(!report.agrees());
+    Ok(())
+}
