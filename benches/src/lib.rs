@@ -1,5 +1,7 @@
 //! What the benches have in common: the environments of POGEMA's paper.
 
+#![forbid(unsafe_code)]
+
 use pogema_core::{Config, Error, Instance};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;

@@ -93,7 +93,7 @@ fn write_report(
         .inspect(|_| bar.inc(1))
         .collect();
     bar.finish_and_clear();
-    write_whole(path, page(suite, &store.about(), &results, &replays)?.as_bytes())?;
+    write_whole(path, page(suite, &store.manifest(), &results, &replays)?.as_bytes())?;
     eprintln!("wrote {}", path.display());
     Ok(())
 }

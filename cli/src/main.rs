@@ -1,5 +1,7 @@
 //! `pogema`: run, check and inspect POGEMA episodes.
 
+#![forbid(unsafe_code)]
+
 mod bench;
 mod conform;
 mod evaluate;

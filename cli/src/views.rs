@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
 use pogema_toolbox::six::Definition;
-use pogema_toolbox::views::{Format, Gallery, Kind, Told, View};
+use pogema_toolbox::views::{Format, Gallery, ImageFormat, Told, View};
 use pogema_toolbox::{Node, Results};
 
 use crate::output::say;
@@ -121,7 +121,7 @@ impl From<TableFormat> for Format {
     }
 }
 
-impl From<PlotFormat> for Kind {
+impl From<PlotFormat> for ImageFormat {
     fn from(format: PlotFormat) -> Self {
         match format {
             PlotFormat::Svg => Self::Svg,

@@ -16,6 +16,8 @@
 //! | [`cases`], [`golden`] | what is kept on disk |
 //! | [`Tally`] | what was checked, rule by rule |
 
+#![forbid(unsafe_code)]
+
 pub mod cases;
 mod compare;
 mod dice;

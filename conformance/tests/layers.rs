@@ -1,12 +1,11 @@
-//! Who may depend on whom, and where unsafe code may stand.
+//! Who may depend on whom, and with which features.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
-use pogema_conformance::golden;
 
 /// A crate uses lower layers only, never its own.
 const LAYERS: [(&str, u8); 14] = [
@@ -70,25 +69,4 @@ fn the_program_and_the_wheel_ask_for_the_features_of_the_tests() {
             assert_eq!(&features, of_tests, "{package} of the {what}: add its features to workspace-hack");
         }
     }
-}
-
-/// Everywhere else the compiler refuses it.
-const MAY_BE_UNSAFE: [&str; 1] = ["fast/src/simd/mod.rs"];
-
-#[test]
-fn unsafe_code_is_allowed_in_named_modules_only() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let metadata = MetadataCommand::new().no_deps().exec().unwrap();
-    let mut allowing = BTreeSet::new();
-    for package in &metadata.packages {
-        let folder = Path::new(&package.manifest_path).parent().unwrap();
-        for path in golden::files(folder, ".rs").unwrap() {
-            let local = path.strip_prefix(root).unwrap().display().to_string();
-            let is_source = local.split('/').nth(1) == Some("src");
-            if is_source && std::fs::read_to_string(&path).unwrap().contains("allow(unsafe_code") {
-                allowing.insert(local);
-            }
-        }
-    }
-    assert_eq!(allowing, MAY_BE_UNSAFE.into_iter().map(str::to_owned).collect());
 }

@@ -1,7 +1,5 @@
 //! The one error type of the workspace.
 
-use crate::Cell;
-
 /// Everything that can be wrong with input, each told in one line.
 ///
 /// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line.
@@ -146,7 +144,13 @@ impl Error {
     }
 
     /// An error about a cell that lies outside a map.
-    pub fn outside(agent: usize, what: &str, cell: Cell, height: usize, width: usize) -> Self {
+    pub fn outside(
+        agent: usize,
+        what: &str,
+        cell: impl std::fmt::Display,
+        height: usize,
+        width: usize,
+    ) -> Self {
         Self::agent(agent, format!("{what} {cell} is outside the map of {height} rows and {width} columns"))
     }
 

@@ -17,6 +17,8 @@
 //! | [`picture`] | text pictures of a state |
 //! | [`Error`] | the one error type |
 
+#![forbid(unsafe_code)]
+
 mod cell;
 mod config;
 mod environment;

@@ -13,6 +13,8 @@
 //! # Ok::<(), pogema_core::Error>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 mod catalogue;
 mod components;
 mod config;

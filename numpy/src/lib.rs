@@ -34,6 +34,8 @@
 //! Doubles are only added, subtracted, multiplied, divided and compared, so a result depends neither on the
 //! processor nor on a C library. What NumPy raises for is a [`NumpyError`] here, and draws nothing.
 
+#![forbid(unsafe_code)]
+
 mod binomial;
 mod choice;
 mod error;

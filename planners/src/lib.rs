@@ -12,6 +12,8 @@
 //! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; [`pogema_team`] and [`sample`] draw the numbers
 //! that POGEMA draws.
 
+#![forbid(unsafe_code)]
+
 mod astar;
 mod cbs;
 mod conflict;

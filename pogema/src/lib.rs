@@ -39,6 +39,8 @@
 //! | `reference` | [`reference`](mod@reference): the rules as plain as possible, to compare other engines with |
 //! | `toolbox` | [`toolbox`]: evaluations of many methods on many episodes |
 
+#![forbid(unsafe_code)]
+
 mod batch;
 mod episode;
 mod seeds;

@@ -158,7 +158,7 @@ impl Evaluation {
                 Some((metrics, film, _)) => Ok(Replay::played(pick, &results, &from_json(&metrics)?, film)),
             };
             let replays = picks.zip(again).map(replay).collect::<Result<Vec<_>, Error>>()?;
-            let page = page(&self.suite, &self.store.about(), &results, &replays)?;
+            let page = page(&self.suite, &self.store.manifest(), &results, &replays)?;
             write_whole(&path, page.as_bytes())
         };
         py.detach(write).map_err(|error| told(&error))

@@ -2,14 +2,11 @@
 
 mod astar;
 mod config;
-mod drawn;
 mod engine;
 mod errors;
 mod evaluation;
 mod lists;
-mod observe;
 mod planners;
-mod state;
 mod vec;
 mod views;
 
@@ -31,6 +28,6 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
-    module.add_function(wrap_pyfunction!(state::restore_engine, module)?)?;
+    module.add_function(wrap_pyfunction!(engine::state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

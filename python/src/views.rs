@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use pogema_core::Error;
-use pogema_toolbox::views::{Format, Gallery, Kind, Told};
+use pogema_toolbox::views::{Format, Gallery, ImageFormat, Told};
 use pogema_toolbox::{Results, six::Definition};
 use pyo3::prelude::*;
 
@@ -52,7 +52,8 @@ const TABLE_FORMATS: [(&str, Format); 4] = [
     ("latex", Format::Latex),
     ("csv", Format::Csv),
 ];
-const PLOT_FORMATS: [(&str, Kind); 3] = [("svg", Kind::Svg), ("pdf", Kind::Pdf), ("png", Kind::Png)];
+const PLOT_FORMATS: [(&str, ImageFormat); 3] =
+    [("svg", ImageFormat::Svg), ("pdf", ImageFormat::Pdf), ("png", ImageFormat::Png)];
 const DEFINITIONS: [(&str, Definition); 2] =
     [("published", Definition::Published), ("paper", Definition::Paper)];
 

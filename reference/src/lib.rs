@@ -29,6 +29,8 @@
 //! # Ok::<(), pogema_core::Error>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 mod collide;
 mod goals;
 mod grid;

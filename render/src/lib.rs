@@ -13,6 +13,8 @@
 //! | [`html`] | a page that replays an episode, and one that edits maps |
 //! | [`stays`] | which rule reverted which move |
 
+#![forbid(unsafe_code)]
+
 mod check;
 pub mod gif;
 mod ground;

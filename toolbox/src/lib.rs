@@ -2,16 +2,18 @@
 //!
 //! A [`Suite`] is read from one YAML file: environments, of which fields may be varied, algorithms, and views.
 
-mod about;
-mod again;
+#![forbid(unsafe_code)]
+
 pub mod bootstrap;
 mod built_in;
 mod environments;
 pub mod frame;
 mod library;
+mod manifest;
 mod pairs;
 mod play;
 mod progress;
+mod replay;
 #[cfg(feature = "views")]
 pub mod report;
 pub mod results;
@@ -24,13 +26,13 @@ mod variants;
 #[cfg(feature = "views")]
 pub mod views;
 
-pub use about::{About, Run, machine};
-pub use again::differences;
 pub use built_in::BuiltIn;
 pub use environments::{Environment, Environments};
+pub use manifest::{Manifest, Run, machine};
 pub use pairs::Pairs;
 pub use play::{Played, play, record};
 pub use progress::{Done, Episode, Failed, Progress};
+pub use replay::differences;
 pub use results::{Results, Row, short};
 pub use run::{Event, Running, Summary, built_in, run, run_one};
 pub use store::{Begin, REPORT, Store};

@@ -7,9 +7,9 @@ use pogema_core::Error;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::manifest;
 use crate::pairs::Pairs;
 use crate::progress::Episode;
-use crate::store::ABOUT;
 
 /// The column of the algorithm's name.
 pub const ALGORITHM: &str = "algorithm";
@@ -147,7 +147,7 @@ impl Results {
 
 /// Whether a JSON file holds something else than rows.
 fn is_apart(name: &str) -> bool {
-    name == ABOUT || name.ends_with(EPISODES)
+    name == manifest::FILE || name.ends_with(EPISODES)
 }
 
 fn first_appearances<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {

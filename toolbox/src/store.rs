@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use pogema_core::Error;
 use pogema_maps::files::{UNFINISHED, write_whole};
 
-use crate::about::{About, Run};
+use crate::manifest::{self, Manifest, Run};
 use crate::suite::Suite;
 
 /// What may be in the folder already.
@@ -39,13 +39,11 @@ pub struct Store {
 /// What is noted of how the results are made.
 #[derive(Debug)]
 struct Noted {
-    about: About,
+    manifest: Manifest,
     /// Whether what this process plays is a run of its own already.
     has_begun: bool,
 }
 
-/// The file that tells how results were made.
-pub(crate) const ABOUT: &str = "about.json";
 /// The suite that was played.
 pub(crate) const SUITE: &str = "suite.yaml";
 const LOCK: &str = ".lock";
@@ -60,10 +58,10 @@ impl Store {
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;
-        let mut about = About::of(suite);
-        let known = About::read(folder)?;
+        let mut manifest = Manifest::of(suite);
+        let known = Manifest::read(folder)?;
         match (begin, known) {
-            (Begin::Resume, Some(known)) => about.go_on(known).map_err(|what| refused(folder, &what))?,
+            (Begin::Resume, Some(known)) => manifest.go_on(known).map_err(|what| refused(folder, &what))?,
             (Begin::Anew, Some(known)) => delete(folder, &known)?,
             (Begin::New, Some(_)) => {
                 let reason = "has results already: `--resume` goes on with them, `--force` deletes them";
@@ -71,10 +69,10 @@ impl Store {
             }
             (_, None) => check_empty(folder)?,
         }
-        let noted = Mutex::new(Noted { about: about.clone(), has_begun: false });
+        let noted = Mutex::new(Noted { manifest: manifest.clone(), has_begun: false });
         let store = Self { folder: folder.to_owned(), noted, versions: Vec::new(), _lock: lock };
         // First what makes it a folder of results: a run may be killed between the two.
-        store.tell(&about)?;
+        store.tell(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
         Ok(store)
     }
@@ -87,8 +85,8 @@ impl Store {
     }
 
     /// How the results were made.
-    pub fn about(&self) -> About {
-        self.noted().about.clone()
+    pub fn manifest(&self) -> Manifest {
+        self.noted().manifest.clone()
     }
 
     /// The number of the run that this process is, which is noted when it is asked for first.
@@ -98,20 +96,20 @@ impl Store {
     pub fn run(&self) -> Result<usize, Error> {
         let mut noted = self.noted();
         if !noted.has_begun {
-            noted.about.runs.push(Run::now(&self.versions));
-            self.tell(&noted.about)?;
+            noted.manifest.runs.push(Run::now(&self.versions));
+            self.tell(&noted.manifest)?;
             noted.has_begun = true;
         }
-        Ok(noted.about.runs.len() - 1)
+        Ok(noted.manifest.runs.len() - 1)
     }
 
     fn noted(&self) -> MutexGuard<'_, Noted> {
         self.noted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self, about: &About) -> Result<(), Error> {
-        let text = serde_json::to_string_pretty(about).map_err(|error| Error::io(&self.folder, error))?;
-        self.write(ABOUT, format!("{text}\n").as_bytes())
+    fn tell(&self, manifest: &Manifest) -> Result<(), Error> {
+        let text = serde_json::to_string_pretty(manifest).map_err(|error| Error::io(&self.folder, error))?;
+        self.write(manifest::FILE, format!("{text}\n").as_bytes())
     }
 
     /// The file of a name in the folder.
@@ -130,7 +128,7 @@ fn refused(folder: &Path, what: &str) -> Error {
 }
 
 /// Deletes the results that an evaluation wrote, and nothing else.
-fn delete(folder: &Path, known: &About) -> Result<(), Error> {
+fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
     for key in known.algorithms.keys() {
         for ending in [RESULTS, EPISODES, LINES, FAILED] {
             remove(&folder.join(format!("{key}.{ending}")))?;

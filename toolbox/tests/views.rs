@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_toolbox::six::Definition;
-use pogema_toolbox::views::{Format, Kind, Shown, View};
+use pogema_toolbox::views::{Format, ImageFormat, Shown, View};
 use pogema_toolbox::{Node, Results, Row};
 
 /// A row of a folder: who solved which seed at what cost, in half as many seconds; nothing costs what was not solved.
@@ -39,7 +39,7 @@ fn show(fields: &str) -> Result<Shown, String> {
 }
 
 fn svg(shown: &Shown) -> String {
-    String::from_utf8(shown.pictures[0].bytes(Kind::Svg).unwrap()).unwrap()
+    String::from_utf8(shown.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap()
 }
 
 fn csv(shown: &Shown) -> Vec<String> {

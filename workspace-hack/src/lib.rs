@@ -1,1 +1,3 @@
 //! Unifies the features of shared dependencies; holds no code.
+
+#![forbid(unsafe_code)]

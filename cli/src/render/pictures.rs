@@ -98,7 +98,7 @@ impl Pictures {
     /// Passes if all that was asked for can be drawn and written, as far as that can be told before the episode.
     ///
     /// # Errors
-    /// About the first file that cannot be written or value that makes no sense.
+    /// Manifest the first file that cannot be written or value that makes no sense.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
         let refused = |reason: String| Err(Error::State { reason });
         for (at, (flag, path)) in self.files().enumerate() {

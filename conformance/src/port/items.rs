@@ -4,7 +4,7 @@ use std::path::Path;
 
 use pogema_core::Error;
 
-use super::run::{Part, Plan};
+use super::plan::{Part, Plan};
 use crate::cases::{self, Case};
 use crate::draw::draw_request;
 use crate::golden::{self, Recording};

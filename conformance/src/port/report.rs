@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::claims::Mode;
 use super::group::{self, Cause, Example};
 use super::judge::Judged;
+use super::plan::Plan;
 use super::protocol::Hello;
-use super::run::Plan;
 use crate::compare::Divergence;
 
 /// The row of the table for what breaks no rule but the protocol.

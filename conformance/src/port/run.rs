@@ -1,6 +1,6 @@
 //! One run of ports over everything that they claim.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pogema_core::Error;
@@ -10,6 +10,7 @@ use super::items::{Item, items};
 use super::judge::{Judged, judge};
 use super::keep::keep;
 use super::link::{Link, Misbehaviour};
+use super::plan::Plan;
 use super::protocol::{Hello, Profile};
 use super::report::{PortReport, Shown, take};
 use super::shrink::shrink;
@@ -24,36 +25,6 @@ pub struct Subject<'a> {
     pub command: String,
     /// Starts one; each worker does so, and again after each misbehaviour.
     pub start: Box<dyn Fn() -> Result<Box<dyn Link>, Misbehaviour> + Sync + 'a>,
-}
-
-/// What to check.
-#[derive(Clone, Debug, Default)]
-pub struct Plan {
-    /// How many cases to draw.
-    pub num_cases: u64,
-    /// Seed of the drawn cases.
-    pub seed: u64,
-    /// Only rules that this matches.
-    pub rules: Option<glob::Pattern>,
-    /// Only these profiles; all that are claimed, if there are none.
-    pub profiles: Vec<Profile>,
-    /// How many cases are played side by side; one for each processor, if none is given.
-    pub num_workers: Option<usize>,
-    /// These cases alone, and nothing else, if there are any.
-    pub files: Vec<PathBuf>,
-    /// These parts alone; all, if there are none.
-    pub parts: Vec<Part>,
-}
-
-/// A part of what there is to check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The hand-written cases.
-    Cases,
-    /// The recordings of POGEMA 1.4.0.
-    Recordings,
-    /// Drawn cases.
-    Drawn,
 }
 
 /// Checks ports, side by side.

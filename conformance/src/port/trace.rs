@@ -7,9 +7,9 @@ use pogema_core::{Error, Trace, TraceStep};
 
 use super::claims::{Mode, Scope};
 use super::judge::Judged;
+use super::plan::Plan;
 use super::protocol::Told;
 use super::report::{PortReport, Shown, take};
-use super::run::Plan;
 use crate::compare::compare_in;
 use crate::files;
 use crate::play::{Engine, Player};

@@ -1,6 +1,7 @@
 //! Where the bits of a window of up to 11 x 11 go.
 
-use super::avx512_windows::LANES;
+/// Words of a vector.
+pub const LANES: usize = 8;
 
 /// Everything about it that follows from its side.
 pub struct Layout {

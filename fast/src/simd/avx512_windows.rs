@@ -15,13 +15,10 @@ use std::arch::x86_64::{
 use std::ops::Range;
 use std::sync::atomic::AtomicU64;
 
-use super::avx512_layout::Layout;
+use super::avx512_layout::{LANES, Layout};
 use super::sights::{GROUP, Sights};
 use super::{MOST_WORDS, Scene};
 use crate::grid::MOST_ROWS;
-
-/// Words of a vector.
-pub const LANES: usize = 8;
 
 /// Writes all three channels of some agents, or says that the windows are too large for this.
 pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, words: &mut [u64]) -> bool {

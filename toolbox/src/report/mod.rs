@@ -11,14 +11,14 @@ use serde::Serialize;
 
 pub use picks::{Pick, picks};
 
-use crate::about::{About, Run};
-use crate::again::differences;
 use crate::environments::Environments;
+use crate::manifest::{Manifest, Run};
 use crate::pairs::Pairs;
+use crate::replay::differences;
 use crate::results::{Results, Row};
 use crate::suite::Suite;
 use crate::tree::Node;
-use crate::views::{Kind, Shown, Table, View};
+use crate::views::{ImageFormat, Shown, Table, View};
 
 /// So many of the worst and of the best episodes are shown of each algorithm.
 pub const SHOWN: usize = 3;
@@ -107,7 +107,12 @@ struct Episode {
 ///
 /// # Errors
 /// If a view is wrong, or a plot cannot be drawn.
-pub fn page(suite: &Suite, about: &About, results: &Results, replays: &[Replay]) -> Result<String, Error> {
+pub fn page(
+    suite: &Suite,
+    manifest: &Manifest,
+    results: &Results,
+    replays: &[Replay],
+) -> Result<String, Error> {
     let stem = suite.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let title = stem.unwrap_or_else(|| "evaluation".into());
     let mut album = Album { title, style: include_str!("report.css").into(), ..Album::default() };
@@ -123,7 +128,7 @@ pub fn page(suite: &Suite, about: &About, results: &Results, replays: &[Replay])
         notes: results.notes.clone(),
         views: sections(suite, results)?,
         algorithms,
-        runs: about.runs.clone(),
+        runs: manifest.runs.clone(),
         suite: suite.text.clone(),
     };
     album.body = fill(include_str!("report.html"), page)?;
@@ -168,7 +173,7 @@ fn sections(suite: &Suite, results: &Results) -> Result<Vec<Section>, Error> {
 
 fn section(name: &str, shown: Shown) -> Result<Section, Error> {
     let plot = |svg: Vec<u8>| format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
-    let plots = shown.pictures.iter().map(|picture| picture.bytes(Kind::Svg).map(plot));
+    let plots = shown.pictures.iter().map(|picture| picture.bytes(ImageFormat::Svg).map(plot));
     Ok(Section {
         name: name.to_owned(),
         plots: plots.collect::<Result<_, _>>()?,

@@ -6,7 +6,7 @@ use pogema_core::Error;
 use pogema_maps::files::write_whole;
 use pogema_maps::nearest;
 
-use super::{Format, Kind, View, read_views};
+use super::{Format, ImageFormat, View, read_views};
 use crate::results::Results;
 use crate::six::Definition;
 use crate::store::SUITE;
@@ -19,7 +19,7 @@ pub struct Gallery {
     /// The format of tables, whatever the views say.
     pub format: Option<Format>,
     /// The format of plots, whatever the views say.
-    pub kind: Option<Kind>,
+    pub kind: Option<ImageFormat>,
     /// The definition of the six metrics, whatever the views say.
     pub definition: Option<Definition>,
     /// The folder for plots; none are written without one.
@@ -99,7 +99,7 @@ fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
     })
 }
 
-fn write(folder: &Path, name: &str, kind: Kind, bytes: &[u8]) -> Result<PathBuf, Error> {
+fn write(folder: &Path, name: &str, kind: ImageFormat, bytes: &[u8]) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
     let path = folder.join(format!("{}.{}", file_name(name), kind.extension()));
     write_whole(&path, bytes)?;

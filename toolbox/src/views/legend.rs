@@ -5,7 +5,7 @@ use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 use super::axes::text_width;
-use super::panel::{bare, insert};
+use super::compose::{bare, insert};
 
 /// Height of a line in heights of the font.
 const LINE: f64 = 1.5;

@@ -1,8 +1,8 @@
 //! One plot with its axes, and the place of its legend.
 
-use kuva::render::layout::{ComputedLayout, Layout};
+use kuva::render::layout::ComputedLayout;
 use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, Scene, render_multiple};
+use kuva::render::render::{Scene, render_multiple};
 
 use super::axes::Frame;
 use super::legend::Legend;
@@ -14,30 +14,11 @@ const GAP: f64 = 4.0;
 const CORNERS: [&str; 7] =
     ["upper right", "upper left", "lower left", "lower right", "center right", "center left", "lower center"];
 
-/// Draws plots without their axes.
-pub(super) fn bare(plots: Vec<Plot>, layout: Layout) -> Scene {
-    let mut scene = render_multiple(plots, layout);
-    // The axes come first, and then what is cut off at them.
-    let first = scene.elements.iter().position(|element| matches!(element, Primitive::ClipStart { .. }));
-    scene.elements.drain(..first.unwrap_or(0));
-    scene
-}
-
 /// Draws plots in a frame.
 pub(super) fn framed(plots: Vec<Plot>, frame: &Frame) -> Scene {
     let mut scene = render_multiple(plots, frame.layout());
     frame.draw(&mut scene);
     scene
-}
-
-/// Puts one scene into another.
-pub(super) fn insert(scene: &mut Scene, part: Scene, (x, y): (f64, f64)) {
-    scene.font_family = scene.font_family.take().or(part.font_family);
-    scene.defs.extend(part.defs);
-    let transform = Some(format!("translate({x},{y})"));
-    scene.add(Primitive::GroupStart { transform, title: None, extra_attrs: None });
-    scene.elements.extend(part.elements);
-    scene.add(Primitive::GroupEnd);
 }
 
 /// Draws a legend where it was asked for; if that is left to us, where no line is, or else beside the plot.

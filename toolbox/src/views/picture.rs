@@ -6,32 +6,11 @@ use kuva::backend::{pdf::PdfBackend, png::PngBackend, svg::SvgBackend};
 use kuva::render::render::{Primitive, Scene};
 use pogema_core::Error;
 
+use super::image_format::ImageFormat;
 use super::style::{INCH, Style};
 
 /// A picture of dots may have so many, 4 bytes each.
 const MOST_DOTS: f64 = 2e8;
-
-/// The format of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Lines and letters, for the web.
-    Svg,
-    /// Lines and letters with their font, for papers.
-    Pdf,
-    /// Dots.
-    Png,
-}
-
-impl Kind {
-    /// What such files end with.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Pdf => "pdf",
-            Self::Png => "png",
-        }
-    }
-}
 
 /// A drawn plot.
 pub struct Picture {
@@ -40,7 +19,7 @@ pub struct Picture {
     /// Dots in an inch, where it is drawn with dots.
     dots_per_inch: f64,
     /// The format that its view asks for.
-    pub kind: Kind,
+    pub kind: ImageFormat,
 }
 
 impl Picture {
@@ -54,12 +33,12 @@ impl Picture {
     ///
     /// # Errors
     /// If it is too large, or the library cannot write it.
-    pub fn bytes(&self, kind: Kind) -> Result<Vec<u8>, Error> {
+    pub fn bytes(&self, kind: ImageFormat) -> Result<Vec<u8>, Error> {
         let told = |reason: String| Error::State { reason: format!("plot: {reason}") };
         match kind {
-            Kind::Svg => Ok(SvgBackend::new().render_scene(&self.scene).into_bytes()),
-            Kind::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),
-            Kind::Png => {
+            ImageFormat::Svg => Ok(SvgBackend::new().render_scene(&self.scene).into_bytes()),
+            ImageFormat::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),
+            ImageFormat::Png => {
                 let scale = (self.dots_per_inch / INCH) as f32;
                 let dots = self.scene.width * self.scene.height * f64::from(scale).powi(2);
                 if dots > MOST_DOTS {

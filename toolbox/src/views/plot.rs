@@ -5,9 +5,10 @@ use pogema_core::Error;
 use serde_json::Value;
 
 use super::axes::{Axis, Frame};
+use super::compose::insert;
 use super::legend::Legend;
 use super::options::{Common, Options};
-use super::panel::{framed, insert, place_legend};
+use super::panel::{framed, place_legend};
 use super::picture::Picture;
 use super::series::{Places, Series, at, means, placeless};
 use super::style::Style;
@@ -287,7 +288,7 @@ fn spread(options: &Options<'_>) -> Result<Spread, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::views::{Kind, View};
+    use crate::views::{ImageFormat, View};
 
     fn results() -> Results {
         let row = |number: u64, algorithm: &str, soc: Value| {
@@ -312,22 +313,22 @@ mod tests {
     fn every_format_is_written_and_every_lack_told() {
         let shown = show("{type: plot, x: num_agents, y: SoC, name: One, extension: svg}").unwrap();
         let picture = &shown.pictures[0];
-        assert_eq!(picture.kind, Kind::Svg);
-        let svg = String::from_utf8(picture.bytes(Kind::Svg).unwrap()).unwrap();
+        assert_eq!(picture.kind, ImageFormat::Svg);
+        let svg = String::from_utf8(picture.bytes(ImageFormat::Svg).unwrap()).unwrap();
         for text in [">One<", ">Number of Agents<", ">SoC<", ">A<"] {
             assert!(svg.contains(text), "{text}: {svg}");
         }
         // What has no numbers has no line.
         assert!(!svg.contains("B &"), "{svg}");
-        assert!(picture.bytes(Kind::Pdf).unwrap().starts_with(b"%PDF"));
-        assert!(picture.bytes(Kind::Png).unwrap().starts_with(b"\x89PNG"));
+        assert!(picture.bytes(ImageFormat::Pdf).unwrap().starts_with(b"%PDF"));
+        assert!(picture.bytes(ImageFormat::Png).unwrap().starts_with(b"\x89PNG"));
         assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; means are over the others");
     }
 
     #[test]
     fn there_are_as_many_panels_as_values() {
         let shown = show("{type: multi-plot, x: num_agents, y: SoC, over: num_agents, num_cols: 2}").unwrap();
-        let svg = String::from_utf8(shown.pictures[0].bytes(Kind::Svg).unwrap()).unwrap();
+        let svg = String::from_utf8(shown.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap();
         assert_eq!(svg.matches(">SoC<").count(), 3);
     }
 

@@ -5,10 +5,10 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
+use super::compose::bare;
 use super::grid::{Cell, Table};
 use super::legend::Legend;
 use super::options::{Common, Options};
-use super::panel::bare;
 use super::picture::Picture;
 use super::series::Series;
 use super::style::Style;

@@ -4,8 +4,8 @@ use pogema_core::Error;
 use serde_json::Value;
 
 use super::axes::{Axis, Frame};
+use super::image_format::ImageFormat;
 use super::options::Options;
-use super::picture::Kind;
 
 /// Points in an inch; pictures are measured in points.
 pub(super) const INCH: f64 = 72.0;
@@ -87,7 +87,7 @@ pub(super) struct Style {
     pub has_line_types: bool,
     pub ticks: Option<Vec<f64>>,
     pub order: Option<Vec<String>>,
-    pub kind: Kind,
+    pub kind: ImageFormat,
     pub dots_per_inch: f64,
     pub palette: Vec<String>,
 }
@@ -147,11 +147,11 @@ impl Style {
     }
 }
 
-fn kind(options: &Options<'_>) -> Result<Kind, Error> {
+fn kind(options: &Options<'_>) -> Result<ImageFormat, Error> {
     Ok(match options.choice("extension", &["pdf", "svg", "png"])? {
-        Some("svg") => Kind::Svg,
-        Some("png") => Kind::Png,
-        _ => Kind::Pdf,
+        Some("svg") => ImageFormat::Svg,
+        Some("png") => ImageFormat::Png,
+        _ => ImageFormat::Pdf,
     })
 }
 

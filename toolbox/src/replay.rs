@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use pogema_core::{Error, Trace};
 
-use crate::about::About;
 use crate::built_in::BuiltIn;
 use crate::environments::Environments;
+use crate::manifest::Manifest;
 use crate::pairs::Pairs;
 use crate::play::{play, record};
 use crate::results::{Row, figure};
@@ -21,11 +21,11 @@ impl Suite {
     /// # Errors
     /// If there are none, or the suite beside them is wrong.
     pub fn of_results(folder: &Path) -> Result<Self, Error> {
-        let about = About::read(folder)?;
-        let about = about.ok_or_else(|| Error::io(folder, "holds no results of `pogema evaluate`"))?;
+        let manifest = Manifest::read(folder)?;
+        let manifest = manifest.ok_or_else(|| Error::io(folder, "holds no results of `pogema evaluate`"))?;
         let text = pogema_maps::files::read_text(&folder.join(SUITE))?;
         // What it names lies beside the file that it was read from.
-        Self::parse(&about.suite, &text)
+        Self::parse(&manifest.suite, &text)
     }
 
     /// Its environments, with the maps of further files.

@@ -5,7 +5,7 @@ use pogema_core::{Environment, Instance, from_border, from_starts};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::engine::Engine;
+use super::Engine;
 use crate::errors;
 use crate::lists::{Pairs, tuples};
 

@@ -1,5 +1,9 @@
 //! One environment behind POGEMA's Python classes.
 
+mod drawn;
+mod observe;
+pub mod state;
+
 use numpy::PyArray2;
 use pogema_core::{
     Action, Cell, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
@@ -9,9 +13,9 @@ use pogema_maps::{InstanceSource, foretold_from};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::drawn::Drawn;
+use self::drawn::Drawn;
 use crate::lists::{Pairs, infos, read_actions};
-use crate::{config, errors, state};
+use crate::{config, errors};
 
 /// Row, column, goal's row and column, step, whether the agent takes part, whether the goal was drawn.
 type Change = (u16, u16, u16, u16, u64, bool, bool);

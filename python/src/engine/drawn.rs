@@ -8,7 +8,7 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::Engine;
+use super::Engine;
 
 /// Whether each agent's goal was drawn since the reset, now and at each change that persistent mode keeps.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

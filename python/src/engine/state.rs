@@ -9,8 +9,8 @@ use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::drawn::Drawn;
-use crate::engine::Engine;
+use super::Engine;
+use super::drawn::Drawn;
 use crate::errors;
 
 const FORMAT: &str = "pogema-rs environment";

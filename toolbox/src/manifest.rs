@@ -8,12 +8,14 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::store::ABOUT;
 use crate::suite::{Algorithm, Suite};
+
+/// The file that tells how results were made.
+pub(crate) const FILE: &str = "about.json";
 
 /// How results were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct About {
+pub struct Manifest {
     /// The suite's file, beside which stand files that it names.
     pub suite: PathBuf,
     /// By what the environments are known.
@@ -35,7 +37,7 @@ pub struct Run {
     pub versions: BTreeMap<String, String>,
 }
 
-impl About {
+impl Manifest {
     /// What a suite's results are known by, before anything was played.
     pub fn of(suite: &Suite) -> Self {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.told()));
@@ -52,7 +54,7 @@ impl About {
     /// # Errors
     /// If the file cannot be read, or is another one.
     pub fn read(folder: &Path) -> Result<Option<Self>, Error> {
-        let path = folder.join(ABOUT);
+        let path = folder.join(FILE);
         if !path.exists() {
             return Ok(None);
         }

@@ -1,0 +1,24 @@
+//! Plots as parts of a larger scene.
+
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+use kuva::render::render::{Primitive, Scene, render_multiple};
+
+/// Draws plots without their axes.
+pub(super) fn bare(plots: Vec<Plot>, layout: Layout) -> Scene {
+    let mut scene = render_multiple(plots, layout);
+    // The axes come first, and then what is cut off at them.
+    let first = scene.elements.iter().position(|element| matches!(element, Primitive::ClipStart { .. }));
+    scene.elements.drain(..first.unwrap_or(0));
+    scene
+}
+
+/// Puts one scene into another.
+pub(super) fn insert(scene: &mut Scene, part: Scene, (x, y): (f64, f64)) {
+    scene.font_family = scene.font_family.take().or(part.font_family);
+    scene.defs.extend(part.defs);
+    let transform = Some(format!("translate({x},{y})"));
+    scene.add(Primitive::GroupStart { transform, title: None, extra_attrs: None });
+    scene.elements.extend(part.elements);
+    scene.add(Primitive::GroupEnd);
+}
