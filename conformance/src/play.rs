@@ -7,7 +7,7 @@ use pogema_core::{
 };
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
 use pogema_numpy::Generator;
-use pogema_planners::{AStarTeam, Windows, pairs, pogema_team, sample};
+use pogema_planners::{AStarTeam, PomapfObservations, pairs, pogema_team, sample};
 
 use crate::digits::pack;
 use crate::request::{
@@ -281,7 +281,7 @@ impl Player {
         if self.density.is_none() {
             return Ok(());
         }
-        let windows = Windows::of(&*self.environment)?;
+        let windows = PomapfObservations::of(&*self.environment)?;
         let counts = windows.counts();
         if let Some(density) = &mut self.density {
             density.feed(counts.into_iter());
@@ -290,8 +290,8 @@ impl Player {
     }
 
     fn plan(&mut self) -> Result<Vec<Action>, Error> {
-        let windows = Windows::of(&*self.environment)?;
-        self.team.act(windows.views())
+        let windows = PomapfObservations::of(&*self.environment)?;
+        self.team.act(windows.each())
     }
 
     fn history(&self) -> History {
@@ -320,7 +320,7 @@ impl Player {
             let windows = values.chunks(3 * side * side).map(pack).collect();
             return Ok(Observed::Default { dtype: "float32".into(), windows, odd: Vec::new() });
         }
-        let windows = Windows::of(&*self.environment)?;
+        let windows = PomapfObservations::of(&*self.environment)?;
         let pomapf = ObservedPomapf {
             dtype: "float32".into(),
             obstacles: windows.obstacles.chunks(side * side).map(pack).collect(),

@@ -5,7 +5,7 @@ use pogema_core::{
     StepOut, Trace, TraceHeader, TraceStart, TraceStep,
 };
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_planners::{NamedPolicy, Windows};
+use pogema_planners::{NamedPolicy, PomapfObservations};
 use pogema_reference::Reference;
 use pogema_render::Ground;
 
@@ -44,7 +44,7 @@ impl Episode {
             num_steps: 0,
             is_over: false,
         };
-        episode.density.feed(Windows::of(&episode.environment)?.counts().into_iter());
+        episode.density.feed(PomapfObservations::of(&episode.environment)?.counts().into_iter());
         Ok(episode)
     }
 
@@ -57,7 +57,7 @@ impl Episode {
         self.environment.step(&actions, out)?;
         let state = self.environment.snapshot();
         self.num_steps += 1;
-        self.density.feed(Windows::of(&self.environment)?.counts().into_iter());
+        self.density.feed(PomapfObservations::of(&self.environment)?.counts().into_iter());
         self.collisions.feed(self.instance.map(), &before.cells, &before.active, &actions, &state.cells);
         let figures = self.meter.feed(&state.on_goal, &terminated, &truncated);
         self.is_over = figures.is_some();

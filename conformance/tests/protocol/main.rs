@@ -159,7 +159,7 @@ fn play(environment: &mut dyn Environment) -> String {
         if environment.config().observation == Observation::Default {
             environment.observe(&mut seen).unwrap();
         } else {
-            let windows = pogema_planners::Windows::of(environment).unwrap();
+            let windows = pogema_planners::PomapfObservations::of(environment).unwrap();
             let _ = write!(told, "{windows:?}");
         }
         let state = environment.snapshot();

@@ -10,8 +10,7 @@ use pogema_planners::{Budget, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, W
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
-const SOLVERS: [WindowSolver; 3] =
-    [WindowSolver::Neighbourhoods, WindowSolver::Pbs, WindowSolver::Ecbs { weight: 1.5 }];
+const SOLVERS: [WindowSolver; 3] = [WindowSolver::Lns, WindowSolver::Pbs, WindowSolver::Ecbs { weight: 1.5 }];
 
 /// Agents that get a random goal whenever they reach one.
 struct World {

@@ -5,7 +5,7 @@ use pogema_core::{
 };
 use pogema_maps::{GridConfig, InstanceSource, value_from_yaml};
 use pogema_numpy::Generator;
-use pogema_planners::{Windows, pogema_team, sample};
+use pogema_planners::{PomapfObservations, pogema_team, sample};
 use pogema_reference::Reference;
 
 /// Who moves the agents.
@@ -35,7 +35,7 @@ pub fn trace(config: &GridConfig, policy: Policy) -> Trace {
     };
     while !is_over(&steps) {
         let actions = match policy {
-            Policy::AStar => team.act(Windows::of(&environment).unwrap().views()).unwrap(),
+            Policy::AStar => team.act(PomapfObservations::of(&environment).unwrap().each()).unwrap(),
             Policy::Random => sample(&mut dice, config.num_agents),
         };
         steps.push(step(&mut environment, actions));

@@ -1,0 +1,22 @@
+//! The large neighbourhood search (LNS) of LaCAM*: replans a few agents of a valid plan at a time, and keeps the new paths
+//! unless the total delay grows.
+//!
+//! Papers: Li, Chen, Harabor, Stuckey, Koenig, "Anytime Multi-Agent Path Finding via Large Neighborhood Search", IJCAI
+//! 2021, and "MAPF-LNS2", AAAI 2022; parallel workers: Chan, Chen, Harabor, Stuckey, "Anytime Multi-Agent Path Finding
+//! with Operation Parallelism in Large Neighborhood Search", AAMAS 2024.
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | P, the paths | [`solution::Solution`] |
+//! | destroy heuristics and their weights | [`neighbourhood::NeighbourhoodSelector`] |
+//! | repair: prioritised planning in random order | `Refiner::repair` |
+
+mod change_log;
+mod earliest_arrival;
+mod neighbourhood;
+mod refiner;
+mod solution;
+mod time_table;
+
+pub(crate) use change_log::ChangeLog;
+pub(crate) use refiner::{Refiner, num_bytes, supports};
