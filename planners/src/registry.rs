@@ -73,7 +73,7 @@ pub fn lifelong(
 ) -> Result<Box<dyn Lifelong>, Error> {
     let seed = settings.seed;
     let rhcr =
-        |graph, solver| Box::new(Rhcr::new(graph, RhcrParams { seed, solver, ..RhcrParams::default() }));
+        |graph, solver| Box::new(Rhcr::new(graph, RhcrParams { solver, seed, ..RhcrParams::default() }));
     Ok(match name {
         "rhcr" => rhcr(graph, WindowSolver::Lns),
         "rhcr-pbs" => rhcr(graph, WindowSolver::Pbs),

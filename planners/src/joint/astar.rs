@@ -91,9 +91,9 @@ pub(crate) fn search(task: &JointTask<'_>, clock: &mut Clock) -> Found {
     // An agent that starts on its goal does not leave before the first step.
     let root = Node { resting: 0, cost: 0, parent: None };
     if task.leaves {
-        search.generate(task.starts, root)
+        search.generate(task.starts, root);
     } else {
-        search.arrive(task.starts, root)
+        search.arrive(task.starts, root);
     }
     search.run(clock)
 }

@@ -7,12 +7,13 @@
 mod components;
 mod constraint_tree;
 mod lns;
-mod nodes;
+
 mod objective;
 mod params;
 mod planner;
 mod run;
 mod search;
+mod search_graph;
 
 pub use params::LacamParams;
 pub use planner::Lacam;

@@ -6,10 +6,10 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | N, its Q | a [`Node`](crate::lacam::nodes::Node), its configuration |
+//! | N, its Q | a [`Node`](crate::lacam::search_graph::Node), its configuration |
 //! | the low-level tree | [`crate::lacam::constraint_tree`] |
 //! | g, h | `cost`, `to_go` |
-//! | Open, Explored | `open`, [`Nodes::find`] |
+//! | Open, Explored | `open`, [`SearchGraph::find`] |
 
 use std::collections::VecDeque;
 
@@ -18,8 +18,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
-use crate::lacam::nodes::{NONE, Nodes};
 use crate::lacam::objective::Objective;
+use crate::lacam::search_graph::{NONE, SearchGraph};
 use crate::pibt::PibtRules;
 use crate::pibt::input::StepInput;
 use crate::pibt::priorities::initial_priorities;
@@ -56,7 +56,7 @@ pub(super) struct Search<'a> {
     options: SearchOptions,
     step: PibtStep,
     random: Pcg64Mcg,
-    nodes: Nodes,
+    explored: SearchGraph,
     open: Vec<u32>,
     goal: u32,
     /// The node with the least cost to go.
@@ -79,7 +79,7 @@ impl<'a> Search<'a> {
             options,
             step: PibtStep::new(&problem.graph, options.pibt, options.seed),
             random: Pcg64Mcg::seed_from_u64(options.seed ^ 0x5eed),
-            nodes: Nodes::new(starts, priorities, options.objective.cost_to_go(costs, starts)),
+            explored: SearchGraph::new(starts, priorities, options.objective.cost_to_go(costs, starts)),
             open: vec![0],
             goal: if problem.starts == problem.goals { 0 } else { NONE },
             closest: 0,
@@ -106,17 +106,17 @@ impl<'a> Search<'a> {
 
     /// Returns the cost of the best solution so far.
     fn solution_cost(&self) -> Option<u64> {
-        (self.goal != NONE).then(|| self.nodes.get(self.goal).cost)
+        (self.goal != NONE).then(|| self.explored.get(self.goal).cost)
     }
 
     /// Returns the configurations of the best solution so far.
     pub fn solution(&self) -> Option<Vec<Vec<Vertex>>> {
-        (self.goal != NONE).then(|| self.nodes.path_to(self.goal))
+        (self.goal != NONE).then(|| self.explored.path_to(self.goal))
     }
 
     /// Returns the configurations up to the one with the least cost to go.
     pub fn closest(&self) -> Vec<Vec<Vertex>> {
-        self.nodes.path_to(self.closest)
+        self.explored.path_to(self.closest)
     }
 
     /// Generates one successor of the node on top of the stack.
@@ -124,7 +124,7 @@ impl<'a> Search<'a> {
         let Some(&top) = self.open.last() else {
             return Progress::Exhausted;
         };
-        let node = self.nodes.get(top);
+        let node = self.explored.get(top);
         let constraints = match node.constraints {
             Some(constraints) if node.cost + node.to_go < self.bound && top != self.goal => constraints,
             _ => {
@@ -132,13 +132,14 @@ impl<'a> Search<'a> {
                 return Progress::Going;
             }
         };
-        let (graph, now, order) = (&self.problem.graph, self.nodes.configuration(top), self.nodes.order(top));
+        let (graph, now, order) =
+            (&self.problem.graph, self.explored.configuration(top), self.explored.order(top));
         // Spread, so that equal digits lead different nodes to different vertices.
         let turn = u64::from(top).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
         constraints.read(graph, now, order, turn, &mut self.constraints);
         let after = constraints.after(graph, now, order);
-        self.nodes.get_mut(top).constraints = after;
-        if self.nodes.num_bytes() > self.options.max_bytes {
+        self.explored.get_mut(top).constraints = after;
+        if self.explored.num_bytes() > self.options.max_bytes {
             return Progress::Full;
         }
         if !self.generate(top) {
@@ -153,7 +154,7 @@ impl<'a> Search<'a> {
     /// Writes a successor configuration of a node into `next`; returns whether PIBT found one.
     fn generate(&mut self, node: u32) -> bool {
         let (graph, goals): (&Graph, _) = (&self.problem.graph, &self.problem.goals[..]);
-        let (now, order) = (self.nodes.configuration(node), self.nodes.order(node));
+        let (now, order) = (self.explored.configuration(node), self.explored.order(node));
         let input = StepInput { graph, now, goals, costs: self.costs, order };
         let next = self.step.run(&input, &self.constraints);
         if let Some(next) = next {
@@ -166,16 +167,16 @@ impl<'a> Search<'a> {
     /// Connects a node to a successor configuration, and opens the successor.
     fn reach(&mut self, from: u32, next: &[Vertex]) -> Progress {
         let before = self.solution_cost();
-        if let Some(to) = self.nodes.find(next) {
-            self.nodes.connect(from, to);
+        if let Some(to) = self.explored.find(next) {
+            self.explored.connect(from, to);
             self.relax(from);
             // Returning to a deep node finds little. Now and then, the search restarts from the root.
             let again = if self.random.next_u32().is_multiple_of(1000) { 0 } else { to };
             self.open.push(again);
         } else {
             let to = self.add(from, next);
-            self.nodes.connect(from, to);
-            let node = self.nodes.get(to);
+            self.explored.connect(from, to);
+            let node = self.explored.get(to);
             if node.cost + node.to_go < self.bound {
                 self.open.push(to);
             }
@@ -190,10 +191,10 @@ impl<'a> Search<'a> {
 
     fn add(&mut self, from: u32, next: &[Vertex]) -> u32 {
         let (objective, goals) = (self.options.objective, &self.problem.goals[..]);
-        let step = objective.step_cost(self.nodes.configuration(from), next, goals);
-        let (cost, to_go) = (self.nodes.get(from).cost + step, objective.cost_to_go(self.costs, next));
-        let node = self.nodes.add(next, from, goals, (cost, to_go));
-        if to_go < self.nodes.get(self.closest).to_go {
+        let step = objective.step_cost(self.explored.configuration(from), next, goals);
+        let (cost, to_go) = (self.explored.get(from).cost + step, objective.cost_to_go(self.costs, next));
+        let node = self.explored.add(next, from, goals, (cost, to_go));
+        if to_go < self.explored.get(self.closest).to_go {
             self.closest = node;
         }
         if self.goal == NONE && next == goals {
@@ -208,13 +209,13 @@ impl<'a> Search<'a> {
         let mut queue = VecDeque::from([from]);
         let mut better = Vec::new();
         while let Some(from) = queue.pop_front() {
-            let (cost, configuration) = (self.nodes.get(from).cost, self.nodes.configuration(from));
-            better.extend(self.nodes.successors(from).filter_map(|to| {
-                let cost = cost + objective.step_cost(configuration, self.nodes.configuration(to), goals);
-                (cost < self.nodes.get(to).cost).then_some((to, cost))
+            let (cost, configuration) = (self.explored.get(from).cost, self.explored.configuration(from));
+            better.extend(self.explored.successors(from).filter_map(|to| {
+                let cost = cost + objective.step_cost(configuration, self.explored.configuration(to), goals);
+                (cost < self.explored.get(to).cost).then_some((to, cost))
             }));
             for (to, cost) in better.drain(..) {
-                let node = self.nodes.get_mut(to);
+                let node = self.explored.get_mut(to);
                 (node.cost, node.parent) = (cost, from);
                 if to != self.goal && cost + node.to_go < self.bound {
                     self.open.push(to);

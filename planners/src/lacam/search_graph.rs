@@ -13,7 +13,7 @@ use crate::problem::Agent;
 /// No node, or no edge.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A node of the search graph. Its configuration, order and priorities are in the arrays of [`Nodes`].
+/// A node of the search graph. Its configuration, order and priorities are in the arrays of [`SearchGraph`].
 #[derive(Debug)]
 pub(super) struct Node {
     pub parent: u32,
@@ -35,7 +35,7 @@ struct Edge {
 
 /// The nodes and edges of the search graph.
 #[derive(Debug)]
-pub(super) struct Nodes {
+pub(super) struct SearchGraph {
     num_agents: usize,
     nodes: Vec<Node>,
     edges: Vec<Edge>,
@@ -49,10 +49,10 @@ pub(super) struct Nodes {
     known: HashTable<(u64, u32)>,
 }
 
-impl Nodes {
+impl SearchGraph {
     /// The graph of the start configuration and its priorities.
     pub fn new(starts: &[Vertex], priorities: Vec<u32>, to_go: u64) -> Self {
-        let mut nodes = Self {
+        let mut graph = Self {
             num_agents: starts.len(),
             nodes: Vec::new(),
             edges: Vec::new(),
@@ -61,8 +61,8 @@ impl Nodes {
             priorities,
             known: HashTable::new(),
         };
-        nodes.insert(starts, NONE, 0, to_go);
-        nodes
+        graph.insert(starts, NONE, 0, to_go);
+        graph
     }
 
     /// Returns a node.
