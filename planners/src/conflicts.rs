@@ -60,11 +60,11 @@ struct Occupancy {
 }
 
 impl Occupancy {
-    const NOBODY: u32 = u32::MAX;
+    const NO_AGENT: u32 = u32::MAX;
 
     fn new(num_vertices: usize, num_agents: usize) -> Self {
-        let nobody = |count| vec![Self::NOBODY; count];
-        Self { last: nobody(num_vertices), earlier: nobody(num_agents), taken: Vec::new() }
+        let empty = |count| vec![Self::NO_AGENT; count];
+        Self { last: empty(num_vertices), earlier: empty(num_agents), taken: Vec::new() }
     }
 
     fn enter(&mut self, agent: usize, at: Vertex) {
@@ -73,15 +73,13 @@ impl Occupancy {
     }
 
     fn at(&self, vertex: Vertex) -> impl Iterator<Item = usize> + '_ {
-        let somebody = |agent: u32| (agent != Self::NOBODY).then_some(agent as usize);
-        std::iter::successors(somebody(self.last[vertex as usize]), move |&agent| {
-            somebody(self.earlier[agent])
-        })
+        let some = |agent: u32| (agent != Self::NO_AGENT).then_some(agent as usize);
+        std::iter::successors(some(self.last[vertex as usize]), move |&agent| some(self.earlier[agent]))
     }
 
     fn clear(&mut self) {
         for vertex in self.taken.drain(..) {
-            self.last[vertex as usize] = Self::NOBODY;
+            self.last[vertex as usize] = Self::NO_AGENT;
         }
     }
 }

@@ -10,9 +10,6 @@ use crate::graph::Vertex;
 /// It knows the current goal of each agent; only [`Lifelong::next_foreseeing`] tells it later ones. Positions and goals
 /// may change arbitrarily between calls; the planner then drops the plans that no longer fit.
 pub trait Lifelong: Send {
-    /// The name of the planner on the command line.
-    fn name(&self) -> &'static str;
-
     /// Clears the state of the episode. Afterwards the same calls return the same moves again.
     fn reset(&mut self);
 

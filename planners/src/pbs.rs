@@ -44,10 +44,6 @@ impl Pbs {
 }
 
 impl Planner for Pbs {
-    fn name(&self) -> &'static str {
-        "pbs"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
         let costs = match problem.costs_to_go(&mut clock) {

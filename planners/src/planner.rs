@@ -6,9 +6,6 @@ use crate::problem::Problem;
 
 /// A planner of one-shot problems.
 pub trait Planner: Send {
-    /// The name of the planner on the command line.
-    fn name(&self) -> &'static str;
-
     /// Plans within a budget. Never panics, and stops soon after the budget is spent.
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome;
 }

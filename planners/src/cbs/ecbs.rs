@@ -60,10 +60,6 @@ impl Ecbs {
 }
 
 impl Planner for Ecbs {
-    fn name(&self) -> &'static str {
-        "ecbs"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
         let costs = match problem.costs_to_go(&mut clock) {

@@ -24,10 +24,6 @@ impl Cbs {
 }
 
 impl Planner for Cbs {
-    fn name(&self) -> &'static str {
-        "cbs"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
         let costs = match problem.costs_to_go(&mut clock) {

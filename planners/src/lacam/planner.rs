@@ -21,10 +21,6 @@ impl Lacam {
 }
 
 impl Planner for Lacam {
-    fn name(&self) -> &'static str {
-        "lacam"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
         let costs = match problem.costs_to_go(&mut clock) {

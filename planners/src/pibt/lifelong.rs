@@ -113,10 +113,6 @@ impl PibtLifelong {
 }
 
 impl Lifelong for PibtLifelong {
-    fn name(&self) -> &'static str {
-        if self.params.guidance.is_some() { "guided-pibt" } else { "pibt" }
-    }
-
     fn reset(&mut self) {
         *self = Self::new(self.graph.clone(), self.goals.len(), self.params.clone());
     }

@@ -67,10 +67,6 @@ impl Pibt {
 }
 
 impl Planner for Pibt {
-    fn name(&self) -> &'static str {
-        "pibt"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
         let costs = match problem.costs_to_go(&mut clock) {

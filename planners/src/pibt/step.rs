@@ -60,9 +60,9 @@ pub(crate) struct PibtStep {
 impl PibtStep {
     /// Prepares steps on a graph; the seed breaks ties.
     pub fn new(graph: &Graph, rules: PibtRules, seed: u64) -> Self {
-        let nobody = vec![NONE; graph.num_vertices()];
+        let empty = vec![NONE; graph.num_vertices()];
         let random = Pcg64Mcg::seed_from_u64(seed);
-        Self { rules, random, standing: nobody.clone(), taken: nobody, next: Vec::new(), stack: Vec::new() }
+        Self { rules, random, standing: empty.clone(), taken: empty, next: Vec::new(), stack: Vec::new() }
     }
 
     /// Returns the next configuration, which satisfies the constraints. PIBT can fail only if there are

@@ -15,7 +15,7 @@ use crate::registry::{LIFELONG, PLANNERS, PlannerSettings, planner};
 pub const SIMPLE: [(&str, &str); 3] = [
     ("random", "what POGEMA's `sample_actions` draws"),
     ("astar", "POGEMA's own A* agent, one for each agent"),
-    ("stay", "nobody moves"),
+    ("stay", "all agents stay"),
 ];
 
 /// The settings of a policy.
@@ -69,7 +69,7 @@ impl NamedPolicy {
         let PolicySettings { budget, planner: planner_settings, future_goals } = settings.clone();
         let is_lifelong = has(&LIFELONG) && (config.on_goal == OnGoal::Restart || !has(&PLANNERS));
         if future_goals && !is_lifelong {
-            let reason = format!("`{name}` cannot be told of goals to come, only lifelong planners can");
+            let reason = format!("`{name}` does not use future goals; only lifelong planners do");
             return Err(Error::State { reason });
         }
         Ok(Self(match name {

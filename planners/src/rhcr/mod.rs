@@ -209,10 +209,6 @@ impl Rhcr {
 }
 
 impl Lifelong for Rhcr {
-    fn name(&self) -> &'static str {
-        "rhcr"
-    }
-
     fn reset(&mut self) {
         let graph = self.distances.graph().clone();
         self.plan = WindowPlan::new(graph, self.params.planning_window, self.params.seed);

@@ -7,7 +7,7 @@ use crate::problem::Agent;
 pub(crate) type Path = Vec<Vertex>;
 
 /// No agent.
-const NOBODY: u16 = u16::MAX;
+const NO_AGENT: u16 = u16::MAX;
 
 /// The occupied vertices and times, as bits and by agent. Paths in the table do not conflict.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(crate) struct TimeTable {
 
 impl TimeTable {
     /// The limit on the number of agents.
-    pub const MAX_AGENTS: usize = NOBODY as usize;
+    pub const MAX_AGENTS: usize = NO_AGENT as usize;
 
     /// Returns the memory of a table. Units: bytes.
     pub fn num_bytes(num_vertices: usize, span: usize) -> usize {
@@ -40,8 +40,8 @@ impl TimeTable {
             span,
             words,
             busy: vec![0; num_vertices * words],
-            passing: vec![NOBODY; num_vertices * span],
-            resting: vec![NOBODY; num_vertices],
+            passing: vec![NO_AGENT; num_vertices * span],
+            resting: vec![NO_AGENT; num_vertices],
         }
     }
 
@@ -65,11 +65,11 @@ impl TimeTable {
     /// Removes a path.
     pub fn remove(&mut self, path: &[Vertex]) {
         for (time, &vertex) in path.iter().enumerate() {
-            self.passing[vertex as usize * self.span + time] = NOBODY;
+            self.passing[vertex as usize * self.span + time] = NO_AGENT;
             self.busy[vertex as usize * self.words + time / 64] &= !(1 << (time % 64));
         }
         if let Some(&last) = path.last() {
-            self.resting[last as usize] = NOBODY;
+            self.resting[last as usize] = NO_AGENT;
             self.rest(last, path.len(), |word, mask| *word &= !mask);
         }
     }
@@ -86,12 +86,12 @@ impl TimeTable {
     /// Returns the agent at a vertex at a time.
     pub fn agent_at(&self, vertex: Vertex, time: u32) -> Option<Agent> {
         let passing = self.passing[vertex as usize * self.span + time as usize];
-        let agent = if passing == NOBODY && self.is_busy(vertex, time) {
+        let agent = if passing == NO_AGENT && self.is_busy(vertex, time) {
             self.resting[vertex as usize]
         } else {
             passing
         };
-        (agent != NOBODY).then_some(Agent::from(agent))
+        (agent != NO_AGENT).then_some(Agent::from(agent))
     }
 
     /// Whether a vertex is occupied at a time.
@@ -151,7 +151,7 @@ impl TimeTable {
     #[inline]
     pub fn is_swap(&self, from: Vertex, to: Vertex, time: u32) -> bool {
         let before = self.passing[to as usize * self.span + time as usize - 1];
-        before != NOBODY && before == self.passing[from as usize * self.span + time as usize]
+        before != NO_AGENT && before == self.passing[from as usize * self.span + time as usize]
     }
 
     /// Whether a path is free of conflicts.
