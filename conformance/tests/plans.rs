@@ -126,7 +126,7 @@ fn reached_by_knowing(episodes: &[(GridConfig, Instance)]) -> [f32; 2] {
         let mut policy =
             LifelongPolicy::new("rhcr", PlannerSettings::default(), Budget::of_nodes(200)).unwrap();
         if is_told {
-            policy.foresee(instance).unwrap();
+            policy.provide_future_goals(instance).unwrap();
         }
         // That a goal is another than the one foretold would be an error.
         let (num_reached, num_reverted) = play(&config.rules(), instance, |environment| {
@@ -159,16 +159,16 @@ fn agents_that_know_their_goals_to_come_reach_more_of_them() {
 fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     let (config, instance) = drawn(1, 12, 16, "restart");
     let new = |name| LifelongPolicy::new(name, PlannerSettings::default(), Budget::of_nodes(50)).unwrap();
-    assert!(new("pibt").foresee(&instance).is_err());
+    assert!(new("pibt").provide_future_goals(&instance).is_err());
     let mut policy = new("rhcr");
-    policy.foresee(&instance).unwrap();
+    policy.provide_future_goals(&instance).unwrap();
     let mut environment = Reference::new(config.rules()).unwrap();
     environment.reset(&drawn(2, 12, 16, "restart").1).unwrap();
     let other = environment.snapshot();
     assert!(policy.act(instance.map(), &other).unwrap_err().to_string().contains("was not to come"));
     policy.reset();
     environment.reset(&instance).unwrap();
-    policy.foresee(&instance).unwrap();
+    policy.provide_future_goals(&instance).unwrap();
     policy.act(instance.map(), &environment.snapshot()).unwrap();
     let again = policy.act(instance.map(), &environment.snapshot()).unwrap_err().to_string();
     assert_eq!(again, "the goals to come are known for step 1, not for 0");

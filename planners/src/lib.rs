@@ -1,7 +1,7 @@
 //! Centralised planners for POGEMA environments, and policies.
 //!
 //! A [`Problem`] is a set of agents on a map, each with a start and a goal. A [`Planner`] solves it within a [`Budget`] and
-//! returns an [`Outcome`]. [`validate`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that get a
+//! returns an [`Outcome`]. [`validate()`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that get a
 //! new goal whenever they reach one.
 //!
 //! | planner | folder |

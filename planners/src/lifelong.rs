@@ -7,7 +7,7 @@ use crate::graph::Vertex;
 
 /// A lifelong planner, which chooses the moves of all agents one step at a time.
 ///
-/// It knows the current goal of each agent; only [`Lifelong::next_foreseeing`] tells it later ones. Positions and goals
+/// It knows the current goal of each agent; only [`Lifelong::next_with_future_goals`] tells it later ones. Positions and goals
 /// may change arbitrarily between calls; the planner then drops the plans that no longer fit.
 pub trait Lifelong: Send {
     /// Clears the state of the episode. Afterwards the same calls return the same moves again.
@@ -21,7 +21,7 @@ pub trait Lifelong: Send {
     fn next(&mut self, now: &[Vertex], goals: &[Vertex], budget: &Budget) -> Result<Vec<Vertex>, Error>;
 
     /// Whether the planner uses future goals.
-    fn foresees(&self) -> bool {
+    fn uses_future_goals(&self) -> bool {
         false
     }
 
@@ -29,7 +29,7 @@ pub trait Lifelong: Send {
     ///
     /// # Errors
     /// As for [`Lifelong::next`]; [`Error::Agent`] also for an agent without a goal.
-    fn next_foreseeing(
+    fn next_with_future_goals(
         &mut self,
         now: &[Vertex],
         goals: &[Vec<Vertex>],

@@ -16,7 +16,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`Error::Instance`] without a start; [`Error::Length`] unless every step has as many agents as the start.
-    /// [`crate::validate`] checks whether the moves are valid.
+    /// [`crate::validate()`] checks whether the moves are valid.
     pub fn new(cells: Vec<Vec<Cell>>) -> Result<Self, Error> {
         let num_agents = cells.first().ok_or_else(|| Error::instance("the plan has no start"))?.len();
         for step in &cells {

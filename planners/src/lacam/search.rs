@@ -169,7 +169,7 @@ impl<'a> Search<'a> {
         let before = self.solution_cost();
         if let Some(to) = self.explored.find(next) {
             self.explored.connect(from, to);
-            self.relax(from);
+            self.relax(from, to);
             // Returning to a deep node finds little. Now and then, the search restarts from the root.
             let again = if self.random.next_u32().is_multiple_of(1000) { 0 } else { to };
             self.open.push(again);
@@ -203,25 +203,24 @@ impl<'a> Search<'a> {
         node
     }
 
-    /// Propagates a lower cost to the successors of a node.
-    fn relax(&mut self, from: u32) {
+    /// Propagates the cost of a node along a new edge, and from there along all edges to nodes that become cheaper.
+    ///
+    /// The costs along all other edges are already consistent.
+    fn relax(&mut self, from: u32, to: u32) {
         let (objective, goals) = (self.options.objective, &self.problem.goals[..]);
-        let mut queue = VecDeque::from([from]);
-        let mut better = Vec::new();
-        while let Some(from) = queue.pop_front() {
-            let (cost, configuration) = (self.explored.get(from).cost, self.explored.configuration(from));
-            better.extend(self.explored.successors(from).filter_map(|to| {
-                let cost = cost + objective.step_cost(configuration, self.explored.configuration(to), goals);
-                (cost < self.explored.get(to).cost).then_some((to, cost))
-            }));
-            for (to, cost) in better.drain(..) {
-                let node = self.explored.get_mut(to);
-                (node.cost, node.parent) = (cost, from);
-                if to != self.goal && cost + node.to_go < self.bound {
-                    self.open.push(to);
-                }
-                queue.push_back(to);
+        let mut edges = VecDeque::from([(from, to)]);
+        while let Some((from, to)) = edges.pop_front() {
+            let (now, next) = (self.explored.configuration(from), self.explored.configuration(to));
+            let cost = self.explored.get(from).cost + objective.step_cost(now, next, goals);
+            let node = self.explored.get_mut(to);
+            if cost >= node.cost {
+                continue;
             }
+            (node.cost, node.parent) = (cost, from);
+            if to != self.goal && cost + node.to_go < self.bound {
+                self.open.push(to);
+            }
+            edges.extend(self.explored.successors(to).map(|next| (to, next)));
         }
     }
 }

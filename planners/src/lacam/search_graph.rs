@@ -3,7 +3,7 @@
 use std::hash::{Hash, Hasher};
 
 use hashbrown::HashTable;
-use rustc_hash::FxHasher;
+use rustc_hash::{FxHashSet, FxHasher};
 
 use crate::graph::Vertex;
 use crate::lacam::constraint_tree::ConstraintNode;
@@ -39,6 +39,8 @@ pub(super) struct SearchGraph {
     num_agents: usize,
     nodes: Vec<Node>,
     edges: Vec<Edge>,
+    /// All edges, to find duplicates.
+    known_edges: FxHashSet<(u32, u32)>,
     /// Shape: `[nodes, agents]`
     configurations: Vec<Vertex>,
     /// Shape: `[nodes, agents]`
@@ -56,6 +58,7 @@ impl SearchGraph {
             num_agents: starts.len(),
             nodes: Vec::new(),
             edges: Vec::new(),
+            known_edges: FxHashSet::default(),
             configurations: Vec::new(),
             orders: Vec::new(),
             priorities,
@@ -88,7 +91,7 @@ impl SearchGraph {
     /// Returns the approximate memory of the graph. Units: bytes.
     pub fn num_bytes(&self) -> usize {
         let node = size_of::<Node>() + 3 * size_of::<u32>() * self.num_agents + 4 * size_of::<u64>();
-        self.nodes.len() * node + self.edges.len() * size_of::<Edge>()
+        self.nodes.len() * node + self.edges.len() * 2 * size_of::<Edge>()
     }
 
     /// Returns the configurations from the start to a node.
@@ -138,7 +141,7 @@ impl SearchGraph {
 
     /// Adds an edge, unless it is known.
     pub fn connect(&mut self, from: u32, to: u32) {
-        if self.successors(from).any(|known| known == to) {
+        if !self.known_edges.insert((from, to)) {
             return;
         }
         let next = std::mem::replace(&mut self.nodes[from as usize].edges, self.edges.len() as u32);

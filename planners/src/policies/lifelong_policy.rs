@@ -45,9 +45,9 @@ impl LifelongPolicy {
     ///
     /// # Errors
     /// [`Error::Config`] for a planner that does not use future goals.
-    pub fn foresee(&mut self, instance: &Instance) -> Result<(), Error> {
+    pub fn provide_future_goals(&mut self, instance: &Instance) -> Result<(), Error> {
         let (_, planner) = self.planner_on(instance.map())?;
-        if !planner.foresees() {
+        if !planner.uses_future_goals() {
             return Err(Error::config("planner", &self.name, "`rhcr`, to make use of goals still to come"));
         }
         self.forecast = Some(GoalForecast::new(instance));
@@ -73,7 +73,7 @@ impl LifelongPolicy {
         let next = if let Some(goals) = future {
             let vertices = |goals: &Vec<Cell>| graph.vertices_of("goal", goals);
             let goals = goals.iter().map(vertices).collect::<Result<Vec<_>, _>>()?;
-            planner.next_foreseeing(&cells, &goals, &budget)?
+            planner.next_with_future_goals(&cells, &goals, &budget)?
         } else {
             planner.next(&cells, &graph.vertices_of("goal", &of(&now.goals))?, &budget)?
         };

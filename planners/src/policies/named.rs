@@ -79,7 +79,7 @@ impl NamedPolicy {
             name if is_lifelong => {
                 let mut policy = LifelongPolicy::new(name, planner_settings, budget)?;
                 if future_goals {
-                    policy.foresee(instance)?;
+                    policy.provide_future_goals(instance)?;
                 }
                 Kind::Lifelong(Box::new(policy))
             }

@@ -8,7 +8,7 @@
 //! | w, planning window | [`RhcrParams::planning_window`] |
 //! | windowed MAPF solver | [`RhcrParams::solver`] |
 //!
-//! In the paper, agents know their next goals. Here only [`Lifelong::next_foreseeing`] provides them. Otherwise agents plan
+//! In the paper, agents know their next goals. Here only [`Lifelong::next_with_future_goals`] provides them. Otherwise agents plan
 //! to their current goals, keep out of the way afterwards, and replan when one of them gets a new goal. If the solver of
 //! the paper fails, agents wait or keep parts of their plans. Here they continue the last plan, which PIBT extends without
 //! conflicts.
@@ -125,10 +125,10 @@ impl Rhcr {
     }
 
     /// Sets the discount for a number of agents with or without future goals.
-    fn set_discount(&mut self, num_agents: usize, foresees: bool) {
-        if self.discounted != Some((num_agents, foresees)) {
-            self.discounted = Some((num_agents, foresees));
-            let own = if num_agents <= 4 && !foresees { 0.85 } else { 1.0 };
+    fn set_discount(&mut self, num_agents: usize, uses_future_goals: bool) {
+        if self.discounted != Some((num_agents, uses_future_goals)) {
+            self.discounted = Some((num_agents, uses_future_goals));
+            let own = if num_agents <= 4 && !uses_future_goals { 0.85 } else { 1.0 };
             self.discount = Discount::new(self.params.discount.unwrap_or(own));
         }
     }
@@ -225,11 +225,11 @@ impl Lifelong for Rhcr {
         Ok(self.step(now, goals.to_vec(), legs, budget))
     }
 
-    fn foresees(&self) -> bool {
+    fn uses_future_goals(&self) -> bool {
         true
     }
 
-    fn next_foreseeing(
+    fn next_with_future_goals(
         &mut self,
         now: &[Vertex],
         goals: &[Vec<Vertex>],

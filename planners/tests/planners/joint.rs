@@ -131,3 +131,13 @@ fn what_is_proven_is_what_a_search_through_everything_finds() {
     }
     assert!(seen[0] > 100 && seen[1] > 100, "{seen:?}");
 }
+
+#[test]
+fn puzzles_cost_what_the_catalogue_says() {
+    assert!(PUZZLES.len() >= 20);
+    for puzzle in &PUZZLES {
+        let text = puzzle.text().unwrap();
+        let found = solvability(&text.map, &text.starts, &text.goals, OnGoal::Nothing, usize::MAX).unwrap();
+        assert_eq!(found, Solvability::Solvable { sum_of_costs: puzzle.sum_of_costs }, "{}", puzzle.name);
+    }
+}

@@ -107,7 +107,7 @@ fn agents_that_know_their_next_goals_need_not_plan_every_step() {
         for _ in 0..100 {
             let ahead = |(goals, &reached): (&Vec<Vertex>, &usize)| goals[reached..].to_vec();
             let goals: Vec<Vec<Vertex>> = world.goals.iter().zip(&world.reached).map(ahead).collect();
-            let next = planner.next_foreseeing(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
+            let next = planner.next_with_future_goals(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
             world.go(next);
         }
         assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());
