@@ -69,21 +69,25 @@ impl SearchGraph {
     }
 
     /// Returns a node.
+    #[inline]
     pub fn get(&self, node: u32) -> &Node {
         &self.nodes[node as usize]
     }
 
     /// Returns a node to be changed.
+    #[inline]
     pub fn get_mut(&mut self, node: u32) -> &mut Node {
         &mut self.nodes[node as usize]
     }
 
     /// Returns the configuration of a node.
+    #[inline]
     pub fn configuration(&self, node: u32) -> &[Vertex] {
         &self.configurations[node as usize * self.num_agents..][..self.num_agents]
     }
 
     /// Returns all agents, highest priority first.
+    #[inline]
     pub fn order(&self, node: u32) -> &[Agent] {
         &self.orders[node as usize * self.num_agents..][..self.num_agents]
     }

@@ -21,6 +21,7 @@ pub(super) struct Node {
 
 impl Node {
     /// Whether this node dominates another: same interval and phase, no later, no more expensive, no more conflicts.
+    #[inline]
     pub fn dominates(&self, other: &Self) -> bool {
         self.vertex == other.vertex
             && self.until == other.until
@@ -33,6 +34,7 @@ impl Node {
 
 impl Task<'_> {
     /// Returns the f-value of a node, unless it exceeds a limit.
+    #[inline]
     pub(super) fn bound(&self, node: &Node) -> Option<u32> {
         let bound = match self.legs.get(node.phase as usize) {
             Some(leg) if leg.to_go[node.vertex as usize] == UNREACHABLE => return None,
@@ -51,6 +53,7 @@ impl Task<'_> {
     }
 
     /// Whether a node ends the path.
+    #[inline]
     pub(super) fn is_end(&self, node: &Node) -> bool {
         let is_finished = node.phase as usize == self.legs.len();
         match self.horizon {
@@ -60,22 +63,26 @@ impl Task<'_> {
     }
 
     /// Whether a step is beyond the window.
+    #[inline]
     pub(super) fn is_beyond(&self, time: u32) -> bool {
         matches!(self.horizon, Horizon::Window(last) if time > last)
     }
 
     /// Returns the cost after waiting until a step. An agent that has reached all goals pays nothing.
+    #[inline]
     pub(super) fn cost_after(&self, node: &Node, time: u32) -> u32 {
         let is_finished = node.phase as usize == self.legs.len();
         if is_finished { node.cost } else { node.cost + time - node.time }
     }
 
     /// Whether a move is forbidden or swaps with a reserved path.
+    #[inline]
     pub(super) fn is_barred(&self, from: Vertex, to: Vertex, time: u32) -> bool {
         self.banned.contains(&(from, to, time)) || self.reserved.num_swaps(from, to, time) > 0
     }
 
     /// Shortens the interval of a node to the part with a constant number of soft conflicts, and counts them.
+    #[inline]
     pub(super) fn split(&self, node: Node) -> Node {
         let Some(avoided) = self.avoided else { return node };
         let (count, until) = avoided.count_at(node.vertex, node.time);

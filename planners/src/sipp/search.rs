@@ -126,6 +126,7 @@ impl Sipp {
     }
 
     /// Opens a node, and advances its phase if it is on a goal.
+    #[inline]
     fn open(&mut self, task: &Task<'_>, mut node: Node) {
         let reaches = |node: &Node| {
             task.legs.get(node.phase as usize).is_some_and(|leg| leg.to_go[node.vertex as usize] == 0)
