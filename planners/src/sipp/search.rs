@@ -11,8 +11,8 @@ use crate::sipp::task::{Horizon, Order, Task, TimedPath};
 
 const NONE: u32 = u32::MAX;
 
-/// The key by which nodes are expanded, and the node.
-type Entry = Reverse<(u32, u32, u32, u32)>;
+/// The key by which nodes are expanded, in the high bits, and the index of the node in the lowest 32.
+type Entry = Reverse<u128>;
 
 /// The search, which reuses its memory for the next task.
 #[derive(Debug)]
@@ -38,7 +38,8 @@ impl Sipp {
         self.queue.clear();
         self.round = self.round.wrapping_add(1);
         self.open_start(task);
-        while let Some(Reverse((_, _, _, index))) = self.queue.pop() {
+        while let Some(Reverse(key)) = self.queue.pop() {
+            let index = key as u32;
             let node = self.nodes[index as usize];
             if task.is_end(&node) {
                 return Some(self.path(task, index));
@@ -169,10 +170,13 @@ impl Sipp {
         self.nodes.push(node);
         let salted = (node.vertex ^ task.salt).wrapping_mul(0x9e37_79b1) >> 24;
         let tie = (!node.time << 8) | salted;
-        self.queue.push(Reverse(match task.order {
-            Order::Cost => (bound, node.conflicts, tie, index),
-            Order::Conflicts { .. } => (node.conflicts, bound, tie, index),
-        }));
+        let (first, second) = match task.order {
+            Order::Cost => (bound, node.conflicts),
+            Order::Conflicts { .. } => (node.conflicts, bound),
+        };
+        let high = u64::from(first) << 32 | u64::from(second);
+        let low = u64::from(tie) << 32 | u64::from(index);
+        self.queue.push(Reverse(u128::from(high) << 64 | u128::from(low)));
     }
 
     /// Whether an earlier node dominates a new one.
