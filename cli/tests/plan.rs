@@ -106,7 +106,7 @@ fn wrong_calls_are_one_line() {
         (vec!["bench", "planners", "--suite", ".", "--future-goals"], "expected `--setting lmapf`"),
         (vec!["bench", "planners", "--suite", ".", "--speed"], "04-movingai.yaml"),
         (vec!["bench", "planners", "--suite", ".", "--speed", "--sets", "x"], "cannot be used with '--sets"),
-        (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` cannot be told of goals to come"),
+        (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
         (
             vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],
             "expected `rhcr`, to make use of goals still to come",

@@ -7,7 +7,7 @@ use pogema_core::{
 };
 use pogema_maps::{GridConfig, InstanceSource, foretold_goals};
 use pogema_numpy::Generator;
-use pogema_planners::{AStarTeam, Windows, pogema_team, sample};
+use pogema_planners::{AStarTeam, PomapfObservations, pogema_team, sample};
 
 use crate::digits::pack;
 use crate::request::{
@@ -280,7 +280,7 @@ impl Player {
     }
 
     fn plan(&mut self) -> Result<Vec<Action>, Error> {
-        self.team.act(Windows::of(&self.episode)?.views())
+        self.team.act(PomapfObservations::of(&self.episode)?.each())
     }
 
     fn history(&self) -> History {
@@ -308,7 +308,7 @@ impl Player {
             let windows = values.chunks(3 * side * side).map(pack).collect();
             return Ok(Observed::Default { dtype: "float32".into(), windows, odd: Vec::new() });
         }
-        let windows = Windows::of(&self.episode)?;
+        let windows = PomapfObservations::of(&self.episode)?;
         let pomapf = ObservedPomapf {
             dtype: "float32".into(),
             obstacles: windows.obstacles.chunks(side * side).map(pack).collect(),

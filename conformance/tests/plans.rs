@@ -5,8 +5,8 @@
 use pogema_core::{Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State};
 use pogema_maps::{GridConfig, InstanceSource, PUZZLES, Puzzle, named_map};
 use pogema_planners::{
-    Budget, Choice, ConflictKind, LIFELONG, LifelongPolicy, PLANNERS, Plan, PlannerPolicy, Problem, planner,
-    validate,
+    Budget, ConflictKind, LIFELONG, LifelongPolicy, PLANNERS, Plan, PlannerPolicy, PlannerSettings, Problem,
+    planner, validate,
 };
 use pogema_reference::Reference;
 use serde_json::json;
@@ -48,8 +48,9 @@ fn the_reference_plays_plans_as_they_are() {
             let num_agents = if matches!(name, "cbs" | "ecbs") { 4 } else { 10 };
             let (config, instance) = drawn(seed, 10, num_agents, "nothing");
             let problem = Problem::of(&instance).unwrap();
-            let outcome =
-                planner(name, Choice { seed, threads: 1 }).unwrap().plan(&problem, &Budget::of_nodes(300));
+            let outcome = planner(name, PlannerSettings { seed, threads: 1 })
+                .unwrap()
+                .plan(&problem, &Budget::of_nodes(300));
             let Some(plan) = outcome.best() else { continue };
             let goals = instance.first_goals();
             let goals = outcome.solution().map(|_| goals.as_slice());
@@ -100,7 +101,8 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
         for seed in 0..4 {
             let (config, instance) = drawn(seed, 12, 12, "restart");
             let mut policy =
-                LifelongPolicy::new(name, Choice { seed, threads: 1 }, Budget::of_nodes(200)).unwrap();
+                LifelongPolicy::new(name, PlannerSettings { seed, threads: 1 }, Budget::of_nodes(200))
+                    .unwrap();
             let (num_reached, num_reverted) =
                 play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
             assert_eq!(num_reverted, 0.0, "{name}, seed {seed}");
@@ -112,9 +114,10 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
 /// Goals reached by agents that are told only of their present goals, and by agents that know those to come.
 fn reached_by_knowing(episodes: &[(GridConfig, Instance)]) -> [f32; 2] {
     let reached = |is_told: bool, (config, instance): &(GridConfig, Instance)| {
-        let mut policy = LifelongPolicy::new("rhcr", Choice::default(), Budget::of_nodes(200)).unwrap();
+        let mut policy =
+            LifelongPolicy::new("rhcr", PlannerSettings::default(), Budget::of_nodes(200)).unwrap();
         if is_told {
-            policy.foresee(instance).unwrap();
+            policy.provide_future_goals(instance).unwrap();
         }
         // That a goal is another than the one foretold would be an error.
         let (num_reached, num_reverted) =
@@ -145,15 +148,15 @@ fn agents_that_know_their_goals_to_come_reach_more_of_them() {
 #[test]
 fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     let (config, instance) = drawn(1, 12, 16, "restart");
-    let new = |name| LifelongPolicy::new(name, Choice::default(), Budget::of_nodes(50)).unwrap();
-    assert!(new("pibt").foresee(&instance).is_err());
+    let new = |name| LifelongPolicy::new(name, PlannerSettings::default(), Budget::of_nodes(50)).unwrap();
+    assert!(new("pibt").provide_future_goals(&instance).is_err());
     let mut policy = new("rhcr");
-    policy.foresee(&instance).unwrap();
+    policy.provide_future_goals(&instance).unwrap();
     let other = started(&config.rules(), &drawn(2, 12, 16, "restart").1);
     assert!(policy.act(instance.map(), other.state()).unwrap_err().to_string().contains("was not to come"));
     policy.reset();
     let episode = started(&config.rules(), &instance);
-    policy.foresee(&instance).unwrap();
+    policy.provide_future_goals(&instance).unwrap();
     policy.act(instance.map(), episode.state()).unwrap();
     let again = policy.act(instance.map(), episode.state()).unwrap_err().to_string();
     assert_eq!(again, "the goals to come are known for step 1, not for 0");
@@ -163,7 +166,7 @@ fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
 fn agents_that_finish_leave_and_the_others_go_on() {
     for seed in 0..8 {
         let (config, instance) = drawn(seed, 8, 8, "finish");
-        let planner = planner("lacam", Choice::default()).unwrap();
+        let planner = planner("lacam", PlannerSettings::default()).unwrap();
         let mut policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(64));
         let (num_reached, _) =
             play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
@@ -177,8 +180,11 @@ fn agents_that_finish_leave_and_the_others_go_on() {
 fn a_policy_plans_anew_when_the_world_is_another() {
     let (config, instance) = drawn(3, 8, 4, "nothing");
     let rules = Config { collision: Collision::Priority, on_goal: OnGoal::Nothing, ..config.rules() };
-    let mut policy =
-        PlannerPolicy::new(planner("lacam", Choice::default()).unwrap(), Budget::of_nodes(300), Some(64));
+    let mut policy = PlannerPolicy::new(
+        planner("lacam", PlannerSettings::default()).unwrap(),
+        Budget::of_nodes(300),
+        Some(64),
+    );
     let mut count = 0;
     play(&rules, &instance, |state| {
         count += 1;

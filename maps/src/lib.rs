@@ -19,7 +19,6 @@ mod catalogue;
 mod components;
 mod config;
 mod distance;
-mod exhaustive;
 pub mod files;
 mod foretell;
 pub mod formats;
@@ -40,12 +39,11 @@ pub use config::{
     yaml_document,
 };
 pub use distance::{distances_to, free_neighbours};
-pub use exhaustive::{Verdict, search};
 pub use foretell::{foretold_from, foretold_goals};
 pub use library::Library;
 pub use place::{capacity, place_at_random};
 pub use put::{put_map, put_scenario};
 pub use source::{Generated, InstanceSource, MadeInstance};
-pub use stats::{Doubt, MapStats, ScenarioStats};
+pub use stats::{Doubt, MapStats, ScenarioPart, ScenarioStats};
 pub use text::{MapText, parse_map_text};
 pub use tiles::{PUBLISHED_TILE, tiles};

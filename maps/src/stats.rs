@@ -6,7 +6,6 @@ use pogema_core::{Cell, Map, OnGoal};
 
 use crate::components::Components;
 use crate::distance::{distances_to, free_neighbours};
-use crate::exhaustive::{Verdict, search};
 
 /// Figures of a map.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +69,7 @@ pub enum Doubt {
     NoWay(usize),
     /// These agents want to stay on one cell.
     SameGoal(Vec<usize>, Cell),
-    /// These agents share a part of the map, and a search through all that they can do finds no solution.
+    /// These agents share a component, and a search through their joint states finds no solution.
     Locked(Vec<usize>),
     /// These agents share a corridor that none can leave, and their goals stand in another order than they do.
     WrongOrder(Vec<usize>),
@@ -91,12 +90,20 @@ pub struct ScenarioStats {
     pub longest_distance: u32,
 }
 
-/// So many states are looked at for each component.
-const MOST_STATES: usize = 200_000;
-
 impl ScenarioStats {
-    /// The figures of starts and goals on a map, and the proofs that cost little.
-    pub fn of(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> Self {
+    /// The limit on joint states of a component that is passed to the joint search.
+    pub const MAX_STATES: usize = 200_000;
+
+    /// Returns the figures of starts and goals on a map.
+    ///
+    /// `is_solvable` decides small components by a search through their joint states, and returns `None` if it cannot.
+    pub fn of(
+        map: &Map,
+        starts: &[Cell],
+        goals: &[Cell],
+        on_goal: OnGoal,
+        mut is_solvable: impl FnMut(&ScenarioPart) -> Option<bool>,
+    ) -> Self {
         let components = Components::of(map);
         let mut figures = Self {
             num_agents: starts.len(),
@@ -125,13 +132,19 @@ impl ScenarioStats {
         }
         for (label, agents) in crowds {
             let part = part_of(map, &components, label, (starts, goals), &agents);
-            figures.judge_part(&part, agents, on_goal);
+            figures.judge_part(&part, agents, on_goal, &mut is_solvable);
         }
         figures.is_proven_solvable &= figures.doubts.is_empty();
         figures
     }
 
-    fn judge_part(&mut self, part: &Part, agents: Vec<usize>, on_goal: OnGoal) {
+    fn judge_part(
+        &mut self,
+        part: &ScenarioPart,
+        agents: Vec<usize>,
+        on_goal: OnGoal,
+        is_solvable: &mut impl FnMut(&ScenarioPart) -> Option<bool>,
+    ) {
         if on_goal == OnGoal::Nothing && part.is_in_wrong_order() {
             self.doubts.push(Doubt::WrongOrder(agents));
             return;
@@ -143,19 +156,23 @@ impl ScenarioStats {
             self.is_proven_solvable = false;
             return;
         }
-        match search(&part.map, &part.starts, &part.goals, on_goal, MOST_STATES) {
-            Verdict::Solvable { .. } => {}
-            Verdict::Unsolvable => self.doubts.push(Doubt::Locked(agents)),
-            Verdict::Unknown => self.is_proven_solvable = false,
+        match is_solvable(part) {
+            Some(true) => {}
+            Some(false) => self.doubts.push(Doubt::Locked(agents)),
+            None => self.is_proven_solvable = false,
         }
     }
 }
 
-/// One component and the agents in it, on a map no larger than need be.
-struct Part {
-    map: Map,
-    starts: Vec<Cell>,
-    goals: Vec<Cell>,
+/// One component of a map and the agents in it.
+#[derive(Clone, Debug)]
+pub struct ScenarioPart {
+    /// The bounding box of the component; all other cells are obstacles.
+    pub map: Map,
+    /// The starts of the agents.
+    pub starts: Vec<Cell>,
+    /// The goals of the agents.
+    pub goals: Vec<Cell>,
 }
 
 fn part_of(
@@ -164,7 +181,7 @@ fn part_of(
     label: u32,
     (starts, goals): (&[Cell], &[Cell]),
     agents: &[usize],
-) -> Part {
+) -> ScenarioPart {
     let inside: Vec<Cell> = (0..map.obstacles().len())
         .filter(|&index| components.label_at(index) == Some(label))
         .map(|index| map.cell_at(index))
@@ -183,17 +200,17 @@ fn part_of(
     // INVARIANT: no larger than the whole map, and with at least one cell.
     let part = Map::new(height, width, obstacles).unwrap_or_else(|_| map.clone());
     let of = |cells: &[Cell]| agents.iter().map(|&agent| moved(&cells[agent])).collect();
-    Part { map: part, starts: of(starts), goals: of(goals) }
+    ScenarioPart { map: part, starts: of(starts), goals: of(goals) }
 }
 
-impl Part {
-    /// Whether its joint states are few.
+impl ScenarioPart {
+    /// Whether its joint states are within the limit.
     fn is_small(&self) -> bool {
         let num_free = self.map.num_free();
         let orders = (0..self.starts.len()).map(|agent| num_free.saturating_sub(agent));
         // Each agent is done or not.
         let states = orders.fold(1_usize, |states, choices| states.saturating_mul(2 * choices));
-        states <= MOST_STATES
+        states <= ScenarioStats::MAX_STATES
     }
 
     /// Whether it is one corridor along which starts and goals stand in different orders.

@@ -1,21 +1,10 @@
-//! Every puzzle is solvable at the cost that the catalogue says, and not without making way.
+//! No puzzle can be solved without making way.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::BTreeSet;
 
-use pogema_core::OnGoal;
-use pogema_maps::{PUZZLES, Verdict, distances_to, search};
-
-#[test]
-fn puzzles_cost_what_the_catalogue_says() {
-    assert!(PUZZLES.len() >= 20);
-    for puzzle in &PUZZLES {
-        let text = puzzle.text().unwrap();
-        let found = search(&text.map, &text.starts, &text.goals, OnGoal::Nothing, usize::MAX);
-        assert_eq!(found, Verdict::Solvable { sum_of_costs: puzzle.sum_of_costs }, "{}", puzzle.name);
-    }
-}
+use pogema_maps::{PUZZLES, distances_to};
 
 #[test]
 fn no_agent_can_go_as_if_it_were_alone() {

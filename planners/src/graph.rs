@@ -1,29 +1,29 @@
-//! A map as planners walk it: its free cells, numbered, each with its free neighbours.
+//! The graph of a map: one vertex for each free cell.
 
 use pogema_core::{Action, Cell, Error, Map};
 
-/// The number of a free cell, counted row by row.
+/// The index of a free cell, in row-major order.
 pub type Vertex = u32;
 
-/// The free cells of a map and the moves between them.
+/// The free cells of a map and their neighbours.
 ///
-/// No move leads off the map: a wall surrounds it, whatever agents may see beyond.
+/// No edge leads off the map.
 #[derive(Debug)]
 pub struct Graph {
     width: usize,
     cells: Vec<Cell>,
-    /// For each cell of the map, row by row, its vertex or `NO_VERTEX`.
+    /// The vertex of each cell of the map in row-major order, or `NO_VERTEX`.
     vertices: Vec<Vertex>,
-    /// The neighbours of each vertex, up, down, left, right, then what is left of four.
+    /// The neighbours of each vertex in the order up, down, left, right, padded with `NO_VERTEX`.
     neighbours: Vec<[Vertex; 4]>,
     degrees: Vec<u8>,
 }
 
-/// The vertex of an obstacle.
+/// The entry of an obstacle.
 const NO_VERTEX: Vertex = Vertex::MAX;
 
 impl Graph {
-    /// The graph of a map.
+    /// Builds the graph of a map.
     pub fn new(map: &Map) -> Self {
         let mut vertices = vec![NO_VERTEX; map.height() * map.width()];
         let mut cells = Vec::with_capacity(map.num_free());
@@ -55,31 +55,31 @@ impl Graph {
         self.cells.len()
     }
 
-    /// The vertex of a cell of the map, if it is free.
+    /// Returns the vertex of a cell, if the cell is free.
     pub fn vertex(&self, cell: Cell) -> Option<Vertex> {
         let index = usize::from(cell.row) * self.width + usize::from(cell.col);
         self.vertices.get(index).copied().filter(|&vertex| vertex != NO_VERTEX)
     }
 
-    /// The cell of a vertex.
+    /// Returns the cell of a vertex.
     pub fn cell(&self, vertex: Vertex) -> Cell {
         self.cells[vertex as usize]
     }
 
-    /// Where one step leads from a vertex, itself left out, in the order up, down, left, right.
+    /// Returns the neighbours of a vertex, without the vertex itself, in the order up, down, left, right.
     pub fn neighbours(&self, vertex: Vertex) -> &[Vertex] {
         &self.neighbours[vertex as usize][..usize::from(self.degrees[vertex as usize])]
     }
 
-    /// The action that leads from a vertex to itself or to a neighbour.
+    /// Returns the action that leads from a vertex to itself or to a neighbour.
     pub fn action(&self, from: Vertex, to: Vertex) -> Action {
         action_between(self.cell(from), self.cell(to)).unwrap_or(Action::Stay)
     }
 
-    /// The vertices of agents' cells.
+    /// Converts one cell per agent to vertices; `what` names the cells in the error.
     ///
     /// # Errors
-    /// [`Error::Agent`] for a cell off the map or on an obstacle; `what` says what the cells are.
+    /// [`Error::Agent`] for a cell off the map or on an obstacle.
     pub fn vertices_of(&self, what: &str, cells: &[Cell]) -> Result<Vec<Vertex>, Error> {
         let vertex_of = |(agent, &cell): (usize, &Cell)| {
             let inside = usize::from(cell.col) < self.width;
@@ -90,14 +90,14 @@ impl Graph {
     }
 }
 
-/// Where an action leads on a map, unless into the wall around it.
+/// Returns the cell that an action leads to, unless it is off the map.
 pub(crate) fn step_from(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
     let (row, col) = cell.toward(action);
     let cell = Cell { row: u16::try_from(row).ok()?, col: u16::try_from(col).ok()? };
     map.contains(cell).then_some(cell)
 }
 
-/// The action that leads from one cell to the other, if there is one.
+/// Returns the action that leads from one cell to another, if there is one.
 pub(crate) fn action_between(from: Cell, to: Cell) -> Option<Action> {
     let place = (i32::from(to.row), i32::from(to.col));
     Action::ALL.into_iter().find(|&action| from.toward(action) == place)

@@ -1,78 +1,72 @@
-//! Planners and policies: who decides what the agents do.
+//! Centralised planners for POGEMA environments, and policies.
 //!
-//! A [`Problem`] is agents on a map, each with a start and a goal; a [`Planner`] makes a [`Plan`] of it within a
-//! [`Budget`] and says what it found out, its [`Outcome`]. [`validate`] checks anyone's plan.
+//! A [`Problem`] is a set of agents on a map, each with a start and a goal. A [`Planner`] solves it within a [`Budget`] and
+//! returns an [`Outcome`]. [`validate()`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that get a
+//! new goal whenever they reach one.
 //!
-//! [`sipp`] finds the way of one agent past others, [`Pbs`], [`Cbs`] and [`Ecbs`] plan whole problems with it, and
-//! [`Rhcr`] plans for agents that get a new goal whenever they reach one, as every [`Lifelong`] does.
+//! | planner | folder |
+//! | --- | --- |
+//! | [`Lacam`]: LaCAM* with large neighbourhood search | `lacam` |
+//! | [`Pibt`], [`PibtLifelong`]: priority inheritance with backtracking | `pibt` |
+//! | [`Cbs`], [`Ecbs`]: conflict-based search | `cbs` |
+//! | [`Pbs`]: priority-based search | `pbs` |
+//! | [`Rhcr`]: rolling-horizon collision resolution | `rhcr` |
+//! | [`sipp`]: safe interval path planning for one agent | `sipp` |
+//! | [`solvability`]: A* through joint states | `joint` |
 //!
-//! [`planner()`] and [`lifelong()`] make a planner by its name; [`PlannerPolicy`] and [`LifelongPolicy`] let one drive any
-//! environment.
+//! [`planner()`] and [`lifelong()`] make a planner by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner control
+//! an environment.
 //!
-//! [`AStarTeam`] is the A* policy that POGEMA ships, action for action; [`pogema_team`] and [`sample`] draw the numbers
-//! that POGEMA draws.
+//! [`AStarTeam`] is POGEMA's A* policy, action for action. [`pogema_team`] and [`sample`] draw POGEMA's random numbers.
 
 #![forbid(unsafe_code)]
 
-mod astar;
+mod bfs;
+mod budget;
 mod cbs;
-mod conflict;
-mod constraints;
-mod discount;
+mod conflicts;
 mod distances;
-mod drawn;
-mod ecbs;
-mod flood;
-mod foresight;
 mod graph;
-mod groups;
-mod guide;
-mod heap;
 mod joint;
 mod lacam;
 mod lifelong;
-mod mdd;
-mod named_policy;
-mod names;
-mod parts;
+mod outcome;
+mod paths;
 mod pbs;
 mod pibt;
 mod plan;
 mod plan_text;
-mod policy;
+mod planner;
+mod policies;
 mod problem;
 mod random;
-mod refine;
+mod registry;
 mod reservations;
 mod rhcr;
-mod scatter;
-mod search;
 pub mod sipp;
-mod stepper;
-mod tree;
+mod team_task;
 mod validate;
-mod window;
-mod windows;
 
-pub use astar::{AStarAgent, AStarTeam, View};
-pub use cbs::{Cbs, CbsParams};
-pub use distances::{AllPairs, CostToGo, Distances, UNREACHABLE};
-pub use drawn::{pogema_team, sample};
-pub use ecbs::{Ecbs, EcbsParams};
+pub use bfs::UNREACHABLE;
+pub use budget::Budget;
+pub use cbs::{Cbs, CbsParams, Ecbs, EcbsParams};
+pub use distances::{CostToGo, Distances};
 pub use graph::{Graph, Vertex};
-pub use guide::GuideParams;
+pub use joint::solvability::{Solvability, solvability};
 pub use lacam::{Lacam, LacamParams};
 pub use lifelong::Lifelong;
-pub use named_policy::{NamedPolicy, PolicySettings, SIMPLE};
-pub use names::{Choice, LIFELONG, PLANNERS, lifelong, planner};
+pub use outcome::Outcome;
 pub use pbs::{Pbs, PbsParams};
-pub use pibt::{Pibt, PibtLifelong, PibtParams};
+pub use pibt::{GuidanceParams, Pibt, PibtLifelong, PibtParams, PibtRules};
 pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
-pub use policy::{LifelongPolicy, PlannerPolicy};
-pub use problem::{Budget, Clock, Outcome, Planner, Problem};
+pub use planner::Planner;
+pub use policies::{
+    AStarAgent, AStarTeam, LifelongPolicy, NamedPolicy, PlannerPolicy, PolicySettings, PomapfObservation,
+    PomapfObservations, SIMPLE, pogema_team, sample,
+};
+pub use problem::Problem;
+pub use registry::{LIFELONG, PLANNERS, PlannerSettings, lifelong, planner};
 pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
-pub use stepper::PibtRules;
 pub use validate::{Conflict, ConflictKind, validate};
-pub use windows::Windows;

@@ -1,61 +1,56 @@
-//! Who moves agents that get a new goal whenever they reach one.
+//! The interface of lifelong planners.
 
 use pogema_core::Error;
 
+use crate::budget::Budget;
 use crate::graph::Vertex;
-use crate::problem::Budget;
 
-/// Chooses the steps of all agents, one after the other, for as long as it is asked.
+/// A lifelong planner, which chooses the moves of all agents one step at a time.
 ///
-/// It knows of each agent the goal that it has now and no later one, unless it is told by
-/// [`Lifelong::next_foreseeing`]. Agents may be anywhere at the next call, and
-/// have any goals: what was planned before is then given up as far as it no longer fits.
+/// It knows the current goal of each agent; only [`Lifelong::next_with_future_goals`] tells it later ones. Positions and goals
+/// may change arbitrarily between calls; the planner then drops the plans that no longer fit.
 pub trait Lifelong: Send {
-    /// A short name, as the command line knows it.
-    fn name(&self) -> &'static str;
-
-    /// Forgets everything that belongs to an episode; the same calls give the same answers again.
+    /// Clears the state of the episode. Afterwards the same calls return the same moves again.
     fn reset(&mut self);
 
-    /// Where each agent is to be after the next step: no two in one cell, no two in each other's place.
+    /// Returns the vertex of each agent after the next step, without vertex or edge conflicts.
     ///
     /// # Errors
-    /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for a vertex that is not one of the graph or
+    /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for a vertex that is not in the graph or that
     /// holds two agents.
     fn next(&mut self, now: &[Vertex], goals: &[Vertex], budget: &Budget) -> Result<Vec<Vertex>, Error>;
 
-    /// Whether it can make use of goals that are still to come.
-    fn foresees(&self) -> bool {
+    /// Whether the planner uses future goals.
+    fn uses_future_goals(&self) -> bool {
         false
     }
 
-    /// As [`Lifelong::next`], for agents that know which goals come after their present ones; each agent's list begins
-    /// with its present goal.
+    /// As [`Lifelong::next`], with future goals; the list of each agent begins with its current goal.
     ///
     /// # Errors
     /// As for [`Lifelong::next`]; [`Error::Agent`] also for an agent without a goal.
-    fn next_foreseeing(
+    fn next_with_future_goals(
         &mut self,
         now: &[Vertex],
         goals: &[Vec<Vertex>],
         budget: &Budget,
     ) -> Result<Vec<Vertex>, Error> {
-        self.next(now, &present_goals(goals)?, budget)
+        self.next(now, &current_goals(goals)?, budget)
     }
 }
 
-/// The first goal of each agent.
+/// Returns the current goal of each agent.
 ///
 /// # Errors
 /// [`Error::Agent`] for an agent without a goal.
-pub(crate) fn present_goals(goals: &[Vec<Vertex>]) -> Result<Vec<Vertex>, Error> {
+pub(crate) fn current_goals(goals: &[Vec<Vertex>]) -> Result<Vec<Vertex>, Error> {
     let first = |(agent, goals): (usize, &Vec<Vertex>)| {
         goals.first().copied().ok_or_else(|| Error::agent(agent, "it has no goal"))
     };
     goals.iter().enumerate().map(first).collect()
 }
 
-/// Passes if agents can be so.
+/// Checks positions and goals.
 ///
 /// # Errors
 /// As for [`Lifelong::next`].

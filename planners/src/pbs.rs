@@ -1,30 +1,34 @@
-//! Priority-based search: agents get in each other's way until it is said who of them goes first.
+//! Priority-based search (PBS): each conflict is resolved by a priority between its two agents.
 //!
 //! Source: Ma et al., "Searching with Consistent Prioritization for Multi-Agent Path Finding", AAAI 2019
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | priority tree node | `Node` |
-//! | i ≺ j | a pair in `Node::pairs`, the first of which goes first |
-//! | plan, N.plan | `Node::paths` |
+//! | priority tree node | [`Node`] |
+//! | i ≺ j | the pair (i, j) in [`Node::priorities`]; i has the higher priority |
+//! | plan, N.plan | [`Node::paths`] |
 
 use std::sync::Arc;
 
-use crate::conflict::{Paths, Setting, first_conflict, one_leg_each};
+use crate::budget::{Budget, Clock};
+use crate::conflicts::first_conflict;
 use crate::graph::Graph;
-use crate::problem::{Budget, Clock, Outcome, Planner, Problem};
+use crate::outcome::Outcome;
+use crate::paths::Paths;
+use crate::planner::Planner;
+use crate::problem::Problem;
 use crate::reservations::Reservations;
 use crate::sipp::{Order, Sipp, Task};
+use crate::team_task::{TeamTask, one_leg_each};
 
-/// How [`Pbs`] plans.
+/// Parameters of [`Pbs`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PbsParams {
-    /// Chooses among what is equally good.
+    /// Seed of tie-breaking.
     pub seed: u64,
 }
 
-/// Priority-based search for whole problems. It finds a plan for nearly all of them, not for all, and never proves
-/// that there is none.
+/// The planner PBS. It is incomplete, solves nearly all problems, and proves no problem impossible.
 ///
 /// A node of its budget is one search for one agent.
 #[derive(Clone, Debug, Default)]
@@ -33,42 +37,38 @@ pub struct Pbs {
 }
 
 impl Pbs {
-    /// A planner with these settings.
+    /// A planner with these parameters.
     pub fn new(params: PbsParams) -> Self {
         Self { params }
     }
 }
 
 impl Planner for Pbs {
-    fn name(&self) -> &'static str {
-        "pbs"
-    }
-
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
         let mut clock = budget.start();
-        let costs = match problem.survey(&mut clock) {
+        let costs = match problem.costs_to_go(&mut clock) {
             Ok(costs) => costs,
             Err(outcome) => return outcome,
         };
         let legs = one_leg_each(&costs);
-        let setting = Setting::one_shot(problem, &legs, self.params.seed);
+        let team = TeamTask::one_shot(problem, &legs, self.params.seed);
         let mut sipp = Sipp::new(problem.graph.clone());
         let lower_bound = problem.lower_bound(&costs);
-        match search(&mut sipp, &problem.graph, &setting, &mut clock) {
+        match search(&mut sipp, &problem.graph, &team, &mut clock) {
             Some(paths) => paths.outcome(problem, lower_bound),
             None => clock.unsolved(None, lower_bound),
         }
     }
 }
 
-/// Paths without conflict, if the search comes upon some while there is time.
+/// Searches for conflict-free paths, depth-first through the priority tree.
 pub(crate) fn search(
     sipp: &mut Sipp,
     graph: &Graph,
-    setting: &Setting<'_>,
+    team: &TeamTask<'_>,
     clock: &mut Clock,
 ) -> Option<Paths> {
-    let mut search = Search { setting, sipp, clock, reserved: Reservations::new(graph.num_vertices()) };
+    let mut search = Search { team, sipp, clock, reserved: Reservations::new(graph.num_vertices()) };
     let mut stack = vec![search.root()?];
     while let Some(node) = stack.pop() {
         let Some(conflict) = first_conflict(&node.paths, graph.num_vertices()) else {
@@ -80,43 +80,44 @@ pub(crate) fn search(
         if search.clock.is_spent() {
             return None;
         }
-        // The better child is looked at first.
+        // The cheaper child is expanded first.
         children.sort_by_key(|child| std::cmp::Reverse(child.paths.total_cost()));
         stack.extend(children);
     }
     None
 }
 
-/// Who goes before whom, and the paths that keep to it.
+/// A node of the priority tree.
 #[derive(Clone, Debug)]
 struct Node {
-    pairs: Vec<(usize, usize)>,
+    /// Pairs of agents, the first of higher priority.
+    priorities: Vec<(usize, usize)>,
     paths: Paths,
 }
 
 struct Search<'a> {
-    setting: &'a Setting<'a>,
+    team: &'a TeamTask<'a>,
     sipp: &'a mut Sipp,
     clock: &'a mut Clock,
     reserved: Reservations,
 }
 
 impl Search<'_> {
-    /// Every agent as if it were alone.
+    /// Returns the root, in which every agent is planned alone.
     fn root(&mut self) -> Option<Node> {
-        let mut paths = Paths::new(self.setting.starts.len(), self.setting.stays());
-        for agent in 0..self.setting.starts.len() {
+        let mut paths = Paths::new(self.team.starts.len(), self.team.stays());
+        for agent in 0..self.team.starts.len() {
             self.plan(agent, &[], &mut paths)?;
         }
-        Some(Node { pairs: Vec::new(), paths })
+        Some(Node { priorities: Vec::new(), paths })
     }
 
-    /// The node with one pair more, unless an agent then has no path.
+    /// Returns the child with one more priority, unless an agent has no path.
     fn child(&mut self, node: &Node, pair: (usize, usize)) -> Option<Node> {
         let (first, second) = pair;
-        let mut pairs = node.pairs.clone();
-        pairs.push(pair);
-        let order = Ranks::new(self.setting.starts.len(), &pairs);
+        let mut priorities = node.priorities.clone();
+        priorities.push(pair);
+        let order = PriorityOrder::new(self.team.starts.len(), &priorities);
         if order.above(second).contains(&second) || order.above(first).contains(&second) {
             return None;
         }
@@ -127,10 +128,10 @@ impl Search<'_> {
                 self.plan(agent, &above, &mut paths)?;
             }
         }
-        Some(Node { pairs, paths })
+        Some(Node { priorities, paths })
     }
 
-    /// Plans for an agent past those that go before it.
+    /// Replans an agent around agents of higher priority.
     fn plan(&mut self, agent: usize, above: &[usize], paths: &mut Paths) -> Option<()> {
         if self.clock.count_node() {
             return None;
@@ -139,42 +140,44 @@ impl Search<'_> {
             self.reserved.add(higher, paths.path(higher), paths.stays);
         }
         let task = Task {
-            start: self.setting.starts[agent],
-            legs: &self.setting.legs[agent],
+            start: self.team.starts[agent],
+            legs: &self.team.legs[agent],
             reserved: &self.reserved,
             avoided: None,
             banned: &[],
-            horizon: self.setting.horizon,
+            horizon: self.team.horizon,
             order: Order::Cost,
-            salt: self.setting.salt,
+            salt: self.team.salt,
         };
-        let way = self.sipp.find(&task);
+        let found = self.sipp.find(&task);
         for &higher in above {
             self.reserved.remove(higher, paths.path(higher), paths.stays);
         }
-        let way = way?;
-        paths.set(agent, Arc::new(way.path), way.cost);
+        let found = found?;
+        paths.set(agent, Arc::new(found.path), found.cost);
         Some(())
     }
 }
 
-/// Who goes directly before and after each agent.
-struct Ranks {
+/// The partial order of priorities, as a graph.
+struct PriorityOrder {
+    /// For each agent, the agents directly above it.
     before: Vec<Vec<usize>>,
+    /// For each agent, the agents directly below it.
     after: Vec<Vec<usize>>,
 }
 
-impl Ranks {
+impl PriorityOrder {
     fn new(num_agents: usize, pairs: &[(usize, usize)]) -> Self {
-        let mut ranks = Self { before: vec![Vec::new(); num_agents], after: vec![Vec::new(); num_agents] };
+        let mut order = Self { before: vec![Vec::new(); num_agents], after: vec![Vec::new(); num_agents] };
         for &(first, second) in pairs {
-            ranks.before[second].push(first);
-            ranks.after[first].push(second);
+            order.before[second].push(first);
+            order.after[first].push(second);
         }
-        ranks
+        order
     }
 
-    /// All that go before an agent.
+    /// Returns all agents of higher priority.
     fn above(&self, agent: usize) -> Vec<usize> {
         let mut seen = vec![false; self.before.len()];
         let mut found = Vec::new();
@@ -188,7 +191,7 @@ impl Ranks {
         found
     }
 
-    /// An agent and all that go after it, those that go first first.
+    /// Returns an agent and all agents of lower priority in topological order.
     fn from(&self, agent: usize) -> Vec<usize> {
         let mut seen = vec![false; self.after.len()];
         let mut done = Vec::new();

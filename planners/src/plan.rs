@@ -1,10 +1,10 @@
-//! Plans: where each agent is after each step.
+//! Plans: the cell of each agent after each step.
 
 use pogema_core::{Action, Cell, Error};
 
 use crate::graph::action_between;
 
-/// Where every agent is at the start and after each step.
+/// The cells of all agents at the start and after each step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Shape: `[steps + 1, agents]`
@@ -12,11 +12,11 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from the cells of all agents, at the start and after each step.
+    /// A plan from the cells of all agents at the start and after each step.
     ///
     /// # Errors
-    /// [`Error::Instance`] for no cells at all, [`Error::Length`] unless every step has as many agents as the
-    /// start. Whether agents may walk so is left to [`crate::validate`].
+    /// [`Error::Instance`] without a start; [`Error::Length`] unless every step has as many agents as the start.
+    /// [`crate::validate()`] checks whether the moves are valid.
     pub fn new(cells: Vec<Vec<Cell>>) -> Result<Self, Error> {
         let num_agents = cells.first().ok_or_else(|| Error::instance("the plan has no start"))?.len();
         for step in &cells {
@@ -25,7 +25,7 @@ impl Plan {
         Ok(Self { cells })
     }
 
-    /// Where all agents are at the start and after each step.
+    /// Returns the cells of all agents at the start and after each step.
     pub fn cells(&self) -> &[Vec<Cell>] {
         &self.cells
     }
@@ -35,12 +35,12 @@ impl Plan {
         self.cells[0].len()
     }
 
-    /// Number of steps, which of a plan without idle steps at its end is the makespan.
+    /// Number of steps. It exceeds the makespan if the last steps are idle.
     pub fn num_steps(&self) -> usize {
         self.cells.len() - 1
     }
 
-    /// The step after which each agent stays where it ends.
+    /// Returns the cost of each agent: the step after which it stays at its last cell.
     pub fn arrivals(&self) -> Vec<usize> {
         let arrival = |agent: usize| {
             let end = self.cells[self.num_steps()][agent];
@@ -49,20 +49,20 @@ impl Plan {
         (0..self.num_agents()).map(arrival).collect()
     }
 
-    /// The sum of costs: over all agents, the steps until they stay where they end.
+    /// Returns the sum of costs: the costs of all agents, summed. Units: steps.
     pub fn sum_of_costs(&self) -> usize {
         self.arrivals().into_iter().sum()
     }
 
-    /// The last step after which an agent still moves.
+    /// Returns the makespan: the highest cost of an agent. Units: steps.
     pub fn makespan(&self) -> usize {
         self.arrivals().into_iter().max().unwrap_or(0)
     }
 
-    /// What each agent does in a step, counted from 0; after the last one all stay.
+    /// Returns the action of each agent in a step, counted from 0. After the last step, all agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent that no action takes to its next cell.
+    /// [`Error::Agent`] if no action leads an agent to its next cell.
     pub fn actions(&self, step: usize) -> Result<Vec<Action>, Error> {
         let (Some(now), Some(next)) = (self.cells.get(step), self.cells.get(step + 1)) else {
             return Ok(vec![Action::Stay; self.num_agents()]);

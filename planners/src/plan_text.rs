@@ -5,36 +5,37 @@
 //! 1: (0,1) (3,2)
 //! ```
 //!
-//! A line holds the cells of all agents as `(row,col)`, after a number that may be left out; commas between cells
-//! and lines that begin with `#` change nothing. A result file is told by its line `solution=`; before it stand
-//! fields such as `map_file=`, `starts=` and `goals=`, and everywhere in it cells are `(x,y)`, the column first.
+//! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells and lines that
+//! begin with `#` are ignored. A result file contains the line `solution=`, preceded by fields such as `map_file=`,
+//! `starts=` and `goals=`. All its cells are `(x,y)`, column first.
 
 use std::fmt::Write as _;
 
 use pogema_core::{Cell, Error, shorten};
 
+use crate::outcome::Outcome;
 use crate::plan::Plan;
-use crate::problem::{Outcome, Problem};
+use crate::problem::Problem;
 
-/// A plan as a file holds it.
+/// The content of a plan file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanText {
     /// The plan.
     pub plan: Plan,
-    /// The name of the map's file, if the file tells it.
+    /// The name of the map file, if the plan file contains it.
     pub map_file: Option<String>,
-    /// Where the agents are to start, if the file tells it.
+    /// The starts, if the plan file contains them.
     pub starts: Option<Vec<Cell>>,
-    /// Where the agents want to go, if the file tells it.
+    /// The goals, if the plan file contains them.
     pub goals: Option<Vec<Cell>>,
 }
 
 impl PlanText {
-    /// Reads either kind of text.
+    /// Reads a plan in either format.
     ///
     /// # Errors
-    /// [`Error::State`] with the line for whatever is neither; for a result without a solution; for steps with
-    /// different numbers of agents.
+    /// [`Error::State`] with the line for text in neither format, for a result without a solution, and for steps
+    /// with different numbers of agents.
     pub fn read(text: &str) -> Result<Self, Error> {
         let lines: Vec<(usize, &str)> =
             (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty()).collect();
@@ -47,7 +48,7 @@ impl PlanText {
     }
 }
 
-/// A plan, one line for each step.
+/// Writes a plan, one line for each step.
 pub fn write_plan(plan: &Plan) -> String {
     let mut text = String::new();
     for (step, cells) in plan.cells().iter().enumerate() {
@@ -57,7 +58,7 @@ pub fn write_plan(plan: &Plan) -> String {
     text
 }
 
-/// A solved problem as a result file of the LaCAM programs, which their tools can show.
+/// Writes a result file of the LaCAM programs, which their tools can show.
 pub fn write_result(map_file: &str, solver: &str, problem: &Problem, outcome: &Outcome) -> String {
     let cells = |cells: Vec<Cell>| -> String {
         let cells: Vec<String> =
@@ -78,7 +79,7 @@ pub fn write_result(map_file: &str, solver: &str, problem: &Problem, outcome: &O
     text
 }
 
-/// Which of a cell's two numbers comes first.
+/// The order of the two numbers of a cell.
 #[derive(Clone, Copy)]
 enum Order {
     RowCol,

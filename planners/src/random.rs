@@ -1,14 +1,17 @@
-//! Random choices, by one generator and without the bias of a remainder.
+//! Reproducible random choices.
 
-use rand_core::Rng;
+use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-/// A number below a bound.
+/// Draws a number below a bound.
 pub(crate) fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
-    ((u128::from(random.next_u64()) * bound as u128) >> 64) as usize
+    random.random_range(0..bound as u64) as usize
 }
 
-/// Puts items in a random order.
+/// Shuffles items by Fisher–Yates.
+///
+/// `SliceRandom::shuffle` is not used, because its draws may change with a release of `rand`. A seed must give the same
+/// plan with all releases.
 pub(crate) fn shuffle<T>(items: &mut [T], random: &mut Pcg64Mcg) {
     for end in (1..items.len()).rev() {
         items.swap(end, below(random, end + 1));

@@ -1,11 +1,11 @@
-//! Who is where and when: the timed paths that others have to keep clear of.
+//! The reservation table: the intervals during which agents occupy each vertex.
 
 use crate::graph::Vertex;
 
-/// Later than any step.
+/// The end of a reservation without end.
 pub(crate) const FOREVER: u32 = u32::MAX;
 
-/// One agent in one cell, from a step to a step, both included.
+/// One agent on one vertex, from one step to another, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Block {
     from: u32,
@@ -13,48 +13,48 @@ struct Block {
     agent: u32,
 }
 
-/// The cells that timed paths occupy; paths may overlap each other.
+/// The reservation table of a set of paths, which may conflict with each other.
 ///
-/// Times are steps from now; a path holds the vertex after each step, the first of them at step 0.
+/// A path holds the vertex after each step; its first vertex is that of step 0.
 #[derive(Clone, Debug, Default)]
 pub struct Reservations {
-    /// For each vertex, by the step at which they begin.
+    /// For each vertex, ordered by first step.
     blocks: Vec<Vec<Block>>,
 }
 
 impl Reservations {
-    /// Nothing reserved on a graph of so many vertices.
+    /// An empty table for a number of vertices.
     pub fn new(num_vertices: usize) -> Self {
         Self { blocks: vec![Vec::new(); num_vertices] }
     }
 
-    /// Takes all reservations back.
+    /// Removes all reservations.
     pub fn clear(&mut self) {
         self.blocks.iter_mut().for_each(Vec::clear);
     }
 
-    /// Reserves an agent's path, and for one that stays its last vertex for ever.
+    /// Reserves the path of an agent. If the agent stays, its last vertex is reserved forever.
     pub fn add(&mut self, agent: usize, path: &[Vertex], stays: bool) {
         for (vertex, from, to) in runs(path, stays) {
             self.block(vertex, from, to, agent);
         }
     }
 
-    /// Takes back what [`Reservations::add`] reserved for the same path.
+    /// Removes what [`Reservations::add`] reserved for the same path.
     pub fn remove(&mut self, agent: usize, path: &[Vertex], stays: bool) {
         for (vertex, from, to) in runs(path, stays) {
             self.unblock(vertex, from, to, agent);
         }
     }
 
-    /// Reserves a vertex from a step to a step, both included.
+    /// Reserves a vertex from one step to another, both included.
     pub fn block(&mut self, vertex: Vertex, from: u32, to: u32, agent: usize) {
         let blocks = &mut self.blocks[vertex as usize];
         let at = blocks.partition_point(|block| block.from <= from);
         blocks.insert(at, Block { from, to, agent: agent as u32 });
     }
 
-    /// Takes back what [`Reservations::block`] reserved.
+    /// Removes what [`Reservations::block`] reserved.
     pub fn unblock(&mut self, vertex: Vertex, from: u32, to: u32, agent: usize) {
         let gone = Block { from, to, agent: agent as u32 };
         let blocks = &mut self.blocks[vertex as usize];
@@ -63,7 +63,7 @@ impl Reservations {
         }
     }
 
-    /// The free interval of a vertex that holds a step or begins after it, both ends included.
+    /// Returns the safe interval of a vertex that contains a step, or else the next one; both ends are included.
     pub(crate) fn free_after(&self, vertex: Vertex, step: u32) -> Option<(u32, u32)> {
         let mut since = 0;
         for block in &self.blocks[vertex as usize] {
@@ -78,7 +78,7 @@ impl Reservations {
         Some((since, FOREVER))
     }
 
-    /// Number of reserved paths that go from `to` to `from` in the step that ends at `step`.
+    /// Number of edge conflicts: reserved paths that move from `to` to `from` in the step that ends at `step`.
     pub(crate) fn num_swaps(&self, from: Vertex, to: Vertex, step: u32) -> u32 {
         let leaves = |block: &&Block| block.to.checked_add(1) == Some(step);
         let enters = |block: &Block, agent| block.from == step && block.agent == agent;
@@ -87,19 +87,19 @@ impl Reservations {
         leaving.filter(|left| entering.iter().any(|block| enters(block, left.agent))).count() as u32
     }
 
-    /// Number of reservations of a vertex at a step, and the last step until which it stays so.
-    pub(crate) fn crowd(&self, vertex: Vertex, step: u32) -> (u32, u32) {
-        let (mut crowd, mut until) = (0, FOREVER);
+    /// Number of reservations of a vertex at a step, and the last step up to which this number holds.
+    pub(crate) fn count_at(&self, vertex: Vertex, step: u32) -> (u32, u32) {
+        let (mut count, mut until) = (0, FOREVER);
         for block in &self.blocks[vertex as usize] {
             if block.from > step {
-                return (crowd, until.min(block.from - 1));
+                return (count, until.min(block.from - 1));
             }
             if block.to >= step {
-                crowd += 1;
+                count += 1;
                 until = until.min(block.to);
             }
         }
-        (crowd, until)
+        (count, until)
     }
 
     /// Number of reservations of a vertex that end after a step.
@@ -107,14 +107,14 @@ impl Reservations {
         self.blocks[vertex as usize].iter().filter(|block| block.to > step).count() as u32
     }
 
-    /// The agents that hold a vertex at some step of an interval.
+    /// Returns the agents that hold a vertex at some step of an interval.
     pub(crate) fn holders(&self, vertex: Vertex, from: u32, to: u32) -> impl Iterator<Item = usize> + '_ {
         let overlaps = move |block: &&Block| block.from <= to && block.to >= from;
         self.blocks[vertex as usize].iter().filter(overlaps).map(|block| block.agent as usize)
     }
 }
 
-/// The vertices of a path, each with its first and its last step.
+/// Splits a path into runs of one vertex, each with its first and last step.
 fn runs(path: &[Vertex], stays: bool) -> impl Iterator<Item = (Vertex, u32, u32)> + '_ {
     let mut from = 0;
     path.chunk_by(|one, other| one == other).map(move |run| {

@@ -1,4 +1,4 @@
-//! An independent check of plans: it reads map and cells, and shares no code with the planners.
+//! The plan validator, independent of the planners: it shares no code with them.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -7,20 +7,20 @@ use pogema_core::{Cell, Map};
 
 use crate::plan::Plan;
 
-/// The first thing wrong with a plan.
+/// The first violation in a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Conflict {
-    /// After which step, counted from 1; 0 is the start.
+    /// The step after which it occurs, counted from 1; 0 is the start.
     pub step: usize,
-    /// The agents that take part in it, the lowest first.
+    /// The agents involved, in ascending order.
     pub agents: Vec<usize>,
-    /// Where.
+    /// The cell where it occurs.
     pub cell: Cell,
-    /// What it is.
+    /// The kind of violation.
     pub kind: ConflictKind,
 }
 
-/// What can be wrong with a plan.
+/// The kinds of violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConflictKind {
     /// The agent is not at its start.
@@ -29,11 +29,11 @@ pub enum ConflictKind {
     Outside,
     /// The agent is on an obstacle.
     Obstacle,
-    /// The agent came from further than one step away.
+    /// The agent moved more than one cell.
     Jump,
     /// Two agents are in one cell.
     Vertex,
-    /// Two agents exchanged their cells.
+    /// Two agents swapped their cells.
     Edge,
     /// The agent is not at its goal at the end.
     Goal,
@@ -56,11 +56,12 @@ impl fmt::Display for Conflict {
     }
 }
 
-/// Passes if agents may walk as planned, from their starts to their goals; without goals they may end anywhere.
+/// Checks that a plan is free of conflicts and leads from the starts to the goals; without goals, agents may end
+/// anywhere.
 ///
 /// # Errors
-/// The first conflict, by step and then by agent. A number of agents other than the plan's counts as wrong starts
-/// or goals of those that are missing.
+/// The first conflict, by step and then by agent. A wrong number of starts or goals counts as a wrong start or goal of
+/// the missing agents.
 pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan) -> Result<(), Conflict> {
     let cells = plan.cells();
     check_ends(ConflictKind::Start, 0, &cells[0], starts)?;

@@ -37,13 +37,13 @@ fn lacam_keeps_to_its_budget() {
     let (starts, mut goals) = (some_cells(&map, 0), some_cells(&map, 9));
     goals.rotate_left(NUM_AGENTS / 20);
     let problem = Problem::new(&map, &starts, &goals).unwrap();
-    let most_bytes = 24 << 20;
-    let params = LacamParams { most_bytes, ..LacamParams::default() };
+    let max_bytes = 24 << 20;
+    let params = LacamParams { max_bytes, ..LacamParams::default() };
     let mut outcome = None;
     let memory = measure(|| outcome = Some(Lacam::new(params).plan(&problem, &Budget::of_nodes(3000))));
     validate(&map, &starts, Some(&goals), outcome.unwrap().solution().unwrap()).unwrap();
     let tables = 4 * NUM_AGENTS * problem.graph.num_vertices();
-    let most = (tables + 2 * most_bytes + REST) as u64;
+    let most = (tables + 2 * max_bytes + REST) as u64;
     assert!(memory.bytes_max <= most, "{} bytes, expected {most} at most", memory.bytes_max);
     assert!(memory.bytes_max > tables as u64, "what is measured is what is taken");
 }

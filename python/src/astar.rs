@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use numpy::{AllowTypeChange, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
 use pogema_core::{Action, Error};
 use pogema_numpy::Generator;
-use pogema_planners::View;
+use pogema_planners::PomapfObservation;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -51,7 +51,7 @@ impl AStarAgent {
             )));
         }
         let obstacles = obstacles.to_vec()?;
-        let view = View { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
+        let view = PomapfObservation { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
         self.was_random.store(false, Relaxed);
         let action = self.agent().act(view).map_err(|error: Error| errors::astar(py, &error))?;
         Ok((action.into(), self.was_random.load(Relaxed)))

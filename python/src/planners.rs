@@ -8,7 +8,7 @@ use numpy::{
 };
 use pogema_core::{Action, Cell, Error, Map, State};
 use pogema_planners::{
-    Budget, Choice, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, Problem,
+    Budget, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, PlannerSettings, Problem,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -35,9 +35,9 @@ pub fn make_plan<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let asked = || {
         let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
-        let choice = Choice { seed, threads: num_threads };
+        let choice = PlannerSettings { seed, threads: num_threads };
         Ok((
-            Problem { most_steps, ..problem },
+            Problem { max_steps: most_steps, ..problem },
             pogema_planners::planner(planner, choice)?,
             read_budget(budget)?,
         ))
@@ -174,7 +174,7 @@ impl PlanFollower {
         lifelong: bool,
     ) -> PyResult<Self> {
         let made = || {
-            let (choice, budget) = (Choice { seed, threads: num_threads }, read_budget(budget)?);
+            let (choice, budget) = (PlannerSettings { seed, threads: num_threads }, read_budget(budget)?);
             Ok(if lifelong {
                 Policy::Lifelong(LifelongPolicy::new(planner, choice, budget)?)
             } else {

@@ -59,10 +59,10 @@ impl BuiltIn {
                 settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, "a time of 0 or more"))?);
             }
             "nodes" => settings.budget.nodes = Some(number("a number of nodes")?),
-            "seed" => settings.choice.seed = if value.is_null() { 0 } else { number("a number")? },
+            "seed" => settings.planner.seed = if value.is_null() { 0 } else { number("a number")? },
             "threads" => {
                 let threads = value.as_u64().filter(|threads| (1..=2).contains(threads));
-                settings.choice.threads = threads.ok_or_else(|| wrong(node, path, "1 or 2"))? as usize;
+                settings.planner.threads = threads.ok_or_else(|| wrong(node, path, "1 or 2"))? as usize;
             }
             "future_goals" => {
                 settings.future_goals = value.as_bool().ok_or_else(|| wrong(node, path, "true or false"))?;

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use comfy_table::Table;
-use pogema_core::{Error, OnGoal};
+use pogema_core::{Cell, Error, Map, OnGoal};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Doubt, GridConfig, InstanceSource, MapStats, ScenarioStats};
+use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
 use super::Sources;
@@ -76,7 +77,7 @@ impl Stats {
         if let Some(path) = &self.scenario {
             let scenario = read_scenario(path, ground)?;
             let scenario = scenario.truncated(self.num_agents.unwrap_or(scenario.starts.len()))?;
-            return Ok(Some(ScenarioStats::of(ground, &scenario.starts, &scenario.goals.first(), on_goal)));
+            return Ok(Some(judged(ground, &scenario.starts, &scenario.goals.first(), on_goal)));
         }
         if let (Some(seed), Some(num_agents)) = (self.seed, self.num_agents) {
             let pools = map.text.pools.clone().unzip();
@@ -90,12 +91,21 @@ impl Stats {
             };
             let instance = InstanceSource::new(config, None)?.generate()?.instance;
             let goals = instance.first_goals();
-            return Ok(Some(ScenarioStats::of(ground, instance.starts(), &goals, on_goal)));
+            return Ok(Some(judged(ground, instance.starts(), &goals, on_goal)));
         }
-        let own = (!map.text.starts.is_empty())
-            .then(|| ScenarioStats::of(ground, &map.text.starts, &map.text.goals, on_goal));
+        let own =
+            (!map.text.starts.is_empty()).then(|| judged(ground, &map.text.starts, &map.text.goals, on_goal));
         Ok(own)
     }
+}
+
+/// Returns the figures of a scenario; joint A* decides its small components.
+fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
+    ScenarioStats::of(map, starts, goals, on_goal, |part| {
+        let max_states = ScenarioStats::MAX_STATES;
+        let found = solvability(&part.map, &part.starts, &part.goals, on_goal, max_states);
+        found.ok().and_then(Solvability::is_solvable)
+    })
 }
 
 fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
 use pogema_core::Error;
-use pogema_planners::{Budget, Choice, PolicySettings};
+use pogema_planners::{Budget, PlannerSettings, PolicySettings};
 use serde::{Deserialize, Serialize};
 
 /// The names of planners, each with what it is good for.
@@ -33,13 +33,13 @@ pub struct Thinking {
 
 impl Thinking {
     /// What a planner is made with.
-    pub fn choice(&self) -> Choice {
-        Choice { seed: self.planner_seed, threads: self.threads }
+    pub fn choice(&self) -> PlannerSettings {
+        PlannerSettings { seed: self.planner_seed, threads: self.threads }
     }
 
     /// What a policy is made with.
     pub fn settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
-        Ok(PolicySettings { budget: self.budget()?, choice: self.choice(), future_goals })
+        Ok(PolicySettings { budget: self.budget()?, planner: self.choice(), future_goals })
     }
 
     /// The budget for one plan.

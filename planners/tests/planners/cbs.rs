@@ -1,9 +1,9 @@
 //! Plans of conflict-based search, against a search through all joint places.
 
+use crate::common::joint_oracle::oracle;
 use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
-use pogema_maps::{Verdict, search};
-use pogema_planners::{Budget, Cbs, CbsParams, Outcome, Planner};
+use pogema_planners::{Budget, Cbs, CbsParams, Outcome, Planner, Solvability};
 
 #[test]
 fn no_plan_costs_less() {
@@ -14,8 +14,8 @@ fn no_plan_costs_less() {
         let case = Case::random(&mut rng(seed), height, width, num_agents);
         let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(1500));
         let plan = case.check(&outcome);
-        match search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
-            Verdict::Solvable { sum_of_costs } => {
+        match oracle(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
+            Solvability::Solvable { sum_of_costs } => {
                 let Outcome::Solved { lower_bound, .. } = outcome else {
                     assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome} in {case:?}");
                     counts[2] += 1;
@@ -26,7 +26,7 @@ fn no_plan_costs_less() {
                 counts[0] += 1;
             }
             verdict => {
-                assert_eq!(verdict, Verdict::Unsolvable);
+                assert_eq!(verdict, Solvability::Unsolvable);
                 assert!(matches!(outcome, Outcome::Impossible { .. }), "{outcome} in {case:?}");
                 counts[1] += 1;
             }
@@ -110,9 +110,9 @@ fn agents_find_the_shortest_way_past_each_other_in_a_long_corridor() {
         let outcome = Cbs::default().plan(&case.problem(), &Budget::of_nodes(2000));
         let cost = case.check(&outcome).unwrap().sum_of_costs() as u64;
         assert_eq!(outcome.lower_bound(), Some(cost));
-        let known = search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000);
+        let known = oracle(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000);
         assert!(
-            matches!(known, Verdict::Solvable { sum_of_costs } if sum_of_costs == cost),
+            matches!(known, Solvability::Solvable { sum_of_costs } if sum_of_costs == cost),
             "{known:?}, {cost}"
         );
     }
@@ -121,7 +121,7 @@ fn agents_find_the_shortest_way_past_each_other_in_a_long_corridor() {
 #[test]
 fn the_tree_takes_no_more_than_it_may() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
-    let params = CbsParams { most_bytes: 200_000, ..CbsParams::default() };
+    let params = CbsParams { max_bytes: 200_000, ..CbsParams::default() };
     let outcome = Cbs::new(params).plan(&case.problem(), &Budget::default());
     assert!(matches!(outcome, Outcome::GaveUp { best: None, .. }), "{outcome}");
 }

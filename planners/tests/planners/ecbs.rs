@@ -1,9 +1,9 @@
 //! Plans within a bound, against a search through all joint places.
 
+use crate::common::joint_oracle::oracle;
 use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
-use pogema_maps::{Verdict, search};
-use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner};
+use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner, Solvability};
 
 fn planner(weight: f64) -> Ecbs {
     Ecbs::new(EcbsParams { weight, ..EcbsParams::default() })
@@ -18,8 +18,8 @@ fn plans_keep_their_bounds() {
         let case = Case::random(&mut rng(seed), height, width, 2 + (seed / 12 % 3) as usize);
         let outcome = planner(weight).plan(&case.problem(), &Budget::of_nodes(2000));
         let plan = case.check(&outcome);
-        match search(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
-            Verdict::Solvable { sum_of_costs } => {
+        match oracle(&case.map, &case.starts, &case.goals, OnGoal::Nothing, 1_000_000) {
+            Solvability::Solvable { sum_of_costs } => {
                 let Outcome::Solved { lower_bound, .. } = outcome else {
                     assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome} in {case:?}");
                     num_late += 1;
@@ -61,7 +61,7 @@ fn odd_weights_are_weights_of_one() {
 #[test]
 fn the_tree_takes_no_more_than_it_may() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
-    let params = EcbsParams { weight: 1.0, most_bytes: 200_000, ..EcbsParams::default() };
+    let params = EcbsParams { weight: 1.0, max_bytes: 200_000, ..EcbsParams::default() };
     let outcome = Ecbs::new(params).plan(&case.problem(), &Budget::default());
     assert!(matches!(outcome, Outcome::GaveUp { best: None, .. }), "{outcome}");
 }

@@ -152,27 +152,6 @@ fn what_is_solvable_is_solved_and_what_is_not_is_proved_impossible() {
 }
 
 #[test]
-fn agents_that_keep_apart_make_a_plan_that_is_no_worse() {
-    let mut random = Pcg64Mcg::seed_from_u64(8);
-    let (mut num_better, mut num_worse) = (0, 0);
-    for seed in 0..40 {
-        let (map, starts, goals) = random_problem(&mut random, 16, 16, 30);
-        let problem = Problem::new(&map, &starts, &goals).unwrap();
-        let cost = |scatter| {
-            let params = LacamParams { seed, scatter, refine: false, ..LacamParams::default() };
-            let outcome = Lacam::new(params).plan(&problem, &Budget::of_nodes(5000));
-            let plan = outcome.solution()?;
-            validate(&map, &starts, Some(&goals), plan).unwrap();
-            Some(plan.sum_of_costs())
-        };
-        let Some((plain, scattered)) = cost(false).zip(cost(true)) else { continue };
-        num_better += usize::from(scattered < plain);
-        num_worse += usize::from(scattered > plain);
-    }
-    assert!(num_better > 5 && num_worse == 0, "{num_better} better, {num_worse} worse");
-}
-
-#[test]
 fn sums_of_costs_come_to_the_least_and_bounds_never_exceed_it() {
     let mut random = Pcg64Mcg::seed_from_u64(2);
     let (mut num_solved, mut num_optimal) = (0, 0);
@@ -354,7 +333,7 @@ fn every_rule_may_be_left_out() {
 fn a_thousand_agents_find_their_way_in_a_city() {
     let (map, starts, goals) = crowd(9, 256, 1000);
     let problem = Problem::new(&map, &starts, &goals).unwrap();
-    let params = LacamParams { most_bytes: 64 << 20, ..LacamParams::default() };
+    let params = LacamParams { max_bytes: 64 << 20, ..LacamParams::default() };
     let outcome = Lacam::new(params).plan(&problem, &Budget::of_nodes(2000));
     validate(&map, &starts, Some(&goals), outcome.solution().unwrap()).unwrap();
 }

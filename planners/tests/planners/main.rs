@@ -5,6 +5,7 @@
 mod cbs;
 mod common;
 mod ecbs;
+mod joint;
 mod lacam;
 mod pbs;
 mod pibt;

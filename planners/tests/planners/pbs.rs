@@ -1,8 +1,8 @@
 //! Plans of priority-based search.
 
+use crate::common::joint_oracle::oracle;
 use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
-use pogema_maps::{Verdict, search};
-use pogema_planners::{Budget, Outcome, Pbs, PbsParams, Planner};
+use pogema_planners::{Budget, Outcome, Pbs, PbsParams, Planner, Solvability};
 
 #[test]
 fn plans_are_valid_and_cost_no_less_than_the_best() {
@@ -10,14 +10,14 @@ fn plans_are_valid_and_cost_no_less_than_the_best() {
     for seed in 0..500 {
         let case = Case::random(&mut rng(seed), 4, 4, 2 + (seed % 2) as usize);
         let outcome = Pbs::default().plan(&case.problem(), &Budget::of_nodes(5000));
-        let truth = search(&case.map, &case.starts, &case.goals, pogema_core::OnGoal::Nothing, 100_000);
+        let truth = oracle(&case.map, &case.starts, &case.goals, pogema_core::OnGoal::Nothing, 100_000);
         if let Some(plan) = case.check(&outcome) {
-            let Verdict::Solvable { sum_of_costs } = truth else { panic!("{truth:?} but {outcome}") };
+            let Solvability::Solvable { sum_of_costs } = truth else { panic!("{truth:?} but {outcome}") };
             assert!(plan.sum_of_costs() as u64 >= sum_of_costs);
             num_solved += 1;
         }
         let is_proved = matches!(outcome, Outcome::Impossible { .. });
-        assert!(!is_proved || truth == Verdict::Unsolvable, "{outcome}");
+        assert!(!is_proved || truth == Solvability::Unsolvable, "{outcome}");
     }
     assert!(num_solved > 200, "{num_solved}");
 }

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use pogema_core::{Cell, Map};
 use pogema_planners::{
-    Budget, Graph, GuideParams, Outcome, Pibt, PibtLifelong, PibtParams, PibtRules, Plan, Planner, Problem,
-    Vertex, validate,
+    Budget, Graph, GuidanceParams, Outcome, Pibt, PibtLifelong, PibtParams, PibtRules, Plan, Planner,
+    Problem, Vertex, validate,
 };
 use proptest::prelude::*;
 
@@ -50,7 +50,7 @@ proptest! {
     ) {
         let goals: Vec<Cell> = goals.iter().map(|goals| goals[0]).collect();
         let problem = Problem::new(&map, &starts, &goals).unwrap().within(60);
-        match Pibt::new(PibtParams { seed, rules, guide: None }).plan(&problem, &Budget::default()) {
+        match Pibt::new(PibtParams { seed, rules, guidance: None }).plan(&problem, &Budget::default()) {
             Outcome::Solved { plan, lower_bound } => {
                 prop_assert_eq!(validate(&map, &starts, Some(&goals), &plan), Ok(()));
                 prop_assert!(lower_bound <= plan.sum_of_costs() as u64 && plan.num_steps() <= 60);
@@ -76,8 +76,8 @@ proptest! {
         seed: u64,
     ) {
         let graph = Arc::new(Graph::new(&map));
-        let guide = is_guided.then(GuideParams::default);
-        let mut pibt = PibtLifelong::new(graph.clone(), starts.len(), PibtParams { seed, rules, guide });
+        let guidance = is_guided.then(GuidanceParams::default);
+        let mut pibt = PibtLifelong::new(graph.clone(), starts.len(), PibtParams { seed, rules, guidance });
         let mut now = graph.vertices_of("start", &starts).unwrap();
         let mut turns = vec![0; starts.len()];
         let mut steps = vec![starts.clone()];
@@ -167,10 +167,10 @@ fn agents_led_around_the_traffic_reach_more_goals() {
     let map = Map::from_rows(&rows).unwrap();
     let graph = Arc::new(Graph::new(&map));
     let num_vertices = graph.num_vertices();
-    let reached = |guide| {
+    let reached = |guidance| {
         let mut now: Vec<Vertex> = (0..num_vertices as Vertex).step_by(3).take(140).collect();
         let mut pibt =
-            PibtLifelong::new(graph.clone(), now.len(), PibtParams { guide, ..PibtParams::default() });
+            PibtLifelong::new(graph.clone(), now.len(), PibtParams { guidance, ..PibtParams::default() });
         let mut draws = 0;
         let mut goals: Vec<Vertex> =
             now.iter().map(|&start| (start * 7 + 5) % num_vertices as Vertex).collect();
@@ -185,6 +185,6 @@ fn agents_led_around_the_traffic_reach_more_goals() {
         }
         draws
     };
-    let (shortest, guided) = (reached(None), reached(Some(GuideParams::default())));
+    let (shortest, guided) = (reached(None), reached(Some(GuidanceParams::default())));
     assert!(guided > shortest, "{guided} with guidance, {shortest} without");
 }

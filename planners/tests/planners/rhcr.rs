@@ -10,8 +10,7 @@ use pogema_planners::{Budget, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, W
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
-const SOLVERS: [WindowSolver; 3] =
-    [WindowSolver::Neighbourhoods, WindowSolver::Pbs, WindowSolver::Ecbs { weight: 1.5 }];
+const SOLVERS: [WindowSolver; 3] = [WindowSolver::Lns, WindowSolver::Pbs, WindowSolver::Ecbs { weight: 1.5 }];
 
 /// Agents that get a random goal whenever they reach one.
 struct World {
@@ -108,7 +107,7 @@ fn agents_that_know_their_next_goals_need_not_plan_every_step() {
         for _ in 0..100 {
             let ahead = |(goals, &reached): (&Vec<Vertex>, &usize)| goals[reached..].to_vec();
             let goals: Vec<Vec<Vertex>> = world.goals.iter().zip(&world.reached).map(ahead).collect();
-            let next = planner.next_foreseeing(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
+            let next = planner.next_with_future_goals(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
             world.go(next);
         }
         assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());

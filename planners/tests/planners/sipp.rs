@@ -118,7 +118,7 @@ fn check_against_all_steps(window: Option<usize>) {
         let to_go = Distances::new(graph.clone(), 0).to(goal);
         let want = least(&graph, start, &to_go, &others, window);
         let reserved = others.reserved(&graph);
-        let horizon = window.map_or(Horizon::Stay { at_most: 60 }, |steps| Horizon::Window(steps as u32));
+        let horizon = window.map_or(Horizon::Stay { max_steps: 60 }, |steps| Horizon::Window(steps as u32));
         let task = Task {
             start,
             legs: &[Leg::last(to_go)],
@@ -171,13 +171,13 @@ fn banned_moves_are_not_made() {
         reserved: &reserved,
         avoided: None,
         banned: &[(0, 1, 1), (0, 3, 1)],
-        horizon: Horizon::Stay { at_most: u32::MAX },
+        horizon: Horizon::Stay { max_steps: u32::MAX },
         order: Order::Cost,
         salt: 0,
     };
     let mut sipp = Sipp::new(graph);
     assert_eq!(sipp.find(&task).unwrap().path, [0, 0, 1, 2]);
-    task.horizon = Horizon::Stay { at_most: 2 };
+    task.horizon = Horizon::Stay { max_steps: 2 };
     assert_eq!(sipp.find(&task), None);
 }
 
@@ -204,13 +204,13 @@ fn what_should_be_avoided_is_if_the_cost_allows() {
             reserved: &reserved,
             avoided: Some(&avoided),
             banned: &[],
-            horizon: Horizon::Stay { at_most: u32::MAX },
+            horizon: Horizon::Stay { max_steps: u32::MAX },
             order: Order::Cost,
             salt: 0,
         };
         assert_eq!(sipp.find(&task).unwrap().cost, least);
         for slack in 0..6 {
-            let order = Order::Conflicts { at_most: least + slack };
+            let order = Order::Conflicts { max_cost: least + slack };
             let way = sipp.find(&Task { order, ..task }).unwrap();
             assert!(way.cost <= least + slack && way.cost >= least);
             assert_eq!(way.path.len() as u32, way.cost + 1);

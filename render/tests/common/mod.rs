@@ -3,7 +3,7 @@
 use pogema_core::{Episode, Trace};
 use pogema_maps::{GridConfig, InstanceSource, value_from_yaml};
 use pogema_numpy::Generator;
-use pogema_planners::{Windows, pogema_team, sample};
+use pogema_planners::{PomapfObservations, pogema_team, sample};
 use pogema_reference::Reference;
 
 /// Who moves the agents.
@@ -26,7 +26,7 @@ pub fn trace(config: &GridConfig, policy: Policy) -> Trace {
     let (mut team, mut dice) = (pogema_team(), Generator::seeded(1));
     while !episode.is_over() {
         let actions = match policy {
-            Policy::AStar => team.act(Windows::of(&episode).unwrap().views()).unwrap(),
+            Policy::AStar => team.act(PomapfObservations::of(&episode).unwrap().each()).unwrap(),
             Policy::Random => sample(&mut dice, config.num_agents),
         };
         episode.step(&actions).unwrap();

@@ -83,7 +83,7 @@ pub fn play_on(
     let mut policy = LifelongPolicy::new(name, thinking.choice(), thinking.budget()?)?;
     let played = play(config, |instance, now| {
         if future_goals && now.step == 0 {
-            policy.foresee(instance)?;
+            policy.provide_future_goals(instance)?;
         }
         policy.act(instance.map(), now)
     })?;

@@ -1,0 +1,130 @@
+//! Enhanced CBS (ECBS): plans whose sum of costs is within a factor of the optimum.
+//!
+//! Source: Barer et al., "Suboptimal Variants of the Conflict-Based Search Algorithm for the Multi-Agent Pathfinding
+//! Problem", Symposium on Combinatorial Search 2014
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | w | [`EcbsParams::weight`] |
+//! | LB | `lower_bound` |
+//! | OPEN, FOCAL | [`FocalQueue`] |
+//! | fmin(i) | [`crate::cbs::node::Node::least`] |
+//!
+//! The low level searches for the least cost first, and then for few conflicts within the weight, with the soft
+//! constraints of [`crate::sipp`].
+
+use crate::budget::{Budget, Clock};
+use crate::cbs::focal::FocalQueue;
+use crate::cbs::low_level::{Aim, LowLevel};
+use crate::cbs::memory::MemoryUse;
+use crate::cbs::node::split;
+use crate::cbs::unsolvable::UnsolvabilityCheck;
+use crate::graph::Graph;
+use crate::outcome::Outcome;
+use crate::paths::Paths;
+use crate::planner::Planner;
+use crate::problem::Problem;
+use crate::sipp::Sipp;
+use crate::team_task::{TeamTask, one_leg_each};
+
+/// Parameters of [`Ecbs`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct EcbsParams {
+    /// The suboptimality bound: a plan costs at most this many times the least. Values up to 1 mean optimal plans.
+    pub weight: f64,
+    /// Seed of tie-breaking.
+    pub seed: u64,
+    /// Byte budget of the constraint tree. If it is exceeded, the planner gives up.
+    pub max_bytes: usize,
+}
+
+impl Default for EcbsParams {
+    fn default() -> Self {
+        Self { weight: 1.2, seed: 0, max_bytes: MemoryUse::DEFAULT_BYTES }
+    }
+}
+
+/// The planner ECBS, which is bounded-suboptimal. A node of its budget is a node of the constraint tree.
+///
+/// It proves that a problem is impossible where [`crate::Cbs`] does.
+#[derive(Clone, Debug, Default)]
+pub struct Ecbs {
+    params: EcbsParams,
+}
+
+impl Ecbs {
+    /// A planner with these parameters.
+    pub fn new(params: EcbsParams) -> Self {
+        Self { params }
+    }
+}
+
+impl Planner for Ecbs {
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let costs = match problem.costs_to_go(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        let legs = one_leg_each(&costs);
+        let team = TeamTask::one_shot(problem, &legs, self.params.seed);
+        let mut sipp = Sipp::new(problem.graph.clone());
+        let mut check = UnsolvabilityCheck::default();
+        let give_up = |clock: &mut Clock| check.count(problem, clock);
+        match search(&mut sipp, &problem.graph, &team, &self.params, &mut clock, give_up) {
+            Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
+            Found::Nothing { lower_bound } => {
+                clock.unsolved(None, lower_bound.max(problem.lower_bound(&costs)))
+            }
+            Found::Proof(reason) => Outcome::Impossible { reason },
+        }
+    }
+}
+
+/// The result of a search.
+pub(crate) enum Found {
+    /// Paths without conflicts.
+    Paths { paths: Paths, lower_bound: u64 },
+    /// No paths within the budget; no plan costs less than the lower bound.
+    Nothing { lower_bound: u64 },
+    /// There are no paths, for a reason.
+    Proof(String),
+}
+
+/// Searches for conflict-free paths within the suboptimality bound; `give_up` may return a proof at every node that
+/// there are none.
+pub(crate) fn search(
+    sipp: &mut Sipp,
+    graph: &Graph,
+    team: &TeamTask<'_>,
+    params: &EcbsParams,
+    clock: &mut Clock,
+    mut give_up: impl FnMut(&mut Clock) -> Option<String>,
+) -> Found {
+    // `max` also replaces NaN by 1.
+    let weight = params.weight.max(1.0);
+    let mut low = LowLevel::new(sipp, graph, team, Aim::Within(weight));
+    if clock.count_node() {
+        return Found::Nothing { lower_bound: 0 };
+    }
+    let Some(root) = low.root(clock) else { return Found::Nothing { lower_bound: 0 } };
+    let mut queue = FocalQueue::new(weight, graph.num_vertices(), MemoryUse::new(params.max_bytes));
+    queue.insert(root);
+    while let Some((entry, lower_bound)) = queue.pop() {
+        let Some(conflict) = entry.conflict else {
+            return Found::Paths { paths: entry.node.paths, lower_bound };
+        };
+        if clock.count_node() || clock.is_spent() || queue.memory.is_full() {
+            return Found::Nothing { lower_bound };
+        }
+        if let Some(reason) = give_up(clock) {
+            return Found::Proof(reason);
+        }
+        for constraint in split(&conflict) {
+            if let Some(child) = low.child(&entry.node, constraint) {
+                queue.insert(child);
+            }
+        }
+    }
+    Found::Proof("no plan is as short as it has to be".to_owned())
+}

@@ -1,0 +1,92 @@
+//! The queues of ECBS.
+
+use std::collections::BTreeSet;
+
+use crate::cbs::memory::MemoryUse;
+use crate::cbs::node::Node;
+use crate::conflicts::all_conflicts;
+use crate::paths::PathConflict;
+
+/// A node of the constraint tree in the queue.
+pub(super) struct Entry {
+    pub node: Node,
+    num_conflicts: usize,
+    /// The first conflict.
+    pub conflict: Option<PathConflict>,
+}
+
+/// The open list, and its nodes within the suboptimality bound ordered by conflicts.
+pub(super) struct FocalQueue {
+    weight: f64,
+    num_vertices: usize,
+    pub memory: MemoryUse,
+    entries: Vec<Option<Entry>>,
+    /// All nodes by lower bound.
+    open: BTreeSet<(u64, usize)>,
+    /// Nodes within the bound by conflicts, cost and age, newest first.
+    focal: BTreeSet<(usize, u64, std::cmp::Reverse<usize>)>,
+    /// Nodes beyond the bound by cost.
+    beyond: BTreeSet<(u64, usize)>,
+}
+
+impl FocalQueue {
+    /// An empty queue.
+    pub fn new(weight: f64, num_vertices: usize, memory: MemoryUse) -> Self {
+        Self {
+            weight,
+            num_vertices,
+            memory,
+            entries: Vec::new(),
+            open: BTreeSet::new(),
+            focal: BTreeSet::new(),
+            beyond: BTreeSet::new(),
+        }
+    }
+
+    /// Inserts a node.
+    pub fn insert(&mut self, node: Node) {
+        let conflicts = all_conflicts(&node.paths, self.num_vertices);
+        let conflict = conflicts.first().copied();
+        let number = self.entries.len();
+        self.memory.add_node(&node);
+        self.memory.add(size_of::<Option<Entry>>());
+        self.open.insert((node.lower_bound(), number));
+        self.beyond.insert((node.paths.total_cost(), number));
+        self.entries.push(Some(Entry { node, num_conflicts: conflicts.len(), conflict }));
+    }
+
+    /// Takes the node with the fewest conflicts within the bound; also returns the lower bound.
+    pub fn pop(&mut self) -> Option<(Entry, u64)> {
+        let &(lower_bound, _) = self.open.first()?;
+        let is_within = |cost: u64| is_within(cost, lower_bound, self.weight);
+        while let Some(&(cost, number)) = self.beyond.first().filter(|&&(cost, _)| is_within(cost)) {
+            self.beyond.pop_first();
+            let num_conflicts = self.entries[number].as_ref()?.num_conflicts;
+            self.focal.insert((num_conflicts, cost, std::cmp::Reverse(number)));
+        }
+        let (_, _, std::cmp::Reverse(number)) = self.focal.pop_first()?;
+        let entry = self.entries[number].take()?;
+        self.open.remove(&(entry.node.lower_bound(), number));
+        self.memory.remove_node(&entry.node);
+        Some((entry, lower_bound))
+    }
+}
+
+/// Whether a cost is at most `weight` times the least, with a tolerance for rounding: the costs of single agents are
+/// rounded one by one, and without the tolerance no node might be within the bound.
+fn is_within(cost: u64, least: u64, weight: f64) -> bool {
+    cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_within;
+
+    #[test]
+    fn what_is_just_so_many_times_the_least_is_within() {
+        // Nine agents whose paths cost 7 in place of 5; 45 times 1.4 is a little under 63 in floating point.
+        assert!(is_within(63, 45, 1.4));
+        assert!(!is_within(64, 45, 1.4));
+        assert!(is_within(6, 5, 1.2) && !is_within(7, 5, 1.2));
+    }
+}

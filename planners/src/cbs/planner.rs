@@ -1,0 +1,38 @@
+//! CBS as a planner.
+
+use crate::budget::Budget;
+use crate::cbs::independence::Groups;
+use crate::cbs::search::CbsParams;
+use crate::outcome::Outcome;
+use crate::planner::Planner;
+use crate::problem::Problem;
+
+/// The planner CBS, which is optimal. A node of its budget is a node of the constraint tree.
+///
+/// It proves that a problem is impossible if the problem is small or has a step limit; otherwise it searches until the
+/// budget is spent.
+#[derive(Clone, Debug, Default)]
+pub struct Cbs {
+    params: CbsParams,
+}
+
+impl Cbs {
+    /// A planner with these parameters.
+    pub fn new(params: CbsParams) -> Self {
+        Self { params }
+    }
+}
+
+impl Planner for Cbs {
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let costs = match problem.costs_to_go(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        if clock.count_node() {
+            return clock.unsolved(None, problem.lower_bound(&costs));
+        }
+        Groups::new(problem, &costs, &self.params).plan(&mut clock)
+    }
+}

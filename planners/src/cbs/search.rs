@@ -1,0 +1,211 @@
+//! The high level of CBS: best-first search through the constraint tree.
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+
+use crate::budget::Clock;
+use crate::cbs::low_level::{Aim, LowLevel};
+use crate::cbs::mdd::Mdd;
+use crate::cbs::memory::MemoryUse;
+use crate::cbs::node::{Node, split};
+use crate::cbs::unsolvable::UnsolvabilityCheck;
+use crate::conflicts::all_conflicts;
+use crate::graph::{Graph, Vertex};
+use crate::paths::{PathConflict, Paths};
+use crate::problem::Problem;
+use crate::sipp::{Leg, Sipp};
+use crate::team_task::TeamTask;
+
+/// Parameters of [`crate::Cbs`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CbsParams {
+    /// Seed of tie-breaking.
+    pub seed: u64,
+    /// Byte budget of the constraint tree. If it is exceeded, the planner gives up.
+    pub max_bytes: usize,
+}
+
+impl Default for CbsParams {
+    fn default() -> Self {
+        Self { seed: 0, max_bytes: MemoryUse::DEFAULT_BYTES }
+    }
+}
+
+/// The input of a search: optimal paths of some agents.
+pub(super) struct CbsTask<'a> {
+    pub problem: &'a Problem,
+    pub legs: &'a [Vec<Leg>],
+    /// Soft constraints: paths of other agents.
+    pub avoided: &'a [&'a [Vertex]],
+    /// Hard constraints: paths of other agents.
+    pub forbidden: &'a [&'a [Vertex]],
+    /// The cost limit.
+    pub max_cost: u64,
+    pub max_nodes: u64,
+}
+
+/// The result of a search.
+pub(super) enum Found {
+    Best(Paths),
+    /// No plan within the limits; no plan costs less than the lower bound.
+    Unknown {
+        lower_bound: u64,
+        is_full: bool,
+    },
+    /// There is no plan, for a reason.
+    Nothing(String),
+}
+
+/// Searches the constraint tree best-first by lower bound.
+pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, clock: &mut Clock) -> Found {
+    let problem = task.problem;
+    let team = TeamTask::one_shot(problem, task.legs, params.seed);
+    let mut low = LowLevel::new(sipp, &problem.graph, &team, Aim::Best);
+    low.avoid(task.avoided);
+    low.forbid(task.forbidden);
+    let Some(root) = low.root(clock) else { return Found::Unknown { lower_bound: 0, is_full: false } };
+    let mut search = Search {
+        graph: &problem.graph,
+        team: &team,
+        low,
+        open: BinaryHeap::new(),
+        num_entries: 0,
+        memory: MemoryUse::new(params.max_bytes),
+    };
+    search.insert(root, vec![None; problem.num_agents()]);
+    let (mut check, mut lower_bound) = (UnsolvabilityCheck::default(), 0);
+    for num_nodes in 0.. {
+        let Some(entry) = search.open.pop() else { break };
+        // The bounds of nodes are not monotonic, but a proved bound stays valid.
+        lower_bound = entry.bound.max(lower_bound);
+        let is_full = search.memory.is_full();
+        if lower_bound > task.max_cost {
+            return Found::Unknown { lower_bound, is_full };
+        }
+        let Some(conflict) = entry.choice else { return Found::Best(entry.node.paths) };
+        if num_nodes >= task.max_nodes || is_full || clock.count_node() || clock.is_spent() {
+            return Found::Unknown { lower_bound, is_full };
+        }
+        search.memory.remove_node(&entry.node);
+        if let Some(reason) = check.count(problem, clock) {
+            return Found::Nothing(reason);
+        }
+        search.expand(entry, &conflict);
+    }
+    Found::Nothing("no plan is as short as it has to be".to_owned())
+}
+
+/// A node of the constraint tree in the open list.
+struct Entry {
+    node: Node,
+    /// The MDD of each agent, where it was needed.
+    mdds: Vec<Option<Arc<Mdd>>>,
+    bound: u64,
+    num_conflicts: usize,
+    /// The conflict to be resolved next.
+    choice: Option<PathConflict>,
+    /// The serial number of the entry.
+    number: u64,
+}
+
+impl Entry {
+    /// The least key is expanded first; of equal entries, the newest.
+    fn key(&self) -> (u64, usize, Reverse<u64>) {
+        (self.bound, self.num_conflicts, Reverse(self.number))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Entry {}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.key().cmp(&self.key())
+    }
+}
+
+struct Search<'a> {
+    graph: &'a Graph,
+    team: &'a TeamTask<'a>,
+    low: LowLevel<'a>,
+    open: BinaryHeap<Entry>,
+    num_entries: u64,
+    memory: MemoryUse,
+}
+
+impl Search<'_> {
+    /// Inserts a node with its lower bound, and selects its next conflict: cardinal, then semi-cardinal, then others.
+    fn insert(&mut self, node: Node, mut mdds: Vec<Option<Arc<Mdd>>>) {
+        let conflicts = all_conflicts(&node.paths, self.graph.num_vertices());
+        let mut choice = None;
+        let (mut is_counted, mut num_disjoint) = (vec![false; self.team.starts.len()], 0);
+        for &conflict in &conflicts {
+            let (one, other) = conflict.agents;
+            let num_forced = split(&conflict)
+                .into_iter()
+                .filter(|constraint| {
+                    let mdd = self.mdd(&node, constraint.agent, &mut mdds);
+                    mdd.is_forced(constraint.step, constraint.from, constraint.at)
+                })
+                .count();
+            // A cardinal conflict costs a step more; disjoint cardinal conflicts add up.
+            if num_forced == 2 && !is_counted[one] && !is_counted[other] {
+                (is_counted[one], is_counted[other]) = (true, true);
+                num_disjoint += 1;
+            }
+            let key = (Reverse(num_forced), conflict.step);
+            if choice.is_none_or(|(known, _)| key < known) {
+                choice = Some((key, conflict));
+            }
+        }
+        let bound = node.paths.total_cost() + num_disjoint;
+        let choice = choice.map(|(_, conflict)| conflict);
+        self.num_entries += 1;
+        self.memory.add_node(&node);
+        let number = self.num_entries;
+        self.open.push(Entry { node, mdds, bound, num_conflicts: conflicts.len(), choice, number });
+    }
+
+    /// Returns the MDD of an agent in a node.
+    fn mdd<'m>(&mut self, node: &Node, agent: usize, mdds: &'m mut [Option<Arc<Mdd>>]) -> &'m Mdd {
+        mdds[agent].get_or_insert_with(|| {
+            let kept: Vec<_> = node.constraints_of(agent).collect();
+            let mdd = Mdd::new(self.graph, self.team, agent, node.paths.cost(agent), &kept);
+            self.memory.add(mdd.num_bytes());
+            Arc::new(mdd)
+        })
+    }
+
+    /// Inserts the two children of a conflict, or bypasses the conflict with a child that costs the same and has fewer
+    /// conflicts.
+    fn expand(&mut self, entry: Entry, conflict: &PathConflict) {
+        let num_vertices = self.graph.num_vertices();
+        let mut children = Vec::with_capacity(2);
+        for constraint in split(conflict) {
+            let Some(child) = self.low.child(&entry.node, constraint) else { continue };
+            let costs_same = child.paths.total_cost() == entry.node.paths.total_cost();
+            if costs_same && all_conflicts(&child.paths, num_vertices).len() < entry.num_conflicts {
+                let node = Node { paths: child.paths, ..entry.node };
+                return self.insert(node, entry.mdds);
+            }
+            children.push((constraint.agent, child));
+        }
+        for (agent, child) in children {
+            let mut mdds = entry.mdds.clone();
+            mdds[agent] = None;
+            self.insert(child, mdds);
+        }
+    }
+}

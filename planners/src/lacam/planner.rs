@@ -1,0 +1,32 @@
+//! LaCAM* as a planner.
+
+use crate::budget::Budget;
+use crate::lacam::params::LacamParams;
+use crate::lacam::run::Run;
+use crate::outcome::Outcome;
+use crate::planner::Planner;
+use crate::problem::Problem;
+
+/// The planner LaCAM*. A node of its budget is a configuration, or one attempt to refine a plan.
+#[derive(Clone, Debug, Default)]
+pub struct Lacam {
+    params: LacamParams,
+}
+
+impl Lacam {
+    /// A planner with these parameters.
+    pub fn new(params: LacamParams) -> Self {
+        Self { params }
+    }
+}
+
+impl Planner for Lacam {
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let costs = match problem.costs_to_go(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        Run::new(&self.params, problem, &costs, budget, clock).run()
+    }
+}

@@ -1,0 +1,126 @@
+//! PIBT as a lifelong planner.
+
+use std::sync::Arc;
+
+use pogema_core::Error;
+
+use crate::budget::Budget;
+use crate::distances::{CostToGo, Distances};
+use crate::graph::{Graph, Vertex};
+use crate::lifelong::Lifelong;
+use crate::pibt::guidance::Guidance;
+use crate::pibt::input::StepInput;
+use crate::pibt::planner::PibtParams;
+use crate::pibt::priorities::Priorities;
+use crate::pibt::step::PibtStep;
+use crate::problem::Agent;
+
+/// Lifelong PIBT, with or without traffic guidance. It ignores its budget: one step is always fast.
+#[derive(Debug)]
+pub struct PibtLifelong {
+    graph: Arc<Graph>,
+    params: PibtParams,
+    step: PibtStep,
+    priorities: Priorities,
+    goals: Vec<Vertex>,
+    costs: CostTables,
+}
+
+/// The costs to go that agents follow.
+#[derive(Debug)]
+enum CostTables {
+    /// Shortest paths.
+    Shortest { distances: Distances, costs: Vec<CostToGo> },
+    /// Costs to go in traffic.
+    Guided { guidance: Guidance, costs: Vec<Vec<u32>> },
+}
+
+impl PibtLifelong {
+    /// A planner for a number of agents on a map.
+    pub fn new(graph: Arc<Graph>, num_agents: usize, params: PibtParams) -> Self {
+        let costs = match params.guidance {
+            Some(guidance) => CostTables::Guided {
+                guidance: Guidance::new(graph.clone(), num_agents, guidance),
+                costs: vec![Vec::new(); num_agents],
+            },
+            None => CostTables::Shortest {
+                distances: Distances::new(graph.clone(), Distances::DEFAULT_BYTES),
+                costs: Vec::new(),
+            },
+        };
+        let step = PibtStep::new(&graph, params.rules, params.seed);
+        let priorities = Priorities::new(num_agents, |_| 0);
+        Self { graph, params, step, priorities, goals: vec![Vertex::MAX; num_agents], costs }
+    }
+
+    /// Returns the next configuration. Goals may be equal or unreachable.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of agents; [`Error::Agent`] for an unknown vertex or a shared start vertex.
+    pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
+        self.check(now, goals)?;
+        self.update_costs(now, goals);
+        let graph = &self.graph;
+        let order = self.priorities.order();
+        let next = match &self.costs {
+            CostTables::Shortest { costs, .. } => {
+                self.step.run(&StepInput { graph, now, goals, costs, order }, &[])
+            }
+            CostTables::Guided { costs, .. } => {
+                self.step.run(&StepInput { graph, now, goals, costs, order }, &[])
+            }
+        };
+        let next = next.ok_or_else(|| Error::instance("two agents are in one cell"))?;
+        self.priorities.update(|agent| next[agent] == goals[agent]);
+        Ok(next)
+    }
+
+    fn check(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
+        Error::check_length("agents", self.goals.len(), now.len())?;
+        Error::check_length("goals", self.goals.len(), goals.len())?;
+        let num_vertices = self.graph.num_vertices() as Vertex;
+        for (agent, (&place, &goal)) in now.iter().zip(goals).enumerate() {
+            if place.max(goal) >= num_vertices {
+                return Err(Error::agent(agent, format!("the map has {num_vertices} free cells")));
+            }
+        }
+        match self.step.find_shared_vertex(now) {
+            Some(agent) => Err(Error::agent(agent, "it is in one cell with another")),
+            None => Ok(()),
+        }
+    }
+
+    /// Computes the costs to go of new goals.
+    fn update_costs(&mut self, now: &[Vertex], goals: &[Vertex]) {
+        if let CostTables::Shortest { distances, costs } = &mut self.costs
+            && costs.is_empty()
+        {
+            *costs = distances.to_all(goals);
+        }
+        for (agent, &goal) in goals.iter().enumerate() {
+            if self.goals[agent] == goal {
+                continue;
+            }
+            match &mut self.costs {
+                CostTables::Shortest { distances, costs } => costs[agent] = distances.to(goal),
+                CostTables::Guided { guidance, costs } => {
+                    guidance.plan(agent as Agent, now[agent], goal, &mut costs[agent]);
+                }
+            }
+        }
+        self.goals.copy_from_slice(goals);
+    }
+}
+
+impl Lifelong for PibtLifelong {
+    fn reset(&mut self) {
+        *self = Self::new(self.graph.clone(), self.goals.len(), self.params.clone());
+    }
+
+    fn next(&mut self, now: &[Vertex], goals: &[Vertex], _: &Budget) -> Result<Vec<Vertex>, Error> {
+        if now.len() != self.goals.len() {
+            *self = Self::new(self.graph.clone(), now.len(), self.params.clone());
+        }
+        self.step(now, goals).map(<[Vertex]>::to_vec)
+    }
+}

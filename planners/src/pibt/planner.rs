@@ -1,0 +1,86 @@
+//! PIBT as a one-shot planner.
+
+use crate::budget::{Budget, Clock};
+use crate::distances::CostToGo;
+use crate::graph::Vertex;
+use crate::outcome::Outcome;
+use crate::pibt::guidance::GuidanceParams;
+use crate::pibt::input::StepInput;
+use crate::pibt::priorities::Priorities;
+use crate::pibt::step::{PibtRules, PibtStep};
+use crate::planner::Planner;
+use crate::problem::{Agent, Problem};
+
+/// Parameters of [`Pibt`] and [`crate::PibtLifelong`].
+#[derive(Clone, Debug, Default)]
+pub struct PibtParams {
+    /// Seed of tie-breaking.
+    pub seed: u64,
+    /// Options of a step.
+    pub rules: PibtRules,
+    /// Traffic guidance of lifelong agents; without it they follow shortest paths.
+    pub guidance: Option<GuidanceParams>,
+}
+
+/// The planner PIBT: fast, but incomplete. A node of its budget is a step.
+#[derive(Clone, Debug, Default)]
+pub struct Pibt {
+    params: PibtParams,
+}
+
+impl Pibt {
+    /// A planner with these parameters.
+    pub fn new(params: PibtParams) -> Self {
+        Self { params }
+    }
+
+    /// Returns the number of steps after which it gives up. Agents that do not walk in circles need far fewer.
+    fn max_steps(problem: &Problem) -> usize {
+        problem.max_steps.unwrap_or(10 * problem.graph.num_vertices() + 100)
+    }
+
+    /// Steps until all agents are on their goals or a limit is reached.
+    fn run(
+        &self,
+        problem: &Problem,
+        costs: &[CostToGo],
+        mut priorities: Priorities,
+        clock: &mut Clock,
+    ) -> Vec<Vec<Vertex>> {
+        let (graph, goals) = (&problem.graph, &problem.goals[..]);
+        let mut step = PibtStep::new(graph, self.params.rules, self.params.seed);
+        let mut steps = vec![problem.starts.clone()];
+        for _ in 0..Self::max_steps(problem) {
+            let now = &steps[steps.len() - 1];
+            if now == goals || clock.count_node() {
+                break;
+            }
+            let input = StepInput { graph, now, goals, costs, order: priorities.order() };
+            let Some(next) = step.run(&input, &[]).map(<[Vertex]>::to_vec) else {
+                break;
+            };
+            priorities.update(|agent| next[agent] == goals[agent]);
+            steps.push(next);
+        }
+        steps
+    }
+}
+
+impl Planner for Pibt {
+    fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
+        let mut clock = budget.start();
+        let costs = match problem.costs_to_go(&mut clock) {
+            Ok(costs) => costs,
+            Err(outcome) => return outcome,
+        };
+        let least = |agent: Agent| costs[agent as usize][problem.starts[agent as usize] as usize];
+        let lower_bound = problem.lower_bound(&costs);
+        let priorities = Priorities::new(problem.num_agents(), least);
+        let steps = self.run(problem, &costs, priorities, &mut clock);
+        let is_solved = steps.last() == Some(&problem.goals);
+        match problem.plan(&steps).ok() {
+            Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
+            best => clock.unsolved(best, lower_bound),
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! POGEMA's A* policy: every agent plans alone and ignores the others.
+//!
+//! Source: POGEMA 1.4.0, `a_star_policy.py`
+
+use std::collections::{HashMap, HashSet};
+
+use pogema_core::{Action, Error};
+
+use crate::policies::heapq::HeapQ;
+use crate::policies::observations::PomapfObservation;
+
+/// A cell relative to the start of the agent, (row, col).
+type Place = (i32, i32);
+
+/// The node limit of a search.
+const MAX_EXPANSIONS: usize = 10_000;
+
+/// One agent, which follows a shortest path around the obstacles it has seen.
+///
+/// After a step in which it did not move, it acts at random until it moves again.
+///
+/// Rule: policy/astar
+pub struct AStarAgent {
+    obstacles: HashSet<Place>,
+    last: Option<Place>,
+    random_action: Box<dyn FnMut() -> Action + Send>,
+}
+
+impl AStarAgent {
+    /// An agent without knowledge of the map, with a source of random actions.
+    pub fn new(random_action: Box<dyn FnMut() -> Action + Send>) -> Self {
+        Self { obstacles: HashSet::new(), last: None, random_action }
+    }
+
+    /// Returns the next action.
+    ///
+    /// # Errors
+    /// [`Error::State`] if the agent is more than one step away from its last cell.
+    ///
+    /// Rule: policy/astar
+    pub fn act(&mut self, observation: PomapfObservation<'_>) -> Result<Action, Error> {
+        let [row, col] = observation.cell;
+        let (cell, goal) = ((row, col), (observation.goal[0], observation.goal[1]));
+        if let Some(last) = self.last {
+            match distance(last, cell) {
+                0 if cell != goal => return Ok((self.random_action)()),
+                0 | 1 => {}
+                _ => {
+                    return Err(Error::State {
+                        reason: "the A* agent jumped; a new episode needs a new agent".into(),
+                    });
+                }
+            }
+        }
+        self.look(cell, &observation);
+        self.last = Some(cell);
+        Ok(first_move(cell, goal, &self.obstacles))
+    }
+
+    /// Clears the state of the episode.
+    pub fn forget(&mut self) {
+        self.obstacles.clear();
+        self.last = None;
+    }
+
+    /// Updates the known obstacles within the observation window. Other agents are not obstacles.
+    fn look(&mut self, (row, col): Place, observation: &PomapfObservation<'_>) {
+        let radius = observation.side as i32 / 2;
+        for (line, values) in observation.obstacles.chunks(observation.side).enumerate() {
+            for (place, &value) in values.iter().enumerate() {
+                let at = (row + line as i32 - radius, col + place as i32 - radius);
+                if value == 0.0 {
+                    self.obstacles.remove(&at);
+                } else {
+                    self.obstacles.insert(at);
+                }
+            }
+        }
+    }
+}
+
+impl std::fmt::Debug for AStarAgent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AStarAgent").field("last", &self.last).finish_non_exhaustive()
+    }
+}
+
+/// One [`AStarAgent`] for each agent of an environment.
+///
+/// Rule: policy/astar
+pub struct AStarTeam {
+    agents: Vec<AStarAgent>,
+    make_random: Box<dyn Fn() -> Box<dyn FnMut() -> Action + Send> + Send>,
+}
+
+impl AStarTeam {
+    /// A team. `make_random` makes the source of random actions of each agent.
+    pub fn new(make_random: Box<dyn Fn() -> Box<dyn FnMut() -> Action + Send> + Send>) -> Self {
+        Self { agents: Vec::new(), make_random }
+    }
+
+    /// Clears the state of the episode.
+    pub fn reset(&mut self) {
+        self.agents.clear();
+    }
+
+    /// Returns the next action of each agent.
+    ///
+    /// # Errors
+    /// As [`AStarAgent::act`].
+    pub fn act<'a>(
+        &mut self,
+        observations: impl IntoIterator<Item = PomapfObservation<'a>>,
+    ) -> Result<Vec<Action>, Error> {
+        let mut actions = Vec::new();
+        for (index, observation) in observations.into_iter().enumerate() {
+            if index == self.agents.len() {
+                self.agents.push(AStarAgent::new((self.make_random)()));
+            }
+            actions.push(self.agents[index].act(observation)?);
+        }
+        Ok(actions)
+    }
+}
+
+impl std::fmt::Debug for AStarTeam {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AStarTeam").field("agents", &self.agents).finish_non_exhaustive()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    place: Place,
+    cost: i32,
+    estimate: i32,
+}
+
+/// POGEMA's comparison: by f-value, then by lower g-value, then by a relation that is not an order.
+fn is_before(one: &Node, other: &Node) -> bool {
+    if one.estimate != other.estimate {
+        return one.estimate < other.estimate;
+    }
+    if one.cost != other.cost {
+        return one.cost < other.cost;
+    }
+    one.place.0 < other.place.0 || one.place.1 < other.place.1
+}
+
+fn distance(one: Place, other: Place) -> i32 {
+    (one.0 - other.0).abs() + (one.1 - other.1).abs()
+}
+
+/// Returns the first move of the path to the goal, or a wait if there is none.
+fn first_move(start: Place, goal: Place, obstacles: &HashSet<Place>) -> Action {
+    let came_by = search(start, goal, obstacles);
+    let mut at = goal;
+    let mut action = Action::Stay;
+    while let Some(&Some((from, step))) = came_by.get(&at) {
+        (at, action) = (from, step);
+    }
+    action
+}
+
+/// Returns the predecessor and the move by which each cell was first reached.
+fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Place, Option<(Place, Action)>> {
+    let mut came_by = HashMap::from([(start, None)]);
+    let mut open = HeapQ::new(is_before);
+    open.push(Node { place: start, cost: 0, estimate: distance(start, goal) });
+    for _ in 0..MAX_EXPANSIONS {
+        let Some(node) = open.pop() else { break };
+        for action in [Action::Up, Action::Down, Action::Left, Action::Right] {
+            let (down, right) = action.delta();
+            let place = (node.place.0 + down, node.place.1 + right);
+            if obstacles.contains(&place) || came_by.contains_key(&place) {
+                continue;
+            }
+            came_by.insert(place, Some((node.place, action)));
+            let cost = node.cost + 1;
+            open.push(Node { place, cost, estimate: cost + distance(place, goal) });
+        }
+        if node.place == goal || open.is_empty() {
+            break;
+        }
+    }
+    came_by
+}

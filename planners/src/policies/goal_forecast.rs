@@ -1,0 +1,68 @@
+//! Future goals, for planners that may know them.
+
+use std::collections::VecDeque;
+
+use pogema_core::{Cell, Error, GoalStream, Instance, State};
+
+/// The future goals of all agents, read from their instance and advanced with the episode.
+#[derive(Debug)]
+pub(crate) struct GoalForecast {
+    streams: Vec<GoalStream>,
+    /// For each agent, its current goal and later ones.
+    ahead: Vec<VecDeque<Cell>>,
+    /// The step of the next state.
+    step: u64,
+}
+
+impl GoalForecast {
+    /// Number of known goals of each agent, including the current one.
+    const NUM_GOALS: usize = 24;
+
+    /// The forecast at the start of an episode.
+    pub fn new(instance: &Instance) -> Self {
+        let mut streams = instance.goals().to_vec();
+        let ahead = streams.iter_mut().map(|stream| {
+            let mut goals = VecDeque::from([stream.first()]);
+            while goals.len() < Self::NUM_GOALS {
+                draw(stream, &mut goals);
+            }
+            goals
+        });
+        Self { ahead: ahead.collect(), streams, step: 0 }
+    }
+
+    /// Advances to the next state.
+    ///
+    /// # Errors
+    /// [`Error::State`] for a state that is not the next one, or for goals of another episode.
+    pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
+        let error = |reason: String| Error::State { reason };
+        if now.step != self.step || now.goals.len() != self.ahead.len() {
+            let reason = format!("the goals to come are known for step {}, not for {}", self.step, now.step);
+            return Err(error(reason));
+        }
+        self.step += 1;
+        for (agent, goals) in self.ahead.iter_mut().enumerate() {
+            if now.step > 0 && now.on_goal[agent] {
+                goals.pop_front();
+                draw(&mut self.streams[agent], goals);
+            }
+            if goals.front() != Some(&now.goals[agent]) {
+                return Err(error(format!("goal {} of agent {agent} was not to come", now.goals[agent])));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the goals of an agent, the current one first.
+    pub fn goals(&mut self, agent: usize) -> &[Cell] {
+        self.ahead[agent].make_contiguous()
+    }
+}
+
+/// Appends the goal after the last one.
+fn draw(stream: &mut GoalStream, goals: &mut VecDeque<Cell>) {
+    if let Some(&last) = goals.back() {
+        goals.push_back(stream.advance(last));
+    }
+}

@@ -1,0 +1,99 @@
+//! Lifelong planners as policies.
+
+use std::sync::Arc;
+
+use pogema_core::{Action, Cell, Error, Instance, Map, State};
+
+use crate::budget::Budget;
+use crate::graph::Graph;
+use crate::lifelong::Lifelong;
+use crate::policies::goal_forecast::GoalForecast;
+use crate::registry::{self, PlannerSettings};
+
+/// A lifelong planner that controls the agents of an environment.
+///
+/// Inactive agents stay and are hidden from the planner.
+pub struct LifelongPolicy {
+    name: String,
+    settings: PlannerSettings,
+    budget: Budget,
+    planner: Option<(Map, Arc<Graph>, Box<dyn Lifelong>)>,
+    forecast: Option<GoalForecast>,
+}
+
+impl LifelongPolicy {
+    /// A policy of a planner of [`registry::LIFELONG`], with a budget for each step.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for an unknown name.
+    pub fn new(name: &str, settings: PlannerSettings, budget: Budget) -> Result<Self, Error> {
+        let nowhere = Map::new(1, 1, vec![true])?;
+        registry::lifelong(name, Arc::new(Graph::new(&nowhere)), settings)?;
+        Ok(Self { name: name.to_owned(), settings, budget, planner: None, forecast: None })
+    }
+
+    /// Clears the state of the episode, including future goals.
+    pub fn reset(&mut self) {
+        self.forecast = None;
+        if let Some((_, _, planner)) = &mut self.planner {
+            planner.reset();
+        }
+    }
+
+    /// Provides future goals to the planner in the episode that begins, as in the RHCR paper. [`LifelongPolicy::act`] must
+    /// then be called in every step.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a planner that does not use future goals.
+    pub fn provide_future_goals(&mut self, instance: &Instance) -> Result<(), Error> {
+        let (_, planner) = self.planner_on(instance.map())?;
+        if !planner.uses_future_goals() {
+            return Err(Error::config("planner", &self.name, "`rhcr`, to make use of goals still to come"));
+        }
+        self.forecast = Some(GoalForecast::new(instance));
+        Ok(())
+    }
+
+    /// Returns the actions of all agents; inactive agents stay.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::State`] if future goals are provided
+    /// and the state is not the next one of their episode.
+    pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
+        let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
+        let future = self.forecast.as_mut().map(|forecast| {
+            forecast.follow(now)?;
+            Ok(agents.iter().map(|&agent| forecast.goals(agent).to_vec()).collect::<Vec<Vec<Cell>>>())
+        });
+        let future = future.transpose()?;
+        let budget = self.budget.clone();
+        let (graph, planner) = self.planner_on(map)?;
+        let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
+        let cells = graph.vertices_of("the agent's cell", &of(now.cells))?;
+        let next = if let Some(goals) = future {
+            let vertices = |goals: &Vec<Cell>| graph.vertices_of("goal", goals);
+            let goals = goals.iter().map(vertices).collect::<Result<Vec<_>, _>>()?;
+            planner.next_with_future_goals(&cells, &goals, &budget)?
+        } else {
+            planner.next(&cells, &graph.vertices_of("goal", &of(now.goals))?, &budget)?
+        };
+        let mut actions = vec![Action::Stay; now.cells.len()];
+        for (&agent, (&from, &to)) in agents.iter().zip(cells.iter().zip(&next)) {
+            actions[agent] = graph.action(from, to);
+        }
+        Ok(actions)
+    }
+
+    /// Returns the planner of a map, from the cache if the map is the same.
+    fn planner_on(&mut self, map: &Map) -> Result<(Arc<Graph>, &mut dyn Lifelong), Error> {
+        let (_, graph, planner) = match self.planner.take() {
+            Some(made) if made.0 == *map => self.planner.insert(made),
+            _ => {
+                let graph = Arc::new(Graph::new(map));
+                let planner = registry::lifelong(&self.name, graph.clone(), self.settings)?;
+                self.planner.insert((map.clone(), graph, planner))
+            }
+        };
+        Ok((graph.clone(), planner.as_mut()))
+    }
+}

@@ -1,0 +1,19 @@
+//! Policies: planners that control an environment, and POGEMA's own policies.
+//!
+//! A policy knows the map and the current state. Future goals are hidden from it unless they are provided explicitly.
+
+mod astar;
+mod goal_forecast;
+mod heapq;
+mod lifelong_policy;
+mod named;
+mod observations;
+mod planner_policy;
+mod pogema;
+
+pub use astar::{AStarAgent, AStarTeam};
+pub use lifelong_policy::LifelongPolicy;
+pub use named::{NamedPolicy, PolicySettings, SIMPLE};
+pub use observations::{PomapfObservation, PomapfObservations};
+pub use planner_policy::PlannerPolicy;
+pub use pogema::{pogema_team, sample};

@@ -1,0 +1,121 @@
+//! One-shot planners as policies.
+
+use std::sync::Arc;
+
+use pogema_core::{Action, Cell, Error, Map, State};
+
+use crate::budget::Budget;
+use crate::graph::Graph;
+use crate::outcome::Outcome;
+use crate::plan::Plan;
+use crate::planner::Planner;
+use crate::problem::Problem;
+
+/// A one-shot planner that controls the agents of an environment.
+///
+/// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave out
+/// inactive agents. An agent that leaves as planned does not trigger replanning.
+pub struct PlannerPolicy {
+    planner: Box<dyn Planner>,
+    budget: Budget,
+    max_steps: Option<u64>,
+    graph: Option<(Map, Arc<Graph>)>,
+    current: Option<CurrentPlan>,
+    outcomes: Vec<Outcome>,
+}
+
+/// The plan that the agents follow.
+struct CurrentPlan {
+    /// The agents of the plan, in its order.
+    agents: Vec<usize>,
+    goals: Vec<Cell>,
+    plan: Plan,
+    /// The step of the episode at which the plan starts.
+    start: u64,
+    /// Whether the plan solves only part of the problem, so that replanning at its end may help.
+    is_partial: bool,
+}
+
+impl PlannerPolicy {
+    /// A policy with a budget for each plan, in episodes with a step limit.
+    pub fn new(planner: Box<dyn Planner>, budget: Budget, max_steps: Option<u64>) -> Self {
+        Self { planner, budget, max_steps, graph: None, current: None, outcomes: Vec::new() }
+    }
+
+    /// Clears the state of the episode.
+    pub fn reset(&mut self) {
+        self.current = None;
+        self.outcomes.clear();
+    }
+
+    /// Returns the outcomes of all calls of the planner in this episode.
+    pub fn outcomes(&self) -> &[Outcome] {
+        &self.outcomes
+    }
+
+    /// Returns the actions of all agents. Inactive agents stay; without a plan, all agents stay.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell.
+    pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
+        if !self.current.as_ref().is_some_and(|plan| plan.is_followed(now)) {
+            self.current = Some(self.plan(map, now)?);
+        }
+        let mut actions = vec![Action::Stay; now.cells.len()];
+        if let Some(current) = &self.current {
+            let planned = current.plan.actions((now.step - current.start) as usize)?;
+            for (&agent, action) in current.agents.iter().zip(planned) {
+                actions[agent] = action;
+            }
+        }
+        Ok(actions)
+    }
+
+    /// Plans for the active agents from their current cells.
+    fn plan(&mut self, map: &Map, now: State<'_>) -> Result<CurrentPlan, Error> {
+        let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
+        let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
+        let (cells, goals) = (of(now.cells), of(now.goals));
+        let graph = self.graph(map);
+        let problem = Problem {
+            starts: graph.vertices_of("the agent's cell", &cells)?,
+            goals: graph.vertices_of("goal", &goals)?,
+            graph,
+            max_steps: self.max_steps.map(|limit| limit.saturating_sub(now.step) as usize),
+        };
+        let outcome = self.planner.plan(&problem, &self.budget);
+        let plan = outcome.best().cloned().map_or_else(|| Plan::new(vec![cells]), Ok)?;
+        let is_partial = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
+        self.outcomes.push(outcome);
+        Ok(CurrentPlan { agents, goals, plan, start: now.step, is_partial })
+    }
+
+    /// Returns the graph of a map, from the cache if the map is the same.
+    fn graph(&mut self, map: &Map) -> Arc<Graph> {
+        match &self.graph {
+            Some((known, graph)) if known == map => graph.clone(),
+            _ => {
+                let graph = Arc::new(Graph::new(map));
+                self.graph = Some((map.clone(), graph.clone()));
+                graph
+            }
+        }
+    }
+}
+
+impl CurrentPlan {
+    /// Whether agents and goals are as planned, and a partial plan has not ended.
+    fn is_followed(&self, now: State<'_>) -> bool {
+        let Some(step) = now.step.checked_sub(self.start).map(|step| step as usize) else { return false };
+        if self.is_partial && step >= self.plan.num_steps().max(1) {
+            return false;
+        }
+        let planned = &self.plan.cells()[step.min(self.plan.num_steps())];
+        let mut places = self.agents.iter().zip(planned).zip(&self.goals);
+        let is_as_planned = places.all(|((&agent, &cell), &goal)| {
+            !now.active[agent] || (now.cells[agent] == cell && now.goals[agent] == goal)
+        });
+        // An active agent that is not in the plan means another episode.
+        is_as_planned && now.active.iter().filter(|&&active| active).count() <= self.agents.len()
+    }
+}

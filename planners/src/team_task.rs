@@ -1,0 +1,32 @@
+//! The path-finding task of a whole team, for searches that plan one agent at a time.
+
+use crate::distances::CostToGo;
+use crate::graph::Vertex;
+use crate::problem::Problem;
+use crate::sipp::{Horizon, Leg};
+
+/// Starts, goals and horizon of all agents.
+pub(crate) struct TeamTask<'a> {
+    pub(crate) starts: &'a [Vertex],
+    pub(crate) legs: &'a [Vec<Leg>],
+    pub(crate) horizon: Horizon,
+    pub(crate) salt: u32,
+}
+
+impl<'a> TeamTask<'a> {
+    /// The task of a one-shot problem.
+    pub(crate) fn one_shot(problem: &'a Problem, legs: &'a [Vec<Leg>], seed: u64) -> Self {
+        let max_steps = problem.max_steps.map_or(u32::MAX, |limit| u32::try_from(limit).unwrap_or(u32::MAX));
+        Self { starts: &problem.starts, legs, horizon: Horizon::Stay { max_steps }, salt: seed as u32 }
+    }
+
+    /// Whether agents stay at the ends of their paths.
+    pub(crate) fn stays(&self) -> bool {
+        matches!(self.horizon, Horizon::Stay { .. })
+    }
+}
+
+/// Makes one leg for each agent of a one-shot problem.
+pub(crate) fn one_leg_each(costs: &[CostToGo]) -> Vec<Vec<Leg>> {
+    costs.iter().map(|to_go| vec![Leg::last(to_go.clone())]).collect()
+}
