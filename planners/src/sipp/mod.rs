@@ -15,7 +15,7 @@
 //! | soft obstacle, c-value | [`Task::avoided`], `conflicts` |
 //!
 //! This SIPP supports soft constraints, several goals and windows. The large neighbourhood search of LaCAM* needs none of
-//! them and has a search of its own, which is 2.0 to 2.7 times as fast on its tasks (measured in one run, five crowds).
+//! them and has a search of its own, which is 1.9 to 2.5 times as fast on its tasks (measured in one run, five crowds).
 
 mod node;
 mod search;

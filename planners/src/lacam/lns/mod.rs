@@ -14,7 +14,7 @@
 //! The LNS has its own SIPP ([`earliest_arrival`]) and reservation table ([`time_table`]), because the general ones
 //! ([`crate::sipp`], [`crate::Reservations`]) are slower. Both pairs were run side by side on five crowds (32 to 192 agents
 //! on random, maze, warehouse and city maps; 20,000 nodes each). They found the same arrivals in all 236,307 searches. The
-//! general search took 2.0 to 2.7 times as long, the general table 2.6 to 7.4 times, and both together 2.1 to 2.9 times.
+//! general search took 1.9 to 2.5 times as long, the general table 4.3 to 7.5 times, and both together 2.0 to 2.6 times.
 
 mod change_log;
 mod earliest_arrival;
