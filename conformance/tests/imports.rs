@@ -74,7 +74,7 @@ impl Sources {
             let length = longest.unwrap_or(0);
             match self.reexports.get(&name[..name.len().min(length + 1)]) {
                 Some(from) if length < name.len() => {
-                    name = [from.clone(), name[length + 1..].to_vec()].concat()
+                    name = [from.clone(), name[length + 1..].to_vec()].concat();
                 }
                 _ => return name[..length].to_vec(),
             }
@@ -125,7 +125,7 @@ fn expand(prefix: &str, tree: &str, take: &mut impl FnMut(&str)) {
                 begin = index + 1;
                 match part.split_once('{') {
                     Some((head, rest)) => {
-                        expand(&format!("{prefix}{head}"), rest.strip_suffix('}').unwrap_or(rest), take)
+                        expand(&format!("{prefix}{head}"), rest.strip_suffix('}').unwrap_or(rest), take);
                     }
                     None if part.is_empty() => {}
                     None => take(format!("{prefix}{part}").split(" as ").next().unwrap_or_default()),

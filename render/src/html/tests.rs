@@ -11,7 +11,7 @@ fn trace() -> Trace {
 }
 
 fn reason(trace: &Trace) -> String {
-    replay(&trace, "wrong").unwrap_err().to_string()
+    replay(trace, "wrong").unwrap_err().to_string()
 }
 
 #[test]

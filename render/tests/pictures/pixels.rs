@@ -33,7 +33,7 @@ impl Picture {
 const CELL: f64 = 20.0;
 
 fn draw(trace: &Trace, style: &Style) -> Picture {
-    let cols = Ground::of(&trace).cols(style.border).len() + 1;
+    let cols = Ground::of(trace).cols(style.border).len() + 1;
     Picture::of(&raster::png(trace, style, (cols as f64 * CELL) as u32).unwrap())
 }
 

@@ -153,7 +153,7 @@ fn a_view_shades_agents_that_its_agent_does_not_see() {
             assert_follows(&circle, &states, |state| state.cells[agent], agent);
             for (frame, state) in states.iter().enumerate() {
                 let Cell { row, col } = state.cells[agent];
-                let is_seen = Ground::of(&trace).sees(state.cells[own], row.into(), col.into());
+                let is_seen = Ground::of(trace).sees(state.cells[own], row.into(), col.into());
                 let found = circle.opacity_at(time_of(frame, states.len()));
                 let expected = if is_seen { 1.0 } else { 0.2 };
                 assert!((found - expected).abs() < NEAR, "agent {agent} frame {frame}");
@@ -181,7 +181,7 @@ fn a_view_shades_obstacles_until_its_agent_sees_them() {
             for at in squares(path.attribute("d").unwrap()) {
                 let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
                 let first =
-                    states.iter().position(|state| Ground::of(&trace).sees(state.cells[own], row, col));
+                    states.iter().position(|state| Ground::of(trace).sees(state.cells[own], row, col));
                 assert_eq!(told.or((!is_shaded).then_some(0)), first, "({row}, {col})");
             }
         }
