@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     let result = match words.split_first() {
         Some((what, [number])) if what == "random" => random(number),
         Some((what, files)) if what == "benchmark" && !files.is_empty() => benchmark(files),
-        _ => Err(Error::State { reason: "expected `random NUMBER` or `benchmark FILE...`".into() }),
+        _ => Err(Error::Request { reason: "expected `random NUMBER` or `benchmark FILE...`".into() }),
     };
     match result {
         Ok(number) => {
@@ -42,7 +42,7 @@ fn main() -> ExitCode {
 
 fn random(number: &str) -> Result<usize, Error> {
     let number: u64 =
-        number.parse().map_err(|error| Error::State { reason: format!("`{number}`: {error}") })?;
+        number.parse().map_err(|error| Error::Request { reason: format!("`{number}`: {error}") })?;
     let requests = (0..number).map(|case| play_script(Engine::REFERENCE, draw_request(SEED, case), SEED).0);
     record("random.jsonl.zst", requests)
 }

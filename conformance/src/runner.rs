@@ -315,7 +315,7 @@ pub(crate) fn on_workers<W, T: Send>(
     let results = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..num_workers).map(|_| scope.spawn(work)).collect();
         let join = |worker: std::thread::ScopedJoinHandle<'_, Result<_, Error>>| {
-            worker.join().unwrap_or_else(|_| Err(Error::State { reason: "a worker panicked".into() }))
+            worker.join().unwrap_or_else(|_| Err(Error::external("worker", "panicked")))
         };
         workers.into_iter().map(join).collect::<Result<Vec<_>, _>>()
     })?;

@@ -1,5 +1,7 @@
 //! The one error type of the workspace.
 
+use std::sync::Arc;
+
 /// Everything that can be wrong with input, each told in one line.
 ///
 /// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line.
@@ -16,6 +18,23 @@ pub enum Error {
         /// What would have been right.
         expected: String,
     },
+    /// A config field names a cell outside the map.
+    #[error(
+        "{}",
+        one_line(format_args!(
+            "config: `{field}` is `{cell}`, expected cells inside the map of {height} rows and {width} columns"
+        ))
+    )]
+    CellOutside {
+        /// The field.
+        field: String,
+        /// The cell.
+        cell: String,
+        /// Rows of the map.
+        height: usize,
+        /// Columns of the map.
+        width: usize,
+    },
     /// A config could not be read at all.
     #[error("{}", one_line(format_args!("config: {reason}")))]
     Syntax {
@@ -31,6 +50,16 @@ pub enum Error {
         column: usize,
         /// What is wrong there.
         reason: String,
+    },
+    /// A map text holds a character without a meaning.
+    #[error("{}", one_line(format_args!("map: line {line}, column {column}: {}", unknown_letter(*letter))))]
+    UnknownLetter {
+        /// Line of the map, counted from 1.
+        line: usize,
+        /// Column of the map, counted from 1.
+        column: usize,
+        /// The character.
+        letter: char,
     },
     /// The instance as a whole cannot be played.
     #[error("{}", one_line(format_args!("instance: {reason}")))]
@@ -89,19 +118,70 @@ pub enum Error {
         /// The values that exist.
         expected: String,
     },
-    /// A call that the state does not allow.
+    /// Saved goals that belong to another episode.
+    #[error("the saved goals belong to another episode")]
+    ForeignGoals,
+    /// A lane of a batch whose first episode has not ended.
+    #[error("no episode of lane {lane} ended yet")]
+    NotEnded {
+        /// The lane.
+        lane: usize,
+    },
+    /// An object that another thread is using.
+    #[error("another thread is using {what}, expected one thread at a time")]
+    Busy {
+        /// The object, with its article.
+        what: &'static str,
+    },
+    /// A policy that sees a state which is not the next one of its episode.
     #[error("{}", one_line(reason))]
-    State {
-        /// What has to happen first.
+    OutOfStep {
+        /// What was expected.
         reason: String,
     },
-    /// A file could not be read or written.
-    #[error("{}", one_line(format_args!("{path}: {reason}")))]
+    /// A plan that breaks a rule or does not fit its text format.
+    #[error("{}", one_line(reason))]
+    Plan {
+        /// What is wrong, with the line where there is one.
+        reason: String,
+    },
+    /// A request that contradicts itself or has nothing to work on; flags and keys stand in it by name.
+    #[error("{}", one_line(reason))]
+    Request {
+        /// What is wrong, and what is accepted.
+        reason: String,
+    },
+    /// An answer of a port that is no answer to its question, or a refusal.
+    #[error("{}", one_line(reason))]
+    Port {
+        /// What the port said or did.
+        reason: String,
+    },
+    /// Data from elsewhere that is not what it should be.
+    #[error("{}", one_line(format_args!("{what}: {reason}")))]
+    Corrupt {
+        /// The data.
+        what: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A failure of the operating system or of a library.
+    #[error("{}", one_line(format_args!("{what}: {cause}")))]
+    External {
+        /// What failed.
+        what: String,
+        /// Why it failed.
+        #[source]
+        cause: Cause,
+    },
+    /// A file could not be read or written, or its content is wrong.
+    #[error("{}", one_line(format_args!("{path}: {cause}")))]
     Io {
         /// The file.
         path: String,
-        /// What the system says.
-        reason: String,
+        /// What the system says, or what is wrong with the content.
+        #[source]
+        cause: Cause,
     },
     /// A trace that cannot be read.
     #[error("{}", one_line(format_args!("trace: line {line}: {reason}")))]
@@ -111,6 +191,49 @@ pub enum Error {
         /// What is wrong there.
         reason: String,
     },
+}
+
+/// Any error, or a text.
+pub type BoxedError = Box<dyn std::error::Error + Send + Sync>;
+
+/// The error behind another one. Two are equal if their texts are.
+#[derive(Clone)]
+pub struct Cause(Arc<dyn std::error::Error + Send + Sync>);
+
+impl Cause {
+    /// Takes any error, or a text.
+    pub fn new(cause: impl Into<BoxedError>) -> Self {
+        Self(cause.into().into())
+    }
+
+    /// The error, to ask for its type.
+    pub fn get(&self) -> &(dyn std::error::Error + Send + Sync + 'static) {
+        &*self.0
+    }
+}
+
+impl std::fmt::Display for Cause {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::fmt::Debug for Cause {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl PartialEq for Cause {
+    fn eq(&self, other: &Self) -> bool {
+        self.to_string() == other.to_string()
+    }
+}
+
+impl std::error::Error for Cause {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.0.source()
+    }
 }
 
 fn of_agent(agent: Option<usize>) -> String {
@@ -131,6 +254,19 @@ impl Error {
     pub fn out_of_range(what: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::OutOfRange { what: what.into(), value, expected: expected.into() }
+    }
+
+    /// An error about a cell of a config field that lies outside the map.
+    pub fn cell_outside(field: &str, cell: impl std::fmt::Display, (height, width): (usize, usize)) -> Self {
+        Self::CellOutside { field: field.into(), cell: cell.to_string(), height, width }
+    }
+
+    /// The config field that is wrong, if it is one.
+    pub fn field(&self) -> Option<&str> {
+        match self {
+            Self::Config { field, .. } | Self::CellOutside { field, .. } => Some(field),
+            _ => None,
+        }
     }
 
     /// An error about an instance as a whole.
@@ -155,14 +291,29 @@ impl Error {
     }
 
     /// An error about a file.
-    pub fn io(path: impl AsRef<std::path::Path>, reason: impl std::fmt::Display) -> Self {
-        Self::Io { path: path.as_ref().display().to_string(), reason: reason.to_string() }
+    pub fn io(path: impl AsRef<std::path::Path>, cause: impl Into<BoxedError>) -> Self {
+        Self::Io { path: path.as_ref().display().to_string(), cause: Cause::new(cause) }
+    }
+
+    /// A failure of the operating system or of a library.
+    pub fn external(what: impl Into<String>, cause: impl Into<BoxedError>) -> Self {
+        Self::External { what: what.into(), cause: Cause::new(cause) }
+    }
+
+    /// An error about a request.
+    pub fn request(reason: impl Into<String>) -> Self {
+        Self::Request { reason: reason.into() }
     }
 
     /// Passes if a list or buffer has the length it must have.
     pub fn check_length(what: &'static str, want: usize, got: usize) -> Result<(), Self> {
         if want == got { Ok(()) } else { Err(Self::Length { what, want, got }) }
     }
+}
+
+/// What is wrong with a character that has no meaning in a map text.
+pub fn unknown_letter(letter: char) -> String {
+    format!("unknown character `{letter}`, expected one of `.#@$!`, a-z or A-Z")
 }
 
 /// The beginning of a text, for a message that quotes it.

@@ -58,7 +58,7 @@ pub enum StreamState {
 }
 
 fn unfit() -> Error {
-    Error::State { reason: "the state of the goals is none of this episode's".into() }
+    Error::ForeignGoals
 }
 
 impl GoalStream {

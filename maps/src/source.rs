@@ -342,8 +342,7 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
 /// Passes if every cell of a field is on the map.
 pub(crate) fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
     let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
-    let expected = format!("cells inside the map of {} rows and {} columns", map.height(), map.width());
-    Err(Error::config(field, cell, expected))
+    Err(Error::cell_outside(field, cell, (map.height(), map.width())))
 }
 
 /// Passes if every draw from the pool ends and hits the map.

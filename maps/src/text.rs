@@ -108,9 +108,12 @@ pub fn parse_map_text(text: &str) -> Result<MapText, Error> {
         for word in words.split_whitespace() {
             // Both are slices of one line, so the distance between them is where the word begins.
             let begin = word.as_ptr() as usize - words.as_ptr() as usize;
-            reader.read_row(word).map_err(|Fault { col, reason }| {
-                let column = words[..begin].chars().count() + col + 1;
-                Error::Map { line: line + 1, column, reason }
+            reader.read_row(word).map_err(|(col, fault)| {
+                let (line, column) = (line + 1, words[..begin].chars().count() + col + 1);
+                match fault {
+                    Fault::Letter(letter) => Error::UnknownLetter { line, column, letter },
+                    Fault::Other(reason) => Error::Map { line, column, reason },
+                }
             })?;
         }
     }
@@ -129,23 +132,23 @@ struct Reader {
     has_pools: bool,
 }
 
-/// What is wrong with a row, and at which of its cells.
-struct Fault {
-    col: usize,
-    reason: String,
+/// What is wrong with a row.
+enum Fault {
+    Letter(char),
+    Other(String),
 }
 
 impl Reader {
-    fn read_row(&mut self, row: &str) -> Result<(), Fault> {
+    /// An error has the column, counted from 0.
+    fn read_row(&mut self, row: &str) -> Result<(), (usize, Fault)> {
         let coordinate = |number: usize, col: usize| {
             let reason = |_| format!("the map has more than {} rows or columns", u16::MAX);
-            u16::try_from(number).map_err(reason).map_err(|reason| Fault { col, reason })
+            u16::try_from(number).map_err(reason).map_err(|reason| (col, Fault::Other(reason)))
         };
         for (col, character) in row.chars().enumerate() {
             let cell = Cell::new(coordinate(self.height, col)?, coordinate(col, col)?);
             if !self.read_cell(character, cell) {
-                let reason = format!("unknown character `{character}`, expected one of `.#@$!`, a-z or A-Z");
-                return Err(Fault { col, reason });
+                return Err((col, Fault::Letter(character)));
             }
         }
         let length = row.chars().count();
@@ -153,7 +156,7 @@ impl Reader {
             self.width = length;
         } else if length != self.width {
             let reason = format!("the row has {length} cells, expected {} as in the first row", self.width);
-            return Err(Fault { col: length.min(self.width), reason });
+            return Err((length.min(self.width), Fault::Other(reason)));
         }
         self.height += 1;
         Ok(())

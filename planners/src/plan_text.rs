@@ -34,7 +34,7 @@ impl PlanText {
     /// Reads a plan in either format.
     ///
     /// # Errors
-    /// [`Error::State`] with the line for text in neither format, for a result without a solution, and for steps
+    /// [`Error::Plan`] with the line for text in neither format, for a result without a solution, and for steps
     /// with different numbers of agents.
     pub fn read(text: &str) -> Result<Self, Error> {
         let lines: Vec<(usize, &str)> =
@@ -99,7 +99,7 @@ fn read_result(fields: &[(usize, &str)], steps: &[(usize, &str)]) -> Result<Plan
         }
     }
     if steps.is_empty() {
-        return Err(Error::State { reason: "the result holds no solution".into() });
+        return Err(Error::Plan { reason: "the result holds no solution".into() });
     }
     let plan = read_steps(steps, Order::XY)?;
     let (map_file, starts, goals) = result;
@@ -118,7 +118,7 @@ fn read_steps(lines: &[(usize, &str)], order: Order) -> Result<Plan, Error> {
         if let Some(first) = steps.first().filter(|first| first.len() != cells.len()) {
             let reason =
                 format!("line {line}: {} cells, expected {}, as at the start", cells.len(), first.len());
-            return Err(Error::State { reason });
+            return Err(Error::Plan { reason });
         }
         steps.push(cells);
     }
@@ -149,5 +149,5 @@ fn read_cells(line: usize, text: &str, order: Order) -> Result<Vec<Cell>, Error>
 
 fn wrong(line: usize, found: &str, expected: &str) -> Error {
     let found = shorten(found, Error::LONGEST_QUOTE);
-    Error::State { reason: format!("line {line}: found `{found}`, expected {expected}") }
+    Error::Plan { reason: format!("line {line}: found `{found}`, expected {expected}") }
 }

@@ -15,12 +15,9 @@ fn of_class(py: Python<'_>, class: &str, error: impl std::fmt::Display) -> PyErr
 
 /// What a wrong config raises; the Python side makes it the class that POGEMA raises.
 pub fn config(py: Python<'_>, error: &Error) -> PyErr {
-    let is_outside =
-        matches!(error, Error::Config { expected, .. } if expected.starts_with("cells inside the map"));
-    let is_unknown = matches!(error, Error::Map { reason, .. } if reason.starts_with("unknown character"));
     let class = match error {
-        _ if is_outside => "OutsideMapError",
-        _ if is_unknown => "MapTextError",
+        Error::CellOutside { .. } => "OutsideMapError",
+        Error::UnknownLetter { .. } => "MapTextError",
         _ => "RefusedConfigError",
     };
     of_class(py, class, error)
@@ -45,8 +42,7 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
 
 /// What a call raises while another thread's is under way.
 pub fn busy(py: Python<'_>) -> PyErr {
-    let reason = "another thread is using this environment, expected one thread at a time".to_owned();
-    of_class(py, "StateError", &Error::State { reason })
+    of_class(py, "StateError", Error::Busy { what: "this environment" })
 }
 
 /// What an A* agent raises that was not told of a new episode.
@@ -57,9 +53,11 @@ pub fn astar(py: Python<'_>, error: &Error) -> PyErr {
 /// What a call of many environments raises.
 pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
     match error {
-        Error::Length { .. } | Error::Action { .. } | Error::NotReset | Error::State { .. } => {
-            call(py, error)
-        }
+        Error::Length { .. }
+        | Error::Action { .. }
+        | Error::NotReset
+        | Error::NotEnded { .. }
+        | Error::Corrupt { .. } => call(py, error),
         _ => instance(py, error),
     }
 }

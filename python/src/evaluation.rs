@@ -273,7 +273,8 @@ fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {
 }
 
 fn from_json<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
-    serde_json::from_str(text).map_err(|error| Error::State { reason: error.to_string() })
+    serde_json::from_str(text)
+        .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
 }
 
 pub fn told(error: &Error) -> PyErr {
@@ -297,8 +298,8 @@ pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -
         let suite = Suite::parse(std::path::Path::new("suite.yaml"), suite)?;
         let environments = Environments::unchecked(&suite, library(&suite, maps, &[])?);
         let (played, runtime) = suite.play_one(&environments)?;
-        let played =
-            serde_json::to_string(&played).map_err(|error| Error::State { reason: error.to_string() })?;
+        let played = serde_json::to_string(&played)
+            .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;
         Ok((played, runtime.as_secs_f64()))
     };
     py.detach(play).map_err(|error: Error| told(&error))

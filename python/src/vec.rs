@@ -319,7 +319,7 @@ fn write_active(
     ended: Option<&[usize]>,
     mut active: PyReadwriteArray2<'_, bool>,
 ) -> Result<(), Error> {
-    let no_array = |_| Error::State { reason: "active is scattered in memory".into() };
+    let no_array = |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
     let active = active.as_slice_mut().map_err(no_array)?;
     let num_agents = batch.config().num_agents;
     let want = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);

@@ -37,11 +37,11 @@ pub fn encode(
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 1)?;
     let first = motion.frame(0);
-    let too_wide = |_| Error::State { reason: "GIF: a picture has at most 65535 pixels a side".into() };
+    let too_wide = |_| Error::external("GIF", "a picture has at most 65535 pixels a side");
     let width = u16::try_from(first.width()).map_err(too_wide)?;
     let height = u16::try_from(first.height()).map_err(too_wide)?;
     let palette = Palette::of(&scene);
-    let failed = |error: gif::EncodingError| Error::State { reason: format!("GIF: {error}") };
+    let failed = |error: gif::EncodingError| Error::external("GIF", error);
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette.bytes()).map_err(failed)?;
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let delay = 100.0 / motion.rate(style.step_time);
@@ -59,7 +59,7 @@ pub fn encode(
             last = next;
         }
     }
-    encoder.into_inner().map_err(|error| Error::State { reason: format!("GIF: {error}") })
+    encoder.into_inner().map_err(|error| Error::external("GIF", error))
 }
 
 /// How long the frame before this one is shown, so that rounding never adds up.

@@ -21,7 +21,7 @@ pub fn png(trace: &Trace, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: style.static_frame.or(Some(0)), ..style.clone() };
     let scene = Scene::new(trace, &style)?;
     let canvas = Painter::new(&scene, width, MOST_PIXELS, 1)?.paint(0.0);
-    canvas.encode_png().map_err(|error| Error::State { reason: format!("PNG: {error}") })
+    canvas.encode_png().map_err(|error| Error::external("PNG", error))
 }
 
 /// The width of a picture whose longer side is about `longer`: cells are whole pixels where they can be, so that
@@ -62,7 +62,7 @@ impl<'a> Painter<'a> {
                 &format!("1 to {most} pixels in all: choose another width"),
             ));
         }
-        let failed = || Error::State { reason: format!("no memory for {width} x {height} pixels") };
+        let failed = || Error::external("picture", format!("no memory for {width} x {height} pixels"));
         let background = Pixmap::new(width as u32, height as u32).ok_or_else(failed)?;
         let transform =
             Transform::from_scale(scale as f32, scale as f32).pre_translate(-left as f32, -top as f32);

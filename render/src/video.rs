@@ -112,7 +112,7 @@ pub fn write(
 /// Passes if there is an ffmpeg to make videos.
 ///
 /// # Errors
-/// [`Error::State`] if it is missing, [`Error::Io`] if it cannot be started.
+/// [`Error::Request`] if it is missing, [`Error::Io`] if it cannot be started.
 pub fn check_ffmpeg() -> Result<(), Error> {
     let mut command = Command::new("ffmpeg");
     let started =
@@ -122,7 +122,7 @@ pub fn check_ffmpeg() -> Result<(), Error> {
 
 fn not_started(error: std::io::Error) -> Error {
     match error.kind() {
-        ErrorKind::NotFound => Error::State { reason: MISSING.into() },
+        ErrorKind::NotFound => Error::request(MISSING),
         _ => Error::io("ffmpeg", error),
     }
 }

@@ -51,12 +51,9 @@ impl Environments {
         self.check_maps().map_err(|error| suite.in_file(error))?;
         self.variants.probes().try_for_each(|(index, line)| {
             let tell = |error: Error| {
-                let of_field = match &error {
-                    Error::Config { field, .. } => self.variants.line_of(field),
-                    _ => None,
-                };
+                let of_field = error.field().and_then(|field| self.variants.line_of(field));
                 let reason = format!("line {}: {error}", of_field.unwrap_or(line));
-                suite.in_file(Error::State { reason })
+                suite.in_file(Error::Request { reason })
             };
             self.at(index).map(|_| ()).map_err(tell)
         })
@@ -200,7 +197,7 @@ impl Environments {
             _ => {
                 let told: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
                 let number = missing.len();
-                Err(Error::State { reason: format!("{number} maps are not known: {}", told.join(", ")) })
+                Err(Error::Request { reason: format!("{number} maps are not known: {}", told.join(", ")) })
             }
         }
     }

@@ -63,7 +63,7 @@ impl Suite {
     pub fn play_one(&self, environments: &Environments) -> Result<(Pairs, Duration), Error> {
         let algorithm = self.algorithms.first();
         let algorithm =
-            algorithm.ok_or_else(|| Error::State { reason: "the suite has no algorithm".into() })?;
+            algorithm.ok_or_else(|| Error::Request { reason: "the suite has no algorithm".into() })?;
         let played = play(&environments.at(0)?.config, &built_in(algorithm)?)?;
         Ok((measured(&played), played.runtime))
     }
@@ -73,7 +73,7 @@ fn built_in(algorithm: &Algorithm) -> Result<BuiltIn, Error> {
     BuiltIn::of(algorithm).unwrap_or_else(|| {
         let key = &algorithm.key;
         let reason = format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it");
-        Err(Error::State { reason })
+        Err(Error::Request { reason })
     })
 }
 

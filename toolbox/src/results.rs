@@ -97,7 +97,7 @@ impl Results {
             let names: Vec<String> = folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
             let reason =
                 format!("no results in {}, expected <algorithm>.json files with rows", names.join(", "));
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         Ok(results)
     }

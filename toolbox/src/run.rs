@@ -189,5 +189,5 @@ const COUNTS: [&str; 4] = ["SoC", "makespan", "a_collisions", "o_collisions"];
 
 fn pool(threads: usize) -> Result<ThreadPool, Error> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| Error::State { reason: error.to_string() })
+    pool.map_err(|error| Error::external("threads", error))
 }

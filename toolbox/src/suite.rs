@@ -166,7 +166,7 @@ impl Algorithm {
 /// An error told with the file it is in.
 pub(crate) fn in_file(path: &Path, error: Error) -> Error {
     match error {
-        Error::Syntax { reason } | Error::State { reason } => Error::io(path, reason),
+        Error::Syntax { reason } | Error::Request { reason } => Error::io(path, reason),
         error => Error::io(path, error),
     }
 }

@@ -51,7 +51,7 @@ impl Variants {
             if let Some(twin) = twin {
                 let (one, other) = (twin.path.join("."), parameter.path.join("."));
                 let reason = format!("`{one}` and `{other}` are both varied under the same last name");
-                return Err(Error::State { reason });
+                return Err(Error::Request { reason });
             }
         }
         let all = node.fields().unwrap_or_default().iter();

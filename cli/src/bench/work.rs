@@ -179,7 +179,7 @@ impl Work {
 
     fn pool(&self) -> Result<Option<Arc<ThreadPool>>, Error> {
         let pool = (self.threads > 1).then(|| ThreadPoolBuilder::new().num_threads(self.threads).build());
-        let pool = pool.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
+        let pool = pool.transpose().map_err(|error| Error::external("threads", error))?;
         Ok(pool.map(Arc::new))
     }
 

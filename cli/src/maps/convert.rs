@@ -104,7 +104,7 @@ impl Export {
             let scenario = scenario.truncated(num_agents)?;
             if matches!(scenario.goals, Targets::Sequences(_)) && self.to != Format::Config {
                 let reason = "the scenario has sequences of goals, which only `--to config` can hold";
-                return Err(Error::State { reason: reason.into() });
+                return Err(Error::Request { reason: reason.into() });
             }
             if self.to == Format::Config {
                 return write_out(self.out.as_deref(), config(&map.text, Some(&scenario)).as_bytes());
@@ -137,7 +137,7 @@ impl Export {
     }
 
     fn one_map(&self, found: usize, what: &str) -> Error {
-        Error::State { reason: format!("`{}` means {found} maps, {what} one", self.map) }
+        Error::Request { reason: format!("`{}` means {found} maps, {what} one", self.map) }
     }
 }
 
@@ -207,7 +207,7 @@ impl Tiles {
         let cut = |map: NamedMap| -> Result<Vec<NamedMap>, Error> {
             if !map.text.starts.is_empty() || map.text.pools.is_some() {
                 let reason = format!("`{}` has starts and goals, which would be lost in tiles", map.name);
-                return Err(Error::State { reason });
+                return Err(Error::Request { reason });
             }
             tiles(&map.name, &map.text.map, self.side)
         };

@@ -48,7 +48,7 @@ impl Stats {
         let maps = self.sources.meant_by(&self.map)?;
         if self.scenario.is_some() && maps.len() != 1 {
             let reason = format!("`{}` means {} maps, a scenario is of one", self.map, maps.len());
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
         let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =

@@ -64,7 +64,7 @@ impl MakePlan {
         if let Outcome::Solved { plan, .. } = &outcome {
             let goals = instance.first_goals();
             validate(instance.map(), instance.starts(), Some(&goals), plan)
-                .map_err(|conflict| Error::State { reason: format!("the plan is wrong: {conflict}") })?;
+                .map_err(|conflict| Error::Plan { reason: format!("the plan is wrong: {conflict}") })?;
             self.keep(&config, &instance, plan)?;
         }
         if let Some(path) = &self.result {

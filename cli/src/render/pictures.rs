@@ -98,9 +98,9 @@ impl Pictures {
     /// Passes if all that was asked for can be drawn and written, as far as that can be told before the episode.
     ///
     /// # Errors
-    /// Manifest the first file that cannot be written or value that makes no sense.
+    /// For the first file that cannot be written, or the first value that is out of range.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
-        let refused = |reason: String| Err(Error::State { reason });
+        let refused = |reason: String| Err(Error::Request { reason });
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
                 return refused(format!("`{other}` and `{flag}` name one file, `{}`", path.display()));

@@ -174,7 +174,7 @@ impl Settings {
     fn take_scenario(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
         let Some(path) = &self.scenario else { return Ok(()) };
         let map = GridConfig::from_value(&Value::Object(fields.clone()))?.map;
-        let map = map.ok_or_else(|| Error::State { reason: "`--scenario` needs a map".into() })?;
+        let map = map.ok_or_else(|| Error::Request { reason: "`--scenario` needs a map".into() })?;
         put_scenario(&read_scenario(path, &map)?, fields)
     }
 }
@@ -195,7 +195,7 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
         return library.choose(pattern, seed).map(|(_, text)| text.clone());
     }
     let names = library.matching(pattern)?;
-    let chance = SeedSequence::from_os().map_err(|error| Error::State { reason: error.to_string() })?;
+    let chance = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
     let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
 }

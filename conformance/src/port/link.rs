@@ -36,6 +36,8 @@ impl Misbehaviour {
     }
 }
 
+impl std::error::Error for Misbehaviour {}
+
 impl std::fmt::Display for Misbehaviour {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.what)?;

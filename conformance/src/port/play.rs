@@ -65,7 +65,7 @@ fn refuse_config(link: &mut dyn Link, request: &Request) -> Answered {
         Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
     match link.ask(&Ask::Reset(Box::new(beginning))) {
         Ok(reply) => {
-            let failed = |reason| failure(When::Phase("config".into()), &Error::State { reason });
+            let failed = |reason| failure(When::Phase("config".into()), &Error::Port { reason });
             answered.response.error = reply.error.map(failed);
         }
         Err(fault) => answered.fault = Some(fault),
@@ -189,7 +189,7 @@ impl<'l> PortPlay<'l> {
             return self.step(&Ask::Act { policy }, kind);
         }
         let chosen = self.expected.records.get(index).and_then(Record::step);
-        let missing = || Error::State { reason: "no actions are expected here".into() };
+        let missing = || Error::Port { reason: "no actions are expected here".into() };
         let actions = numbers(&chosen.ok_or_else(missing)?.step.actions);
         self.step(&Ask::Step { actions }, kind)
     }

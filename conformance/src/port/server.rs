@@ -47,7 +47,7 @@ impl Server {
             Ask::Back => Op::Back,
             Ask::History => Op::History,
         };
-        let before_reset = || Error::State { reason: "reset comes first".into() };
+        let before_reset = || Error::Port { reason: "reset comes first".into() };
         self.player.as_mut().ok_or_else(before_reset)?.perform(&op).map(reply_of)
     }
 
@@ -69,7 +69,7 @@ impl Server {
             self.player = None;
             self.player = Some(Player::new(&self.make, &request)?);
         }
-        let nothing = || Error::State { reason: "there is nothing to reset".into() };
+        let nothing = || Error::Port { reason: "there is nothing to reset".into() };
         let op = Op::Reset(beginning.seed);
         self.player.as_mut().ok_or_else(nothing)?.perform(&op).map(reply_of)
     }

@@ -156,7 +156,7 @@ impl<'l> Port<'l> {
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Error> {
         let reply = self.link.ask(ask).map_err(|fault| self.misbehaved(fault))?;
         match reply.error {
-            Some(reason) => Err(Error::State { reason }),
+            Some(reason) => Err(Error::Port { reason }),
             None => Ok(reply),
         }
     }
@@ -164,7 +164,7 @@ impl<'l> Port<'l> {
     fn misbehaved(&mut self, fault: Misbehaviour) -> Error {
         let reason = fault.what.clone();
         self.fault = Some(fault);
-        Error::State { reason }
+        Error::Port { reason }
     }
 
     fn need<T>(&mut self, key: &str, value: Option<&T>) -> Result<(), Error> {
@@ -190,7 +190,7 @@ impl<'l> Port<'l> {
         let want = self.config.num_agents;
         match lengths {
             [Some(cells), Some(goals)] if cells == goals && cells != want => {
-                Err(Error::State { reason: format!("there are {cells} agents, expected {want}") })
+                Err(Error::Port { reason: format!("there are {cells} agents, expected {want}") })
             }
             _ => Ok(()),
         }
@@ -212,7 +212,7 @@ impl<'l> Port<'l> {
             for cell in cells.iter().flatten() {
                 if as_cell(cell).is_none() {
                     // No breach of the form, but a wrong answer.
-                    return Err(Error::State {
+                    return Err(Error::Port {
                         reason: format!("{what} ({}, {}) is on no map", cell[0], cell[1]),
                     });
                 }

@@ -201,7 +201,7 @@ impl Batch {
     /// # Errors
     /// For a lane that is not there or of which no episode ended yet, or for a buffer of the wrong length.
     pub fn observe_ended(&self, lanes: &[usize], observations: Observations<'_>) -> Result<(), Error> {
-        let no_end = |lane| Error::State { reason: format!("no episode of lane {lane} ended yet") };
+        let no_end = |lane| Error::NotEnded { lane };
         let engine = |&lane| Ok(self.ended(lane)?.ok_or_else(|| no_end(lane))?.0);
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
         observations.check(lanes.len(), &self.config)?;

@@ -90,9 +90,9 @@ impl Preparer {
         let (wanted, lanes) = channel();
         let thread = std::thread::Builder::new().name("pogema instances".into());
         let theirs = Arc::clone(&shared);
-        let thread = thread.spawn(move || work(&theirs, &lanes)).map_err(|error| Error::State {
-            reason: format!("the thread that prepares instances cannot be started: {error}"),
-        })?;
+        let thread = thread
+            .spawn(move || work(&theirs, &lanes))
+            .map_err(|error| Error::external("thread that prepares instances", error))?;
         Ok(Self { shared, wanted: Some(wanted), thread: Some(thread) })
     }
 
@@ -112,7 +112,7 @@ impl Preparer {
                     progress = slot.ready.wait(progress).unwrap_or_else(PoisonError::into_inner);
                 }
                 // INVARIANT: a lane asks for its next instance before it takes it.
-                Progress::Taken => return Err(Error::State { reason: "no instance was asked for".into() }),
+                Progress::Taken => return Err(Error::external("batch", "no instance was requested")),
             }
         }
     }

@@ -29,7 +29,7 @@ impl Team {
     pub fn new(num_threads: usize) -> Result<Self, Error> {
         let helpers =
             (num_threads > 1).then(|| ThreadPoolBuilder::new().num_threads(num_threads - 1).build());
-        let helpers = helpers.transpose().map_err(|error| Error::State { reason: error.to_string() })?;
+        let helpers = helpers.transpose().map_err(|error| Error::external("threads", error))?;
         Ok(Self { helpers })
     }
 

@@ -35,10 +35,7 @@ impl GridConfig {
         let (height, width) = (self.height, self.width);
         let inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
         match cells.into_iter().find(|cell| !inside(cell)) {
-            Some(cell) => {
-                let expected = format!("cells inside the map of {height} rows and {width} columns");
-                Err(Error::config(field, cell, expected))
-            }
+            Some(cell) => Err(Error::cell_outside(field, cell, (height, width))),
             None => Ok(()),
         }
     }

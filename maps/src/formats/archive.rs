@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read, Seek, Write};
 
-use pogema_core::{Error, Map, shorten};
+use pogema_core::{BoxedError, Error, Map, shorten};
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
@@ -35,22 +35,22 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         let mut entry =
             archive.by_index(index).map_err(|error| Error::io(format!("entry {index}"), error))?;
         let path = entry.name().to_owned();
-        let failed = |reason: &dyn std::fmt::Display| Error::io(shorten(&path, Error::LONGEST_QUOTE), reason);
+        let failed = |cause: BoxedError| Error::io(shorten(&path, Error::LONGEST_QUOTE), cause);
         let inside = entry.enclosed_name().filter(|_| !path.starts_with(['/', '\\']));
-        let inside = inside.ok_or_else(|| failed(&"lies outside the folder of the archive"))?;
+        let inside = inside.ok_or_else(|| failed("lies outside the folder of the archive".into()))?;
         if entry.is_dir() || inside.extension().is_none_or(|ending| ending != "map") {
             continue;
         }
         let mut bytes = Vec::new();
-        entry.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| failed(&error))?;
+        entry.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| failed(error.into()))?;
         room = room.checked_sub(bytes.len() as u64).ok_or_else(|| {
-            failed(&format!("with this entry the maps unpack to more than {} MiB", MOST_UNPACKED >> 20))
+            failed(format!("with this entry the maps unpack to more than {} MiB", MOST_UNPACKED >> 20).into())
         })?;
-        let text = String::from_utf8(bytes).map_err(|error| failed(&error.utf8_error()))?;
-        let map = read_movingai(&text, water).map_err(|error| failed(&error))?;
+        let text = String::from_utf8(bytes).map_err(|error| failed(error.utf8_error().into()))?;
+        let map = read_movingai(&text, water).map_err(|error| failed(error.into()))?;
         let name = inside.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         if maps.insert(name.clone(), MapText::from(map)).is_some() {
-            return Err(failed(&format!("a second map named `{name}`")));
+            return Err(failed(format!("a second map named `{name}`").into()));
         }
     }
     Ok(maps.into_iter().map(|(name, text)| NamedMap { name, text }).collect())
@@ -65,12 +65,12 @@ pub fn write_archive<'a>(maps: impl IntoIterator<Item = (&'a str, &'a Map)>) -> 
     // Nothing of when and where it was made, so that the same maps give the same bytes.
     let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
     for (name, map) in maps {
-        let failed = |reason: &dyn std::fmt::Display| Error::io(name, reason);
+        let failed = |cause: BoxedError| Error::io(name, cause);
         if name.is_empty() || name.contains(['/', '\\', '\0']) || name == "." || name == ".." {
-            return Err(failed(&"is no name of a file"));
+            return Err(failed("is no name of a file".into()));
         }
-        writer.start_file(format!("{name}.map"), options).map_err(|error| failed(&error))?;
-        writer.write_all(write_movingai(map).as_bytes()).map_err(|error| failed(&error))?;
+        writer.start_file(format!("{name}.map"), options).map_err(|error| failed(error.into()))?;
+        writer.write_all(write_movingai(map).as_bytes()).map_err(|error| failed(error.into()))?;
     }
     let written = writer.finish().map_err(|error| Error::io("archive", error))?;
     Ok(written.into_inner())

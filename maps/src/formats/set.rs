@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use pogema_core::{Error, shorten};
+use pogema_core::{Error, shorten, unknown_letter};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
@@ -31,7 +31,7 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
         return Ok(Vec::new());
     }
     let entries: Entries = yaml_document(text).map_err(|error| match error {
-        Error::Syntax { reason } => Error::State { reason: format!("map set: {reason}") },
+        Error::Syntax { reason } => Error::Request { reason: format!("map set: {reason}") },
         other => other,
     })?;
     let mut names = BTreeSet::new();
@@ -42,6 +42,9 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
         }
         let map = parse_map_text(&block.value).map_err(|error| match error {
             Error::Map { line, column, reason } => place.error(line, column, &reason),
+            Error::UnknownLetter { line, column, letter } => {
+                place.error(line, column, &unknown_letter(letter))
+            }
             Error::Instance { reason } => place.error(1, 1, &reason),
             other => other,
         })?;

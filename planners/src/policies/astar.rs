@@ -35,7 +35,7 @@ impl AStarAgent {
     /// Returns the next action.
     ///
     /// # Errors
-    /// [`Error::State`] if the agent is more than one step away from its last cell.
+    /// [`Error::OutOfStep`] if the agent is more than one step away from its last cell.
     ///
     /// Rule: policy/astar
     pub fn act(&mut self, observation: PomapfObservation<'_>) -> Result<Action, Error> {
@@ -46,7 +46,7 @@ impl AStarAgent {
                 0 if cell != goal => return Ok((self.random_action)()),
                 0 | 1 => {}
                 _ => {
-                    return Err(Error::State {
+                    return Err(Error::OutOfStep {
                         reason: "the A* agent jumped; a new episode needs a new agent".into(),
                     });
                 }

@@ -34,9 +34,9 @@ impl GoalForecast {
     /// Advances to the next state.
     ///
     /// # Errors
-    /// [`Error::State`] for a state that is not the next one, or for goals of another episode.
+    /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode.
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
-        let error = |reason: String| Error::State { reason };
+        let error = |reason: String| Error::OutOfStep { reason };
         if now.step != self.step || now.goals.len() != self.ahead.len() {
             let reason = format!("the goals to come are known for step {}, not for {}", self.step, now.step);
             return Err(error(reason));

@@ -57,7 +57,7 @@ impl LifelongPolicy {
     /// Returns the actions of all agents; inactive agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::State`] if future goals are provided
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are provided
     /// and the state is not the next one of their episode.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();

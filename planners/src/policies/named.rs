@@ -57,7 +57,7 @@ impl NamedPolicy {
     /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
     ///
     /// # Errors
-    /// [`Error::Config`] for an unknown name; [`Error::State`] for future goals that the policy does not use.
+    /// [`Error::Config`] for an unknown name; [`Error::Request`] for future goals that the policy does not use.
     pub fn new(
         name: &str,
         settings: &PolicySettings,
@@ -70,7 +70,7 @@ impl NamedPolicy {
         let is_lifelong = has(&LIFELONG) && (config.on_goal == OnGoal::Restart || !has(&PLANNERS));
         if future_goals && !is_lifelong {
             let reason = format!("`{name}` does not use future goals; only lifelong planners do");
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         Ok(Self(match name {
             "random" => Kind::Random(Box::new(generator)),

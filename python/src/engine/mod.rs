@@ -295,7 +295,7 @@ impl Engine {
         let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
         let rules = rules(&source, self.exact, self.time_limit);
         self.start(rules, generated.instance).map_err(|error| match error {
-            Error::Config { .. } => errors::config(py, &error),
+            Error::Config { .. } | Error::CellOutside { .. } => errors::config(py, &error),
             _ => errors::instance(py, &error),
         })?;
         self.episode.meters_mut().episode.measure_over(source.config().max_episode_steps);

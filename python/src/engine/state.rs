@@ -106,7 +106,7 @@ impl Engine {
 }
 
 fn foreign(reason: &str) -> Error {
-    Error::State { reason: format!("these bytes are no saved environment: {reason}") }
+    Error::Corrupt { what: "these bytes are no saved environment".into(), reason: reason.to_owned() }
 }
 
 fn restored(saved: &[u8]) -> Result<Engine, Error> {

@@ -18,7 +18,7 @@ fn main() -> Result<(), Error> {
     match arguments.as_slice() {
         [check, files @ ..] if check == "check" => files.iter().try_for_each(|file| check_file(file)),
         [folder] => write_all(Path::new(folder)),
-        _ => Err(Error::State { reason: "expected `pages DIR` or `pages check FILE...`".into() }),
+        _ => Err(Error::Request { reason: "expected `pages DIR` or `pages check FILE...`".into() }),
     }
 }
 

@@ -17,7 +17,7 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
     let mut walkers = Walkers { generator: Generator::seeded(seed), stray, ways: HashMap::new() };
     while !episode.is_over() {
         let actions = walkers.act(episode.instance()?.map(), &episode.snapshot());
-        episode.step(&actions.map_err(|error| Error::State { reason: error.to_string() })?)?;
+        episode.step(&actions.map_err(|error| Error::external("random numbers", error))?)?;
     }
     episode.trace()
 }

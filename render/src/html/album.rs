@@ -31,7 +31,10 @@ impl Album {
     pub fn text(&self) -> Result<String, Error> {
         let read = |(title, data): &(String, String)| {
             let film = serde_json::from_str::<Value>(data);
-            let film = film.map_err(|error| Error::State { reason: format!("replay `{title}`: {error}") })?;
+            let film = film.map_err(|error| Error::Corrupt {
+                what: format!("replay `{title}`"),
+                reason: error.to_string(),
+            })?;
             Ok(json!({"title": title, "film": film}))
         };
         let films = self.replays.iter().map(read).collect::<Result<Vec<_>, Error>>()?;

@@ -19,7 +19,7 @@ pub fn fill(template: &str, holes: impl Serialize) -> Result<String, Error> {
         environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
         environment.render_str(template, Serde(holes))
     };
-    let text = fill().map_err(|error: minijinja::Error| Error::State { reason: error.to_string() })?;
+    let text = fill().map_err(|error: minijinja::Error| Error::external("page", error))?;
     // Slashes are escaped too, without need; a reader of the file wants to find a name as it is.
     Ok(text.replace("&#x2f;", "/"))
 }

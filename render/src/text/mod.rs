@@ -39,7 +39,7 @@ impl Default for Style {
 /// their goals have a `*`.
 ///
 /// # Errors
-/// [`Error::State`] if there is no such agent; [`Error::Length`] if the state's lists do not fit each other.
+/// [`Error::OutOfRange`] if there is no such agent; [`Error::Length`] if the state's lists do not fit each other.
 pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -> Result<String, Error> {
     let num_agents = state.cells.len();
     Error::check_length("goals", num_agents, state.goals.len())?;

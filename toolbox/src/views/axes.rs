@@ -100,7 +100,7 @@ fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     if decades.len() > 2 { decades } else { of(10, &[1.0, 2.0, 5.0]) }
 }
 
-/// Manifest how wide a text is.
+/// The approximate width of a text.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {
     text.chars().count() as f64 * f64::from(size) * LETTER
 }

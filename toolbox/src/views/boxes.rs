@@ -61,7 +61,7 @@ impl BoxView {
             keys.iter().rev().map(group).filter(|(_, values)| !values.is_empty()).collect();
         if groups.is_empty() {
             let reason = format!("view `{name}`: no row has a number in `{}`", self.y);
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         let mut notes = placeless(&results.rows, [&self.x]);
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));

@@ -61,7 +61,7 @@ impl CactusView {
             .collect();
         if lines.iter().all(|(_, times)| times.is_empty()) {
             let reason = format!("view `{name}`: no row is solved and has a `{}`", self.x);
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
         notes.extend(

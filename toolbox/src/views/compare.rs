@@ -99,7 +99,7 @@ impl CompareView {
             _ => {
                 let known = all.join(", ");
                 let reason = format!("view `{name}`: expected `first` and `second`, each one of {known}");
-                return Err(Error::State { reason });
+                return Err(Error::Request { reason });
             }
         };
         for (key, algorithm) in [("first", &first), ("second", &second)] {

@@ -95,7 +95,7 @@ fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
     let found = all.iter().find(|path| path.is_file()).cloned();
     found.ok_or_else(|| {
         let looked = all.iter().map(|path| format!("`{}`", path.display())).collect::<Vec<_>>().join(", ");
-        Error::State { reason: format!("no views: expected {looked}, or another file as `config`") }
+        Error::Request { reason: format!("no views: expected {looked}, or another file as `config`") }
     })
 }
 

@@ -166,7 +166,7 @@ fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Resul
 fn named<'a>(view: &str, key: &str, column: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
     let hint = nearest(column, known).map(|hint| format!("; the nearest column is `{hint}`"));
     let hint = hint.unwrap_or_default();
-    Error::State {
+    Error::Request {
         reason: format!("view `{view}`: `{key}` is `{column}`, expected a column of the results{hint}"),
     }
 }

@@ -34,7 +34,7 @@ impl Picture {
     /// # Errors
     /// If it is too large, or the library cannot write it.
     pub fn bytes(&self, kind: ImageFormat) -> Result<Vec<u8>, Error> {
-        let told = |reason: String| Error::State { reason: format!("plot: {reason}") };
+        let told = |reason: String| Error::external("plot", reason);
         match kind {
             ImageFormat::Svg => Ok(SvgBackend::new().render_scene(&self.scene).into_bytes()),
             ImageFormat::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),

@@ -97,7 +97,7 @@ impl PlotView {
         }
         if contents.iter().all(|content| content.series.is_empty()) {
             let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         notes.extend(placeless(
             &results.rows,

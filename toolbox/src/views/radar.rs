@@ -52,7 +52,7 @@ impl RadarView {
         if all.iter().all(|six| six.values.iter().all(Option::is_none)) {
             let reason =
                 format!("view `{name}`: none of the six metrics can be computed: {}", notes.join("; "));
-            return Err(Error::State { reason });
+            return Err(Error::Request { reason });
         }
         let is_beyond = |six: &Six| six.values.iter().flatten().any(|&value| value > 1.0);
         if all.iter().any(is_beyond) {

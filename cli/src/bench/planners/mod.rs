@@ -202,7 +202,7 @@ impl Planners {
 
     fn play(&self, set: &Set, maps: &[NamedMap], task: &Task) -> Result<Record, Error> {
         let config = set.config(self.setting, task, maps)?;
-        let in_task = |error: Error| Error::State {
+        let in_task = |error: Error| Error::Request {
             reason: format!(
                 "{} {} seed {}, {} agents: {error}",
                 task.set, task.map, task.seed, task.num_agents

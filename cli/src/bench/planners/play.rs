@@ -59,7 +59,7 @@ pub fn play_once(config: &GridConfig, name: &str, thinking: &Thinking) -> Result
     })?;
     let outcome = policy.outcomes().first();
     if let (Some((map, starts, goals)), Some(Outcome::Solved { plan, .. })) = (task, outcome) {
-        let wrong = |reason: String| Error::State { reason: format!("a plan is wrong: {reason}") };
+        let wrong = |reason: String| Error::Plan { reason: format!("a plan is wrong: {reason}") };
         validate(&map, &starts, Some(&goals), plan).map_err(|conflict| wrong(conflict.to_string()))?;
         if played.num_reverted > 0 || policy.outcomes().len() > 1 {
             return Err(wrong(format!("the engine took {} moves back", played.num_reverted)));
@@ -89,7 +89,7 @@ pub fn play_on(
     })?;
     if played.num_reverted > 0 {
         let reason = format!("a plan is wrong: the engine took {} moves back", played.num_reverted);
-        return Err(Error::State { reason });
+        return Err(Error::Plan { reason });
     }
     Ok(played)
 }

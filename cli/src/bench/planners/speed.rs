@@ -90,7 +90,7 @@ fn first_plan(config: &GridConfig) -> Result<Option<Duration>, Error> {
     let time = began.elapsed();
     let Some(plan) = outcome.solution() else { return Ok(None) };
     validate(instance.map(), instance.starts(), Some(&instance.first_goals()), plan)
-        .map_err(|conflict| Error::State { reason: format!("a plan is wrong: {conflict}") })?;
+        .map_err(|conflict| Error::Plan { reason: format!("a plan is wrong: {conflict}") })?;
     Ok(Some(time))
 }
 

@@ -116,7 +116,7 @@ impl Set {
             "on_target": on_target, "collision_system": "soft",
         });
         let map = maps.iter().find(|map| map.name == task.map);
-        let map = map.ok_or_else(|| Error::State { reason: format!("no map `{}`", task.map) })?;
+        let map = map.ok_or_else(|| Error::Request { reason: format!("no map `{}`", task.map) })?;
         if let Some(fields) = fields.as_object_mut() {
             put_map(&map.text, fields)?;
         }
