@@ -53,7 +53,7 @@ impl Environment for Mine {
 /// Plays 200 drawn episodes; counterexamples are kept in a folder.
 fn check(engine: Engine) -> Result<Report, Error> {
     let mut report = Report::default();
-    let folder = std::env::temp_dir().join("pogema-found");
+    let folder = std::env::temp_dir().join(format!("pogema-found-{}", std::process::id()));
     report.check_fresh(&[Engine::REFERENCE, engine], 200, 1, &folder, &|| ())?;
     Ok(report)
 }

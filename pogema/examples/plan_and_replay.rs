@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), Error> {
     }
     assert!(episode.is_over(), "all agents are on their goals");
     let page = html::replay(&episode.trace()?, "Planned by LaCAM*")?;
-    let path = std::env::temp_dir().join("pogema-plan.html");
+    let path = std::env::temp_dir().join(format!("pogema-plan-{}.html", std::process::id()));
     std::fs::write(&path, page).map_err(|error| Error::io(&path, error))?;
     println!("sum of costs {}, replay in {}", plan.sum_of_costs(), path.display());
     Ok(())

@@ -57,7 +57,8 @@ pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
         | Error::Action { .. }
         | Error::NotReset
         | Error::NotEnded { .. }
-        | Error::Corrupt { .. } => call(py, error),
+        | Error::Corrupt { .. }
+        | Error::External { .. } => call(py, error),
         _ => instance(py, error),
     }
 }
