@@ -13,6 +13,7 @@ mod render;
 mod replay;
 mod run;
 mod views;
+mod words;
 
 use std::process::ExitCode;
 

@@ -15,6 +15,7 @@
 //! | [`Trace`] | a recorded episode, as JSON lines |
 //! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
 //! | [`picture`] | text pictures of a state |
+//! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
 //! | [`Error`] | the one error type |
 
 #![forbid(unsafe_code)]
@@ -32,6 +33,10 @@ pub mod metrics;
 mod observe;
 pub mod picture;
 mod trace;
+mod words;
+
+#[doc(hidden)]
+pub use serde;
 
 pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
@@ -45,3 +50,4 @@ pub use map::{Map, check_row_length};
 pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 pub use observe::{from_border, from_starts};
 pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};
+pub use words::{Word, Words, deserialize_word, serialize_word};

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Cell, Error, Map, State};
+use pogema_core::{Action, Cell, Error, Map, State, Words};
 use pogema_planners::{
-    Budget, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, PlannerSettings, Problem,
+    Budget, Distances, Graph, LifelongName, LifelongPolicy, Outcome, Plan, PlannerName, PlannerPolicy,
+    PlannerSettings, Problem,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -38,7 +39,7 @@ pub fn make_plan<'py>(
         let choice = PlannerSettings { seed, threads: num_threads };
         Ok((
             Problem { max_steps: most_steps, ..problem },
-            pogema_planners::planner(planner, choice)?,
+            PlannerName::read("planner", planner)?.make(choice),
             read_budget(budget)?,
         ))
     };
@@ -176,10 +177,10 @@ impl PlanFollower {
         let made = || {
             let (choice, budget) = (PlannerSettings { seed, threads: num_threads }, read_budget(budget)?);
             Ok(if lifelong {
-                Policy::Lifelong(LifelongPolicy::new(planner, choice, budget)?)
+                Policy::Lifelong(LifelongPolicy::new(LifelongName::read("planner", planner)?, choice, budget))
             } else {
                 Policy::Once(PlannerPolicy::new(
-                    pogema_planners::planner(planner, choice)?,
+                    PlannerName::read("planner", planner)?.make(choice),
                     budget,
                     most_steps,
                 ))

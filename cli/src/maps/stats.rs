@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use comfy_table::Table;
-use pogema_core::{Cell, Error, Map, OnGoal};
+use pogema_core::{Cell, Error, Map, OnGoal, Words};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Doubt, GridConfig, InstanceSource, MapStats, ScenarioStats};
@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::Sources;
 use crate::output::{markdown_table, say};
+use crate::words::word_of;
 
 #[derive(Args, Debug)]
 pub struct Stats {
@@ -30,17 +31,11 @@ pub struct Stats {
     #[arg(long, value_name = "S", requires = "num_agents")]
     seed: Option<u64>,
     /// Whether agents leave the map on their goals or have to be there all at once
-    #[arg(long, value_enum, default_value_t = OnTarget::Nothing)]
-    on_target: OnTarget,
+    #[arg(long, default_value_t = OnGoal::Nothing, value_parser = word_of(&OnGoal::WORDS[..2]))]
+    on_target: OnGoal,
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnTarget {
-    Finish,
-    Nothing,
 }
 
 impl Stats {
@@ -69,10 +64,7 @@ impl Stats {
 
     /// The scenario that was asked for, or that the map brings itself.
     fn scenario_of(&self, map: &NamedMap) -> Result<Option<ScenarioStats>, Error> {
-        let on_goal = match self.on_target {
-            OnTarget::Finish => OnGoal::Finish,
-            OnTarget::Nothing => OnGoal::Nothing,
-        };
+        let on_goal = self.on_target;
         let ground = &map.text.map;
         if let Some(path) = &self.scenario {
             let scenario = read_scenario(path, ground)?;

@@ -1,18 +1,13 @@
-//! Which planner, and how long it may think.
+//! The budget and threads of a planner.
 
 use std::fmt;
 use std::time::Duration;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
+use clap::builder::RangedU64ValueParser;
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings, PolicySettings};
 use serde::{Deserialize, Serialize};
-
-/// The names of planners, each with what it is good for.
-pub fn names(known: &'static [(&'static str, &'static str)]) -> PossibleValuesParser {
-    PossibleValuesParser::new(known.iter().map(|&(name, help)| PossibleValue::new(name).help(help)))
-}
 
 /// How long a planner may think, and on how many threads.
 #[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]

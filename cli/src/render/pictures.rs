@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::files;
 use pogema_core::{Error, Trace};
@@ -10,6 +10,7 @@ use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, 
 
 use super::screen::Screen;
 use crate::output::check_writable;
+use crate::words::word;
 
 /// The longer side of pictures. Units: pixels.
 const LONGER_SIDE_OF_PNG: u32 = 1024;
@@ -49,8 +50,8 @@ pub struct Pictures {
     #[arg(long, help_heading = "Pictures")]
     no_agents: bool,
     /// How much of the border is drawn
-    #[arg(long, value_enum, default_value_t = BorderName::Thin, help_heading = "Pictures")]
-    border: BorderName,
+    #[arg(long, default_value_t, value_parser = word::<Border>(), help_heading = "Pictures")]
+    border: Border,
     /// Colours of the agents in turn, such as `#c1433c,#2e6f9e`
     #[arg(long, value_name = "COLORS", value_delimiter = ',', help_heading = "Pictures")]
     colors: Vec<Color>,
@@ -60,16 +61,6 @@ pub struct Pictures {
     /// Steps per second: 4 unless told otherwise, and 8 in the terminal
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     fps: Option<f64>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BorderName {
-    /// The map alone
-    None,
-    /// The wall around the map
-    Thin,
-    /// All that agents can see, as wide as their radius
-    Full,
 }
 
 impl Pictures {
@@ -148,8 +139,7 @@ impl Pictures {
 
     /// A screen for the same episode.
     pub fn screen(&self) -> Screen {
-        let border = self.border.into();
-        let style = text::Style { view: self.egocentric, border, ..text::Style::default() };
+        let style = text::Style { view: self.egocentric, border: self.border, ..text::Style::default() };
         Screen::new(style, self.fps.unwrap_or(TERMINAL_FPS))
     }
 
@@ -164,19 +154,9 @@ impl Pictures {
             egocentric: self.egocentric,
             show_agents: !self.no_agents,
             show_lines: !self.no_lines,
-            border: self.border.into(),
+            border: self.border,
             step_time: self.fps.map_or(usual.step_time, f64::recip),
             colors,
-        }
-    }
-}
-
-impl From<BorderName> for Border {
-    fn from(name: BorderName) -> Self {
-        match name {
-            BorderName::None => Self::None,
-            BorderName::Thin => Self::Thin,
-            BorderName::Full => Self::Full,
         }
     }
 }

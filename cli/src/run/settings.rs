@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use pogema_core::{Error, Map};
+use clap::Args;
+use pogema_core::{Collision, Error, Map, OnGoal, Words};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, InstanceSource, Library, MapText, put_map, put_scenario};
@@ -11,6 +11,7 @@ use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::Sources;
+use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Settings {
@@ -43,29 +44,14 @@ pub struct Settings {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<i64>,
     /// What reaching a goal does
-    #[arg(long)]
-    on_target: Option<OnTarget>,
+    #[arg(long, value_parser = word::<OnGoal>())]
+    on_target: Option<OnGoal>,
     /// How conflicts are resolved
-    #[arg(long)]
-    collision_system: Option<CollisionSystem>,
+    #[arg(long, value_parser = word::<Collision>())]
+    collision_system: Option<Collision>,
     /// Any other field, such as `empty_outside=false`
     #[arg(long = "set", value_name = "FIELD=VALUE")]
     others: Vec<String>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnTarget {
-    Finish,
-    Nothing,
-    Restart,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum CollisionSystem {
-    Priority,
-    BlockBoth,
-    Soft,
 }
 
 impl Settings {
@@ -125,8 +111,8 @@ impl Settings {
         set("density", self.density.map(number));
         set("obs_radius", self.obs_radius.map(Into::into));
         set("max_episode_steps", self.steps.map(Into::into));
-        set("on_target", word(self.on_target).map(Into::into));
-        set("collision_system", word(self.collision_system).map(Into::into));
+        set("on_target", self.on_target.map(|word| word.word().into()));
+        set("collision_system", self.collision_system.map(|word| word.word().into()));
         for other in &self.others {
             let (field, value) = other
                 .split_once('=')
@@ -198,10 +184,6 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     let chance = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
     let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
-}
-
-fn word(choice: Option<impl ValueEnum>) -> Option<String> {
-    choice?.to_possible_value().map(|value| value.get_name().to_owned())
 }
 
 /// JSON has no NaN and would make it null, so it is left to the config to refuse the word.

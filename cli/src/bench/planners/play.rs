@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use pogema_core::{Action, Episode, Error, Instance, Metrics, State};
+use pogema_core::{Action, Episode, Error, Instance, Metrics, State, Words};
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_planners::{LifelongPolicy, Outcome, PlannerPolicy, planner, validate};
+use pogema_planners::{LifelongName, LifelongPolicy, Outcome, PlannerName, PlannerPolicy, validate};
 use pogema_reference::Reference;
 
 use crate::plan::Thinking;
@@ -46,7 +46,11 @@ pub fn play(
 /// Plays an episode of one goal for each agent; its plan, if it is whole, has to be valid and to come true.
 pub fn play_once(config: &GridConfig, name: &str, thinking: &Thinking) -> Result<Played, Error> {
     let most_steps = u64::try_from(config.max_episode_steps).ok();
-    let mut policy = PlannerPolicy::new(planner(name, thinking.choice())?, thinking.budget()?, most_steps);
+    let mut policy = PlannerPolicy::new(
+        PlannerName::read("planner", name)?.make(thinking.choice()),
+        thinking.budget()?,
+        most_steps,
+    );
     let mut task = None;
     let mut played = play(config, |instance, now| {
         task.get_or_insert_with(|| (instance.map().clone(), now.cells.to_vec(), now.goals.to_vec()));
@@ -80,7 +84,8 @@ pub fn play_on(
     thinking: &Thinking,
     future_goals: bool,
 ) -> Result<Played, Error> {
-    let mut policy = LifelongPolicy::new(name, thinking.choice(), thinking.budget()?)?;
+    let mut policy =
+        LifelongPolicy::new(LifelongName::read("planner", name)?, thinking.choice(), thinking.budget()?);
     let played = play(config, |instance, now| {
         if future_goals && now.step == 0 {
             policy.provide_future_goals(instance)?;

@@ -101,7 +101,7 @@ fn walk(config: &GridConfig) -> Result<Duration, Error> {
     let mut streams = instance.goals().to_vec();
     let mut now = graph.vertices_of("start", instance.starts())?;
     let mut goals = graph.vertices_of("goal", &instance.first_goals())?;
-    let mut pibt = PibtLifelong::new(graph.clone(), now.len(), PibtParams::default());
+    let mut pibt = PibtLifelong::new(graph.clone(), PibtParams::default());
     let num_steps = u32::try_from(config.max_episode_steps).unwrap_or(u32::MAX).max(1);
     let mut time = Duration::ZERO;
     for _ in 0..num_steps {
