@@ -12,6 +12,7 @@ mod port;
 mod render;
 mod replay;
 mod run;
+mod threads;
 mod views;
 mod words;
 

@@ -32,6 +32,7 @@ mod map;
 pub mod metrics;
 mod observe;
 pub mod picture;
+mod threads;
 mod trace;
 mod words;
 
@@ -49,5 +50,6 @@ pub use instance::{Instance, Outside};
 pub use map::{Map, check_row_length};
 pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 pub use observe::{from_border, from_starts};
+pub use threads::{MAX_THREADS, check_threads, threads_note};
 pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};
 pub use words::{Word, Words, deserialize_word, serialize_word};

@@ -54,9 +54,9 @@ pub trait Words: Copy + PartialEq + Send + Sync + 'static {
     /// Returns the variant of the word that an argument holds.
     ///
     /// # Errors
-    /// [`Error::Config`] with the argument, the word and all known words.
+    /// [`Error::Argument`] with the argument, the word and all known words.
     fn read(argument: &str, word: &str) -> Result<Self, Error> {
-        Self::of_word(word).ok_or_else(|| Error::config(argument, word, Self::expected()))
+        Self::of_word(word).ok_or_else(|| Error::argument(argument, word, Self::expected()))
     }
 
     /// Returns all words as an error message lists them.

@@ -264,7 +264,7 @@ fn read_begin(name: &str) -> Result<Begin, Error> {
         "new" => Ok(Begin::New),
         "resume" => Ok(Begin::Resume),
         "anew" => Ok(Begin::Anew),
-        _ => Err(Error::config("begin", name, "`new`, `resume` or `anew`")),
+        _ => Err(Error::argument("begin", name, "`new`, `resume` or `anew`")),
     }
 }
 

@@ -5,6 +5,7 @@ mod config;
 mod engine;
 mod errors;
 mod evaluation;
+mod fields;
 mod lists;
 mod planners;
 mod vec;
@@ -23,6 +24,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
     module.add_function(wrap_pyfunction!(views::show_views, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
+    module.add("MAX_THREADS", pogema_core::MAX_THREADS)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;

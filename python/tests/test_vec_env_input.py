@@ -151,7 +151,7 @@ def test_wrong_resets_are_told_and_change_nothing(env, arguments, error, text):
 BAD_VECTORS = [
     ({"num_envs": 0}, ValueError, "num_envs is 0, expected at least 1"),
     ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
-    ({"num_threads": 3}, ValueError, "num_threads is 3, expected 1 to 2, the number of environments"),
+    ({"num_threads": 1025}, ValueError, "num_threads is 1025, expected 1 to 1024"),
     ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
     ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32' or 'uint8'"),
     ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use pogema_conformance::files;
 use pogema_core::{Episode, Error, Instance, Trace, Words};
-use pogema_maps::{GridConfig, InstanceSource};
+use pogema_maps::GridConfig;
 use pogema_planners::{Outcome, Plan, PlannerName, Problem, validate, write_plan, write_result};
 use pogema_reference::Reference;
 use serde_json::json;
@@ -53,7 +53,7 @@ impl MakePlan {
         }
         self.pictures.check(config.num_agents)?;
         let budget = self.thinking.budget()?;
-        let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
+        let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
         let problem = match self.settings.most_steps()?.map(usize::try_from) {
             Some(Ok(most)) => problem.within(most),

@@ -9,7 +9,7 @@ use pogema_core::{Error, Trace};
 use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, video};
 
 use super::screen::Screen;
-use crate::output::check_writable;
+use crate::output::{check_writable, flagged};
 use crate::words::word;
 
 /// The longer side of pictures. Units: pixels.
@@ -91,10 +91,10 @@ impl Pictures {
     /// # Errors
     /// For the first file that cannot be written, or the first value that is out of range.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
-        let refused = |reason: String| Err(Error::Request { reason });
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
-                return refused(format!("`{other}` and `{flag}` name one file, `{}`", path.display()));
+                let reason = format!("`{other}` and `{flag}` name one file, `{}`", path.display());
+                return Err(Error::Request { reason });
             }
             check_writable(path)?;
         }
@@ -103,19 +103,26 @@ impl Pictures {
             video::check_ffmpeg()?;
         }
         if let Some(agent) = self.egocentric.filter(|&agent| agent >= num_agents) {
-            return refused(format!("agent is `{agent}`, expected 0 to {}", num_agents.saturating_sub(1)));
+            return Err(Error::argument(
+                "--egocentric",
+                agent,
+                format!("0 to {}", num_agents.saturating_sub(1)),
+            ));
         }
         if let Some(fps) = self.fps.filter(|fps| self.are_wanted() && !(*fps > 0.0 && fps.is_finite())) {
-            return refused(format!("`--fps` is `{fps}`, expected more than 0"));
+            return Err(Error::argument("--fps", fps, "more than 0"));
         }
         match self.width {
-            Some(0) => refused("`--width` is `0`, expected at least 1".into()),
+            Some(0) => Err(Error::argument("--width", 0, "at least 1")),
             _ => Ok(()),
         }
     }
 
     /// Draws and writes all that is asked for; the page of a replay has a title.
     pub fn draw(&self, trace: &Trace, title: &str) -> Result<(), Error> {
+        if let Some(frame) = self.frame {
+            trace.state(frame).map_err(flagged("--frame"))?;
+        }
         let style = self.style();
         let width = |longer| self.width.unwrap_or_else(|| raster::width_for(trace, &style, longer));
         if let Some(path) = &self.svg {

@@ -1,7 +1,7 @@
 //! From YAML or JSON to a config.
 
 use pogema_core::{Cell, Error, Map};
-use serde_json::{Value, json};
+use serde_json::{Map as Object, Value, json};
 
 use super::fields::{Fields, cells};
 use super::parse::{value_from_json, value_from_yaml};
@@ -43,7 +43,11 @@ impl GridConfig {
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {
-        let object = value.as_object().ok_or_else(|| no_object(value))?;
+        Self::read(value.as_object().ok_or_else(|| no_object(value))?, None)
+    }
+
+    /// Reads fields, of which a given map replaces `map`.
+    pub(crate) fn read(object: &Object<String, Value>, map: Option<MapText>) -> Result<Self, Error> {
         let fields = Fields::new(object)?;
         check_constants(&fields)?;
         let mut config =
@@ -51,7 +55,7 @@ impl GridConfig {
         config.read_sizes(&fields)?;
         config.read_places(&fields)?;
         config.read_rules(&fields)?;
-        config.read_map(&fields)?;
+        config.read_map(&fields, map)?;
         config.check_places()?;
         Ok(config)
     }
@@ -107,12 +111,13 @@ impl GridConfig {
     }
 
     /// Rule: config/map
-    fn read_map(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
-        let map = match fields.optional("map") {
-            None => return Ok(()),
-            Some(Value::String(text)) => self.take_map_text(parse_map_text(text)?)?,
-            Some(Value::Array(rows)) => map_from_rows(rows)?,
-            Some(other) => return Err(Error::config("map", other, "a text or a list of rows")),
+    fn read_map(&mut self, fields: &Fields<'_>, given: Option<MapText>) -> Result<(), Error> {
+        let map = match (given, fields.optional("map")) {
+            (None, None) => return Ok(()),
+            (Some(text), _) => self.take_map_text(text)?,
+            (None, Some(Value::String(text))) => self.take_map_text(parse_map_text(text)?)?,
+            (None, Some(Value::Array(rows))) => map_from_rows(rows)?,
+            (None, Some(other)) => return Err(Error::config("map", other, "a text or a list of rows")),
         };
         (self.width, self.height) = (map.width(), map.height());
         self.size = self.width.max(self.height);

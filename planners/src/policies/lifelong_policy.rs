@@ -39,11 +39,11 @@ impl LifelongPolicy {
     /// then be called in every step.
     ///
     /// # Errors
-    /// [`Error::Config`] for a planner that does not use future goals.
+    /// [`Error::Argument`] for a planner that does not use future goals.
     pub fn provide_future_goals(&mut self, instance: &Instance) -> Result<(), Error> {
         let (_, planner) = self.planner_on(instance.map());
         if !planner.uses_future_goals() {
-            return Err(Error::config("planner", self.name, "`rhcr`, to make use of goals still to come"));
+            return Err(Error::argument("planner", self.name, "`rhcr`, to make use of goals still to come"));
         }
         self.forecast = Some(GoalForecast::new(instance));
         Ok(())

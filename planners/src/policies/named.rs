@@ -67,7 +67,7 @@ impl NamedPolicy {
     /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
     ///
     /// # Errors
-    /// [`Error::Config`] for an unknown name; [`Error::Request`] for future goals that the policy does not use.
+    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for future goals that the policy does not use.
     pub fn new(
         name: &str,
         settings: &PolicySettings,
@@ -100,7 +100,7 @@ impl NamedPolicy {
             Some(SimplePolicy::Random) => Kind::Random(Box::new(generator)),
             Some(SimplePolicy::Astar) => Kind::Astar(pogema_team()),
             Some(SimplePolicy::Stay) => Kind::Stay,
-            None => return Err(Error::config("policy", name, format!("one of {}", known().join(", ")))),
+            None => return Err(Error::argument("policy", name, format!("one of {}", known().join(", ")))),
         }))
     }
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use pogema_core::Error;
+use pogema_maps::GridConfig;
 use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{GridConfig, put_map};
 use serde_json::json;
 
 /// What the agents of an episode have to do.
@@ -117,9 +117,6 @@ impl Set {
         });
         let map = maps.iter().find(|map| map.name == task.map);
         let map = map.ok_or_else(|| Error::Request { reason: format!("no map `{}`", task.map) })?;
-        if let Some(fields) = fields.as_object_mut() {
-            put_map(&map.text, fields)?;
-        }
-        GridConfig::from_value(&fields)
+        GridConfig::on_map(fields.as_object_mut().unwrap_or(&mut serde_json::Map::new()), &map.text)
     }
 }
