@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::{
     Begin, Environments, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,

@@ -14,6 +14,7 @@
 //! | [`Episode`] | an engine at play, measured and recorded |
 //! | [`Trace`] | a recorded episode, as JSON lines |
 //! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
+//! | [`files`] | files that are written whole or not at all |
 //! | [`picture`] | text pictures of a state |
 //! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
 //! | [`Error`] | the one error type |
@@ -25,6 +26,7 @@ mod config;
 mod environment;
 mod episode;
 mod error;
+pub mod files;
 mod goals;
 mod history;
 mod instance;

@@ -43,6 +43,6 @@ pub use foretell::{foretold_from, foretold_goals};
 pub use library::Library;
 pub use place::{capacity, place_at_random};
 pub use source::{Generated, InstanceSource, MadeInstance};
-pub use stats::{Doubt, MapStats, ScenarioPart, ScenarioStats};
+pub use stats::{Infeasibility, MapStats, ScenarioPart, ScenarioStats};
 pub use text::{MapText, parse_map_text};
 pub use tiles::{PUBLISHED_TILE, tiles};

@@ -13,6 +13,7 @@ __all__ = [
     "Evaluation",
     "MAX_THREADS",
     "PlanFollower",
+    "WORDS",
     "__version__",
     "check_plan",
     "cost_to_go",
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 MAX_THREADS: int
+WORDS: dict[str, list[str]]
 __version__: str
 
 _Pairs = list[tuple[int, int]]

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};

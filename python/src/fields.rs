@@ -1,13 +1,14 @@
 //! Python values as the fields of a config.
 
-use pyo3::exceptions::PyRecursionError;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
 use serde_json::{Map as Object, Number, Value};
 
 /// The fields of a config, from a dictionary of Python values.
 ///
-/// Errors: TypeError for a key that is no text, or a value that is neither number, text nor sequence.
+/// Errors: TypeError for a key that is no text, or a value that is neither number, text nor sequence; ValueError for a
+/// list that contains itself.
 pub struct Fields(pub Value);
 
 impl<'py> FromPyObject<'_, 'py> for Fields {
@@ -27,7 +28,7 @@ const DEEPEST: usize = 16;
 
 fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if depth > DEEPEST {
-        return Err(PyRecursionError::new_err("a field holds lists in lists without end"));
+        return Err(PyValueError::new_err("a field holds lists in lists without end"));
     }
     if object.is_none() {
         return Ok(Value::Null);

@@ -332,3 +332,15 @@ def test_ten_thousand_steps_take_no_more_memory_than_a_hundred():
     tracemalloc.stop()
     # The allocator keeps pages of its own, per thread, which it fills one after the other.
     assert resident() - held < 4 << 20
+
+
+def test_more_threads_than_cores_or_environments_are_a_note():
+    with pytest.warns(UserWarning, match="num_threads is 1024, the machine has"):
+        many = VecEnv(CONFIG, 2, num_threads=1024)
+    one = VecEnv(CONFIG, 2, num_threads=1)
+    for env in (many, one):
+        env.reset(seed=3)
+    actions = np.ones((2, CONFIG["num_agents"]), dtype=np.int64)
+    np.testing.assert_array_equal(many.step(actions)[0], one.step(actions)[0])
+    many.close()
+    one.close()
