@@ -22,6 +22,14 @@ __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "Pogema
 _PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
 
+def _differ(one: Any, other: Any) -> bool:
+    """Whether two values of a field differ; arrays, which NumPy compares cell by cell, count as different."""
+    try:
+        return bool(one != other)
+    except ValueError:
+        return True
+
+
 class ActionsSampler:
     """Draws random actions with a generator of its own.
 
@@ -98,11 +106,11 @@ class Pogema(PogemaBase):
     def _begin_episode(self) -> None:
         fields, last = self.grid_config.__dict__, self._last_fields
         is_same = self.grid_config is self._last_config
-        changed = [name for name in last if fields[name] is not last[name] and fields[name] != last[name]]
-        changed += [name for name, places in self._last_places.items() if fields[name] != places]
+        changed = [name for name in last if fields[name] is not last[name] and _differ(fields[name], last[name])]
+        changed += [name for name, places in self._last_places.items() if _differ(fields[name], places)]
         if is_same and all(name == "seed" for name in changed):
             if changed:
-                self._engine.reseed(self.grid_config.seed)
+                self._engine.reseed({"seed": self.grid_config.seed})
             noticed = self._engine.reset()
         else:
             fixed: dict[str, Any] = dict(self._fixed)

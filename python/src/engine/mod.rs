@@ -9,7 +9,7 @@ use pogema_core::{
     Action, Cell, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
     Observation, Occupancy, OnGoal, Outside, Trace,
 };
-use pogema_maps::{InstanceSource, foretold_from};
+use pogema_maps::{GridConfig, InstanceSource, foretold_from};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -64,9 +64,11 @@ impl Engine {
         this.begin(py, config.as_ref(), registered)
     }
 
-    /// Chooses the seed of the episodes from the next reset on; what resets did to pools stays.
-    fn reseed(&mut self, seed: Option<u64>) {
-        self.source.reseed(seed);
+    /// Takes the field `seed` for the episodes from the next reset on; what resets did to pools stays.
+    fn reseed(&mut self, py: Python<'_>, fields: Fields) -> PyResult<()> {
+        let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
+        self.source.reseed(config.seed);
+        Ok(())
     }
 
     /// Forgets what the metrics counted so far.
