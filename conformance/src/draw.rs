@@ -243,7 +243,8 @@ fn lines(obstacles: &[Vec<bool>]) -> Vec<String> {
     obstacles.iter().map(line).collect()
 }
 
-fn text(obstacles: &[Vec<bool>]) -> String {
+/// A map as text, `#` for an obstacle.
+pub(crate) fn text(obstacles: &[Vec<bool>]) -> String {
     lines(obstacles).join("\n")
 }
 

@@ -3,7 +3,7 @@
 use pogema_conformance::panel::{Content, Grid, Limits, Moment, Panel, text_of_panels};
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
 use pogema_conformance::{Record, agents_grid, play};
-use pogema_core::{Error, Map, Snapshot, shorten};
+use pogema_core::{Error, Snapshot, shorten};
 use serde::Serialize;
 
 use super::grid_svg::drawing;
@@ -195,17 +195,11 @@ fn difference(example: &Example, port: &str) -> Option<Difference> {
 
 /// The states before, as expected and as they came, as far as they can be drawn.
 fn drawings(example: &Example, told: &[Panel], op: usize) -> Vec<Drawing> {
-    let records = play(&example.request).records;
-    let reached = &records[..records.len().min(op + 1)];
-    let map = reached.iter().rev().find_map(|record| match record {
-        Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
-        _ => None,
-    });
-    let Some(map) = map else { return Vec::new() };
-    let before = records[..records.len().min(op)].iter().rev().find_map(Record::state);
-    let expected = records.get(op).and_then(Record::state);
+    let played = play(&example.request);
+    let Some(map) = played.map_at(op) else { return Vec::new() };
+    let expected = played.records.get(op).and_then(Record::state);
     let grid = |state: Option<&Snapshot>| state.map_or(Grid::new(), |state| agents_grid(&map, state));
-    let [before, expected] = [before, expected].map(grid);
+    let [before, expected] = [played.state_before(op), expected].map(grid);
     let came = |panel: &&Panel| (panel.moment, panel.content) == (Moment::Got, Content::State);
     let got = told.iter().find(came).and_then(|panel| panel.grids.first().cloned()).unwrap_or_default();
     let drawn = [("before", &before, &Grid::new()), ("expected", &expected, &got), ("got", &got, &expected)];

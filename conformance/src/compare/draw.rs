@@ -5,7 +5,7 @@ use pogema_core::{Cell, Map, Snapshot};
 
 use super::panel::{Content, Grid, Moment, Panel, Sign};
 use crate::digits::unpack;
-use crate::request::{Record, Response};
+use crate::request::Response;
 
 /// The agents and goals of a state.
 pub fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
@@ -28,11 +28,7 @@ fn grid(map: &Map, signs: impl Iterator<Item = Sign>) -> Grid {
 
 /// The state before an operation, as expected after it, and as it came.
 pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
-    let map = expected.records[..=op].iter().rev().find_map(|record| match record {
-        Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
-        _ => None,
-    });
-    let Some(map) = map else { return Vec::new() };
+    let Some(map) = expected.map_at(op) else { return Vec::new() };
     let is_on_map = |cell: &Cell| map.contains(*cell);
     let panel = |(moment, state): (Moment, Option<&Snapshot>)| {
         let state = state?;
@@ -45,7 +41,7 @@ pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
         Some(Panel { moment, content: Content::State, grids })
     };
     let states = [
-        (Moment::Before, expected.records[..op].iter().rev().find_map(Record::state)),
+        (Moment::Before, expected.state_before(op)),
         (Moment::Expected, expected.records[op].state()),
         (Moment::Got, got.records[op].state()),
     ];

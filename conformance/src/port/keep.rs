@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::group::Example;
 use crate::compare::{Field, FieldPart};
-use crate::digits::unpack;
+use crate::digits::{area_of, unpack};
 use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
@@ -175,12 +175,7 @@ fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observe
         Some(Observed::Default { windows, .. }) if field.name == "observation" => {
             let Some(window) = windows.get(agent) else { return };
             let bits = unpack(window);
-            let area = (1..)
-                .step_by(2)
-                .map(|side: usize| side * side)
-                .take_while(|area| 3 * area <= bits.len())
-                .last();
-            let Some(area) = area else { return };
+            let Some(area) = area_of(bits.len()) else { return };
             let [obstacles, agents, goal] =
                 [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
             facts.insert(
