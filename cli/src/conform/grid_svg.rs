@@ -70,3 +70,16 @@ fn colour(letter: char) -> String {
     let hue = letter.to_ascii_lowercase() as usize * GOLDEN_ANGLE % 360;
     format!("hsl({hue} 65% 33%)")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_with_digits_for_letters_are_squares() {
+        let grid = vec![vec![Sign::Agent(26), Sign::Goal(26), Sign::Goal(99)]];
+        let svg = drawing("got", &grid, &Grid::new()).unwrap_or_default();
+        let shapes = ["<circle", "class=\"goal\"", ">0</text>", ">?</text>", "differs"];
+        assert_eq!(shapes.map(|shape| svg.matches(shape).count()), [1, 2, 2, 1, 0]);
+    }
+}
