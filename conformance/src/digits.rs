@@ -1,26 +1,13 @@
 //! Windows as hexadecimal digits.
 
 /// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
-pub(crate) fn pack(window: &[f32]) -> String {
-    in_digits(window, |&value| value != 0.0)
-}
-
-/// The same of flags.
-pub(crate) fn pack_bits(bits: &[bool]) -> String {
-    in_digits(bits, |&bit| bit)
-}
-
-fn in_digits<T>(cells: &[T], is_set: impl Fn(&T) -> bool) -> String {
-    const DIGITS: [char; 16] =
-        ['0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'a', 'b', 'c', 'd', 'e', 'f'];
-    let mut text = String::with_capacity(2 * cells.len().div_ceil(8));
-    for cells in cells.chunks(8) {
-        let bit = |byte: u8, (at, cell)| byte | u8::from(is_set(cell)) << (7 - at);
-        let byte = cells.iter().enumerate().fold(0u8, bit);
-        text.push(DIGITS[usize::from(byte >> 4)]);
-        text.push(DIGITS[usize::from(byte & 15)]);
-    }
-    text
+pub(crate) fn pack<T>(window: &[T], is_set: impl Fn(&T) -> bool) -> String {
+    let digits = window.chunks(8).flat_map(|cells| {
+        let byte =
+            cells.iter().zip((0..8).rev()).fold(0, |byte, (cell, bit)| byte | u32::from(is_set(cell)) << bit);
+        [byte >> 4, byte & 15]
+    });
+    digits.filter_map(|digit| char::from_digit(digit, 16)).collect()
 }
 
 /// What [`pack`] packed, and the zeros that filled the last byte.
@@ -30,4 +17,10 @@ pub(crate) fn unpack(window: &str) -> Vec<bool> {
         .chars()
         .flat_map(|character| (0..4).rev().map(move |bit| digit(character) >> bit & 1 == 1))
         .collect()
+}
+
+/// The area of a window, three of which fill so many flags up to a whole byte.
+pub(crate) fn area_of(num_flags: usize) -> Option<usize> {
+    let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
+    areas.last().filter(|area| num_flags < 3 * area + 8)
 }

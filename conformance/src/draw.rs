@@ -43,7 +43,7 @@ fn fits(dice: &mut Dice, request: &mut Request) -> bool {
             .and_then(|config| InstanceSource::new(config, registered.clone())?.generate());
         let Err(error) = generated else { return true };
         let num_agents = request.config.get("num_agents").and_then(Value::as_u64);
-        let is_crowded = error.to_string().contains("`num_agents`");
+        let is_crowded = error.field() == Some("num_agents");
         match num_agents {
             Some(num) if num > 1 && is_crowded && !dice.chance(KEPT_UNPLAYABLE) => {
                 request.config["num_agents"] = json!(num / 2);
@@ -243,7 +243,8 @@ fn lines(obstacles: &[Vec<bool>]) -> Vec<String> {
     obstacles.iter().map(line).collect()
 }
 
-fn text(obstacles: &[Vec<bool>]) -> String {
+/// A map as text, `#` for an obstacle.
+pub(crate) fn text(obstacles: &[Vec<bool>]) -> String {
     lines(obstacles).join("\n")
 }
 

@@ -36,7 +36,7 @@ mod runner;
 mod script;
 mod tally;
 
-pub use compare::{Divergence, compare, compare_in};
+pub use compare::{Divergence, Field, FieldPart, agents_grid, compare, compare_in, panel};
 pub use draw::draw_request;
 pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};

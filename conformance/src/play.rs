@@ -12,6 +12,7 @@ use pogema_planners::{AStarTeam, PomapfObservations, pogema_team, sample};
 use crate::digits::pack;
 use crate::request::{
     Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
+    actions_of, padded_dtype,
 };
 
 /// Longer episodes have too many goals to list; the oracle lists none for them either.
@@ -87,13 +88,13 @@ impl Source {
 
 /// Which figures are measured beyond POGEMA's own.
 #[derive(Clone, Copy)]
-struct Measured {
-    density: bool,
-    collisions: bool,
+pub(crate) struct Measured {
+    pub density: bool,
+    pub collisions: bool,
 }
 
 impl Measured {
-    fn of(figures: &[String]) -> Self {
+    pub fn of(figures: &[String]) -> Self {
         let has = |name: &str| figures.iter().any(|figure| figure == name);
         Self { density: has("avg_agents_density"), collisions: has("a_collisions") || has("o_collisions") }
     }
@@ -177,12 +178,7 @@ impl Player {
     pub(crate) fn perform(&mut self, op: &Op) -> Result<Record, Error> {
         match op {
             Op::Reset(_) => self.reset().map(|record| Record::Reset(Box::new(record))),
-            Op::Step(numbers) => {
-                let actions = numbers.iter().enumerate();
-                let actions: Result<_, _> =
-                    actions.map(|(agent, &number)| Action::from_number(agent, number)).collect();
-                self.step(actions?).map(|record| Record::Step(Box::new(record)))
-            }
+            Op::Step(numbers) => self.step(actions_of(numbers)?).map(|record| Record::Step(Box::new(record))),
             Op::Astar => {
                 let actions = self.plan()?;
                 self.step(actions).map(|record| Record::Astar(Box::new(record)))
@@ -216,13 +212,7 @@ impl Player {
             self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MOST_FORETOLD_STEPS;
         let goal_lists = may_foretell.then(|| foretold_goals(&self.config, instance)).flatten();
         let record = ResetRecord {
-            derived: Derived {
-                width: self.config.width,
-                height: self.config.height,
-                size: self.config.size,
-                density: self.config.density,
-                num_agents: self.config.num_agents,
-            },
+            derived: Derived::of(&self.config),
             map: instance.map().rows(),
             padded,
             state: self.episode.snapshot(),
@@ -296,23 +286,26 @@ impl Player {
         let mut obstacles = vec![0; height * width];
         self.episode.engine().observe_map(&mut obstacles)?;
         let line = |row: &[u8]| row.iter().map(|&value| if value == 0 { '.' } else { '#' }).collect();
-        let dtype = if self.config.empty_outside { "float64" } else { "int64" };
-        Ok(Padded { dtype: dtype.into(), rows: obstacles.chunks(width).map(line).collect() })
+        Ok(Padded {
+            dtype: padded_dtype(&self.config).into(),
+            rows: obstacles.chunks(width).map(line).collect(),
+        })
     }
 
     fn observed(&self, at_reset: bool) -> Result<Observed, Error> {
         let side = self.config.obs_radius * 2 + 1;
+        let packed = |window: &[f32]| pack(window, |&value| value != 0.0);
         if self.config.observation_type == Observation::Default {
             let mut values = vec![0.0; self.episode.config().num_observed()];
             self.episode.engine().observe(&mut values)?;
-            let windows = values.chunks(3 * side * side).map(pack).collect();
+            let windows = values.chunks(3 * side * side).map(packed).collect();
             return Ok(Observed::Default { dtype: "float32".into(), windows, odd: Vec::new() });
         }
         let windows = PomapfObservations::of(&self.episode)?;
         let pomapf = ObservedPomapf {
             dtype: "float32".into(),
-            obstacles: windows.obstacles.chunks(side * side).map(pack).collect(),
-            agents: windows.agents.chunks(side * side).map(pack).collect(),
+            obstacles: windows.obstacles.chunks(side * side).map(packed).collect(),
+            agents: windows.agents.chunks(side * side).map(packed).collect(),
             xy: windows.cells,
             target_xy: windows.goals,
             odd: Vec::new(),

@@ -1,6 +1,7 @@
 //! What is asked of an implementation, and what it answers: the same JSON for every implementation.
 
-use pogema_core::{Action, Cell, Change, Observed, Padded, Snapshot, TraceStep};
+use pogema_core::{Action, Cell, Change, Error, Map, Observed, Padded, Snapshot, TraceStep};
+use pogema_maps::GridConfig;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -189,6 +190,39 @@ impl Record {
             Self::History(_) | Self::Odd(_) => None,
         }
     }
+}
+
+impl Response {
+    /// The map of the episode that an operation belongs to.
+    pub fn map_at(&self, op: usize) -> Option<Map> {
+        self.records.iter().take(op + 1).rev().find_map(|record| match record {
+            Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
+            _ => None,
+        })
+    }
+
+    /// The last state before an operation.
+    pub fn state_before(&self, op: usize) -> Option<&Snapshot> {
+        self.records.iter().take(op).rev().find_map(Record::state)
+    }
+}
+
+impl Derived {
+    /// The fields of a config.
+    pub(crate) fn of(config: &GridConfig) -> Self {
+        let GridConfig { width, height, size, density, num_agents, .. } = *config;
+        Self { width, height, size, density, num_agents }
+    }
+}
+
+/// NumPy's name of the element type of the map with its border.
+pub(crate) fn padded_dtype(config: &GridConfig) -> &'static str {
+    if config.empty_outside { "float64" } else { "int64" }
+}
+
+/// The actions of a request.
+pub(crate) fn actions_of(numbers: &[i64]) -> Result<Vec<Action>, Error> {
+    numbers.iter().enumerate().map(|(agent, &number)| Action::from_number(agent, number)).collect()
 }
 
 /// Actions as a request writes them.

@@ -43,11 +43,6 @@ impl Tally {
             sum.diverged += count.diverged;
         }
     }
-
-    /// All divergences together.
-    pub fn num_diverged(&self) -> u64 {
-        self.rules.values().map(|count| count.diverged).sum()
-    }
 }
 
 /// The rules that a config brings into play, one for each thing compared.

@@ -1,16 +1,17 @@
-//! Drawings of text pictures: obstacles dark, agents as discs, goals as squares, by the same letters.
+//! Drawings of states: obstacles dark, agents as discs, goals as squares, with the letters of the text pictures.
 
 use std::fmt::Write as _;
+
+use pogema_conformance::panel::{Grid, Sign};
 
 /// Side of a cell. Units: pixels.
 const CELL: usize = 24;
 /// On more cells in a line nothing can be made out.
 const MOST_CELLS: usize = 64;
 
-/// A drawing of the rows of a picture, in which cells stand out that are not as in `other`; nothing for pictures that
-/// are too large.
-pub fn drawing(title: &str, rows: &[&str], other: &[&str]) -> Option<String> {
-    let (height, width) = (rows.len(), rows.first()?.len());
+/// Draws a picture, in which cells stand out that are not as in `other`. Pictures that are too large are not drawn.
+pub fn drawing(title: &str, grid: &Grid, other: &Grid) -> Option<String> {
+    let (height, width) = (grid.len(), grid.first()?.len());
     if height.max(width) > MOST_CELLS {
         return None;
     }
@@ -24,17 +25,17 @@ pub fn drawing(title: &str, rows: &[&str], other: &[&str]) -> Option<String> {
     let down = (0..=width).map(|column| format!("M{} 0v{bottom}", column * CELL));
     let lines: String = across.chain(down).collect();
     let _ = write!(svg, r#"<path class="lines" d="{lines}"/>"#);
-    for (row, line) in rows.iter().enumerate() {
-        for (column, letter) in line.bytes().enumerate() {
-            let differs = other.get(row).is_some_and(|line| line.as_bytes().get(column) != Some(&letter));
-            svg.push_str(&cell(column * CELL, row * CELL, letter, differs));
+    for (row, line) in grid.iter().enumerate() {
+        for (column, &sign) in line.iter().enumerate() {
+            let differs = other.get(row).is_some_and(|line| line.get(column) != Some(&sign));
+            svg.push_str(&cell(column * CELL, row * CELL, sign, differs));
         }
     }
     svg.push_str("</svg>");
     Some(svg)
 }
 
-fn cell(x: usize, y: usize, letter: u8, differs: bool) -> String {
+fn cell(x: usize, y: usize, sign: Sign, differs: bool) -> String {
     let square = |class: &str, rim: usize, more: &str| {
         let side = CELL - 2 * rim;
         format!(
@@ -44,18 +45,18 @@ fn cell(x: usize, y: usize, letter: u8, differs: bool) -> String {
         )
     };
     let (middle, centre) = (x + CELL / 2, y + CELL / 2);
+    let letter = sign.letter();
     let colour = colour(letter);
     let lettered = |shape: &str, fill: &str| {
-        let letter = letter as char;
         format!(r#"{shape}<text x="{middle}" y="{}" fill="{fill}">{letter}</text>"#, centre + 4)
     };
-    let mut shapes = match letter {
-        b'#' => square("obstacle", 0, ""),
-        b'A'..=b'Z' => lettered(&square("goal", 4, &format!(r#" stroke="{colour}""#)), &colour),
-        b'a'..=b'z' | b'0'..=b'9' | b'?' => {
+    let mut shapes = match sign {
+        Sign::Obstacle => square("obstacle", 0, ""),
+        Sign::Goal(_) => lettered(&square("goal", 4, &format!(r#" stroke="{colour}""#)), &colour),
+        Sign::Agent(_) => {
             lettered(&format!(r#"<circle cx="{middle}" cy="{centre}" r="10" fill="{colour}"/>"#), "#fff")
         }
-        _ => String::new(),
+        Sign::Free | Sign::Occupied | Sign::Set => String::new(),
     };
     if differs {
         shapes.push_str(&square("differs", 1, ""));
@@ -64,8 +65,21 @@ fn cell(x: usize, y: usize, letter: u8, differs: bool) -> String {
 }
 
 /// An agent and its goal share a colour; agents that follow each other have colours far apart.
-fn colour(letter: u8) -> String {
+fn colour(letter: char) -> String {
     const GOLDEN_ANGLE: usize = 137;
     let hue = letter.to_ascii_lowercase() as usize * GOLDEN_ANGLE % 360;
     format!("hsl({hue} 65% 33%)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_with_digits_for_letters_are_squares() {
+        let grid = vec![vec![Sign::Agent(26), Sign::Goal(26), Sign::Goal(99)]];
+        let svg = drawing("got", &grid, &Grid::new()).unwrap_or_default();
+        let shapes = ["<circle", "class=\"goal\"", ">0</text>", ">?</text>", "differs"];
+        assert_eq!(shapes.map(|shape| svg.matches(shape).count()), [1, 2, 2, 1, 0]);
+    }
 }

@@ -1,8 +1,9 @@
 //! The report as one page that needs nothing else.
 
+use pogema_conformance::panel::{Content, Grid, Limits, Moment, Panel, text_of_panels};
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
-use pogema_conformance::{Record, play};
-use pogema_core::{Error, Map, picture, shorten};
+use pogema_conformance::{Record, agents_grid, play};
+use pogema_core::{Error, Snapshot, shorten};
 use serde::Serialize;
 
 use super::grid_svg::drawing;
@@ -12,7 +13,6 @@ use super::summary::{
     title, verdict,
 };
 use super::template::fill;
-use super::text_picture::{Limits, cut, panels};
 
 /// A page can be scrolled, but should open on a phone.
 const LIMITS: Limits = Limits { rows: 64, columns: 128 };
@@ -184,37 +184,27 @@ fn difference(example: &Example, port: &str) -> Option<Difference> {
         text_of(example, port).unwrap_or_else(|error| format!("# it cannot be written as YAML: {error}"));
     Some(Difference {
         op: found.op,
-        field: found.field.clone(),
+        field: found.field.to_string(),
         expected: shortened(&found.expected),
         got: shortened(&found.got),
         drawings: drawings(example, &found.picture, found.op),
-        picture: cut(&found.picture, LIMITS),
+        picture: text_of_panels(&found.picture, LIMITS),
         case: shorten(&case, LONGEST_CASE),
     })
 }
 
 /// The states before, as expected and as they came, as far as they can be drawn.
-fn drawings(example: &Example, told: &str, op: usize) -> Vec<Drawing> {
-    let records = play(&example.request).records;
-    let reached = &records[..records.len().min(op + 1)];
-    let map = reached.iter().rev().find_map(|record| match record {
-        Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
-        _ => None,
-    });
-    let Some(map) = map else { return Vec::new() };
-    let before = records[..records.len().min(op)].iter().rev().find_map(Record::state);
-    let expected = records.get(op).and_then(Record::state);
-    let [before, expected] =
-        [before, expected].map(|state| state.map_or(String::new(), |state| picture::picture(&map, state)));
-    let [before, expected]: [Vec<&str>; 2] = [before.lines().collect(), expected.lines().collect()];
-    // What came is known as a text alone.
-    let panels = panels(told);
-    let got = panels.iter().find(|panel| panel.title.starts_with("got: agents and goals"));
-    let got: Vec<&str> =
-        got.iter().flat_map(|panel| &panel.rows).filter_map(|row| row.first().copied()).collect();
-    let drawn = [("before", &before, &[][..]), ("expected", &expected, &got), ("got", &got, &expected)];
+fn drawings(example: &Example, told: &[Panel], op: usize) -> Vec<Drawing> {
+    let played = play(&example.request);
+    let Some(map) = played.map_at(op) else { return Vec::new() };
+    let expected = played.records.get(op).and_then(Record::state);
+    let grid = |state: Option<&Snapshot>| state.map_or(Grid::new(), |state| agents_grid(&map, state));
+    let [before, expected] = [played.state_before(op), expected].map(grid);
+    let came = |panel: &&Panel| (panel.moment, panel.content) == (Moment::Got, Content::State);
+    let got = told.iter().find(came).and_then(|panel| panel.grids.first().cloned()).unwrap_or_default();
+    let drawn = [("before", &before, &Grid::new()), ("expected", &expected, &got), ("got", &got, &expected)];
     let drawn = drawn
         .into_iter()
-        .filter_map(|(what, rows, other)| Some(Drawing { what, svg: drawing(what, rows, other)? }));
+        .filter_map(|(what, grid, other)| Some(Drawing { what, svg: drawing(what, grid, other)? }));
     drawn.collect()
 }

@@ -10,7 +10,6 @@ mod port_table;
 mod ports;
 mod summary;
 mod template;
-mod text_picture;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use pogema_conformance::panel::{Limits, text_of_panels};
 use pogema_conformance::port::{Cause, PortReport};
 
 use super::known::Leftover;
 use super::summary::{self, OUTCOMES, counts, names, printable, shortened, times, title, verdict};
 use super::table;
-use super::text_picture::{Limits, cut};
 
 /// What to do about a known deviation that is gone.
 const STOPPED: &str = "it stopped occurring and can be removed from the list";
@@ -115,7 +115,11 @@ pub fn tell_cause(cause: &Cause) -> String {
     if let Some(found) = &cause.example.divergence {
         let _ = writeln!(text, "  operation {}: {}", found.op, found.field);
         let (expected, got) = (shortened(&found.expected), shortened(&found.got));
-        let _ = write!(text, "  expected {expected}\n  got      {got}\n{}", cut(&found.picture, LIMITS));
+        let _ = write!(
+            text,
+            "  expected {expected}\n  got      {got}\n{}",
+            text_of_panels(&found.picture, LIMITS)
+        );
     }
     if let Some(fault) = &cause.example.fault {
         let _ = writeln!(text, "  {fault}");

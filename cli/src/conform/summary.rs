@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use pogema_conformance::port::{Cause, PortReport, Verdicts, needed_by};
+use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Verdicts, needed_by};
 use pogema_core::shorten;
 
 /// How a rule came out for a port, all its cases together.
@@ -65,7 +65,7 @@ pub fn counts(report: &PortReport, rule: &str) -> [String; 4] {
 
 /// Whether a row is about a rule, and not about the protocol.
 pub fn is_rule(row: &str) -> bool {
-    !row.starts_with('(')
+    row != PROTOCOL_ROW
 }
 
 /// Every rule that any of the ports was asked for or did not claim.
@@ -234,6 +234,6 @@ mod tests {
             count += 1;
         }
         assert!(count > 50, "{count} links were found");
-        assert_eq!(spec_url("(protocol)"), None);
+        assert_eq!(spec_url(PROTOCOL_ROW), None);
     }
 }

@@ -6,7 +6,7 @@ use pogema_core::{Cell, Change, Map, Metrics, Observed, Snapshot, picture};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::digits::unpack;
+use crate::digits::{area_of, unpack};
 use crate::request::{Record, ResetRecord, StepRecord};
 
 /// What holds after one operation. Pictures may end in blank lines.
@@ -183,12 +183,6 @@ impl Sees {
             .or_else(|| differ_in_window("agents", self.agents.as_deref(), &agents))
             .or_else(|| differ_in_window("goal", self.goal.as_deref(), &goal?))
     }
-}
-
-/// The area of a window, three of which fill so many flags up to a whole byte.
-fn area_of(num_flags: usize) -> Option<usize> {
-    let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
-    areas.last().filter(|area| num_flags < 3 * area + 8)
 }
 
 fn differ<T: PartialEq + std::fmt::Debug>(what: &str, expected: Option<&T>, got: &T) -> Option<String> {

@@ -1,71 +1,73 @@
-//! Text pictures of a difference.
+//! Draws the states and windows of a difference.
 
-use std::fmt::Write as _;
+use pogema_core::picture::marks;
+use pogema_core::{Cell, Map, Snapshot};
 
-use pogema_core::{Cell, Map, picture};
-
+use super::panel::{Content, Grid, Moment, Panel, Sign};
 use crate::digits::unpack;
-use crate::request::{Record, Response};
+use crate::request::Response;
 
-/// Before, expected and got, below each other.
-pub fn states(expected: &Response, got: &Response, op: usize) -> String {
-    let map = expected.records[..=op].iter().rev().find_map(|record| match record {
-        Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
-        _ => None,
-    });
-    let Some(map) = map else { return String::new() };
-    let before = expected.records[..op].iter().rev().find_map(Record::state);
-    let states =
-        [("before", before), ("expected", expected.records[op].state()), ("got", got.records[op].state())];
-    let mut text = String::new();
-    for (what, state) in states {
-        let Some(state) = state else { continue };
-        let is_on_map = |cell: &Cell| map.contains(*cell);
-        if ![&state.cells, &state.goals, &state.occupied].into_iter().flatten().all(is_on_map) {
-            let _ = writeln!(text, "  {what}: somebody or something is off the map");
-            continue;
-        }
-        let occupancy = picture::occupancy_picture(&map, state);
-        let _ = writeln!(text, "  {what}: agents and goals, then occupancy");
-        for (agents, occupied) in picture::picture(&map, state).lines().zip(occupancy.lines()) {
-            let _ = writeln!(text, "    {agents}   {occupied}");
-        }
-    }
-    text
+/// The agents and goals of a state.
+pub fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
+    grid(map, marks(map, state).into_iter().map(Sign::from))
 }
 
-/// Two windows of one agent below each other, channel by channel, or nothing where they are not of such a form.
-pub fn windows(expected: &str, got: &str, side: usize) -> String {
+fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
+    let ground = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
+    let mut signs: Vec<Sign> = map.obstacles().iter().map(ground).collect();
+    for &cell in &state.occupied {
+        signs[map.index(cell)] = Sign::Occupied;
+    }
+    grid(map, signs.into_iter())
+}
+
+fn grid(map: &Map, signs: impl Iterator<Item = Sign>) -> Grid {
+    let signs: Vec<Sign> = signs.collect();
+    signs.chunks(map.width()).map(<[Sign]>::to_vec).collect()
+}
+
+/// The state before an operation, as expected after it, and as it came.
+pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
+    let Some(map) = expected.map_at(op) else { return Vec::new() };
+    let is_on_map = |cell: &Cell| map.contains(*cell);
+    let panel = |(moment, state): (Moment, Option<&Snapshot>)| {
+        let state = state?;
+        let can_be_drawn = [&state.cells, &state.goals, &state.occupied].into_iter().flatten().all(is_on_map);
+        let grids = if can_be_drawn {
+            vec![agents_grid(&map, state), occupancy_grid(&map, state)]
+        } else {
+            Vec::new()
+        };
+        Some(Panel { moment, content: Content::State, grids })
+    };
+    let states = [
+        (Moment::Before, expected.state_before(op)),
+        (Moment::Expected, expected.records[op].state()),
+        (Moment::Got, got.records[op].state()),
+    ];
+    states.into_iter().filter_map(panel).collect()
+}
+
+/// The expected window of one agent and the one that came, or nothing for a hash or a window of another size.
+pub fn windows(expected: &str, got: &str, side: usize) -> Vec<Panel> {
     if got.contains(':') || expected.len() != got.len() {
-        return String::new();
+        return Vec::new();
     }
-    let (expected, got) = (unpack(expected), unpack(got));
     let area = side * side;
-    let num_channels = expected.len() / area;
-    let mut text = String::new();
-    for (what, bits) in [("expected", &expected), ("got", &got)] {
-        let names = if num_channels == 3 { ": obstacles, agents, goal" } else { "" };
-        let _ = writeln!(text, "  {what}{names}");
-        for row in 0..side {
-            let line = |channel: usize| {
-                let begin = channel * area + row * side;
-                bits[begin..begin + side].iter().map(|&bit| if bit { '1' } else { '.' }).collect::<String>()
-            };
-            let lines: Vec<String> = (0..num_channels).map(line).collect();
-            let _ = writeln!(text, "    {}", lines.join("   "));
-        }
-    }
-    text
+    let sign = |&bit: &bool| if bit { Sign::Set } else { Sign::Free };
+    let channel =
+        |bits: &[bool]| bits.chunks(side).map(|row| row.iter().map(sign).collect()).collect::<Grid>();
+    [(Moment::Expected, expected), (Moment::Got, got)]
+        .map(|(moment, window)| {
+            let grids = unpack(window).chunks_exact(area).map(channel).collect();
+            Panel { moment, content: Content::Window, grids }
+        })
+        .into()
 }
 
 /// The place of the first value that differs, row by row.
 pub fn first_differing_bit(one: &str, other: &str) -> usize {
-    let digits = one.chars().zip(other.chars()).enumerate();
-    let digit = |character: char| character.to_digit(16).unwrap_or(0);
-    digits
-        .map(|(index, (one, other))| (index, digit(one) ^ digit(other)))
-        .find(|(_, difference)| *difference != 0)
-        .map_or(4 * one.len().min(other.len()), |(index, difference)| {
-            4 * index + difference.leading_zeros() as usize - 28
-        })
+    let (one, other) = (unpack(one), unpack(other));
+    let differing = one.iter().zip(&other).position(|(one, other)| one != other);
+    differing.unwrap_or(one.len().min(other.len()))
 }

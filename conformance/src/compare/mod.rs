@@ -1,11 +1,16 @@
 //! The first place where two answers to one request differ.
 
 mod draw;
+mod field;
+pub mod panel;
 
 use pogema_core::{Metrics, Observed, ObservedPomapf, OnGoal, Snapshot};
 use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
 
+pub use self::draw::agents_grid;
+pub use self::field::{Field, FieldPart};
+use self::panel::{Limits, Panel, text_of_panels};
 use crate::port::{Scope, Told, resolve_hashes};
 use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord};
 use crate::tally::{Families, Tally, families_of};
@@ -16,22 +21,16 @@ pub struct Divergence {
     /// Index of the operation after which they differ.
     pub op: usize,
     /// What differs, with the index of the agent or list element.
-    pub field: String,
+    pub field: Field,
     /// What was expected.
     pub expected: String,
     /// What came instead.
     pub got: String,
     /// The rule that says what is right.
     pub rule: String,
-    /// The state before the operation, as expected after it, and as it came.
-    pub picture: String,
-}
-
-impl Divergence {
-    /// What differs, without saying where.
-    pub fn kind(&self) -> String {
-        kind_of(&self.field)
-    }
+    /// The state before the operation, as expected after it, and as it came; then the windows that differ.
+    #[serde(serialize_with = "panel::serialize")]
+    pub picture: Vec<Panel>,
 }
 
 impl std::fmt::Display for Divergence {
@@ -39,7 +38,7 @@ impl std::fmt::Display for Divergence {
         writeln!(f, "operation {}: {} differs (rule {})", self.op, self.field, self.rule)?;
         writeln!(f, "  expected {}", self.expected)?;
         writeln!(f, "  got      {}", self.got)?;
-        write!(f, "{}", self.picture)
+        f.write_str(&text_of_panels(&self.picture, Limits::NONE))
     }
 }
 
@@ -82,7 +81,7 @@ pub fn compare_in(
         comparison.op = op;
         comparison.records(one, other);
         for found in comparison.found.iter_mut().filter(|found| found.op == op) {
-            found.picture.insert_str(0, &draw::states(expected, got, op));
+            found.picture.splice(0..0, draw::states(expected, got, op));
         }
         if comparison.is_lost || (scope.is_whole() && !comparison.found.is_empty()) {
             return comparison.found;
@@ -119,11 +118,11 @@ fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) 
     };
     Divergence {
         op,
-        field: "error".into(),
+        field: Field { name: "error", part: FieldPart::Whole },
         expected: tell(expected),
         got: tell(got),
         rule: rule.into(),
-        picture: String::new(),
+        picture: Vec::new(),
     }
 }
 
@@ -276,18 +275,15 @@ impl Comparison<'_> {
             && self.list(rule, "target_xy", &expected.target_xy, &got.target_xy)
     }
 
-    fn windows(&mut self, rule: &str, what: &str, expected: &[String], got: &[String]) -> bool {
+    fn windows(&mut self, rule: &str, name: &'static str, expected: &[String], got: &[String]) -> bool {
         let differing = expected.iter().zip(got).position(|(one, other)| one != other);
-        let Some(agent) = differing else { return self.list(rule, what, expected, got) };
+        let Some(agent) = differing else { return self.list(rule, name, expected, got) };
         let (one, other) = (&expected[agent], &got[agent]);
         // Of a hash that differs nothing else can be said.
-        let place = if other.contains(':') {
-            String::new()
-        } else {
-            format!(", value {} row by row", draw::first_differing_bit(one, other))
-        };
+        let value = (!other.contains(':')).then(|| draw::first_differing_bit(one, other));
         let num_found = self.found.len();
-        self.value(rule, &format!("{what} of agent {agent}{place}"), one, other);
+        self.tally.count(rule, false);
+        self.report(rule, Field { name, part: FieldPart::Window { agent, value } }, one, other);
         if let Some(found) = self.found.get_mut(num_found) {
             found.picture = draw::windows(one, other, self.side);
         }
@@ -295,37 +291,49 @@ impl Comparison<'_> {
     }
 
     /// A part of the state, without which nothing that follows can be right.
-    fn state_list<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &[T], got: &[T]) {
-        self.list(rule, what, expected, got);
+    fn state_list<T: PartialEq + Serialize>(
+        &mut self,
+        rule: &str,
+        name: &'static str,
+        expected: &[T],
+        got: &[T],
+    ) {
+        self.list(rule, name, expected, got);
         self.is_lost |= expected != got;
     }
 
-    fn list<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &[T], got: &[T]) -> bool {
+    fn list<T: PartialEq + Serialize>(
+        &mut self,
+        rule: &str,
+        name: &'static str,
+        expected: &[T],
+        got: &[T],
+    ) -> bool {
         let holds = expected == got;
         self.tally.count(rule, holds);
         if expected.len() != got.len() {
-            self.report(rule, format!("number of {what} entries"), &expected.len(), &got.len());
+            self.report(rule, Field { name, part: FieldPart::Length }, &expected.len(), &got.len());
         } else if let Some(index) = expected.iter().zip(got).position(|(one, other)| one != other) {
-            self.report(rule, format!("{what} {index}"), &expected[index], &got[index]);
+            self.report(rule, Field { name, part: FieldPart::Element(index) }, &expected[index], &got[index]);
         }
         holds
     }
 
-    fn value<T: PartialEq + Serialize>(&mut self, rule: &str, what: &str, expected: &T, got: &T) {
+    fn value<T: PartialEq + Serialize>(&mut self, rule: &str, name: &'static str, expected: &T, got: &T) {
         let holds = expected == got;
         self.tally.count(rule, holds);
         if !holds {
-            self.report(rule, what.into(), expected, got);
+            self.report(rule, Field { name, part: FieldPart::Whole }, expected, got);
         }
     }
 
-    fn report(&mut self, rule: &str, field: String, expected: &impl Serialize, got: &impl Serialize) {
-        let is_told = |found: &Divergence| found.rule == rule && found.kind() == kind_of(&field);
+    fn report(&mut self, rule: &str, field: Field, expected: &impl Serialize, got: &impl Serialize) {
+        let is_told = |found: &Divergence| found.rule == rule && found.field.kind() == field.kind();
         if self.is_lost || self.found.iter().any(is_told) {
             return;
         }
         let (expected, got) = (in_json(expected), in_json(got));
-        let (op, rule, picture) = (self.op, rule.into(), String::new());
+        let (op, rule, picture) = (self.op, rule.into(), Vec::new());
         self.found.push(Divergence { op, field, expected, got, rule, picture });
     }
 }
@@ -333,12 +341,4 @@ impl Comparison<'_> {
 /// A value as those see it who write ports in other languages.
 fn in_json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_else(|error| error.to_string())
-}
-
-/// A field or message without its numbers and quotes.
-fn kind_of(text: &str) -> String {
-    let head = text.split(['`', ':', ',']).next().unwrap_or(text);
-    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
-    let kind: Vec<&str> = words.collect();
-    kind.join(" ").trim_end_matches(" of agent").to_owned()
 }

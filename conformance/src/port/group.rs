@@ -61,7 +61,7 @@ impl Cause {
 impl Example {
     fn key(&self) -> (Option<String>, String) {
         match (&self.divergence, &self.fault) {
-            (Some(found), _) => (Some(found.rule.clone()), found.kind()),
+            (Some(found), _) => (Some(found.rule.clone()), found.field.kind()),
             (None, Some(fault)) => (None, kind_of_fault(&fault.what)),
             (None, None) => (None, String::new()),
         }

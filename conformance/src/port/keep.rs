@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::group::Example;
-use crate::digits::unpack;
+use crate::compare::{Field, FieldPart};
+use crate::digits::{area_of, unpack};
 use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
@@ -50,9 +51,11 @@ struct StepOfFile {
 pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathBuf>, Error> {
     let Some(found) = &example.divergence else { return Ok(None) };
     let text = text_of(example, port).map_err(|error| Error::io(folder, error))?;
-    let field: String =
-        found.field.chars().take_while(|letter| !letter.is_ascii_digit() && *letter != ',').collect();
-    let words: Vec<&str> = found.rule.split('/').chain(field.split_whitespace()).collect();
+    let field = match found.field {
+        Field { name, part: FieldPart::Window { .. } } => format!("{name} of agent"),
+        field => field.kind(),
+    };
+    let words: Vec<&str> = found.rule.split('/').chain(field.split(' ')).collect();
     let path = folder.join(format!("{}.yaml", words.join("-")));
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
     files::write(&path, text.as_bytes())?;
@@ -66,8 +69,9 @@ pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathB
 pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
     let request = &example.request;
     let expected = play(request);
-    let (rule, field) = example.divergence.as_ref().map_or(("", ""), |found| (&found.rule, &found.field));
-    let last = example.divergence.as_ref().map_or(0, |found| found.op);
+    let found = example.divergence.as_ref();
+    let field = found.map(|found| found.field);
+    let last = found.map_or(0, |found| found.op);
     let mut start = BTreeMap::new();
     let mut steps = Vec::new();
     let mut map = None;
@@ -88,8 +92,8 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
         steps.push(step_of(op, BTreeMap::new()));
     }
     let file = CaseFile {
-        rule: rule.to_owned(),
-        says: format!("{port} differs in: {field}."),
+        rule: found.map(|found| found.rule.clone()).unwrap_or_default(),
+        says: format!("{port} differs in: {}.", field.map(|field| field.to_string()).unwrap_or_default()),
         config: request.config.clone(),
         register: request.register.clone(),
         density: request.density,
@@ -121,7 +125,12 @@ fn word(number: i64) -> Value {
 }
 
 /// What to expect of a moment: a picture of each, and of the last all that could differ.
-fn facts(record: &Record, map: Option<&Map>, field: &str, is_last: bool) -> BTreeMap<&'static str, Value> {
+fn facts(
+    record: &Record,
+    map: Option<&Map>,
+    field: Option<Field>,
+    is_last: bool,
+) -> BTreeMap<&'static str, Value> {
     let mut facts = BTreeMap::new();
     let (Some(state), Some(map)) = (record.state(), map) else {
         if let Record::History(history) = record {
@@ -148,7 +157,7 @@ fn facts(record: &Record, map: Option<&Map>, field: &str, is_last: bool) -> BTre
             facts.insert("terminated", json!(step.step.terminated));
             facts.insert("truncated", json!(step.step.truncated));
             facts.insert("metrics", json!(step.step.metrics.unwrap_or_default()));
-            if field.starts_with("caller's action") {
+            if field.is_some_and(|field| field.name == "caller's action") {
                 facts.insert("actions_after", json!(step.actions_after));
             }
             add_sees(&mut facts, step.step.observations.as_ref(), field);
@@ -160,19 +169,13 @@ fn facts(record: &Record, map: Option<&Map>, field: &str, is_last: bool) -> BTre
 }
 
 /// What the agent sees whose observation differs.
-fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: &str) {
-    let numbers = field.split(|letter: char| !letter.is_ascii_digit()).filter(|word| !word.is_empty());
-    let Some(agent) = numbers.map(str::parse::<usize>).find_map(Result::ok) else { return };
+fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: Option<Field>) {
+    let Some((field, agent)) = field.and_then(|field| Some((field, field.index()?))) else { return };
     match observed {
-        Some(Observed::Default { windows, .. }) if field.starts_with("observation") => {
+        Some(Observed::Default { windows, .. }) if field.name == "observation" => {
             let Some(window) = windows.get(agent) else { return };
             let bits = unpack(window);
-            let area = (1..)
-                .step_by(2)
-                .map(|side: usize| side * side)
-                .take_while(|area| 3 * area <= bits.len())
-                .last();
-            let Some(area) = area else { return };
+            let Some(area) = area_of(bits.len()) else { return };
             let [obstacles, agents, goal] =
                 [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
             facts.insert(

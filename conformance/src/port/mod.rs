@@ -38,7 +38,7 @@ pub use plan::{Part, Plan};
 pub use play::{Answered, play_on_port};
 pub use process::{Command, Process};
 pub use protocol::{Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
-pub use report::{PortReport, Verdicts};
+pub use report::{PROTOCOL_ROW, PortReport, Verdicts};
 pub use run::{Subject, check_ports, shrink_causes};
 pub use server::{Server, serve};
 pub use session::Port;

@@ -6,7 +6,7 @@ use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, P
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::digits::{pack_bits, unpack};
+use crate::digits::{pack, unpack};
 
 /// Reads what a port told; an error says in words what is wrong with its form.
 ///
@@ -167,7 +167,7 @@ fn read_values(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result
         }
     }
     if bits.len() == num_values {
-        Ok(pack_bits(&bits))
+        Ok(pack(&bits, |&bit| bit))
     } else {
         Err(format!("has {} values, expected {num_values}", bits.len()))
     }

@@ -1,6 +1,6 @@
 //! A port's answer to a whole request, in the form of every other answer.
 
-use pogema_core::{Action, Error, Map, Metrics, Padded, TraceStep};
+use pogema_core::{Error, Map, Metrics, Padded, TraceStep};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
 
@@ -9,7 +9,8 @@ use super::link::{Link, Misbehaviour};
 use super::protocol::{Ask, Beginning, Hello, Policy, Profile};
 use super::session::Port;
 use crate::request::{
-    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When, numbers,
+    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
+    actions_of, numbers, padded_dtype,
 };
 
 /// What a port answered, and what it did instead of answering.
@@ -113,7 +114,7 @@ impl<'l> PortPlay<'l> {
             named.map(|map| Map::from_rows(&map.rows)).transpose().map_err(Unplayable::Instance)?;
         let source = InstanceSource::new(config.clone(), registered).map_err(Unplayable::Instance)?;
         let mut port = Port::new(link, hello, config.rules());
-        port.set_padded_dtype(if config.empty_outside { "float64" } else { "int64" });
+        port.set_padded_dtype(padded_dtype(&config));
         let plays_policies = mode == Mode::Config && hello.profiles.contains(&Profile::Policies);
         Ok(Self { port, mode, config, source, request, expected, plays_policies, has_begun: false })
     }
@@ -140,19 +141,13 @@ impl<'l> PortPlay<'l> {
         let beginning = self.beginning(index, seed)?;
         self.port.begin(beginning)?;
         self.has_begun = true;
-        let config = &self.config;
-        let derived = Derived {
-            width: config.width,
-            height: config.height,
-            size: config.size,
-            density: config.density,
-            num_agents: config.num_agents,
-        };
         let reply = self.port.reply();
-        let dtype = if config.empty_outside { "float64" } else { "int64" };
-        let padded = Padded { dtype: dtype.into(), rows: reply.padded.clone().unwrap_or_default() };
+        let padded = Padded {
+            dtype: padded_dtype(&self.config).into(),
+            rows: reply.padded.clone().unwrap_or_default(),
+        };
         Ok(ResetRecord {
-            derived: reply.derived.clone().unwrap_or(derived),
+            derived: reply.derived.clone().unwrap_or_else(|| Derived::of(&self.config)),
             map: reply.map.clone().unwrap_or_default(),
             padded,
             goal_lists: reply.foretold.clone().given(),
@@ -202,11 +197,8 @@ impl<'l> PortPlay<'l> {
             Ask::Step { actions } => actions.clone(),
             _ => reply.actions.unwrap_or_default(),
         };
-        let numbered = numbers.iter().enumerate();
-        let actions: Result<Vec<Action>, _> =
-            numbered.map(|(agent, &number)| Action::from_number(agent, number)).collect();
         // No action at all, and yet it was played: there is no record of such a step.
-        let Ok(actions) = actions else { return Ok(Record::Odd(json!({ "played": numbers }))) };
+        let Ok(actions) = actions_of(&numbers) else { return Ok(Record::Odd(json!({ "played": numbers }))) };
         let step = TraceStep {
             actions,
             rewards: reply.rewards.unwrap_or_default(),

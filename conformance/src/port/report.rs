@@ -12,7 +12,7 @@ use super::protocol::Hello;
 use crate::compare::Divergence;
 
 /// The row of the table for what breaks no rule but the protocol.
-const PROTOCOL_ROW: &str = "(protocol)";
+pub const PROTOCOL_ROW: &str = "(protocol)";
 
 /// What a run shows of one port.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -153,7 +153,8 @@ fn is_about(case_rule: &str, found: &Divergence) -> bool {
         "border" | "occupancy" => "observe".to_owned(),
         other => other.to_owned(),
     };
-    let is_of_state = ["cell", "goal", "active", "start", "action", "error"].contains(&found.kind().as_str());
+    let is_of_state =
+        ["cell", "goal", "active", "start", "action", "error"].contains(&found.field.kind().as_str());
     // What comes after a step back, or after a draw, shows itself in any field.
     let is_about_all = ["history", "policy", "seed"].contains(&family(case_rule).as_str());
     is_of_state || is_about_all || family(case_rule) == family(&found.rule)

@@ -4,6 +4,7 @@ use pogema_core::{Cell, Map, OnGoal};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};
 
+use crate::draw::text;
 use crate::request::{Op, Record, Request, Response, numbers};
 
 /// An episode: a map, agents, what they do, and the fields of the config that have nothing to do with those.
@@ -64,9 +65,7 @@ impl Scene {
     /// The scene as a request.
     pub fn request(&self) -> Request {
         let mut config = Object::new();
-        let line = |row: &Vec<bool>| row.iter().map(|&flag| if flag { '#' } else { '.' }).collect::<String>();
-        let text: Vec<String> = self.rows.iter().map(line).collect();
-        config.insert("map".into(), text.join("\n").into());
+        config.insert("map".into(), text(&self.rows).into());
         config.insert("agents_xy".into(), json!(self.starts));
         let first: Vec<Cell> = self.goals.iter().filter_map(|goals| goals.first().copied()).collect();
         config.insert("targets_xy".into(), if self.restarts { json!(self.goals) } else { json!(first) });

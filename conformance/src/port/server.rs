@@ -7,7 +7,7 @@ use pogema_core::{Collision, Config, Environment, Error, Instance, Observation, 
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
-use crate::play::{Engine, Make, Player};
+use crate::play::{Engine, Make, Measured, Player};
 use crate::request::{Op, Record, Request, numbers};
 
 /// An engine as a port. It claims everything.
@@ -57,13 +57,13 @@ impl Server {
             let player = Player::of_instance(&self.make, &header.config, instance, &beginning.measure)?;
             self.player = Some(player);
         } else if let Some(config) = &beginning.config {
-            let measures = |name: &str| beginning.measure.iter().any(|wanted| wanted == name);
+            let Measured { density, collisions } = Measured::of(&beginning.measure);
             let request = Request {
                 id: 0,
                 config: config.clone(),
                 register: beginning.register.clone(),
-                density: measures("avg_agents_density"),
-                collisions: measures("a_collisions") || measures("o_collisions"),
+                density,
+                collisions,
                 ops: Vec::new(),
             };
             self.player = None;

@@ -70,7 +70,7 @@ impl Shrinker<'_> {
             return false;
         }
         let expected = play(request);
-        let is_about_errors = self.best.divergence.as_ref().is_some_and(|found| found.field == "error");
+        let is_about_errors = self.best.divergence.as_ref().is_some_and(|found| found.field.name == "error");
         if expected.error.is_some() && !is_about_errors {
             return false;
         }

@@ -6,7 +6,7 @@ mod engine;
 mod flaw;
 mod moves;
 mod port;
-mod soft;
+mod views;
 
 use std::fmt::Write as _;
 use std::path::Path;

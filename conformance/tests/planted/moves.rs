@@ -1,64 +1,168 @@
-//! The collision systems `priority` and `block_both`, with the bugs planted in them.
+//! Bugs in who moves: agents that stay although they may go, and agents that go although they have to stay.
 
-use std::collections::{HashMap, HashSet};
+use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
-use pogema_core::{Action, Collision};
-
-use crate::engine::{Flawed, Place};
 use crate::flaw::Flaw;
 
-impl Flawed {
-    pub fn move_agents(&mut self, actions: &[Action]) {
-        match self.config.collision {
-            Collision::Priority => self.move_by_priority(actions),
-            Collision::BlockBoth => self.move_blocking_both(actions),
-            Collision::Soft => self.move_softly(actions),
+/// A cell, or a place next to the map.
+type Place = (i32, i32);
+
+/// What agents aim at in one step, and how a flaw changes who gets there.
+pub struct Moves<'a> {
+    flaw: Flaw,
+    config: &'a Config,
+    map: &'a Map,
+    before: &'a Snapshot,
+    is_over: bool,
+    actions: Vec<Action>,
+    cells: Vec<Place>,
+    targets: Vec<Place>,
+}
+
+impl<'a> Moves<'a> {
+    /// The moves that agents want to make; `is_over` says whether the episode has ended already.
+    pub fn new(
+        flaw: Flaw,
+        config: &'a Config,
+        map: &'a Map,
+        before: &'a Snapshot,
+        is_over: bool,
+        actions: &[Action],
+    ) -> Self {
+        let actions: Vec<Action> = actions.iter().map(|&action| turned(flaw, action)).collect();
+        let cells = before.cells.iter().map(|cell| cell.toward(Action::Stay)).collect();
+        let targets = before.cells.iter().zip(&actions).map(|(cell, &action)| cell.toward(action)).collect();
+        Self { flaw, config, map, before, is_over, actions, cells, targets }
+    }
+
+    /// The actions, except that an agent waits if the flaw keeps it back.
+    pub fn played(&self) -> Vec<Action> {
+        let agents = self.actions.iter().enumerate();
+        agents.map(|(agent, &action)| if self.is_kept_back(agent) { Action::Stay } else { action }).collect()
+    }
+
+    /// Moves the agents that stayed in `after`, but go on with the flaw.
+    pub fn add_missing(&self, after: &mut Snapshot) {
+        let stayed = |agent: usize| self.wants(agent) && after.cells[agent] == self.before.cells[agent];
+        let is_missing = |&agent: &usize| stayed(agent) && self.goes_nevertheless(agent, &after.cells);
+        let missing: Vec<usize> = (0..self.targets.len()).filter(is_missing).collect();
+        for agent in missing {
+            let (row, col) = self.targets[agent];
+            after.cells[agent] = Cell::new(row as u16, col as u16);
         }
     }
 
-    fn move_by_priority(&mut self, actions: &[Action]) {
-        let mut order = self.active_agents();
-        if self.has(Flaw::PriorityHighestFirst) {
-            order.reverse();
-        }
-        let before = self.occupied.clone();
-        for agent in order {
-            let target = self.target(agent, actions);
-            let was_taken = self.has(Flaw::PriorityNobodyFollows) && before.contains(&target);
-            if !self.is_blocked(target) && !self.is_taken(target) && !was_taken {
-                self.put(agent, target);
+    fn is_kept_back(&self, agent: usize) -> bool {
+        let is_led_to_finished =
+            |other: usize| !self.before.active[other] && self.cells[other] == self.targets[agent];
+        let follows = self.occupant(agent).is_some();
+        match (self.flaw, self.config.collision) {
+            (Flaw::StandsStillAfterTheEnd, _) => self.is_over,
+            (Flaw::FinishedStillBlock, _) => (0..self.cells.len()).any(is_led_to_finished),
+            (Flaw::PriorityHighestFirst, Collision::Priority) => {
+                self.rivals(agent).any(|other| other > agent)
+                    || self.occupant(agent).is_some_and(|other| other < agent)
             }
+            (Flaw::PriorityNobodyFollows, Collision::Priority)
+            | (Flaw::SoftNobodyFollows, Collision::Soft) => follows,
+            (Flaw::BlockBothLowestEnters, Collision::BlockBoth) => self.has_lower_rival(agent),
+            (Flaw::SoftHighestWins, Collision::Soft) => self.rivals(agent).any(|other| other > agent),
+            (Flaw::SoftAllContendersStay, Collision::Soft) => self.rivals(agent).next().is_some(),
+            (Flaw::SoftNoRotation, Collision::Soft) => self.rotates(agent),
+            _ => false,
         }
     }
 
-    /// Whether a cell is marked by somebody who blocks it.
-    fn is_taken(&self, target: Place) -> bool {
-        let is_finished = |agent: usize| !self.active[agent] && self.cells[agent] == target;
-        let only_seen = self.has(Flaw::FinishedAreSeen) && (0..self.cells.len()).any(is_finished);
-        let stands = |agent: usize| self.active[agent] && self.cells[agent] == target;
-        let holds = (0..self.cells.len()).any(stands);
-        self.occupied.contains(&target) && (holds || !only_seen)
+    fn goes_nevertheless(&self, agent: usize, after: &[Cell]) -> bool {
+        let target = self.targets[agent];
+        if self.flaw == Flaw::FinishedMove {
+            let is_taken = after.iter().any(|cell| cell.toward(Action::Stay) == target);
+            return !self.before.active[agent] && !self.is_blocked(target) && !is_taken;
+        }
+        if self.flaw == Flaw::MapHasNoWall {
+            return !self.is_on_map(target);
+        }
+        let Some(ahead) = self.occupant(agent) else { return false };
+        match (self.flaw, self.config.collision) {
+            (Flaw::PriorityHighestFirst, Collision::Priority) => {
+                ahead > agent && after[ahead] != self.before.cells[ahead]
+            }
+            (Flaw::BlockBothFollows, Collision::BlockBoth) => {
+                self.wants(ahead) && self.rivals(agent).next().is_none()
+            }
+            (Flaw::SoftSwaps, Collision::Soft) => self.targets[ahead] == self.cells[agent],
+            (Flaw::SoftOnlyDirectConflicts, Collision::Soft) => self.distance_to_cause(agent) >= 2,
+            (Flaw::SoftChainStopsAfterOne, Collision::Soft) => self.distance_to_cause(agent) >= 3,
+            (Flaw::SoftWaitClaimsNothing, Collision::Soft) => {
+                !self.wants(ahead) && !self.has_lower_rival(agent)
+            }
+            (Flaw::SoftObstaclesLast, Collision::Soft) => {
+                self.is_blocked(self.targets[ahead]) && !self.has_lower_rival(agent)
+            }
+            _ => false,
+        }
     }
 
-    fn move_blocking_both(&mut self, actions: &[Action]) {
-        let targets: HashMap<usize, Place> =
-            self.active_agents().into_iter().map(|agent| (agent, self.target(agent, actions))).collect();
-        let taken: HashSet<Place> = self.occupied.iter().copied().filter(|&at| self.is_taken(at)).collect();
-        let is_left =
-            |at: Place| targets.iter().any(|(&other, &target)| self.cells[other] == at && target != at);
-        let may_move = |agent: &usize| {
-            let target = targets[agent];
-            let mut wanting: Vec<usize> =
-                targets.iter().filter(|(_, other)| **other == target).map(|(&other, _)| other).collect();
-            wanting.sort_unstable();
-            let alone =
-                wanting.len() == 1 || self.has(Flaw::BlockBothLowestEnters) && wanting.first() == Some(agent);
-            let free = !taken.contains(&target) || self.has(Flaw::BlockBothFollows) && is_left(target);
-            alone && free && !self.is_blocked(target)
+    fn wants(&self, agent: usize) -> bool {
+        self.targets[agent] != self.cells[agent]
+    }
+
+    fn is_on_map(&self, (row, col): Place) -> bool {
+        (0..self.map.height() as i32).contains(&row) && (0..self.map.width() as i32).contains(&col)
+    }
+
+    fn is_blocked(&self, place: Place) -> bool {
+        !self.is_on_map(place) || self.map.is_obstacle(Cell::new(place.0 as u16, place.1 as u16))
+    }
+
+    /// The other active agent on the cell that an agent aims at.
+    fn occupant(&self, agent: usize) -> Option<usize> {
+        let is_there = |&other: &usize| {
+            other != agent && self.before.active[other] && self.cells[other] == self.targets[agent]
         };
-        let moving: Vec<usize> = self.active_agents().into_iter().filter(may_move).collect();
-        for agent in moving {
-            self.put(agent, targets[&agent]);
+        (0..self.cells.len()).find(is_there)
+    }
+
+    /// The other active agents that want to enter the same cell.
+    fn rivals(&self, agent: usize) -> impl Iterator<Item = usize> {
+        let target = self.targets[agent];
+        (0..self.cells.len()).filter(move |&other| {
+            other != agent && self.before.active[other] && self.wants(other) && self.targets[other] == target
+        })
+    }
+
+    fn has_lower_rival(&self, agent: usize) -> bool {
+        self.rivals(agent).any(|other| other < agent)
+    }
+
+    /// Whether an agent is part of a ring in which each wants the cell of the next one.
+    fn rotates(&self, agent: usize) -> bool {
+        let next = |&other: &usize| self.occupant(other);
+        std::iter::successors(self.occupant(agent), next).take(self.cells.len()).any(|other| other == agent)
+    }
+
+    /// How many agents ahead the cause lies that keeps an agent where it is: 0 for a wait, a swap or an obstacle of its
+    /// own, 1 for a cell that another agent keeps or wins.
+    fn distance_to_cause(&self, agent: usize) -> usize {
+        let ahead = self.occupant(agent);
+        let swaps = ahead.is_some_and(|other| self.targets[other] == self.cells[agent]);
+        if !self.wants(agent) || swaps || self.is_blocked(self.targets[agent]) {
+            return 0;
+        }
+        match ahead {
+            Some(other) if !self.has_lower_rival(agent) => 1 + self.distance_to_cause(other),
+            _ => 1,
         }
     }
+}
+
+/// An action as a port with this flaw reads it.
+fn turned(flaw: Flaw, action: Action) -> Action {
+    use Action::{Down, Left, Right, Stay, Up};
+    let turned = match flaw {
+        Flaw::UpIsDown => [Stay, Down, Up, Left, Right],
+        Flaw::RowsAreColumns => [Stay, Left, Right, Up, Down],
+        _ => Action::ALL,
+    };
+    turned[action as usize]
 }

@@ -61,7 +61,10 @@ fn a_true_trace_passes_and_an_altered_one_does_not() {
     let report = check_traces(&paths).unwrap();
     assert_eq!(report.causes.len(), 1);
     let found = report.causes[0].example.divergence.as_ref().unwrap();
-    assert_eq!((found.op, found.field.as_str(), found.rule.as_str()), (8, "cell 2", "collide/soft"));
+    assert_eq!(
+        (found.op, found.field.to_string().as_str(), found.rule.as_str()),
+        (8, "cell 2", "collide/soft")
+    );
     assert!(report.causes[0].example.name.ends_with("wrong.jsonl"));
 }
 

@@ -1,0 +1,68 @@
+//! The names of what differs.
+
+use serde::{Serialize, Serializer};
+
+/// What differs between two answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The name of the value or list, such as `cell`.
+    pub name: &'static str,
+    /// Which part of it differs.
+    pub part: FieldPart,
+}
+
+/// Which part of a value or list differs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldPart {
+    /// The value as a whole.
+    Whole,
+    /// The length of the list.
+    Length,
+    /// One element of the list.
+    Element(usize),
+    /// The window of one agent.
+    Window {
+        /// The agent.
+        agent: usize,
+        /// The first value that differs, row by row. A hash has no values.
+        value: Option<usize>,
+    },
+}
+
+impl Field {
+    /// The field without its index. Differences of one kind have one cause.
+    pub fn kind(&self) -> String {
+        match self.part {
+            FieldPart::Length => format!("number of {} entries", self.name),
+            _ => self.name.into(),
+        }
+    }
+
+    /// The index of the agent or list element.
+    pub fn index(&self) -> Option<usize> {
+        match self.part {
+            FieldPart::Element(index) | FieldPart::Window { agent: index, .. } => Some(index),
+            FieldPart::Whole | FieldPart::Length => None,
+        }
+    }
+}
+
+impl std::fmt::Display for Field {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = self.name;
+        match self.part {
+            FieldPart::Whole | FieldPart::Length => f.write_str(&self.kind()),
+            FieldPart::Element(index) => write!(f, "{name} {index}"),
+            FieldPart::Window { agent, value: None } => write!(f, "{name} of agent {agent}"),
+            FieldPart::Window { agent, value: Some(value) } => {
+                write!(f, "{name} of agent {agent}, value {value} row by row")
+            }
+        }
+    }
+}
+
+impl Serialize for Field {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

@@ -1,0 +1,57 @@
+//! Bugs in what agents see.
+
+use pogema_core::{Cell, Config, Map, Snapshot};
+
+use crate::flaw::Flaw;
+
+/// The goal that an agent sees in place of its own.
+pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
+    let radius = radius as i32;
+    let down = i32::from(goal.row) - i32::from(cell.row);
+    let right = i32::from(goal.col) - i32::from(cell.col);
+    let longest = down.abs().max(right.abs());
+    if longest <= radius {
+        return goal;
+    }
+    let on_line = |away: i32| (f64::from(away * radius) / f64::from(longest)).round() as i32;
+    let (down, right) = match flaw {
+        Flaw::GoalNormalised => (on_line(down), on_line(right)),
+        Flaw::GoalClampedByLongerAxis if down.abs() > right.abs() => (down, 0),
+        Flaw::GoalClampedByLongerAxis => (0, right),
+        _ => (down, right),
+    };
+    Cell::new((i32::from(cell.row) + down) as u16, (i32::from(cell.col) + right) as u16)
+}
+
+/// Plants a bug in the observation of one agent.
+///
+/// Shape: three channels of a window each.
+pub fn spoil(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: usize, channels: &mut [f32]) {
+    let side = config.side();
+    let area = side * side;
+    match flaw {
+        Flaw::FinishedSeeNothing if !state.active[agent] => channels.fill(0.0),
+        Flaw::SelfUnseen => channels[area + area / 2] = 0.0,
+        Flaw::WindowTransposed => {
+            for channel in channels.chunks_mut(area) {
+                let seen = channel.to_vec();
+                (0..area).for_each(|at| channel[at] = seen[at % side * side + at / side]);
+            }
+        }
+        Flaw::NoRing => {
+            let Cell { row, col } = state.cells[agent];
+            let place = |at: usize| (usize::from(row) + at / side, usize::from(col) + at % side);
+            let on_ring = (0..area).filter(|&at| is_ring(config, map, place(at)));
+            on_ring.for_each(|at| channels[at] = 0.0);
+        }
+        _ => {}
+    }
+}
+
+/// Whether a place belongs to the wall around the map. Places count from the corner of the border.
+pub fn is_ring(config: &Config, map: &Map, (row, col): (usize, usize)) -> bool {
+    let inner = |at: usize, size: usize| (config.radius..config.radius + size).contains(&at);
+    let outer = |at: usize, size: usize| (config.radius..config.radius + size + 2).contains(&(at + 1));
+    let (height, width) = (map.height(), map.width());
+    outer(row, height) && outer(col, width) && !(inner(row, height) && inner(col, width))
+}
