@@ -37,7 +37,7 @@ impl Engine {
 }
 
 /// Makes an environment for a config.
-pub type Make<'a> = dyn Fn(Config) -> Result<Box<dyn Environment>, Error> + 'a;
+pub type Make<'a> = dyn Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'a;
 
 /// Plays a request on the reference.
 pub fn play(request: &Request) -> Response {

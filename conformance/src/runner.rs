@@ -1,9 +1,11 @@
 //! One run over everything there is to check.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use pogema_core::Error;
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compare::{Divergence, compare};
@@ -291,35 +293,25 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
     }
 }
 
-/// Runs cases on some workers, or as many as there are processors; the results come in the order of the cases.
-pub(crate) fn on_workers<W, T: Send>(
+/// Runs cases on some workers, or as many as there are cores; the results come in the order of the cases.
+///
+/// A worker may be a process that is slow to start, so there is one for each thread and not for each part of the work.
+pub(crate) fn on_workers<W: Send, T: Send>(
     num_workers: Option<usize>,
     num_cases: u64,
     make_worker: impl Fn() -> Result<W, Error> + Sync,
     run: impl Fn(&mut W, u64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    let num_workers =
-        num_workers.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let next = AtomicU64::new(0);
-    let work = || -> Result<Vec<(u64, T)>, Error> {
-        let mut worker = make_worker()?;
-        let mut results = Vec::new();
-        loop {
-            let case = next.fetch_add(1, Ordering::Relaxed);
-            if case >= num_cases {
-                return Ok(results);
-            }
-            results.push((case, run(&mut worker, case)?));
-        }
+    let pool = ThreadPoolBuilder::new().num_threads(num_workers.unwrap_or_default()).build();
+    let pool = pool.map_err(|error| Error::external("threads", error))?;
+    let idle = Mutex::new(Vec::new());
+    let locked = || idle.lock().unwrap_or_else(PoisonError::into_inner);
+    let one = |case| {
+        let taken = locked().pop();
+        let mut worker = taken.map_or_else(&make_worker, Ok)?;
+        let result = run(&mut worker, case);
+        locked().push(worker);
+        result
     };
-    let results = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..num_workers).map(|_| scope.spawn(work)).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<'_, Result<_, Error>>| {
-            worker.join().unwrap_or_else(|_| Err(Error::external("worker", "panicked")))
-        };
-        workers.into_iter().map(join).collect::<Result<Vec<_>, _>>()
-    })?;
-    let mut results: Vec<(u64, T)> = results.into_iter().flatten().collect();
-    results.sort_by_key(|(case, _)| *case);
-    Ok(results.into_iter().map(|(_, result)| result).collect())
+    pool.install(|| (0..num_cases).into_par_iter().map(one).collect())
 }

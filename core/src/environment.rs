@@ -10,10 +10,11 @@ use crate::{Action, Cell, Config, Error, Instance};
 /// An implementation of the rules: one environment with its whole state.
 ///
 /// The caller owns every buffer. Lengths are checked before anything changes, and an `Err` leaves the state
-/// as it was. A step never resets; stepping on after the end is allowed (rule: end/after).
+/// as it was. A step never resets; stepping on after the end is allowed (rule: end/after). An engine is `Send`, since the
+/// kit for ports plays cases on several threads.
 ///
 /// [`crate::Episode`] builds everything else on these methods.
-pub trait Environment {
+pub trait Environment: Send {
     /// The rules and sizes of this environment.
     fn config(&self) -> &Config;
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::files;
 use pogema_conformance::port::{
@@ -18,6 +18,7 @@ use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, score};
 use crate::output::{check_writable, say};
+use crate::words::word;
 
 /// The exit status for a port that breaks the protocol.
 const MISBEHAVED: u8 = 3;
@@ -32,11 +33,11 @@ pub struct Ports {
     #[arg(long, value_name = "PATTERN", requires = "commands", value_parser = glob::Pattern::new)]
     rules: Option<glob::Pattern>,
     /// Check only this profile; may be given several times
-    #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = profile)]
+    #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = word::<Profile>())]
     profiles: Vec<Profile>,
     /// Play only this part; may be given several times
-    #[arg(long = "part", value_enum, value_name = "PART", requires = "commands")]
-    parts: Vec<PartWord>,
+    #[arg(long = "part", value_name = "PART", requires = "commands", value_parser = word::<Part>())]
+    parts: Vec<Part>,
     /// Seconds that a port may take for one answer
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     timeout: f64,
@@ -51,31 +52,6 @@ pub struct Ports {
     traces: Vec<PathBuf>,
     #[command(flatten)]
     outputs: Outputs,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PartWord {
-    /// The hand-written cases
-    Cases,
-    /// The recordings of POGEMA 1.4.0
-    Recordings,
-    /// Drawn cases
-    Drawn,
-}
-
-impl From<PartWord> for Part {
-    fn from(word: PartWord) -> Self {
-        match word {
-            PartWord::Cases => Self::Cases,
-            PartWord::Recordings => Self::Recordings,
-            PartWord::Drawn => Self::Drawn,
-        }
-    }
-}
-
-fn profile(word: &str) -> Result<Profile, String> {
-    serde_json::from_value(word.into())
-        .map_err(|_| "expected core, observations, metrics, seeding, history or policies".to_owned())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -151,7 +127,7 @@ impl Ports {
             profiles: self.profiles.clone(),
             num_workers: self.workers.map(usize::from),
             files: self.files.clone(),
-            parts: self.parts.iter().map(|&part| part.into()).collect(),
+            parts: self.parts.clone(),
         }
     }
 }

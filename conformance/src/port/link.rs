@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::protocol::{Ask, Hello, Reply};
 
 /// Somebody who speaks the protocol.
-pub trait Link {
+pub trait Link: Send {
     /// Who is it, and what does it claim?
     ///
     /// # Errors

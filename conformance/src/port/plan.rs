@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use pogema_core::words;
+
 use super::protocol::Profile;
 
 /// What to check.
@@ -23,13 +25,14 @@ pub struct Plan {
     pub parts: Vec<Part>,
 }
 
-/// A part of what there is to check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The hand-written cases.
-    Cases,
-    /// The recordings of POGEMA 1.4.0.
-    Recordings,
-    /// Drawn cases.
-    Drawn,
+words! {
+    /// A part of a run.
+    pub enum Part {
+        /// The hand-written cases.
+        Cases = "cases",
+        /// The recordings of POGEMA 1.4.0.
+        Recordings = "recordings",
+        /// Drawn cases.
+        Drawn = "drawn",
+    }
 }

@@ -2,7 +2,9 @@
 //!
 //! docs/PORTING.md explains it to those who write ports.
 
-use pogema_core::{Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader};
+use pogema_core::{
+    Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader, words,
+};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
@@ -131,40 +133,40 @@ fn any_number() -> usize {
     usize::MAX
 }
 
-/// A named set of rules that a port claims.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Profile {
-    /// Who moves, which goals come next, what is rewarded, when it ends.
-    Core,
-    /// What agents see.
-    Observations,
-    /// The figures of an episode.
-    Metrics,
-    /// Maps, starts and goals drawn from a config and its seed.
-    Seeding,
-    /// Steps taken back, and the list of changes.
-    History,
-    /// POGEMA's own policies.
-    Policies,
+words! {
+    /// A named set of rules that a port claims.
+    pub enum Profile {
+        /// Which agents move, the next goals, rewards and the end of the episode.
+        Core = "core",
+        /// What agents see.
+        Observations = "observations",
+        /// The figures of an episode.
+        Metrics = "metrics",
+        /// Maps, starts and goals drawn from a config and its seed.
+        Seeding = "seeding",
+        /// Steps taken back, and the list of changes.
+        History = "history",
+        /// POGEMA's own policies.
+        Policies = "policies",
+    }
 }
 
-/// A key of an answer that not every port can give.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Told {
-    /// Who is on the goal, before goals change. Rule: goal/finish
-    OnGoal,
-    /// The cells that the occupancy grid marks. Rule: occupancy/as-released
-    Occupied,
-    /// The map with its border. Rule: border/ring
-    Padded,
-    /// The fields that the config derives. Rule: config/size
-    Derived,
-    /// The goals foretold for each agent. Rule: goal/restart/foretold
-    Foretold,
-    /// The caller's list of actions after the step. Rule: collide/soft/rewrite
-    ActionsAfter,
+words! {
+    /// A key of an answer that not every port can give.
+    pub enum Told {
+        /// The agents on their goals, before goals change. Rule: goal/finish
+        OnGoal = "on_goal",
+        /// The cells that the occupancy grid marks. Rule: occupancy/as-released
+        Occupied = "occupied",
+        /// The map with its border. Rule: border/ring
+        Padded = "padded",
+        /// The fields that the config derives. Rule: config/size
+        Derived = "derived",
+        /// The goals foretold for each agent. Rule: goal/restart/foretold
+        Foretold = "foretold",
+        /// The caller's list of actions after the step. Rule: collide/soft/rewrite
+        ActionsAfter = "actions_after",
+    }
 }
 
 /// A port's answer to anything else; which keys it needs depends on the question and on what the port claims.

@@ -24,7 +24,7 @@ impl Server {
     }
 
     /// A port that plays on whatever environments are made for it.
-    pub fn with(name: &str, make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + 'static) -> Self {
+    pub fn with(name: &str, make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'static) -> Self {
         Self { name: name.into(), make: Box::new(make), player: None }
     }
 
