@@ -5,7 +5,6 @@
 mod links;
 mod schema;
 mod traces;
-mod validate;
 
 use pogema_conformance::port::{
     Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
