@@ -1,13 +1,11 @@
 //! Which planner, and how long it may think.
 
-use std::fmt;
 use std::time::Duration;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings, PolicySettings};
-use serde::{Deserialize, Serialize};
 
 /// The names of planners, each with what it is good for.
 pub fn names(known: &'static [(&'static str, &'static str)]) -> PossibleValuesParser {
@@ -15,7 +13,7 @@ pub fn names(known: &'static [(&'static str, &'static str)]) -> PossibleValuesPa
 }
 
 /// How long a planner may think, and on how many threads.
-#[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Args, Clone, Debug)]
 pub struct Thinking {
     /// Most time for a plan, in seconds; 1 if `--nodes` is not given either
     #[arg(long, value_name = "S")]
@@ -39,7 +37,8 @@ impl Thinking {
 
     /// What a policy is made with.
     pub fn settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
-        Ok(PolicySettings { budget: self.budget()?, planner: self.choice(), future_goals })
+        let (budget, planner) = (self.budget()?, self.choice());
+        Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
     }
 
     /// The budget for one plan.
@@ -50,17 +49,5 @@ impl Thinking {
                 .map_err(|_| Error::config("seconds", seconds, "a time of 0 or more"))
         };
         Ok(Budget { time: seconds.map(time).transpose()?, nodes: self.nodes, cancelled: None })
-    }
-}
-
-impl fmt::Display for Thinking {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut bounds = Vec::new();
-        if let Some(seconds) = self.seconds.or(self.nodes.is_none().then_some(1.0)) {
-            bounds.push(format!("{seconds} s"));
-        }
-        bounds.extend(self.nodes.map(|nodes| format!("{nodes} nodes")));
-        let threads = if self.threads == 1 { "1 thread".into() } else { format!("{} threads", self.threads) };
-        write!(f, "{} on {threads}", bounds.join(" or "))
     }
 }

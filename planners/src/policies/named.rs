@@ -4,6 +4,7 @@ use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal};
 use pogema_numpy::Generator;
 
 use crate::budget::Budget;
+use crate::outcome::Outcome;
 use crate::policies::astar::AStarTeam;
 use crate::policies::lifelong_policy::LifelongPolicy;
 use crate::policies::observations::PomapfObservations;
@@ -27,6 +28,8 @@ pub struct PolicySettings {
     pub planner: PlannerSettings,
     /// Whether a lifelong planner knows future goals.
     pub future_goals: bool,
+    /// Whether a one-shot planner that finds no plan is not called again in that episode.
+    pub single_attempt: bool,
 }
 
 /// A policy for all agents of one episode, made by name.
@@ -57,7 +60,7 @@ impl NamedPolicy {
     /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
     ///
     /// # Errors
-    /// [`Error::Config`] for an unknown name; [`Error::Request`] for future goals that the policy does not use.
+    /// [`Error::Config`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
     pub fn new(
         name: &str,
         settings: &PolicySettings,
@@ -66,10 +69,15 @@ impl NamedPolicy {
         generator: Generator,
     ) -> Result<Self, Error> {
         let has = |known: &[(&str, &str)]| known.iter().any(|(known, _)| *known == name);
-        let PolicySettings { budget, planner: planner_settings, future_goals } = settings.clone();
+        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt } =
+            settings.clone();
         let is_lifelong = has(&LIFELONG) && (config.on_goal == OnGoal::Restart || !has(&PLANNERS));
         if future_goals && !is_lifelong {
             let reason = format!("`{name}` does not use future goals; only lifelong planners do");
+            return Err(Error::Request { reason });
+        }
+        if single_attempt && (is_lifelong || !has(&PLANNERS)) {
+            let reason = format!("`{name}` does not use a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
         }
         Ok(Self(match name {
@@ -85,13 +93,18 @@ impl NamedPolicy {
             }
             name => {
                 let max_steps = u64::try_from(config.max_steps).ok();
-                Kind::Planner(Box::new(PlannerPolicy::new(
-                    planner(name, planner_settings)?,
-                    budget,
-                    max_steps,
-                )))
+                let policy = PlannerPolicy::new(planner(name, planner_settings)?, budget, max_steps);
+                Kind::Planner(Box::new(if single_attempt { policy.with_single_attempt() } else { policy }))
             }
         }))
+    }
+
+    /// Returns the outcome of the first call of a one-shot planner, whose problem is the whole episode.
+    pub fn first_outcome(&self) -> Option<&Outcome> {
+        match &self.0 {
+            Kind::Planner(policy) => policy.outcomes().first(),
+            _ => None,
+        }
     }
 
     /// Returns the actions of the next step.
