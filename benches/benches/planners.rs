@@ -76,7 +76,7 @@ fn walk(instance: &Instance) -> Duration {
     let mut streams = instance.goals().to_vec();
     let mut now = graph.vertices_of("start", instance.starts()).unwrap();
     let mut goals = graph.vertices_of("goal", &instance.first_goals()).unwrap();
-    let mut pibt = PibtLifelong::new(graph.clone(), now.len(), PibtParams::default());
+    let mut pibt = PibtLifelong::new(graph.clone(), PibtParams::default());
     let mut time = Duration::ZERO;
     for _ in 0..NUM_STEPS {
         let start = Instant::now();

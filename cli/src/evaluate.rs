@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::{
     Begin, Environments, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
@@ -16,6 +16,7 @@ use pogema_toolbox::{
 
 use crate::maps::Sources;
 use crate::output::{check_writable, say};
+use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
 pub struct Evaluate {
@@ -30,8 +31,8 @@ pub struct Evaluate {
     #[command(flatten)]
     sources: Sources,
     /// Threads that play; by default as many as the machine has
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
+    #[arg(long, value_name = "N", value_parser = number_of_threads())]
+    threads: Option<usize>,
     /// Go on with the results of an earlier run that broke off
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -65,7 +66,8 @@ impl Evaluate {
         let watch = |event: Event<'_>| bar.show(event);
         let stop = AtomicBool::new(false);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = self.threads.map_or(cores, usize::from);
+        let threads = self.threads.unwrap_or(cores);
+        note_threads(threads);
         let running = Running { threads, stop: &stop, watch: &watch };
         let summary = run(&suite, &environments, &store, running)?;
         let write = |path: &PathBuf| write_report(path, &self.out, &suite, &environments, &store);

@@ -12,7 +12,9 @@ mod port;
 mod render;
 mod replay;
 mod run;
+mod threads;
 mod views;
+mod words;
 
 use std::process::ExitCode;
 

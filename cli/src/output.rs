@@ -52,6 +52,14 @@ pub fn write_trace(path: &Path, trace: &Trace) -> Result<(), Error> {
     pogema_conformance::files::write(path, &text)
 }
 
+/// Names the flag whose value an error is about.
+pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
+    move |error| match error {
+        Error::OutOfRange { value, expected, .. } => Error::argument(flag, value, expected),
+        error => error,
+    }
+}
+
 /// A table that is Markdown too, its numbers to the right of a first column of names.
 pub fn markdown_table(head: &[&str]) -> Table {
     let mut table = Table::new();

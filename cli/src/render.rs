@@ -11,6 +11,8 @@ use pogema_conformance::files;
 use pogema_core::{Error, Trace, shorten};
 use pogema_render::{Ground, check};
 
+use crate::output::flagged;
+
 pub use pictures::Pictures;
 
 #[derive(Args, Debug)]
@@ -54,7 +56,7 @@ impl Render {
         check(&trace).map_err(|error| Error::io(&self.trace, error))?;
         self.pictures.check(trace.header.config.num_agents)?;
         let (first, trace) = match self.steps {
-            Some(Steps { first, last }) => (first, trace.part(first..=last)?),
+            Some(Steps { first, last }) => (first, trace.part(first..=last).map_err(flagged("--steps"))?),
             None => (0, trace),
         };
         let name = self.trace.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -68,7 +70,9 @@ impl Render {
     fn play(&self, trace: &Trace, first: usize) -> Result<(), Error> {
         let (mut screen, ground) = (self.pictures.screen(), Ground::of(trace));
         match self.pictures.frame() {
-            Some(frame) => screen.draw(ground, first + frame, trace.state(frame)?),
+            Some(frame) => {
+                screen.draw(ground, first + frame, trace.state(frame).map_err(flagged("--frame"))?)
+            }
             None => {
                 (first..).zip(trace.states()).try_for_each(|(step, state)| screen.draw(ground, step, state))
             }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use pogema_core::{Episode, Error, Trace};
-use pogema_maps::{GridConfig, InstanceSource};
+use pogema_maps::GridConfig;
 use pogema_reference::Reference;
 use pogema_render::Ground;
 use pogema_toolbox::short;
@@ -53,7 +53,7 @@ impl Run {
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
         let settings = self.thinking.settings(self.future_goals)?;
-        let generated = InstanceSource::new(config.clone(), None)?.generate()?;
+        let generated = self.settings.generate(&config)?;
         for warning in &generated.warnings {
             eprintln!("warning: {warning}");
         }

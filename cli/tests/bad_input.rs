@@ -38,18 +38,27 @@ const REFUSED: [(&str, &str); 51] = [
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
     (
         "run unknown-key.yaml",
-        "config: unknown field `colision_system`, the nearest known one is `collision_system`",
+        "unknown-key.yaml: config: unknown field `colision_system`, the nearest known one is `collision_system`",
     ),
-    ("run wrong-type.yaml", "config: `num_agents` is `\"two\"`, expected a whole number from 1 to 10000000"),
-    ("run --set persistent=1", "config: `persistent` is `1`, expected true or false"),
-    ("run out-of-range.yaml", "config: `obs_radius` is `129`, expected a whole number from 1 to 128"),
-    ("run --size 1", "config: `size` is `1`, expected a whole number from 2 to 4096"),
-    ("run --density 1.5", "config: `density` is `1.5`, expected a number from 0 to 1"),
-    ("run --density nan", "config: `density` is `\"NaN\"`, expected a number from 0 to 1"),
+    (
+        "run wrong-type.yaml",
+        "wrong-type.yaml: config: `num_agents` is `\"two\"`, expected a whole number from 1 to 10000000",
+    ),
+    ("run --set persistent=1", "`--set persistent` is `1`, expected true or false"),
+    (
+        "run out-of-range.yaml",
+        "out-of-range.yaml: config: `obs_radius` is `129`, expected a whole number from 1 to 128",
+    ),
+    ("run --size 1", "`--size` is `1`, expected a whole number from 2 to 4096"),
+    ("run --density 1.5", "`--density` is `1.5`, expected a number from 0 to 1"),
+    ("run --density nan", "`--density` is `\"NaN\"`, expected a number from 0 to 1"),
     ("run nan.yaml", "nan.yaml: config: line 1, column 10: `density` is `NaN`, expected a finite number"),
     ("run list.yaml", "list.yaml: expected fields and values such as `size: 8`"),
-    ("run --set size", "config: `--set size`, expected FIELD=VALUE"),
-    ("run ragged.yaml", "map: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
+    ("run --set size", "`--set` is `size`, expected FIELD=VALUE, such as `empty_outside=false`"),
+    (
+        "run ragged.yaml",
+        "ragged.yaml: map: line 2, column 3: the row has 2 cells, expected 3 as in the first row",
+    ),
     (
         "run --map odd.txt",
         "odd.txt: map: line 2, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
@@ -59,11 +68,11 @@ const REFUSED: [(&str, &str); 51] = [
         "five-rooms: there is no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
          known map; the nearest is `four-rooms`",
     ),
-    ("run twins.yaml", "instance: agent 1: start (0, 0) is the start of agent 0 too"),
-    ("run goals.yaml", "targets_xy has length 1, expected 2"),
+    ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
+    ("run goals.yaml", "goals.yaml: targets_xy has length 1, expected 2"),
     (
         "run --size 3 --density 0 --seed 1 --num-agents 5",
-        "config: `num_agents` is `5`, expected at most 4, for which the map has room",
+        "`--num-agents` is `5`, expected at most 4, for which the map has room",
     ),
     ("run missing.yaml", "missing.yaml: No such file or directory (os error 2)"),
     (
@@ -93,11 +102,8 @@ const REFUSED: [(&str, &str); 51] = [
     ),
     ("run --steps 9000000000 --policy stay --trace blank.yaml/x", "blank.yaml/x: `blank.yaml` is no folder"),
     ("conform --cases 9000000000 --json ./", "./: is no file"),
-    (
-        "bench --rows nothing",
-        "config: `rows` is `nothing`, expected a part of a row's name, such as `64 agents`",
-    ),
-    ("bench --seconds 0", "config: `seconds` is `0`, expected a time above 0"),
+    ("bench --rows nothing", "`--rows` is `nothing`, expected a part of a row's name, such as `64 agents`"),
+    ("bench --seconds 0", "`--seconds` is `0`, expected a time above 0"),
     ("bench --rounds 0", "invalid value '0' for '--rounds <N>': 0 is not in 1..18446744073709551615"),
     ("bench --json no/where.json", "no/where.json: `no`: No such file or directory (os error 2)"),
     ("render", "the following required arguments were not provided:"),
@@ -107,9 +113,9 @@ const REFUSED: [(&str, &str); 51] = [
         "render trace.jsonl --svg nowhere/a.svg",
         "nowhere/a.svg: `nowhere`: No such file or directory (os error 2)",
     ),
-    ("render trace.jsonl --frame 1", "frame is `1`, expected 0 to 0"),
-    ("render trace.jsonl --png a.png --frame 1", "frame is `1`, expected 0 to 0"),
-    ("render trace.jsonl --svg a.svg --egocentric 1", "agent is `1`, expected 0 to 0"),
+    ("render trace.jsonl --frame 1", "`--frame` is `1`, expected 0 to 0"),
+    ("render trace.jsonl --png a.png --frame 1", "`--frame` is `1`, expected 0 to 0"),
+    ("render trace.jsonl --svg a.svg --egocentric 1", "`--egocentric` is `1`, expected 0 to 0"),
     ("render trace.jsonl --png a.png --width 0", "`--width` is `0`, expected at least 1"),
     (
         "render trace.jsonl --png a.png --width 90000",
@@ -126,12 +132,12 @@ const REFUSED: [(&str, &str); 51] = [
         "render trace.jsonl --steps 3..1",
         "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected two steps such as `10..20`",
     ),
-    ("render trace.jsonl --steps 0..1", "frame is `1`, expected 0 to 0"),
+    ("render trace.jsonl --steps 0..1", "`--steps` is `1`, expected 0 to 0"),
     (
         "render trace.jsonl --colors red",
         "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected one such as `#c1433c`",
     ),
-    ("run --gif a.gif --view 5", "agent is `5`, expected 0 to 0"),
+    ("run --gif a.gif --view 5", "`--egocentric` is `5`, expected 0 to 0"),
 ];
 
 fn folder() -> tempfile::TempDir {

@@ -98,8 +98,8 @@ fn wrong_calls_are_one_line() {
     for (arguments, part) in [
         (vec!["plan", "--planner", "none"], "invalid value 'none' for '--planner <NAME>'"),
         (vec!["plan", "--seconds", "-1"], "-1"),
-        (vec!["plan", "--seconds=-1"], "config: `seconds` is `-1`, expected a time of 0 or more"),
-        (vec!["plan", "--threads", "3"], "3 is not in 1..=2"),
+        (vec!["plan", "--seconds=-1"], "`--seconds` is `-1`, expected a time of 0 or more"),
+        (vec!["plan", "--threads", "1025"], "1025 is not in 1..=1024"),
         (vec!["plan", "--out", "no/such/folder"], "no/such"),
         (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
         (

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 
 /// Opens a text, decompressing it if its name ends in `.zst`.
 ///

@@ -160,9 +160,9 @@ fn refusal<T>(result: Result<T, Error>) -> String {
 fn wrong_calls_name_both_numbers_and_change_nothing() {
     let source = |lane, episode| instance(OnGoal::Finish, lane, episode);
     let new = |lanes, threads| refusal(Batch::new(config(OnGoal::Finish), lanes, threads, source));
-    assert_eq!(new(0, 1), "config: `num_lanes` is `0`, expected at least 1");
-    assert_eq!(new(2, 3), "config: `num_threads` is `3`, expected 1 to 2, the number of lanes");
-    assert_eq!(new(2, 0), "config: `num_threads` is `0`, expected 1 to 2, the number of lanes");
+    assert_eq!(new(0, 1), "`num_lanes` is `0`, expected at least 1");
+    assert_eq!(new(2, 1025), "`num_threads` is `1025`, expected 1 to 1024");
+    assert_eq!(new(2, 0), "`num_threads` is `0`, expected 1 to 1024");
     let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
     assert_eq!(refusal(batch.observe(Observations::None)), "the environment was not reset yet");
     batch.reset().unwrap();

@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_core::{Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State};
+use pogema_core::{Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State, Words};
 use pogema_maps::{GridConfig, InstanceSource, PUZZLES, Puzzle, named_map};
 use pogema_planners::{
-    Budget, ConflictKind, LIFELONG, LifelongPolicy, PLANNERS, Plan, PlannerPolicy, PlannerSettings, Problem,
-    planner, validate,
+    Budget, ConflictKind, LifelongName, LifelongPolicy, Plan, PlannerName, PlannerPolicy, PlannerSettings,
+    Problem, validate,
 };
 use pogema_reference::Reference;
 use serde_json::json;
@@ -42,15 +42,14 @@ fn surprise(config: &Config, instance: &Instance, plan: &Plan) -> Option<usize> 
 
 #[test]
 fn the_reference_plays_plans_as_they_are() {
-    for (name, _) in PLANNERS {
+    for name in PlannerName::all() {
         let mut num_solved = 0;
         for seed in 0..30 {
-            let num_agents = if matches!(name, "cbs" | "ecbs") { 4 } else { 10 };
+            let num_agents = if matches!(name, PlannerName::Cbs | PlannerName::Ecbs) { 4 } else { 10 };
             let (config, instance) = drawn(seed, 10, num_agents, "nothing");
             let problem = Problem::of(&instance).unwrap();
-            let outcome = planner(name, PlannerSettings { seed, threads: 1 })
-                .unwrap()
-                .plan(&problem, &Budget::of_nodes(300));
+            let outcome =
+                name.make(PlannerSettings { seed, threads: 1 }).plan(&problem, &Budget::of_nodes(300));
             let Some(plan) = outcome.best() else { continue };
             let goals = instance.first_goals();
             let goals = outcome.solution().map(|_| goals.as_slice());
@@ -97,12 +96,11 @@ fn play(
 
 #[test]
 fn agents_go_from_goal_to_goal_without_a_collision() {
-    for (name, _) in LIFELONG {
+    for name in LifelongName::all() {
         for seed in 0..4 {
             let (config, instance) = drawn(seed, 12, 12, "restart");
             let mut policy =
-                LifelongPolicy::new(name, PlannerSettings { seed, threads: 1 }, Budget::of_nodes(200))
-                    .unwrap();
+                LifelongPolicy::new(name, PlannerSettings { seed, threads: 1 }, Budget::of_nodes(200));
             let (num_reached, num_reverted) =
                 play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
             assert_eq!(num_reverted, 0.0, "{name}, seed {seed}");
@@ -115,7 +113,7 @@ fn agents_go_from_goal_to_goal_without_a_collision() {
 fn reached_by_knowing(episodes: &[(GridConfig, Instance)]) -> [f32; 2] {
     let reached = |is_told: bool, (config, instance): &(GridConfig, Instance)| {
         let mut policy =
-            LifelongPolicy::new("rhcr", PlannerSettings::default(), Budget::of_nodes(200)).unwrap();
+            LifelongPolicy::new(LifelongName::Rhcr, PlannerSettings::default(), Budget::of_nodes(200));
         if is_told {
             policy.provide_future_goals(instance).unwrap();
         }
@@ -148,9 +146,9 @@ fn agents_that_know_their_goals_to_come_reach_more_of_them() {
 #[test]
 fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     let (config, instance) = drawn(1, 12, 16, "restart");
-    let new = |name| LifelongPolicy::new(name, PlannerSettings::default(), Budget::of_nodes(50)).unwrap();
-    assert!(new("pibt").provide_future_goals(&instance).is_err());
-    let mut policy = new("rhcr");
+    let new = |name| LifelongPolicy::new(name, PlannerSettings::default(), Budget::of_nodes(50));
+    assert!(new(LifelongName::Pibt).provide_future_goals(&instance).is_err());
+    let mut policy = new(LifelongName::Rhcr);
     policy.provide_future_goals(&instance).unwrap();
     let other = started(&config.rules(), &drawn(2, 12, 16, "restart").1);
     assert!(policy.act(instance.map(), other.state()).unwrap_err().to_string().contains("was not to come"));
@@ -166,7 +164,7 @@ fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
 fn agents_that_finish_leave_and_the_others_go_on() {
     for seed in 0..8 {
         let (config, instance) = drawn(seed, 8, 8, "finish");
-        let planner = planner("lacam", PlannerSettings::default()).unwrap();
+        let planner = PlannerName::Lacam.make(PlannerSettings::default());
         let mut policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(64));
         let (num_reached, _) =
             play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
@@ -181,7 +179,7 @@ fn a_policy_plans_anew_when_the_world_is_another() {
     let (config, instance) = drawn(3, 8, 4, "nothing");
     let rules = Config { collision: Collision::Priority, on_goal: OnGoal::Nothing, ..config.rules() };
     let mut policy = PlannerPolicy::new(
-        planner("lacam", PlannerSettings::default()).unwrap(),
+        PlannerName::Lacam.make(PlannerSettings::default()),
         Budget::of_nodes(300),
         Some(64),
     );

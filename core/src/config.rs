@@ -4,67 +4,70 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// How moves that get in each other's way are resolved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Collision {
-    /// One agent after another, lowest index first. Rule: collide/priority
-    #[default]
-    Priority,
-    /// Nobody enters a cell that is occupied or wanted by two. Rule: collide/block-both
-    BlockBoth,
-    /// All at once; only impossible moves are taken back. Rule: collide/soft
-    Soft,
+crate::words! {
+    /// How conflicting moves are resolved.
+    #[derive(Default)]
+    pub enum Collision {
+        /// One agent after another, lowest index first. Rule: collide/priority
+        #[default]
+        Priority = "priority",
+        /// No agent enters a cell that is occupied or wanted by two. Rule: collide/block-both
+        BlockBoth = "block_both",
+        /// All at once; only impossible moves are taken back. Rule: collide/soft
+        Soft = "soft",
+    }
 }
 
-/// What happens when an agent reaches its goal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnGoal {
-    /// The agent leaves the map. Rule: goal/finish
-    #[default]
-    Finish,
-    /// Nothing, until all agents are on their goals at once. Rule: goal/nothing
-    Nothing,
-    /// The agent gets its next goal. Rule: goal/restart
-    Restart,
+crate::words! {
+    /// What happens when an agent reaches its goal.
+    #[derive(Default)]
+    pub enum OnGoal {
+        /// The agent leaves the map. Rule: goal/finish
+        #[default]
+        Finish = "finish",
+        /// Nothing, until all agents are on their goals at once. Rule: goal/nothing
+        Nothing = "nothing",
+        /// The agent gets its next goal. Rule: goal/restart
+        Restart = "restart",
+    }
 }
 
-/// What the occupancy grid shows after a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Occupancy {
-    /// As POGEMA 1.4.0 leaves it, which under `soft` loses agents. Rule: occupancy/as-released
-    #[default]
-    AsReleased,
-    /// Every active agent's cell. Rule: occupancy/exact
-    Exact,
+crate::words! {
+    /// What the occupancy grid shows after a step.
+    #[derive(Default)]
+    pub enum Occupancy {
+        /// As POGEMA 1.4.0 leaves it, which under `soft` loses agents. Rule: occupancy/as-released
+        #[default]
+        AsReleased = "as_released",
+        /// Every active agent's cell. Rule: occupancy/exact
+        Exact = "exact",
+    }
 }
 
-/// Which arrays an agent observes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Observation {
-    /// Three windows: obstacles, agents, goal. Rule: observe/default
-    #[default]
-    #[serde(rename = "default")]
-    Default,
-    /// Two windows and positions relative to the start. Rule: observe/pomapf
-    #[serde(rename = "POMAPF")]
-    Pomapf,
-    /// The same and the whole map. Rule: observe/mapf
-    #[serde(rename = "MAPF")]
-    Mapf,
+crate::words! {
+    /// Which arrays an agent observes.
+    #[derive(Default)]
+    pub enum Observation {
+        /// Three windows: obstacles, agents, goal. Rule: observe/default
+        #[default]
+        Default = "default",
+        /// Two windows and positions relative to the start. Rule: observe/pomapf
+        Pomapf = "POMAPF",
+        /// The same and the whole map. Rule: observe/mapf
+        Mapf = "MAPF",
+    }
 }
 
-/// Who is rewarded for a goal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Reward {
-    /// As POGEMA 1.4.0 pays it. Rule: reward/own
-    #[default]
-    Own,
-    /// The share of agents on their goals, to everybody. Rule: reward/shared
-    Shared,
+crate::words! {
+    /// Which agents are rewarded for a goal.
+    #[derive(Default)]
+    pub enum Reward {
+        /// As POGEMA 1.4.0 pays it. Rule: reward/own
+        #[default]
+        Own = "own",
+        /// The share of agents on their goals, to every agent. Rule: reward/shared
+        Shared = "shared",
+    }
 }
 
 /// The rules and sizes of an episode; with an [`crate::Instance`] and actions it fixes every array.

@@ -9,13 +9,23 @@ use std::sync::Arc;
 #[non_exhaustive]
 pub enum Error {
     /// A config field holds what it may not hold.
-    #[error("{}", one_line(format_args!("config: `{field}` is `{value}`, expected {expected}")))]
+    #[error("{}", one_line(format_args!("config: {}", wrong_field(field, value, expected))))]
     Config {
         /// The field, by the name the file gives it.
         field: String,
         /// The offending value.
         value: String,
         /// What would have been right.
+        expected: String,
+    },
+    /// An argument of a call, or a flag of the program, holds what it may not hold.
+    #[error("{}", one_line(wrong_field(name, value, expected)))]
+    Argument {
+        /// The argument, or the flag with its hyphens.
+        name: String,
+        /// The offending value.
+        value: String,
+        /// What is accepted.
         expected: String,
     },
     /// A config field names a cell outside the map.
@@ -240,6 +250,10 @@ fn of_agent(agent: Option<usize>) -> String {
     agent.map(|index| format!(" of agent {index}")).unwrap_or_default()
 }
 
+fn wrong_field(field: &str, value: &str, expected: &str) -> String {
+    format!("`{field}` is `{value}`, expected {expected}")
+}
+
 impl Error {
     /// So much of a value of the input is quoted. Units: characters.
     pub const LONGEST_QUOTE: usize = 60;
@@ -248,6 +262,12 @@ impl Error {
     pub fn config(field: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::Config { field: field.into(), value, expected: expected.into() }
+    }
+
+    /// An error about one argument of a call, or one flag of the program.
+    pub fn argument(name: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
+        let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
+        Self::Argument { name: name.into(), value, expected: expected.into() }
     }
 
     /// An error about a requested value that does not exist.
@@ -266,6 +286,15 @@ impl Error {
         match self {
             Self::Config { field, .. } | Self::CellOutside { field, .. } => Some(field),
             _ => None,
+        }
+    }
+
+    /// Returns the text of a wrong config without the leading `config:`, for messages that name the config already.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Config { field, value, expected } => one_line(wrong_field(field, value, expected)),
+            Self::Syntax { reason } => one_line(reason),
+            other => other.to_string(),
         }
     }
 

@@ -14,7 +14,9 @@
 //! | [`Episode`] | an engine at play, measured and recorded |
 //! | [`Trace`] | a recorded episode, as JSON lines |
 //! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
+//! | [`files`] | files that are written whole or not at all |
 //! | [`picture`] | text pictures of a state |
+//! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
 //! | [`Error`] | the one error type |
 
 #![forbid(unsafe_code)]
@@ -24,6 +26,7 @@ mod config;
 mod environment;
 mod episode;
 mod error;
+pub mod files;
 mod goals;
 mod history;
 mod instance;
@@ -31,7 +34,12 @@ mod map;
 pub mod metrics;
 mod observe;
 pub mod picture;
+mod threads;
 mod trace;
+mod words;
+
+#[doc(hidden)]
+pub use serde;
 
 pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
@@ -44,4 +52,6 @@ pub use instance::{Instance, Outside};
 pub use map::{Map, check_row_length};
 pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 pub use observe::{from_border, from_starts};
+pub use threads::{MAX_THREADS, check_threads, threads_note};
 pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};
+pub use words::{Word, Words, deserialize_word, serialize_word};

@@ -6,7 +6,7 @@ mod parse;
 mod read;
 mod write;
 
-use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, Reward};
+use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, Reward, words};
 
 pub(crate) use fields::cells as cells_of;
 pub use fields::{FIELDS, nearest};
@@ -106,27 +106,34 @@ impl Targets {
     }
 }
 
-/// The frameworks POGEMA can wrap an environment for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is the framework's own name")]
-pub enum Integration {
-    SampleFactory,
-    PyMarl,
-    Rllib,
-    Gymnasium,
-    PettingZoo,
+words! {
+    /// The frameworks POGEMA can wrap an environment for.
+    pub enum Integration {
+        /// Sample Factory.
+        SampleFactory = "SampleFactory",
+        /// PyMARL.
+        PyMarl = "PyMARL",
+        /// RLlib.
+        Rllib = "rllib",
+        /// Gymnasium.
+        Gymnasium = "gymnasium",
+        /// PettingZoo.
+        PettingZoo = "PettingZoo",
+    }
 }
 
-/// How large maps and crowds may be.
-///
-/// Rule: config/limits
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Limits {
-    /// As POGEMA 1.4.0: sides up to 4096, up to 10,000,000 agents.
-    #[default]
-    AsReleased,
-    /// As our types: sides up to [`Map::LONGEST_SIDE`], agents up to 2³²−1.
-    Extended,
+words! {
+    /// The largest maps and crowds.
+    ///
+    /// Rule: config/limits
+    #[derive(Default)]
+    pub enum Limits {
+        /// As POGEMA 1.4.0: sides up to 4096, up to 10,000,000 agents.
+        #[default]
+        AsReleased = "as_released",
+        /// As our types: sides up to [`Map::LONGEST_SIDE`], agents up to 2³²−1.
+        Extended = "extended",
+    }
 }
 
 impl Default for GridConfig {

@@ -1,7 +1,7 @@
 //! Maps and scenarios from files, and files written whole or not at all.
 
 use std::fs::File;
-use std::io::{Cursor, Read, Write};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 use crate::config::{FIELDS, GridConfig, value_from_yaml};
@@ -147,24 +147,4 @@ pub fn ending(path: &Path) -> &str {
 
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-/// What the name of a file begins with that a process was writing when it was killed.
-pub const UNFINISHED: &str = ".pogema-unfinished-";
-
-/// Writes a file under a temporary name and renames it.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be written; a file that was there before is then still there.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let failed = |error: std::io::Error| Error::io(path, error);
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(UNFINISHED);
-    // A temporary file is its owner's alone by default; what it becomes is for everybody the umask lets.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(path).map(|_| ()).map_err(|error| failed(error.error))
 }

@@ -78,13 +78,16 @@ impl Library {
         Ok(names)
     }
 
-    /// The map that a seed chooses among those that a pattern matches.
+    /// Returns the map of a name, or the map that a seed chooses among those that a pattern matches.
     ///
     /// # Errors
     /// As [`Library::matching`].
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     pub fn choose(&self, pattern: &str, seed: u64) -> Result<(&str, &MapText), Error> {
+        if let Some((name, text)) = self.maps.get_key_value(pattern) {
+            return Ok((name, text));
+        }
         let names = self.matching(pattern)?;
         let index = Generator::seeded(seed).integers(0, names.len() as i64).unwrap_or_default();
         let name = names[index as usize];

@@ -64,9 +64,9 @@ impl MapStats {
 
 /// Why a scenario cannot be solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Doubt {
+pub enum Infeasibility {
     /// There is no way from this agent's start to its goal.
-    NoWay(usize),
+    NoPath(usize),
     /// These agents want to stay on one cell.
     SameGoal(Vec<usize>, Cell),
     /// These agents share a component, and a search through their joint states finds no solution.
@@ -81,7 +81,7 @@ pub struct ScenarioStats {
     /// Number of agents.
     pub num_agents: usize,
     /// Why it cannot be solved; nothing is proven if there is nothing here.
-    pub doubts: Vec<Doubt>,
+    pub infeasibilities: Vec<Infeasibility>,
     /// Whether every part of it was proven to have a solution.
     pub is_proven_solvable: bool,
     /// The sum over all agents that can reach their goals of the way there; no solution costs less. Units: steps.
@@ -107,7 +107,7 @@ impl ScenarioStats {
         let components = Components::of(map);
         let mut figures = Self {
             num_agents: starts.len(),
-            doubts: Vec::new(),
+            infeasibilities: Vec::new(),
             is_proven_solvable: true,
             sum_of_distances: 0,
             longest_distance: 0,
@@ -123,18 +123,20 @@ impl ScenarioStats {
                     figures.longest_distance = figures.longest_distance.max(distance);
                     crowds.entry(one).or_default().push(agent);
                 }
-                _ => figures.doubts.push(Doubt::NoWay(agent)),
+                _ => figures.infeasibilities.push(Infeasibility::NoPath(agent)),
             }
         }
         if on_goal == OnGoal::Nothing {
             let shared = by_goal.into_iter().filter(|(_, agents)| agents.len() > 1);
-            figures.doubts.extend(shared.map(|(goal, agents)| Doubt::SameGoal(agents, goal)));
+            figures
+                .infeasibilities
+                .extend(shared.map(|(goal, agents)| Infeasibility::SameGoal(agents, goal)));
         }
         for (label, agents) in crowds {
             let part = part_of(map, &components, label, (starts, goals), &agents);
             figures.judge_part(&part, agents, on_goal, &mut is_solvable);
         }
-        figures.is_proven_solvable &= figures.doubts.is_empty();
+        figures.is_proven_solvable &= figures.infeasibilities.is_empty();
         figures
     }
 
@@ -146,7 +148,7 @@ impl ScenarioStats {
         is_solvable: &mut impl FnMut(&ScenarioPart) -> Option<bool>,
     ) {
         if on_goal == OnGoal::Nothing && part.is_in_wrong_order() {
-            self.doubts.push(Doubt::WrongOrder(agents));
+            self.infeasibilities.push(Infeasibility::WrongOrder(agents));
             return;
         }
         if agents.len() == 1 {
@@ -158,7 +160,7 @@ impl ScenarioStats {
         }
         match is_solvable(part) {
             Some(true) => {}
-            Some(false) => self.doubts.push(Doubt::Locked(agents)),
+            Some(false) => self.infeasibilities.push(Infeasibility::Locked(agents)),
             None => self.is_proven_solvable = false,
         }
     }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Cell, Map, OnGoal};
-use pogema_maps::{Doubt, MapStats, ScenarioStats};
+use pogema_maps::{Infeasibility, MapStats, ScenarioStats};
 
 fn map(rows: &[&str]) -> Map {
     Map::from_rows(rows).unwrap()
@@ -32,19 +32,22 @@ fn a_map_by_its_figures() {
 #[test]
 fn no_way_to_the_goal() {
     let stats = judge(&["..#.."], &[[(0, 0), (0, 4)], [(0, 3), (0, 4)]], OnGoal::Finish);
-    assert_eq!(stats.doubts, [Doubt::NoWay(0)]);
+    assert_eq!(stats.infeasibilities, [Infeasibility::NoPath(0)]);
     assert!(!stats.is_proven_solvable);
     assert_eq!((stats.sum_of_distances, stats.longest_distance), (1, 1));
     // A start on an obstacle is in no component.
-    assert_eq!(judge(&["#."], &[[(0, 0), (0, 1)]], OnGoal::Nothing).doubts, [Doubt::NoWay(0)]);
+    assert_eq!(
+        judge(&["#."], &[[(0, 0), (0, 1)]], OnGoal::Nothing).infeasibilities,
+        [Infeasibility::NoPath(0)]
+    );
 }
 
 #[test]
 fn one_cell_is_the_goal_of_two() {
     let agents = [[(0, 0), (0, 1)], [(0, 2), (0, 1)]];
     let together = judge(&["...", "..."], &agents, OnGoal::Nothing);
-    assert!(together.doubts.contains(&Doubt::SameGoal(vec![0, 1], Cell::new(0, 1))));
-    assert_eq!(judge(&["...", "..."], &agents, OnGoal::Finish).doubts, []);
+    assert!(together.infeasibilities.contains(&Infeasibility::SameGoal(vec![0, 1], Cell::new(0, 1))));
+    assert_eq!(judge(&["...", "..."], &agents, OnGoal::Finish).infeasibilities, []);
 }
 
 #[test]
@@ -52,9 +55,12 @@ fn a_corridor_keeps_the_order_of_its_agents() {
     let row = ".".repeat(1000);
     let rows = [row.as_str()];
     let reversed = [[(0, 10), (0, 990)], [(0, 500), (0, 20)]];
-    assert_eq!(judge(&rows, &reversed, OnGoal::Nothing).doubts, [Doubt::WrongOrder(vec![0, 1])]);
+    assert_eq!(
+        judge(&rows, &reversed, OnGoal::Nothing).infeasibilities,
+        [Infeasibility::WrongOrder(vec![0, 1])]
+    );
     let kept = [[(0, 10), (0, 20)], [(0, 500), (0, 990)]];
-    assert_eq!(judge(&rows, &kept, OnGoal::Nothing).doubts, []);
+    assert_eq!(judge(&rows, &kept, OnGoal::Nothing).infeasibilities, []);
     // A ring has no ends, so no order.
     let around = [[(0, 0), (0, 2)], [(0, 2), (0, 0)]];
     assert!(judge(&["...", ".#.", "..."], &around, OnGoal::Nothing).is_proven_solvable);

@@ -14,7 +14,7 @@
 //! | [`sipp`]: safe interval path planning for one agent | `sipp` |
 //! | [`solvability`]: A* through joint states | `joint` |
 //!
-//! [`planner()`] and [`lifelong()`] make a planner by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner control
+//! [`PlannerName`] and [`LifelongName`] make a planner by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner control
 //! an environment.
 //!
 //! [`AStarTeam`] is POGEMA's A* policy, action for action. [`pogema_team`] and [`sample`] draw POGEMA's random numbers.
@@ -63,10 +63,10 @@ pub use plan_text::{PlanText, write_plan, write_result};
 pub use planner::Planner;
 pub use policies::{
     AStarAgent, AStarTeam, LifelongPolicy, NamedPolicy, PlannerPolicy, PolicySettings, PomapfObservation,
-    PomapfObservations, SIMPLE, pogema_team, sample,
+    PomapfObservations, SimplePolicy, pogema_team, sample,
 };
 pub use problem::Problem;
-pub use registry::{LIFELONG, PLANNERS, PlannerSettings, lifelong, planner};
+pub use registry::{LifelongName, PlannerName, PlannerSettings};
 pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub use validate::{Conflict, ConflictKind, validate};

@@ -54,7 +54,7 @@ fn agents_with_goal_after_goal_keep_only_so_many_tables() {
     let graph = Arc::new(Graph::new(&map));
     let mut cells = graph.vertices_of("start", &some_cells(&map, 0)).unwrap();
     let memory = measure(|| {
-        let mut agents = PibtLifelong::new(graph.clone(), NUM_AGENTS, PibtParams::default());
+        let mut agents = PibtLifelong::new(graph.clone(), PibtParams::default());
         for round in 1..6 {
             let goals = graph.vertices_of("goal", &some_cells(&map, 3 * round)).unwrap();
             cells = agents.next(&cells, &goals, &Budget::default()).unwrap();

@@ -1,13 +1,13 @@
 //! Plans with LaCAM*, checks the plan, plays it and writes a page that replays it.
 
-use pogema::planners::{Budget, PlannerSettings, Problem, planner, validate};
+use pogema::planners::{Budget, PlannerName, PlannerSettings, Problem, validate};
 use pogema::{Engine, Episode, Error, GridConfig, InstanceSource, render::html};
 
 pub(crate) fn main() -> Result<(), Error> {
     let text = "{size: 16, num_agents: 12, seed: 5, on_target: nothing, collision_system: soft}";
     let config = GridConfig::from_yaml(text)?;
     let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
-    let mut lacam = planner("lacam", PlannerSettings::default())?;
+    let mut lacam = PlannerName::Lacam.make(PlannerSettings::default());
     let outcome = lacam.plan(&Problem::of(&instance)?, &Budget::of_nodes(5_000));
     let plan = outcome.solution().ok_or_else(|| Error::instance("LaCAM* found no plan"))?;
     let goals = instance.first_goals();

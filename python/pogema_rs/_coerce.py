@@ -53,7 +53,8 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
 def _refused(name: str, value: Any, expected: str) -> RefusedConfigError:
     text = repr(value)
     shown = text if len(text) <= 60 else text[:57] + "..."
-    return RefusedConfigError(f"config: `{name}` is `{shown}`, expected {expected}")
+    reason = f"`{name}` is `{shown}`, expected {expected}"
+    return RefusedConfigError(f"config: {reason}", name, reason)
 
 
 def _whole(name: str, value: Any) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from pogema_rs import _engine, grid_registry
 from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError, NotResetError, StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
-from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.semantics import Semantics
 from pogema_rs.svg_animation.animation_wrapper import Filmed
 from pogema_rs.wrappers import persistence
@@ -75,7 +75,7 @@ class Pogema(PogemaBase):
         self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
         self._remember_config()
         self._engine = _engine.Engine(
-            engine_json(self.grid_config, **self._fixed),
+            engine_fields(self.grid_config, **self._fixed),
             self._registered(),
             self.semantics.occupancy_is_exact,
         )
@@ -109,7 +109,7 @@ class Pogema(PogemaBase):
             pools = self._engine.pools()
             if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
                 fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
-            noticed = self._engine.reset(engine_json(self.grid_config, **fixed), self._registered())
+            noticed = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
         if changed or not is_same:
             self._remember_config()
         for text in noticed:

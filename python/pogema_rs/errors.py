@@ -4,6 +4,8 @@ POGEMA 1.4.0 and its 2.0 line raise different classes for the same mistake; each
 whatever a program catches catches ours. Every message is one line: what was wrong, and what was expected.
 """
 
+from typing import Optional
+
 from gymnasium.error import ResetNeeded
 
 __all__ = [
@@ -35,6 +37,13 @@ class _Quiet(KeyError):
 
 class RefusedConfigError(ValueError):
     """A field of a config holds what it may not hold; `GridConfig` shows it as pydantic's ValidationError."""
+
+    def __init__(self, message: str, field: Optional[str] = None, reason: Optional[str] = None) -> None:
+        super().__init__(message)
+        #: The field, if one field alone is wrong.
+        self.field = field
+        #: The message without the word `config`.
+        self.reason = message if reason is None else reason
 
 
 class OutsideMapError(IndexError, ValueError):

@@ -13,7 +13,7 @@ import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs.errors import StateError
-from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.utils import render_grid
 
 __all__ = ["Grid", "GridLifeLong"]
@@ -31,7 +31,7 @@ class Grid:
     """
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
-        engine = _engine.Engine(engine_json(grid_config), grid_registry.map_text(grid_config.map_name))
+        engine = _engine.Engine(engine_fields(grid_config), grid_registry.map_text(grid_config.map_name))
         for text in engine.reset():
             warnings.warn(text, UserWarning, stacklevel=2)
         self._show(engine, grid_config)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Optional, Union
@@ -105,19 +104,14 @@ class GridConfig(BaseModel):
 _OF_ENGINE = tuple(name for name in GridConfig.model_fields if name not in ("integration", "auto_reset"))
 
 
-def engine_json(config: GridConfig | Mapping[str, Any], **changes: Any) -> str:
-    """A config as the engine reads it."""
+def engine_fields(config: GridConfig | Mapping[str, Any], **changes: Any) -> dict[str, Any]:
+    """The fields of a config that the engine reads."""
     if isinstance(config, Mapping):
         own = {name: config[name] for name in _OF_ENGINE if name in config}
     else:
         # The longer side follows from the two, and may be less than a size that is given.
         own = {name: config.__dict__[name] for name in _OF_ENGINE if name != "size"}
-    return json.dumps({**own, **changes}, default=_plain)
-
-
-def _plain(value: Any) -> Any:
-    """NumPy's numbers and arrays, and any other sequence, as JSON can hold them."""
-    return value.tolist() if hasattr(value, "tolist") else list(value)
+    return {**own, **changes}
 
 
 def _warn_of_unknown(fields: Mapping[str, Any], known: Mapping[str, Any]) -> None:
@@ -137,7 +131,7 @@ def _derived(fields: dict[str, Any]) -> dict[str, Any]:
         raise EmptyMapError("config: `map` has no cells")
     if isinstance(text, str):
         _check_letters(text, fields)
-    derived = json.loads(_engine.derive_config(engine_json(fields)))
+    derived = _engine.derive_config(engine_fields(fields))
     result = {**fields, **{name: derived[name] for name in GridConfig._DERIVED}}
     if isinstance(text, str):
         result["map"] = derived["map"]
@@ -167,9 +161,8 @@ def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
 
 
 def _validation_error(title: str, refused: RefusedConfigError, fields: Mapping[str, Any]) -> ValidationError:
-    text = str(refused).removeprefix("config: ")
-    name = next((name for name in GridConfig.model_fields if text.startswith(f"`{name}`")), None)
-    error = PydanticCustomError("pogema", "{text}", {"text": text})
+    name = refused.field if refused.field in GridConfig.model_fields else None
+    error = PydanticCustomError("pogema", "{text}", {"text": refused.reason})
     place: tuple[str, ...] = (name,) if name else ()
     details = InitErrorDetails(type=error, loc=place, input=fields.get(name) if name else fields)
     return ValidationError.from_exception_data(title, [details])

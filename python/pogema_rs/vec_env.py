@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NoReturn, Optional, Union, cast
@@ -13,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs._vec_input import AutoresetMode, check_out, read_actions, read_autoreset, read_mask, read_seed
-from pogema_rs.grid_config import GridConfig, engine_json
+from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.semantics import Semantics
 
 __all__ = ["AutoresetMode", "VecEnv"]
@@ -22,11 +24,14 @@ NUM_ACTIONS = 5
 _DTYPES: dict[str, np.dtype] = {"float32": np.dtype(np.float32), "uint8": np.dtype(np.uint8)}
 
 
-def _config_texts(config: Any) -> tuple[str, Optional[str]]:
-    """A config as the engine reads it, and the text of the map that it names."""
+_Config = tuple[dict[str, Any], Optional[str]]
+
+
+def _engine_config(config: Any) -> _Config:
+    """The fields that the engine reads, and the text of the map that it names."""
     if not isinstance(config, GridConfig):
         config = GridConfig(**_fields(config))
-    return engine_json(config), grid_registry.map_text(config.map_name)
+    return engine_fields(config), grid_registry.map_text(config.map_name)
 
 
 def _fields(config: Any) -> Mapping[str, Any]:
@@ -261,29 +266,35 @@ def _read_dtype(dtype: Any) -> np.dtype:
     raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'uint8'")
 
 
-def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[tuple[str, Optional[str]]], list[int]]:
+def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Config], list[int]]:
     """The configs that differ, and which one each environment has."""
     if isinstance(grid_config, (list, tuple)):
         if num_envs not in (None, len(grid_config)):
             raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-        texts = [_config_texts(config) for config in grid_config]
+        configs = [_engine_config(config) for config in grid_config]
     else:
         num_envs = 1 if num_envs is None else num_envs
         _check_whole("num_envs", num_envs)
-        texts = [_config_texts(grid_config)] * num_envs
-    if not texts:
+        configs = [_engine_config(grid_config)] * num_envs
+    if not configs:
         raise ValueError("num_envs is 0, expected at least 1")
-    places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
-    return list(places), [places[text] for text in texts]
+    # Equal configs are read once; two that only look different are merely read twice.
+    keys = [pickle.dumps(config) for config in configs]
+    places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+    first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}
+    return [first[place] for place in range(len(places))], [places[key] for key in keys]
 
 
 def _read_threads(num_threads: Optional[int], num_envs: int) -> int:
     if num_threads is None:
         return min(num_envs, _engine.num_cores())
     _check_whole("num_threads", num_threads)
-    if not 1 <= num_threads <= num_envs:
-        raise ValueError(f"num_threads is {num_threads}, expected 1 to {num_envs}, the number of environments")
-    return num_threads
+    if num_threads > _engine.MAX_THREADS:
+        raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")
+    if num_threads > _engine.num_cores():
+        text = f"num_threads is {num_threads}, the machine has {_engine.num_cores()} cores"
+        warnings.warn(text, UserWarning, stacklevel=3)
+    return int(num_threads)
 
 
 def _check_whole(name: str, value: Any) -> None:

@@ -1,21 +1,36 @@
 //! What is derived of a config.
 
-use pogema_core::{Error, Map};
+use pogema_core::{Cell, Error, Map};
 use pogema_maps::{GridConfig, InstanceSource, nearest, parse_map_text};
 use pyo3::prelude::*;
-use serde_json::json;
+use pyo3::types::PyDict;
 
 use crate::errors;
+use crate::fields::Fields;
 
-/// Everything that POGEMA derives of a config, from and to an object in JSON.
+/// Returns what POGEMA derives of a config.
 #[pyfunction]
-pub fn derive_config(py: Python<'_>, config: &str) -> PyResult<String> {
-    let config = GridConfig::from_json(config).map_err(|error| errors::config(py, &error))?;
-    let mut fields = config.to_value();
-    fields["width"] = json!(config.width);
-    fields["height"] = json!(config.height);
-    fields["size"] = json!(config.size);
-    Ok(fields.to_string())
+pub fn derive_config<'py>(py: Python<'py>, fields: Fields) -> PyResult<Bound<'py, PyDict>> {
+    let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
+    let derived = PyDict::new(py);
+    derived.set_item("width", config.width)?;
+    derived.set_item("height", config.height)?;
+    derived.set_item("size", config.size)?;
+    derived.set_item("density", config.density)?;
+    derived.set_item("num_agents", config.num_agents)?;
+    let rows = config.map.as_ref().map(|map| {
+        let number = |&is_obstacle: &bool| i64::from(is_obstacle);
+        map.obstacles().chunks(map.width()).map(|row| row.iter().map(number).collect()).collect()
+    });
+    derived.set_item::<_, Option<Vec<Vec<i64>>>>("map", rows)?;
+    let pairs = |cells: &[Cell]| cells.iter().map(|cell| [cell.row, cell.col]).collect::<Vec<_>>();
+    let cells = |cells: &Option<Vec<Cell>>| cells.as_deref().map(pairs);
+    derived.set_item("agents_xy", cells(&config.agents_xy))?;
+    derived.set_item("possible_agents_xy", cells(&config.possible_agents_xy))?;
+    derived.set_item("possible_targets_xy", cells(&config.possible_targets_xy))?;
+    let goals = config.targets_xy.map(|goals| pairs(&goals.first()));
+    derived.set_item("targets_xy", goals)?;
+    Ok(derived)
 }
 
 /// The known name that is most like the one given.
@@ -25,14 +40,14 @@ pub fn nearest_name(name: &str, known: Vec<String>) -> String {
 }
 
 /// The source of a config's instances, and the config.
-pub fn source(config: &str, registered: Option<&str>) -> Result<InstanceSource, Error> {
-    let (config, map) = read(config, registered)?;
+pub fn source(fields: &Fields, registered: Option<&str>) -> Result<InstanceSource, Error> {
+    let (config, map) = read(fields, registered)?;
     InstanceSource::new(config, map)
 }
 
 /// A config, and the map that its `map_name` names.
-pub fn read(config: &str, registered: Option<&str>) -> Result<(GridConfig, Option<Map>), Error> {
-    let mut config = GridConfig::from_json(config)?;
+pub fn read(fields: &Fields, registered: Option<&str>) -> Result<(GridConfig, Option<Map>), Error> {
+    let mut config = GridConfig::from_value(&fields.0)?;
     // A name that nobody registered means nothing to POGEMA.
     if registered.is_none() {
         config.map_name = None;

@@ -1,26 +1,33 @@
 //! Errors as the Python classes that POGEMA's users catch.
 
 use pogema_core::Error;
+use pyo3::PyErrArguments;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
 /// An error of a class of `pogema_rs.errors`.
 fn of_class(py: Python<'_>, class: &str, error: impl std::fmt::Display) -> PyErr {
+    made(py, class, (error.to_string(),))
+}
+
+fn made(py: Python<'_>, class: &str, arguments: impl PyErrArguments + Send + Sync + 'static) -> PyErr {
     let class = py
         .import("pogema_rs.errors")
         .and_then(|module| module.getattr(class)?.cast_into::<PyType>().map_err(PyErr::from));
-    class.map_or_else(|missing| missing, |class| PyErr::from_type(class, error.to_string()))
+    class.map_or_else(|missing| missing, |class| PyErr::from_type(class, arguments))
 }
 
 /// What a wrong config raises; the Python side makes it the class that POGEMA raises.
 pub fn config(py: Python<'_>, error: &Error) -> PyErr {
-    let class = match error {
-        Error::CellOutside { .. } => "OutsideMapError",
-        Error::UnknownLetter { .. } => "MapTextError",
-        _ => "RefusedConfigError",
-    };
-    of_class(py, class, error)
+    match error {
+        Error::CellOutside { .. } => of_class(py, "OutsideMapError", error),
+        Error::UnknownLetter { .. } => of_class(py, "MapTextError", error),
+        _ => {
+            let field = error.field().map(str::to_owned);
+            made(py, "RefusedConfigError", (error.to_string(), field, error.reason()))
+        }
+    }
 }
 
 /// What an instance that cannot be made raises.

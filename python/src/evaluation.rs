@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
@@ -264,7 +264,7 @@ fn read_begin(name: &str) -> Result<Begin, Error> {
         "new" => Ok(Begin::New),
         "resume" => Ok(Begin::Resume),
         "anew" => Ok(Begin::Anew),
-        _ => Err(Error::config("begin", name, "`new`, `resume` or `anew`")),
+        _ => Err(Error::argument("begin", name, "`new`, `resume` or `anew`")),
     }
 }
 

@@ -5,12 +5,16 @@ mod config;
 mod engine;
 mod errors;
 mod evaluation;
+mod fields;
 mod lists;
 mod planners;
 mod vec;
 mod views;
 
+use pogema_core::{Collision, Observation, OnGoal, Words};
+use pogema_maps::Integration;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 #[pymodule]
 fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -23,6 +27,8 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
     module.add_function(wrap_pyfunction!(views::show_views, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
+    module.add("MAX_THREADS", pogema_core::MAX_THREADS)?;
+    module.add("WORDS", words(module.py())?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
@@ -30,4 +36,14 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
     module.add_function(wrap_pyfunction!(engine::state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
+}
+
+/// The words that each argument accepts, by its name in Python.
+fn words(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let words = PyDict::new(py);
+    words.set_item("on_target", OnGoal::NAMES)?;
+    words.set_item("collision_system", Collision::NAMES)?;
+    words.set_item("observation_type", Observation::NAMES)?;
+    words.set_item("integration", Integration::NAMES)?;
+    Ok(words)
 }

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Cell, Error, Map, State};
+use pogema_core::{Action, Cell, Error, Map, State, Words, check_threads};
 use pogema_planners::{
-    Budget, Distances, Graph, LifelongPolicy, Outcome, Plan, PlannerPolicy, PlannerSettings, Problem,
+    Budget, Distances, Graph, LifelongName, LifelongPolicy, Outcome, Plan, PlannerName, PlannerPolicy,
+    PlannerSettings, Problem,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -35,10 +36,10 @@ pub fn make_plan<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let asked = || {
         let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
-        let choice = PlannerSettings { seed, threads: num_threads };
+        let choice = PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? };
         Ok((
             Problem { max_steps: most_steps, ..problem },
-            pogema_planners::planner(planner, choice)?,
+            PlannerName::read("planner", planner)?.make(choice),
             read_budget(budget)?,
         ))
     };
@@ -174,12 +175,15 @@ impl PlanFollower {
         lifelong: bool,
     ) -> PyResult<Self> {
         let made = || {
-            let (choice, budget) = (PlannerSettings { seed, threads: num_threads }, read_budget(budget)?);
+            let (choice, budget) = (
+                PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? },
+                read_budget(budget)?,
+            );
             Ok(if lifelong {
-                Policy::Lifelong(LifelongPolicy::new(planner, choice, budget)?)
+                Policy::Lifelong(LifelongPolicy::new(LifelongName::read("planner", planner)?, choice, budget))
             } else {
                 Policy::Once(PlannerPolicy::new(
-                    pogema_planners::planner(planner, choice)?,
+                    PlannerName::read("planner", planner)?.make(choice),
                     budget,
                     most_steps,
                 ))
@@ -221,7 +225,7 @@ impl PlanFollower {
 fn read_budget((seconds, nodes): (Option<f64>, Option<u64>)) -> Result<Budget, Error> {
     let time = |seconds: f64| {
         Duration::try_from_secs_f64(seconds)
-            .map_err(|_| Error::config("seconds", seconds, "a time of 0 or more"))
+            .map_err(|_| Error::argument("seconds", seconds, "a time of 0 or more"))
     };
     Ok(Budget { time: seconds.map(time).transpose()?, nodes, cancelled: None })
 }
@@ -256,7 +260,7 @@ fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Err
     let shape = steps.shape();
     if shape[2] != 2 {
         let found = format!("of the shape ({}, {}, {})", shape[0], shape[1], shape[2]);
-        return Err(Error::config("cells", found, "the shape (steps + 1, agents, 2)"));
+        return Err(Error::argument("cells", found, "the shape (steps + 1, agents, 2)"));
     }
     let steps = steps.as_array();
     let step = |places: numpy::ndarray::ArrayView2<'_, i64>| {

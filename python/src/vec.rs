@@ -13,6 +13,7 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::fields::Fields;
 use crate::{config, errors};
 
 /// Where a step's rewards and ends go: rewards, terminated, truncated.
@@ -47,7 +48,7 @@ impl Batch {
     #[new]
     fn new(
         py: Python<'_>,
-        configs: Vec<(String, Option<String>)>,
+        configs: Vec<(Fields, Option<String>)>,
         of_env: Vec<usize>,
         autoreset: &str,
         exact: bool,
@@ -223,16 +224,16 @@ impl Drop for Batch {
 
 impl Game {
     fn new(
-        configs: &[(String, Option<String>)],
+        configs: &[(Fields, Option<String>)],
         of_env: Vec<usize>,
         exact: bool,
         num_threads: usize,
     ) -> Result<Self, Error> {
         let num_envs = of_env.len();
         if num_envs == 0 {
-            return Err(Error::config("num_envs", num_envs, "at least 1"));
+            return Err(Error::argument("num_envs", num_envs, "at least 1"));
         }
-        let read = |(config, map): &(String, Option<String>)| config::read(config, map.as_deref());
+        let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
         let source = EnvSource::new(configs.iter().map(read).collect::<Result<_, _>>()?, of_env)?;
         let rules = source.config(0).rules();
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
@@ -357,6 +358,6 @@ fn read_autoreset(name: &str) -> Result<Autoreset, Error> {
         "SameStep" => Ok(Autoreset::SameStep),
         "NextStep" => Ok(Autoreset::NextStep),
         "Disabled" => Ok(Autoreset::Off),
-        _ => Err(Error::config("autoreset_mode", name, "`SameStep`, `NextStep` or `Disabled`")),
+        _ => Err(Error::argument("autoreset_mode", name, "`SameStep`, `NextStep` or `Disabled`")),
     }
 }

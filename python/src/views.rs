@@ -64,5 +64,5 @@ fn named<T: Copy>(option: &str, name: Option<&str>, known: &[(&str, T)]) -> Resu
         return Ok(Some(found));
     }
     let names: Vec<String> = known.iter().map(|(name, _)| format!("`{name}`")).collect();
-    Err(Error::config(option, name, names.join(", ")))
+    Err(Error::argument(option, name, names.join(", ")))
 }

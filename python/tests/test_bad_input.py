@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import threading
 import warnings
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from pydantic import ValidationError
 
-from pogema_rs import errors
+from pogema_rs import _engine, errors
 from pogema_rs.envs import _make_pogema
 from pogema_rs.grid_config import GridConfig
 
 CONFIG: dict[str, Any] = {"size": 6, "num_agents": 3, "obs_radius": 2, "density": 0.1, "seed": 3}
 SYSTEMS = ("priority", "block_both", "soft")
+
+#: A list that contains itself.
+ENDLESS: list = []
+ENDLESS.append(ENDLESS)
 
 
 def started(**fields: Any) -> Any:
@@ -192,3 +197,56 @@ def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
                 each.step([3])
     assert state(env) == state(other)
     assert env.step([4])[4] == other.step([4])[4] == [{"is_active": True, "metrics": {"avg_throughput": 1.0}}]
+
+
+def test_python_accepts_the_words_of_the_engine():
+    for field in ("on_target", "collision_system", "observation_type", "integration"):
+        annotation = GridConfig.model_fields[field].annotation
+        literal = next((part for part in get_args(annotation) if get_args(part)), annotation)
+        assert sorted(get_args(literal)) == sorted(_engine.WORDS[field]), field
+
+
+@pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ({"size": 1}, ("size",)),
+        ({"num_agents": 0}, ("num_agents",)),
+        ({"agents_xy": "here"}, ("agents_xy",)),
+        ({"map": [[0, 0], [0]]}, ()),
+    ],
+)
+def test_a_refused_config_names_its_field(fields, place):
+    with pytest.raises(ValidationError) as raised:
+        GridConfig(**fields)
+    (error,) = raised.value.errors()
+    assert error["loc"] == place
+    assert not error["msg"].startswith("config")
+
+
+def test_an_assigned_field_may_hold_what_numpy_makes():
+    env = started(num_agents=2)
+    env.grid_config.seed = np.int64(5)
+    env.grid_config.map = np.zeros((4, 5), dtype=np.uint8)
+    env.grid_config.agents_xy = np.array([[0, 0], [1, 1]])
+    env.grid_config.targets_xy = ((np.int32(2), 2), (3, 3))
+    env.reset()
+    assert env.get_agents_xy(ignore_borders=True) == [(0, 0), (1, 1)]
+    assert env.get_targets_xy(ignore_borders=True) == [(2, 2), (3, 3)]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("seed", 10**30, ValueError),
+        ("density", float("nan"), ValueError),
+        ("map", object(), TypeError),
+        ("agents_xy", [ENDLESS], ValueError),
+    ],
+)
+def test_an_assigned_field_that_no_config_can_hold_changes_nothing(field, value, error):
+    env = started()
+    before = state(env)
+    setattr(env.grid_config, field, value)
+    with pytest.raises(error):
+        env.reset()
+    assert state(env) == before

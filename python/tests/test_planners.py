@@ -63,7 +63,7 @@ def test_what_cannot_be_is_an_outcome():
 @pytest.mark.parametrize(
     ("asked", "text"),
     [
-        ({"planner": "none"}, "config: `planner` is `none`, expected `lacam`, `pibt`, `pbs`, `ecbs`, `cbs`"),
+        ({"planner": "none"}, "`planner` is `none`, expected one of `lacam`, `pibt`, `pbs`, `ecbs`, `cbs`"),
         ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is no free cell"),
         ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "of 3 columns"),
@@ -143,7 +143,7 @@ def test_agents_go_from_goal_to_goal(planner):
             observations, _, _, truncated, infos = env.step(agents.act(observations))
         throughputs.append(infos[0]["metrics"]["avg_throughput"])
     assert throughputs[0] == throughputs[1] > 0.5
-    with pytest.raises(ValueError, match="expected `rhcr`, `pibt`, `guided-pibt`"):
+    with pytest.raises(ValueError, match="expected one of `rhcr`, `pibt`, `guided-pibt`"):
         PlannerAgents("cbs", lifelong=True)
 
 

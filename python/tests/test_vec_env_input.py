@@ -151,7 +151,7 @@ def test_wrong_resets_are_told_and_change_nothing(env, arguments, error, text):
 BAD_VECTORS = [
     ({"num_envs": 0}, ValueError, "num_envs is 0, expected at least 1"),
     ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
-    ({"num_threads": 3}, ValueError, "num_threads is 3, expected 1 to 2, the number of environments"),
+    ({"num_threads": 1025}, ValueError, "num_threads is 1025, expected 1 to 1024"),
     ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
     ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32' or 'uint8'"),
     ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),
@@ -332,3 +332,15 @@ def test_ten_thousand_steps_take_no_more_memory_than_a_hundred():
     tracemalloc.stop()
     # The allocator keeps pages of its own, per thread, which it fills one after the other.
     assert resident() - held < 4 << 20
+
+
+def test_more_threads_than_cores_or_environments_are_a_note():
+    with pytest.warns(UserWarning, match="num_threads is 1024, the machine has"):
+        many = VecEnv(CONFIG, 2, num_threads=1024)
+    one = VecEnv(CONFIG, 2, num_threads=1)
+    for env in (many, one):
+        env.reset(seed=3)
+    actions = np.ones((2, CONFIG["num_agents"]), dtype=np.int64)
+    np.testing.assert_array_equal(many.step(actions)[0], one.step(actions)[0])
+    many.close()
+    one.close()

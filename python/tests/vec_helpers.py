@@ -1,6 +1,5 @@
 """What a `VecEnv` has to play, one engine for each environment and reset by hand."""
 
-import json
 
 import numpy as np
 from pogema_rs import _engine
@@ -42,7 +41,7 @@ class Plain:
     def begin(self):
         self.episode += 1
         self.seed = self.seed_of(self.env, self.episode)
-        self.engine = _engine.Engine(json.dumps({**self.config, "seed": self.seed}), None, self.exact)
+        self.engine = _engine.Engine({**self.config, "seed": self.seed}, None, self.exact)
         self.engine.reset()
         self.last = None
 

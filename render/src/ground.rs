@@ -2,18 +2,20 @@
 
 use std::ops::Range;
 
-use pogema_core::{Cell, Instance, Map, Outside, Trace};
+use pogema_core::{Cell, Instance, Map, Outside, Trace, words};
 
-/// How much of the border is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Border {
-    /// The map alone.
-    None,
-    /// The map and the wall around it, as POGEMA draws it.
-    #[default]
-    Thin,
-    /// All that an agent can see: the border is as wide as the radius.
-    Full,
+words! {
+    /// How much of the border is drawn.
+    #[derive(Default)]
+    pub enum Border {
+        /// The map alone.
+        None = "none",
+        /// The map and the wall around it, as POGEMA draws it.
+        #[default]
+        Thin = "thin",
+        /// All that agents can see: the border is as wide as the radius.
+        Full = "full",
+    }
 }
 
 /// The cells of a map and of its border; rows and columns count from the map's corner, those above and to the

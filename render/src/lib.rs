@@ -11,10 +11,11 @@
 //! | [`gif`] | GIF animations |
 //! | [`video`] | MP4 and `WebM`, by the program ffmpeg |
 //! | [`html`] | a page that replays an episode, and one that edits maps |
-//! | [`stays`] | which rule reverted which move |
+//! | [`blocked_moves`] | which rule reverted which move |
 
 #![forbid(unsafe_code)]
 
+pub mod blocked_moves;
 mod check;
 pub mod gif;
 mod ground;
@@ -22,7 +23,6 @@ pub mod html;
 mod motion;
 pub mod raster;
 mod scene;
-pub mod stays;
 mod style;
 pub mod svg;
 pub mod text;

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
+use pogema_core::files::temporary_beside;
 use pogema_core::{Error, Trace, shorten};
 
 use crate::motion::Motion;
@@ -89,12 +90,7 @@ pub fn write(
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 2)?;
     let failed = |error: std::io::Error| Error::io(path, error);
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // A temporary file is its owner's alone by default; what it becomes is for everybody the umask lets.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let unfinished = builder.suffix(format.suffix()).tempfile_in(folder).map_err(failed)?.into_temp_path();
+    let unfinished = temporary_beside(path, format.suffix())?.into_temp_path();
     let mut said = tempfile::tempfile().map_err(failed)?;
     let mut ffmpeg = start(&motion, style.step_time, format, &unfinished, said.try_clone().map_err(failed)?)?;
     let fed = feed(&mut ffmpeg, &motion, progress);

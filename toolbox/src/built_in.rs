@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use pogema_core::Error;
+use pogema_core::{Error, MAX_THREADS};
 use pogema_maps::nearest;
 use pogema_planners::{Budget, NamedPolicy, PolicySettings};
 
@@ -62,8 +62,9 @@ impl BuiltIn {
             "nodes" => settings.budget.nodes = Some(number("a number of nodes")?),
             "seed" => settings.planner.seed = if value.is_null() { 0 } else { number("a number")? },
             "threads" => {
-                let threads = value.as_u64().filter(|threads| (1..=2).contains(threads));
-                settings.planner.threads = threads.ok_or_else(|| wrong(node, path, "1 or 2"))? as usize;
+                let threads = value.as_u64().filter(|threads| (1..=MAX_THREADS as u64).contains(threads));
+                let expected = format!("1 to {MAX_THREADS}");
+                settings.planner.threads = threads.ok_or_else(|| wrong(node, path, &expected))? as usize;
             }
             "future_goals" => settings.future_goals = flag()?,
             "single_attempt" => settings.single_attempt = flag()?,

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use pogema_core::Error;
+use pogema_core::{Error, Map};
 use pogema_maps::files::read_scenario;
-use pogema_maps::{GridConfig, Library, MapText, put_map, put_scenario};
+use pogema_maps::formats::Scenario;
+use pogema_maps::{GridConfig, Library, MapText};
 use serde_json::{Map as Object, Value};
 
 use crate::Pairs;
@@ -65,7 +66,7 @@ impl Environments {
     /// If it is out of range.
     pub fn fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let variant = self.variants.at(index);
-        let out_of_range = || Error::config("episode", index, format!("below {}", self.len()));
+        let out_of_range = || Error::argument("episode", index, format!("below {}", self.len()));
         variant.map(|variant| variant.fields).ok_or_else(out_of_range)
     }
 
@@ -77,8 +78,10 @@ impl Environments {
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let meant =
-            fields.get("map_name").and_then(Value::as_str).and_then(|name| self.meant(name, seed).ok());
+        let meant = fields
+            .get("map_name")
+            .and_then(Value::as_str)
+            .and_then(|name| self.library.choose(name, seed).ok());
         if let Some(name) = meant.map(|(name, _)| Value::from(name)) {
             fields.insert("map_name".into(), name);
         }
@@ -101,7 +104,7 @@ impl Environments {
     /// If it is out of range, or cannot be.
     pub fn at(&self, index: usize) -> Result<Environment, Error> {
         let variant = self.variants.at(index);
-        let out_of_range = || Error::config("episode", index, format!("below {}", self.len()));
+        let out_of_range = || Error::argument("episode", index, format!("below {}", self.len()));
         let variant = variant.ok_or_else(out_of_range)?;
         let mut fields = variant.fields;
         let scenario = fields.get("scenario").cloned();
@@ -118,11 +121,19 @@ impl Environments {
             let given = fields.get("seed").map_or_else(|| "missing".into(), told);
             Error::config("seed", given, "a number, or results could not be repeated")
         })?;
-        let map_name = if uses_maps { self.put_map(&mut fields, seed)? } else { None };
-        if let Some(scenario) = scenario.filter(|value| !value.is_null()) {
-            self.put_scenario(&scenario, &mut fields)?;
-        }
-        let config = GridConfig::from_value(&Value::Object(fields))?;
+        let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
+        let config = match &map {
+            Some((_, text)) => GridConfig::on_map(&fields, text)?,
+            None => GridConfig::from_value(&Value::Object(fields.clone()))?,
+        };
+        let config = match scenario.filter(|value| !value.is_null()) {
+            Some(file) => {
+                let scenario = self.scenario(&file, config.map.as_ref())?;
+                config.with_scenario(&scenario, &fields)?
+            }
+            None => config,
+        };
+        let map_name = map.map(|(name, _)| name);
         Ok(Environment { changes: Pairs(variant.changes), map_name, config })
     }
 
@@ -132,7 +143,7 @@ impl Environments {
     /// If it is out of range.
     pub fn changes(&self, index: usize) -> Result<Pairs, Error> {
         let changes = self.variants.changes_at(index).map(Pairs);
-        changes.ok_or_else(|| Error::config("episode", index, format!("below {}", self.len())))
+        changes.ok_or_else(|| Error::argument("episode", index, format!("below {}", self.len())))
     }
 
     /// Numbers of environments with those first that make the most work; of two that make as much, the earlier one.
@@ -155,30 +166,31 @@ impl Environments {
     /// # Errors
     /// If there is none.
     pub fn map(&self, pattern: &str, seed: u64) -> Result<(String, String), Error> {
-        let (name, text) = self.meant(pattern, seed)?;
+        let (name, text) = self.library.choose(pattern, seed)?;
         Ok((name.to_owned(), text.to_text()?))
     }
 
-    fn meant<'a>(&'a self, pattern: &'a str, seed: u64) -> Result<(&'a str, &'a MapText), Error> {
-        self.library.map(pattern).map(|text| (pattern, text)).or_else(|_| self.library.choose(pattern, seed))
-    }
-
-    /// Puts the map that the seed chooses among those of the name in its place.
+    /// Takes the name of a map out of the fields, and returns the map that the seed chooses among those of the name.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
-    fn put_map(&self, fields: &mut Object<String, Value>, seed: u64) -> Result<Option<String>, Error> {
-        let Some(Value::String(pattern)) = fields.get("map_name").cloned() else { return Ok(None) };
-        fields.remove("map_name");
-        let (name, text) = self.meant(&pattern, seed)?;
-        put_map(text, fields)?;
-        Ok(Some(name.to_owned()))
+    fn chosen_map(
+        &self,
+        fields: &mut Object<String, Value>,
+        seed: u64,
+    ) -> Result<Option<(String, &MapText)>, Error> {
+        if !fields.get("map_name").is_some_and(Value::is_string) {
+            return Ok(None);
+        }
+        let pattern = fields.remove("map_name");
+        let pattern = pattern.as_ref().and_then(Value::as_str).unwrap_or_default();
+        let (name, text) = self.library.choose(pattern, seed)?;
+        Ok(Some((name.to_owned(), text)))
     }
 
-    fn put_scenario(&self, scenario: &Value, fields: &mut Object<String, Value>) -> Result<(), Error> {
+    fn scenario(&self, scenario: &Value, map: Option<&Map>) -> Result<Scenario, Error> {
         let file = scenario.as_str().ok_or_else(|| Error::config("scenario", scenario, "a file"))?;
-        let map = GridConfig::from_value(&Value::Object(fields.clone()))?.map;
         let map = map.ok_or_else(|| Error::config("scenario", file, "a map that it is on"))?;
-        put_scenario(&read_scenario(&self.folder.join(file), &map)?, fields)
+        read_scenario(&self.folder.join(file), map)
     }
 
     /// Passes if there is a map for each name.

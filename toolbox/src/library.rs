@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pogema_core::Error;
+use pogema_core::{Error, Words};
 use pogema_maps::Library;
 use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::generators::Preset;
@@ -26,7 +26,7 @@ impl Suite {
             let tell = |name| format!("{path}: a second map named `{name}` takes the place of the first");
             warnings.extend(replaced.into_iter().map(tell));
         }
-        for preset in Preset::ALL {
+        for preset in Preset::all() {
             if self.names_of(preset).any(|name| library.matching(name).is_err()) {
                 let is_new = |name: &str| library.map(name).is_err();
                 let maps: Vec<_> = preset.maps()?.into_iter().filter(|map| is_new(&map.name)).collect();
@@ -39,6 +39,6 @@ impl Suite {
     /// The names of maps that may be those of a generator.
     fn names_of(&self, preset: Preset) -> impl Iterator<Item = &str> {
         let names = self.environments.values_of("map_name").into_iter().filter_map(Value::as_str);
-        names.filter(move |name| name.contains(preset.name()))
+        names.filter(move |name| name.contains(preset.word()))
     }
 }

@@ -52,7 +52,7 @@ impl Suite {
         let algorithm = self.algorithms.iter().find(|algorithm| algorithm.key == key);
         let algorithm = algorithm.ok_or_else(|| {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
-            Error::config("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
+            Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
         let (played, trace) = record(&environments.at(index)?.config, &built_in(algorithm)?)?;
         Ok((measured(&played), trace))

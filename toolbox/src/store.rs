@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pogema_core::Error;
-use pogema_maps::files::{UNFINISHED, write_whole};
+use pogema_core::files::{UNFINISHED, write_whole};
 
 use crate::manifest::{self, Manifest, Run};
 use crate::suite::Suite;

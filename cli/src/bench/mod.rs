@@ -94,11 +94,11 @@ impl Bench {
     pub fn run(&self) -> Result<(), Error> {
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let budget = Duration::try_from_secs_f64(self.seconds).ok().filter(|budget| !budget.is_zero());
-        let budget = budget.ok_or_else(|| Error::config("seconds", self.seconds, "a time above 0"))?;
+        let budget = budget.ok_or_else(|| Error::argument("--seconds", self.seconds, "a time above 0"))?;
         let python = self.peers.then(|| find_oracle_python(&self.oracle_folder)).transpose()?;
         let works: Vec<_> = works().into_iter().filter(|work| work.name().contains(&self.rows)).collect();
         if works.is_empty() {
-            return Err(Error::config("rows", &self.rows, "a part of a row's name, such as `64 agents`"));
+            return Err(Error::argument("--rows", &self.rows, "a part of a row's name, such as `64 agents`"));
         }
         let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}");
         let bar = ProgressBar::new(self.rounds * works.len() as u64);

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::{Sources, write_out};
 use crate::output::check_writable;
+use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Import {
@@ -20,8 +21,8 @@ pub struct Import {
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Whether agents may enter MovingAI's water
-    #[arg(long, value_enum, default_value_t = WaterName::Free)]
-    water: WaterName,
+    #[arg(long, default_value_t, value_parser = word::<Water>())]
+    water: Water,
     /// Take off the outermost rows and columns of MovingAI maps, as the toolbox does
     #[arg(long)]
     strip_border: bool,
@@ -30,21 +31,9 @@ pub struct Import {
     out: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum WaterName {
-    /// They may, as in the toolbox and the published sets
-    Free,
-    /// They may not, as MovingAI has it
-    Obstacle,
-}
-
 impl Import {
     pub fn run(&self) -> Result<(), Error> {
-        let water = match self.water {
-            WaterName::Free => Water::Free,
-            WaterName::Obstacle => Water::Obstacle,
-        };
-        let reading = Reading { water, strips_border: self.strip_border };
+        let reading = Reading { water: self.water, strips_border: self.strip_border };
         let mut maps: Vec<NamedMap> = Vec::new();
         for path in &self.paths {
             for map in read_maps(path, reading)? {

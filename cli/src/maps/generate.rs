@@ -3,13 +3,14 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use pogema_core::Error;
 use pogema_maps::MapText;
 use pogema_maps::formats::{NamedMap, write_set};
 use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, of_seeds};
 
 use super::write_out;
+use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Generate {
@@ -80,18 +81,8 @@ struct Shelves {
     #[arg(long, value_name = "N")]
     vertical_gap: Option<usize>,
     /// Where agents may start and have their goals
-    #[arg(long, value_enum, default_value_t = BaysName::None)]
-    bays: BaysName,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BaysName {
-    /// Nothing is said of it
-    None,
-    /// As the toolbox lays them
-    Toolbox,
-    /// As in the published warehouse
-    Published,
+    #[arg(long, default_value_t, value_parser = word::<Bays>())]
+    bays: Bays,
 }
 
 fn seeds(text: &str) -> Result<Range<u64>, String> {
@@ -116,7 +107,7 @@ impl Generate {
             }
             "shelves" => {
                 let name = self.name.clone().unwrap_or_else(|| "shelves".into());
-                vec![NamedMap { name, text: self.shelves.warehouse().generate(self.shelves.bays())? }]
+                vec![NamedMap { name, text: self.shelves.warehouse().generate(self.shelves.bays)? }]
             }
             preset => Preset::by_name(preset)?.maps()?,
         };
@@ -165,14 +156,6 @@ impl Shelves {
             bottom_gap: self.bottom_gap.unwrap_or(default.bottom_gap),
             horizontal_gap: self.horizontal_gap.unwrap_or(default.horizontal_gap),
             vertical_gap: self.vertical_gap.unwrap_or(default.vertical_gap),
-        }
-    }
-
-    fn bays(&self) -> Bays {
-        match self.bays {
-            BaysName::None => Bays::None,
-            BaysName::Toolbox => Bays::Toolbox,
-            BaysName::Published => Bays::Published,
         }
     }
 }

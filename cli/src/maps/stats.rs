@@ -2,17 +2,18 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use comfy_table::Table;
-use pogema_core::{Cell, Error, Map, OnGoal};
+use pogema_core::{Cell, Error, Map, OnGoal, Words};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{Doubt, GridConfig, InstanceSource, MapStats, ScenarioStats};
+use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats};
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
 use super::Sources;
 use crate::output::{markdown_table, say};
+use crate::words::word_of;
 
 #[derive(Args, Debug)]
 pub struct Stats {
@@ -30,17 +31,11 @@ pub struct Stats {
     #[arg(long, value_name = "S", requires = "num_agents")]
     seed: Option<u64>,
     /// Whether agents leave the map on their goals or have to be there all at once
-    #[arg(long, value_enum, default_value_t = OnTarget::Nothing)]
-    on_target: OnTarget,
+    #[arg(long, default_value_t = OnGoal::Nothing, value_parser = word_of(&OnGoal::WORDS[..2]))]
+    on_target: OnGoal,
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnTarget {
-    Finish,
-    Nothing,
 }
 
 impl Stats {
@@ -69,10 +64,7 @@ impl Stats {
 
     /// The scenario that was asked for, or that the map brings itself.
     fn scenario_of(&self, map: &NamedMap) -> Result<Option<ScenarioStats>, Error> {
-        let on_goal = match self.on_target {
-            OnTarget::Finish => OnGoal::Finish,
-            OnTarget::Nothing => OnGoal::Nothing,
-        };
+        let on_goal = self.on_target;
         let ground = &map.text.map;
         if let Some(path) = &self.scenario {
             let scenario = read_scenario(path, ground)?;
@@ -143,29 +135,31 @@ fn in_words(scenario: &ScenarioStats) -> String {
     let bounds = format!(
         "{num_agents} agents, no sum of costs below {sum_of_distances}, no makespan below {longest_distance}"
     );
-    let verdict = match scenario.doubts.as_slice() {
+    let verdict = match scenario.infeasibilities.as_slice() {
         [] if scenario.is_proven_solvable => "solvable".to_owned(),
         [] => "nothing proves it unsolvable".to_owned(),
-        doubts => {
-            let told: Vec<String> = doubts.iter().map(doubt).collect();
+        infeasibilities => {
+            let told: Vec<String> = infeasibilities.iter().map(infeasibility).collect();
             format!("unsolvable: {}", told.join("; "))
         }
     };
     format!("{bounds}; {verdict}")
 }
 
-fn doubt(doubt: &Doubt) -> String {
+fn infeasibility(infeasibility: &Infeasibility) -> String {
     let listed = |agents: &[usize]| agents.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-    match doubt {
-        Doubt::NoWay(agent) => format!("agent {agent} has no way to its goal"),
-        Doubt::SameGoal(agents, cell) => format!("agents {} all want to stay on cell {cell}", listed(agents)),
-        Doubt::Locked(agents) => {
+    match infeasibility {
+        Infeasibility::NoPath(agent) => format!("agent {agent} has no way to its goal"),
+        Infeasibility::SameGoal(agents, cell) => {
+            format!("agents {} all want to stay on cell {cell}", listed(agents))
+        }
+        Infeasibility::Locked(agents) => {
             format!(
                 "agents {} share a component in which nothing they can do brings them all home",
                 listed(agents)
             )
         }
-        Doubt::WrongOrder(agents) => {
+        Infeasibility::WrongOrder(agents) => {
             format!(
                 "agents {} share a corridor along which their goals stand in another order",
                 listed(agents)
@@ -189,12 +183,12 @@ fn as_json(map: &NamedMap, stats: &MapStats, scenario: Option<&ScenarioStats>) -
             "num_agents": scenario.num_agents,
             "least_sum_of_costs": scenario.sum_of_distances,
             "least_makespan": scenario.longest_distance,
-            "solvable": match (scenario.doubts.is_empty(), scenario.is_proven_solvable) {
+            "solvable": match (scenario.infeasibilities.is_empty(), scenario.is_proven_solvable) {
                 (true, true) => Some(true),
                 (true, false) => None,
                 (false, _) => Some(false),
             },
-            "proofs": scenario.doubts.iter().map(doubt).collect::<Vec<_>>(),
+            "proofs": scenario.infeasibilities.iter().map(infeasibility).collect::<Vec<_>>(),
         })),
     })
 }

@@ -6,25 +6,26 @@ use std::time::Instant;
 
 use clap::Args;
 use pogema_conformance::files;
-use pogema_core::{Episode, Error, Instance, Trace};
-use pogema_maps::{GridConfig, InstanceSource};
-use pogema_planners::{Outcome, PLANNERS, Plan, Problem, planner, validate, write_plan, write_result};
+use pogema_core::{Episode, Error, Instance, Trace, Words};
+use pogema_maps::GridConfig;
+use pogema_planners::{Outcome, Plan, PlannerName, Problem, validate, write_plan, write_result};
 use pogema_reference::Reference;
 use serde_json::json;
 
 use crate::output::{check_writable, say};
 use crate::render::Pictures;
 use crate::run::Settings;
+use crate::words::word;
 
-use super::thinking::{Thinking, names};
+use super::thinking::Thinking;
 
 #[derive(Args, Debug)]
 pub struct MakePlan {
     #[command(flatten)]
     settings: Settings,
     /// Who plans
-    #[arg(long, value_name = "NAME", default_value = "lacam", value_parser = names(&PLANNERS))]
-    planner: String,
+    #[arg(long, value_name = "NAME", default_value_t = PlannerName::Lacam, value_parser = word::<PlannerName>())]
+    planner: PlannerName,
     #[command(flatten)]
     thinking: Thinking,
     /// Write the plan to this file, a line of cells for each step
@@ -52,14 +53,14 @@ impl MakePlan {
         }
         self.pictures.check(config.num_agents)?;
         let budget = self.thinking.budget()?;
-        let instance = InstanceSource::new(config.clone(), None)?.generate()?.instance;
+        let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
         let problem = match self.settings.most_steps()?.map(usize::try_from) {
             Some(Ok(most)) => problem.within(most),
             _ => problem,
         };
         let began = Instant::now();
-        let outcome = planner(&self.planner, self.thinking.choice())?.plan(&problem, &budget);
+        let outcome = self.planner.make(self.thinking.choice()).plan(&problem, &budget);
         let seconds = began.elapsed().as_secs_f64();
         if let Outcome::Solved { plan, .. } = &outcome {
             let goals = instance.first_goals();
@@ -69,7 +70,7 @@ impl MakePlan {
         }
         if let Some(path) = &self.result {
             let map = self.settings.map_word().unwrap_or_default();
-            let text = write_result(&map, &self.planner, &problem, &outcome);
+            let text = write_result(&map, self.planner.word(), &problem, &outcome);
             files::write(path, text.as_bytes())?;
         }
         say(&if self.json { as_json(&outcome, seconds) } else { format!("{outcome}; {seconds:.3} s") })?;

@@ -1,16 +1,12 @@
-//! Which planner, and how long it may think.
+//! The budget and threads of a planner.
 
 use std::time::Duration;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings, PolicySettings};
 
-/// The names of planners, each with what it is good for.
-pub fn names(known: &'static [(&'static str, &'static str)]) -> PossibleValuesParser {
-    PossibleValuesParser::new(known.iter().map(|&(name, help)| PossibleValue::new(name).help(help)))
-}
+use crate::threads::{note_threads, number_of_threads};
 
 /// How long a planner may think, and on how many threads.
 #[derive(Args, Clone, Debug)]
@@ -21,8 +17,8 @@ pub struct Thinking {
     /// Most nodes that the search may look at: the same number gives the same plan on one thread
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
-    /// Threads of the planner
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=2))]
+    /// Most threads of the planner; LaCAM refines plans on as many
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = number_of_threads())]
     threads: usize,
     /// Seed of the planner
     #[arg(long, value_name = "S", default_value_t = 0)]
@@ -43,10 +39,11 @@ impl Thinking {
 
     /// The budget for one plan.
     pub fn budget(&self) -> Result<Budget, Error> {
+        note_threads(self.threads);
         let seconds = self.seconds.or(self.nodes.is_none().then_some(1.0));
         let time = |seconds: f64| {
             Duration::try_from_secs_f64(seconds)
-                .map_err(|_| Error::config("seconds", seconds, "a time of 0 or more"))
+                .map_err(|_| Error::argument("--seconds", seconds, "a time of 0 or more"))
         };
         Ok(Budget { time: seconds.map(time).transpose()?, nodes: self.nodes, cancelled: None })
     }

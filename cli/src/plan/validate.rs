@@ -6,7 +6,6 @@ use std::process::ExitCode;
 
 use clap::Args;
 use pogema_core::{Cell, Error, Instance, Map};
-use pogema_maps::InstanceSource;
 use pogema_maps::files::{Reading, read_maps, read_text};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
 use serde_json::json;
@@ -67,7 +66,7 @@ impl Validate {
 
     fn instance(&self, num_agents: usize) -> Result<Instance, Error> {
         let config = self.settings.config_for(Some(num_agents))?;
-        Ok(InstanceSource::new(config, None)?.generate()?.instance)
+        Ok(self.settings.generate(&config)?.instance)
     }
 
     /// The map that a result names, looked for where the result is and here.

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::files;
 use pogema_core::{Error, Trace};
 use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, video};
 
 use super::screen::Screen;
-use crate::output::check_writable;
+use crate::output::{check_writable, flagged};
+use crate::words::word;
 
 /// The longer side of pictures. Units: pixels.
 const LONGER_SIDE_OF_PNG: u32 = 1024;
@@ -49,8 +50,8 @@ pub struct Pictures {
     #[arg(long, help_heading = "Pictures")]
     no_agents: bool,
     /// How much of the border is drawn
-    #[arg(long, value_enum, default_value_t = BorderName::Thin, help_heading = "Pictures")]
-    border: BorderName,
+    #[arg(long, default_value_t, value_parser = word::<Border>(), help_heading = "Pictures")]
+    border: Border,
     /// Colours of the agents in turn, such as `#c1433c,#2e6f9e`
     #[arg(long, value_name = "COLORS", value_delimiter = ',', help_heading = "Pictures")]
     colors: Vec<Color>,
@@ -60,16 +61,6 @@ pub struct Pictures {
     /// Steps per second: 4 unless told otherwise, and 8 in the terminal
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     fps: Option<f64>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BorderName {
-    /// The map alone
-    None,
-    /// The wall around the map
-    Thin,
-    /// All that agents can see, as wide as their radius
-    Full,
 }
 
 impl Pictures {
@@ -100,10 +91,10 @@ impl Pictures {
     /// # Errors
     /// For the first file that cannot be written, or the first value that is out of range.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
-        let refused = |reason: String| Err(Error::Request { reason });
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
-                return refused(format!("`{other}` and `{flag}` name one file, `{}`", path.display()));
+                let reason = format!("`{other}` and `{flag}` name one file, `{}`", path.display());
+                return Err(Error::Request { reason });
             }
             check_writable(path)?;
         }
@@ -112,19 +103,26 @@ impl Pictures {
             video::check_ffmpeg()?;
         }
         if let Some(agent) = self.egocentric.filter(|&agent| agent >= num_agents) {
-            return refused(format!("agent is `{agent}`, expected 0 to {}", num_agents.saturating_sub(1)));
+            return Err(Error::argument(
+                "--egocentric",
+                agent,
+                format!("0 to {}", num_agents.saturating_sub(1)),
+            ));
         }
         if let Some(fps) = self.fps.filter(|fps| self.are_wanted() && !(*fps > 0.0 && fps.is_finite())) {
-            return refused(format!("`--fps` is `{fps}`, expected more than 0"));
+            return Err(Error::argument("--fps", fps, "more than 0"));
         }
         match self.width {
-            Some(0) => refused("`--width` is `0`, expected at least 1".into()),
+            Some(0) => Err(Error::argument("--width", 0, "at least 1")),
             _ => Ok(()),
         }
     }
 
     /// Draws and writes all that is asked for; the page of a replay has a title.
     pub fn draw(&self, trace: &Trace, title: &str) -> Result<(), Error> {
+        if let Some(frame) = self.frame {
+            trace.state(frame).map_err(flagged("--frame"))?;
+        }
         let style = self.style();
         let width = |longer| self.width.unwrap_or_else(|| raster::width_for(trace, &style, longer));
         if let Some(path) = &self.svg {
@@ -148,8 +146,7 @@ impl Pictures {
 
     /// A screen for the same episode.
     pub fn screen(&self) -> Screen {
-        let border = self.border.into();
-        let style = text::Style { view: self.egocentric, border, ..text::Style::default() };
+        let style = text::Style { view: self.egocentric, border: self.border, ..text::Style::default() };
         Screen::new(style, self.fps.unwrap_or(TERMINAL_FPS))
     }
 
@@ -164,19 +161,9 @@ impl Pictures {
             egocentric: self.egocentric,
             show_agents: !self.no_agents,
             show_lines: !self.no_lines,
-            border: self.border.into(),
+            border: self.border,
             step_time: self.fps.map_or(usual.step_time, f64::recip),
             colors,
-        }
-    }
-}
-
-impl From<BorderName> for Border {
-    fn from(name: BorderName) -> Self {
-        match name {
-            BorderName::None => Self::None,
-            BorderName::Thin => Self::Thin,
-            BorderName::Full => Self::Full,
         }
     }
 }

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use pogema_core::{Error, Map};
+use clap::Args;
+use pogema_core::{Collision, Error, Map, OnGoal, Words};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{GridConfig, InstanceSource, Library, MapText, put_map, put_scenario};
+use pogema_maps::{Generated, GridConfig, InstanceSource, Library, MapText};
 use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::Sources;
+use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Settings {
@@ -43,29 +44,14 @@ pub struct Settings {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<i64>,
     /// What reaching a goal does
-    #[arg(long)]
-    on_target: Option<OnTarget>,
+    #[arg(long, value_parser = word::<OnGoal>())]
+    on_target: Option<OnGoal>,
     /// How conflicts are resolved
-    #[arg(long)]
-    collision_system: Option<CollisionSystem>,
+    #[arg(long, value_parser = word::<Collision>())]
+    collision_system: Option<Collision>,
     /// Any other field, such as `empty_outside=false`
     #[arg(long = "set", value_name = "FIELD=VALUE")]
     others: Vec<String>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnTarget {
-    Finish,
-    Nothing,
-    Restart,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum CollisionSystem {
-    Priority,
-    BlockBoth,
-    Soft,
 }
 
 impl Settings {
@@ -97,9 +83,9 @@ impl Settings {
     /// The map that is asked for, or drawn.
     pub fn map(&self) -> Result<Map, Error> {
         let config = self.config()?;
-        match config.map {
-            Some(map) => Ok(map),
-            None => Ok(InstanceSource::new(config, None)?.generate()?.instance.map().clone()),
+        match &config.map {
+            Some(map) => Ok(map.clone()),
+            None => Ok(self.generate(&config)?.instance.map().clone()),
         }
     }
 
@@ -108,31 +94,65 @@ impl Settings {
         self.config_for(None)
     }
 
-    /// The same for so many agents, unless file or flags say another number.
+    /// The same for a number of agents, unless file or flags set another one.
     pub fn config_for(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
+        self.read(num_agents).map_err(|error| self.located(error))
+    }
+
+    /// The instance of a config that [`Settings::config`] made, and warnings about it.
+    pub fn generate(&self, config: &GridConfig) -> Result<Generated, Error> {
+        let generated = InstanceSource::new(config.clone(), None).and_then(|mut source| source.generate());
+        generated.map_err(|error| self.located(error))
+    }
+
+    /// An error with the flag or the file that it comes from.
+    fn located(&self, error: Error) -> Error {
+        let flags = self.flags().unwrap_or_default();
+        let flag = flags.into_iter().find(|(field, ..)| error.field() == Some(field));
+        match (error, flag, &self.config) {
+            (Error::Config { value, expected, .. }, Some((_, flag, _)), _) => {
+                Error::argument(&flag, value, expected)
+            }
+            (Error::CellOutside { cell, height, width, .. }, Some((_, flag, _)), _) => {
+                let expected = format!("cells inside the map of {height} rows and {width} columns");
+                Error::argument(&flag, cell, expected)
+            }
+            (error @ (Error::Io { .. } | Error::Argument { .. }), ..) => error,
+            (error, None, Some(path)) => Error::io(path, error),
+            (error, ..) => error,
+        }
+    }
+
+    /// The fields that flags set, each with its flag.
+    fn flags(&self) -> Result<Vec<(String, String, Value)>, Error> {
+        let plain: [(&str, &str, Option<Value>); 8] = [
+            ("seed", "--seed", self.seed.map(Into::into)),
+            ("num_agents", "--num-agents", self.num_agents.map(Into::into)),
+            ("size", "--size", self.size.map(Into::into)),
+            ("density", "--density", self.density.map(number)),
+            ("obs_radius", "--obs-radius", self.obs_radius.map(Into::into)),
+            ("max_episode_steps", "--steps", self.steps.map(Into::into)),
+            ("on_target", "--on-target", self.on_target.map(|word| word.word().into())),
+            ("collision_system", "--collision-system", self.collision_system.map(|word| word.word().into())),
+        ];
+        let plain = plain
+            .into_iter()
+            .filter_map(|(field, flag, value)| Some(Ok((field.to_owned(), flag.to_owned(), value?))));
+        let others = self.others.iter().map(|other| {
+            let (field, value) = other.split_once('=').ok_or_else(|| {
+                Error::argument("--set", other, "FIELD=VALUE, such as `empty_outside=false`")
+            })?;
+            Ok((field.to_owned(), format!("--set {field}"), value_of(value)))
+        });
+        plain.chain(others).collect()
+    }
+
+    fn read(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
         let mut fields = match &self.config {
             Some(path) => fields_of(path)?,
             None => Object::new(),
         };
-        let mut set = |field: &str, value: Option<Value>| {
-            if let Some(value) = value {
-                fields.insert(field.into(), value);
-            }
-        };
-        set("seed", self.seed.map(Into::into));
-        set("num_agents", self.num_agents.map(Into::into));
-        set("size", self.size.map(Into::into));
-        set("density", self.density.map(number));
-        set("obs_radius", self.obs_radius.map(Into::into));
-        set("max_episode_steps", self.steps.map(Into::into));
-        set("on_target", word(self.on_target).map(Into::into));
-        set("collision_system", word(self.collision_system).map(Into::into));
-        for other in &self.others {
-            let (field, value) = other
-                .split_once('=')
-                .ok_or_else(|| Error::Syntax { reason: format!("`--set {other}`, expected FIELD=VALUE") })?;
-            set(field, Some(value_of(value)));
-        }
+        fields.extend(self.flags()?.into_iter().map(|(field, _, value)| (field, value)));
         if let Some(num_agents) = num_agents {
             fields.entry("num_agents").or_insert(num_agents.into());
         }
@@ -140,21 +160,30 @@ impl Settings {
             fields.remove("width");
             fields.remove("height");
         }
-        self.choose_map(&mut fields)?;
-        self.take_scenario(&mut fields)?;
-        GridConfig::from_value(&Value::Object(fields))
+        let map = self.chosen_map(&mut fields)?;
+        let config = match map {
+            Some(text) => GridConfig::on_map(&fields, &text)?,
+            None => GridConfig::from_value(&Value::Object(fields.clone()))?,
+        };
+        let Some(path) = &self.scenario else { return Ok(config) };
+        let map = config
+            .map
+            .as_ref()
+            .ok_or_else(|| Error::Request { reason: "`--scenario` needs a map".into() })?;
+        let scenario = read_scenario(path, map)?;
+        config.with_scenario(&scenario, &fields)
     }
 
-    /// Puts the map that is named in the place of its name.
+    /// Takes the name of a map out of the fields, and returns the map that flag or name ask for.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
-    fn choose_map(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
+    fn chosen_map(&self, fields: &mut Object<String, Value>) -> Result<Option<MapText>, Error> {
         let named = fields.get("map_name").and_then(Value::as_str).map(str::to_owned);
         // What is no text is left for the config to refuse.
         if named.is_some() {
             fields.remove("map_name");
         }
-        let Some(word) = self.map.clone().or(named) else { return Ok(()) };
+        let Some(word) = self.map.clone().or(named) else { return Ok(None) };
         let library = self.sources.library()?;
         let text = if let Ok(text) = library.map(&word) {
             text.clone()
@@ -167,15 +196,7 @@ impl Settings {
                 None => error,
             })?
         };
-        put_map(&text, fields)
-    }
-
-    /// Puts starts and goals of a file in their place: those of the first agents, where their number is given.
-    fn take_scenario(&self, fields: &mut Object<String, Value>) -> Result<(), Error> {
-        let Some(path) = &self.scenario else { return Ok(()) };
-        let map = GridConfig::from_value(&Value::Object(fields.clone()))?.map;
-        let map = map.ok_or_else(|| Error::Request { reason: "`--scenario` needs a map".into() })?;
-        put_scenario(&read_scenario(path, &map)?, fields)
+        Ok(Some(text))
     }
 }
 
@@ -198,10 +219,6 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     let chance = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
     let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
-}
-
-fn word(choice: Option<impl ValueEnum>) -> Option<String> {
-    choice?.to_possible_value().map(|value| value.get_name().to_owned())
 }
 
 /// JSON has no NaN and would make it null, so it is left to the config to refuse the word.

@@ -5,7 +5,7 @@ mod lane;
 mod prepare;
 mod team;
 
-use pogema_core::{Action, Config, Error, Metrics, StepOut};
+use pogema_core::{Action, Config, Error, Metrics, StepOut, check_threads};
 
 use crate::{Engine, Path};
 
@@ -47,11 +47,11 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch of `num_lanes` environments, played by `num_threads` threads, the calling one among them; it wants a
-    /// reset first.
+    /// A batch of `num_lanes` environments, played by at most `num_threads` threads, the calling one among them. Call
+    /// `reset` before the first step.
     ///
     /// # Errors
-    /// If the config is out of range; for no lanes, no threads or more threads than lanes; if threads cannot be
+    /// If the config is out of range; for no lanes, or a number of threads other than 1 to 1024; if threads cannot be
     /// started.
     pub fn new(
         config: Config,
@@ -60,12 +60,10 @@ impl Batch {
         source: impl Instances + 'static,
     ) -> Result<Self, Error> {
         if num_lanes == 0 {
-            return Err(Error::config("num_lanes", num_lanes, "at least 1"));
+            return Err(Error::argument("num_lanes", num_lanes, "at least 1"));
         }
-        if !(1..=num_lanes).contains(&num_threads) {
-            let expected = format!("1 to {num_lanes}, the number of lanes");
-            return Err(Error::config("num_threads", num_threads, expected));
-        }
+        // A lane is played by one thread at a time.
+        let num_threads = check_threads("num_threads", num_threads)?.min(num_lanes);
         let path = Path::from_environment()?;
         let lane = |index| Lane::new(index, config, path);
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;

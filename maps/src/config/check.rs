@@ -6,7 +6,7 @@ use super::{GridConfig, Integration, Targets};
 
 impl GridConfig {
     /// Rule: config/positions, config/fields
-    pub(super) fn check_places(&self) -> Result<(), Error> {
+    pub(crate) fn check_places(&self) -> Result<(), Error> {
         self.check_inside("agents_xy", self.agents_xy.iter().flatten())?;
         match &self.targets_xy {
             Some(Targets::Single(goals)) => self.check_inside("targets_xy", goals)?,

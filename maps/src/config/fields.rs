@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use pogema_core::{Cell, Error, shorten};
+use pogema_core::{Cell, Error, Words, shorten};
 use serde_json::{Map as Object, Value};
 
 /// Every key a config may have, POGEMA's first, ours last.
@@ -103,15 +103,14 @@ impl<'a> Fields<'a> {
         self.required(field, "true or false")?.map_or(Ok(default), |value| flag(field, value))
     }
 
-    /// One of a few words, where null stands for absent.
-    pub fn optional_choice<T: Copy>(&self, field: &str, words: &[(&str, T)]) -> Result<Option<T>, Error> {
-        self.optional(field).map(|value| choice(field, value, words)).transpose()
+    /// A word, where null stands for absent.
+    pub fn optional_word<T: Words>(&self, field: &str) -> Result<Option<T>, Error> {
+        self.optional(field).map(|value| word(field, value)).transpose()
     }
 
-    /// One of a few words; the first one by default.
-    pub fn choice<T: Copy>(&self, field: &str, words: &[(&str, T)]) -> Result<T, Error> {
-        let value = self.required(field, &one_of(words))?;
-        value.map_or(Ok(words[0].1), |value| choice(field, value, words))
+    /// A word, or the default.
+    pub fn word<T: Words + Default>(&self, field: &str) -> Result<T, Error> {
+        self.required(field, &T::expected())?.map_or_else(|| Ok(T::default()), |value| word(field, value))
     }
 
     /// A text, where null stands for absent.
@@ -142,14 +141,9 @@ fn flag(field: &str, value: &Value) -> Result<bool, Error> {
     value.as_bool().ok_or_else(|| Error::config(field, value, "true or false"))
 }
 
-fn one_of<T>(words: &[(&str, T)]) -> String {
-    let quoted: Vec<String> = words.iter().map(|(word, _)| format!("`{word}`")).collect();
-    format!("one of {}", quoted.join(", "))
-}
-
-fn choice<T: Copy>(field: &str, value: &Value, words: &[(&str, T)]) -> Result<T, Error> {
-    let chosen = value.as_str().and_then(|word| words.iter().find(|(known, _)| *known == word));
-    chosen.map(|(_, meaning)| *meaning).ok_or_else(|| Error::config(field, value, one_of(words)))
+fn word<T: Words>(field: &str, value: &Value) -> Result<T, Error> {
+    let known = value.as_str().and_then(T::of_word);
+    known.ok_or_else(|| Error::config(field, value, T::expected()))
 }
 
 /// A list of `[row, col]` pairs.

@@ -1,11 +1,11 @@
 //! From YAML or JSON to a config.
 
-use pogema_core::{Cell, Collision, Error, Map, Observation, Occupancy, OnGoal, Reward};
-use serde_json::{Value, json};
+use pogema_core::{Cell, Error, Map};
+use serde_json::{Map as Object, Value, json};
 
 use super::fields::{Fields, cells};
 use super::parse::{value_from_json, value_from_yaml};
-use super::{GridConfig, Integration, Limits, Targets};
+use super::{GridConfig, Limits, Targets};
 use crate::text::{MapText, parse_map_text};
 
 /// Largest side and number of agents that POGEMA 1.4.0 accepts.
@@ -43,20 +43,19 @@ impl GridConfig {
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {
-        let object = value.as_object().ok_or_else(|| no_object(value))?;
+        Self::read(value.as_object().ok_or_else(|| no_object(value))?, None)
+    }
+
+    /// Reads fields, of which a given map replaces `map`.
+    pub(crate) fn read(object: &Object<String, Value>, map: Option<MapText>) -> Result<Self, Error> {
         let fields = Fields::new(object)?;
         check_constants(&fields)?;
-        let limits = fields
-            .choice("limits", &[("as_released", Limits::AsReleased), ("extended", Limits::Extended)])?;
-        let on_target = fields.choice(
-            "on_target",
-            &[("finish", OnGoal::Finish), ("nothing", OnGoal::Nothing), ("restart", OnGoal::Restart)],
-        )?;
-        let mut config = Self { on_target, limits, ..Self::default() };
+        let mut config =
+            Self { on_target: fields.word("on_target")?, limits: fields.word("limits")?, ..Self::default() };
         config.read_sizes(&fields)?;
         config.read_places(&fields)?;
         config.read_rules(&fields)?;
-        config.read_map(&fields)?;
+        config.read_map(&fields, map)?;
         config.check_places()?;
         Ok(config)
     }
@@ -98,48 +97,27 @@ impl GridConfig {
     }
 
     fn read_rules(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
-        let released = [("as_released", Occupancy::AsReleased), ("exact", Occupancy::Exact)];
-        let frameworks = [
-            ("SampleFactory", Integration::SampleFactory),
-            ("PyMARL", Integration::PyMarl),
-            ("rllib", Integration::Rllib),
-            ("gymnasium", Integration::Gymnasium),
-            ("PettingZoo", Integration::PettingZoo),
-        ];
-        self.collision_system = fields.choice(
-            "collision_system",
-            &[
-                ("priority", Collision::Priority),
-                ("block_both", Collision::BlockBoth),
-                ("soft", Collision::Soft),
-            ],
-        )?;
-        self.observation_type = fields.choice(
-            "observation_type",
-            &[
-                ("default", Observation::Default),
-                ("POMAPF", Observation::Pomapf),
-                ("MAPF", Observation::Mapf),
-            ],
-        )?;
+        self.collision_system = fields.word("collision_system")?;
+        self.observation_type = fields.word("observation_type")?;
         self.max_episode_steps = fields.integer("max_episode_steps", i64::MIN..=i64::MAX, 64)?;
         self.persistent = fields.flag("persistent", false)?;
         self.empty_outside = fields.flag("empty_outside", true)?;
         self.map_name = fields.text("map_name")?.map(str::to_owned);
-        self.integration = fields.optional_choice("integration", &frameworks)?;
+        self.integration = fields.optional_word("integration")?;
         self.auto_reset = fields.optional_flag("auto_reset")?;
-        self.occupancy = fields.choice("occupancy", &released)?;
-        self.reward = fields.choice("reward", &[("own", Reward::Own), ("shared", Reward::Shared)])?;
+        self.occupancy = fields.word("occupancy")?;
+        self.reward = fields.word("reward")?;
         Ok(())
     }
 
     /// Rule: config/map
-    fn read_map(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
-        let map = match fields.optional("map") {
-            None => return Ok(()),
-            Some(Value::String(text)) => self.take_map_text(parse_map_text(text)?)?,
-            Some(Value::Array(rows)) => map_from_rows(rows)?,
-            Some(other) => return Err(Error::config("map", other, "a text or a list of rows")),
+    fn read_map(&mut self, fields: &Fields<'_>, given: Option<MapText>) -> Result<(), Error> {
+        let map = match (given, fields.optional("map")) {
+            (None, None) => return Ok(()),
+            (Some(text), _) => self.take_map_text(text)?,
+            (None, Some(Value::String(text))) => self.take_map_text(parse_map_text(text)?)?,
+            (None, Some(Value::Array(rows))) => map_from_rows(rows)?,
+            (None, Some(other)) => return Err(Error::config("map", other, "a text or a list of rows")),
         };
         (self.width, self.height) = (map.width(), map.height());
         self.size = self.width.max(self.height);

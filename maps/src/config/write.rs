@@ -1,9 +1,8 @@
 //! From a config back to the object that POGEMA would read.
 
-use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward};
 use serde_json::{Value, json};
 
-use super::{GridConfig, Integration, Limits, Targets};
+use super::{GridConfig, Targets};
 
 impl GridConfig {
     /// The config as an object under POGEMA's names, everything derived written out but for the sides of a given
@@ -11,11 +10,7 @@ impl GridConfig {
     pub fn to_value(&self) -> Value {
         let side = |length: usize| self.map.is_none().then_some(length);
         json!({
-            "on_target": match self.on_target {
-                OnGoal::Finish => "finish",
-                OnGoal::Nothing => "nothing",
-                OnGoal::Restart => "restart",
-            },
+            "on_target": self.on_target,
             "seed": self.seed,
             "width": side(self.width),
             "height": side(self.height),
@@ -26,41 +21,18 @@ impl GridConfig {
             "num_agents": self.num_agents,
             "possible_agents_xy": self.possible_agents_xy,
             "possible_targets_xy": self.possible_targets_xy,
-            "collision_system": match self.collision_system {
-                Collision::Priority => "priority",
-                Collision::BlockBoth => "block_both",
-                Collision::Soft => "soft",
-            },
+            "collision_system": self.collision_system,
             "persistent": self.persistent,
-            "observation_type": match self.observation_type {
-                Observation::Default => "default",
-                Observation::Pomapf => "POMAPF",
-                Observation::Mapf => "MAPF",
-            },
+            "observation_type": self.observation_type,
             "map": self.map.as_ref().map(rows_of_numbers),
             "map_name": self.map_name,
-            "integration": self.integration.map(|framework| match framework {
-                Integration::SampleFactory => "SampleFactory",
-                Integration::PyMarl => "PyMARL",
-                Integration::Rllib => "rllib",
-                Integration::Gymnasium => "gymnasium",
-                Integration::PettingZoo => "PettingZoo",
-            }),
+            "integration": self.integration,
             "max_episode_steps": self.max_episode_steps,
             "auto_reset": self.auto_reset,
             "empty_outside": self.empty_outside,
-            "occupancy": match self.occupancy {
-                Occupancy::AsReleased => "as_released",
-                Occupancy::Exact => "exact",
-            },
-            "reward": match self.reward {
-                Reward::Own => "own",
-                Reward::Shared => "shared",
-            },
-            "limits": match self.limits {
-                Limits::AsReleased => "as_released",
-                Limits::Extended => "extended",
-            },
+            "occupancy": self.occupancy,
+            "reward": self.reward,
+            "limits": self.limits,
         })
     }
 }

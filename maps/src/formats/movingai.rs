@@ -1,17 +1,19 @@
 //! Maps of the MovingAI benchmarks.
 
-use pogema_core::{Error, Map};
+use pogema_core::{Error, Map, words};
 
 use crate::text::check_side;
 
-/// Whether agents may enter water, which MovingAI writes as `W`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Water {
-    /// They may, as in the toolbox and the published map sets.
-    #[default]
-    Free,
-    /// They may not, as MovingAI has it for those who walk.
-    Obstacle,
+words! {
+    /// Whether agents may enter water, which MovingAI writes as `W`.
+    #[derive(Default)]
+    pub enum Water {
+        /// They may, as in the toolbox and the published map sets.
+        #[default]
+        Free = "free",
+        /// They may not, as MovingAI defines it for walking agents.
+        Obstacle = "obstacle",
+    }
 }
 
 /// Reads a `.map` file.

@@ -2,25 +2,30 @@
 
 use std::ops::Range;
 
-use pogema_core::Error;
+use pogema_core::{Error, Words, words};
 
 use super::{Bays, MazeRanges, RandomRanges, Warehouse};
 use crate::config::nearest;
 use crate::formats::NamedMap;
 use crate::text::MapText;
 
-/// A map set of the paper.
-///
-/// Source: pogema-toolbox 0.1.1, `random_generator.py`, `maze_generator.py` and `warehouse_generator.py`, `main`;
-/// the published sets, whose mazes have sides from 17 to 21 in place of the generator's 5 to 9
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is the set of its name")]
-pub enum Preset {
-    ValidationRandom,
-    TrainingRandom,
-    ValidationMazes,
-    TrainingMazes,
-    Warehouse,
+words! {
+    /// A map set of the paper. The names of its maps begin with its word.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `maze_generator.py` and `warehouse_generator.py`, `main`;
+    /// the published sets, whose mazes have sides from 17 to 21 in place of the generator's 5 to 9
+    pub enum Preset {
+        /// 128 random maps for validation.
+        ValidationRandom = "validation-random",
+        /// 512 random maps for training.
+        TrainingRandom = "training-random",
+        /// 128 mazes for validation.
+        ValidationMazes = "validation-mazes",
+        /// 2048 mazes for training.
+        TrainingMazes = "training-mazes",
+        /// The warehouse.
+        Warehouse = "warehouse",
+    }
 }
 
 /// Training goes on where validation ends.
@@ -29,33 +34,13 @@ const SEEDS_OF_RANDOM_TRAINING: Range<u64> = 128..128 + 512;
 const SEEDS_OF_MAZE_TRAINING: Range<u64> = 128..128 + 2048;
 
 impl Preset {
-    /// Each of them.
-    pub const ALL: [Self; 5] = [
-        Self::ValidationRandom,
-        Self::TrainingRandom,
-        Self::ValidationMazes,
-        Self::TrainingMazes,
-        Self::Warehouse,
-    ];
-
-    /// Its name, which the names of its maps begin with.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ValidationRandom => "validation-random",
-            Self::TrainingRandom => "training-random",
-            Self::ValidationMazes => "validation-mazes",
-            Self::TrainingMazes => "training-mazes",
-            Self::Warehouse => "warehouse",
-        }
-    }
-
     /// The preset of a name.
     ///
     /// # Errors
     /// [`Error::Config`] with the nearest name.
     pub fn by_name(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
-            let hint = nearest(name, Self::ALL.into_iter().map(Self::name)).unwrap_or_default();
+        Self::of_word(name).ok_or_else(|| {
+            let hint = nearest(name, Self::NAMES.iter().copied()).unwrap_or_default();
             Error::config("preset", name, format!("a known one; the nearest is `{hint}`"))
         })
     }
@@ -82,10 +67,10 @@ impl Preset {
         let random = |seed| RandomRanges::default().sample(seed)?.generate().map(MapText::from);
         let maze = |seed| Self::MAZES.sample(seed)?.generate().map(MapText::from);
         match self {
-            Self::ValidationRandom => of_seeds(self.name(), SEEDS_OF_VALIDATION, random),
-            Self::TrainingRandom => of_seeds(self.name(), SEEDS_OF_RANDOM_TRAINING, random),
-            Self::ValidationMazes => of_seeds(self.name(), SEEDS_OF_VALIDATION, maze),
-            Self::TrainingMazes => of_seeds(self.name(), SEEDS_OF_MAZE_TRAINING, maze),
+            Self::ValidationRandom => of_seeds(self.word(), SEEDS_OF_VALIDATION, random),
+            Self::TrainingRandom => of_seeds(self.word(), SEEDS_OF_RANDOM_TRAINING, random),
+            Self::ValidationMazes => of_seeds(self.word(), SEEDS_OF_VALIDATION, maze),
+            Self::TrainingMazes => of_seeds(self.word(), SEEDS_OF_MAZE_TRAINING, maze),
             Self::Warehouse => {
                 let text = Warehouse::PUBLISHED.generate(Bays::Published)?;
                 Ok(vec![NamedMap { name: "wfi_warehouse".into(), text }])

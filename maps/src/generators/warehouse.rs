@@ -1,6 +1,6 @@
 //! Warehouses: shelves in rows, aisles between them, and bays at both ends.
 
-use pogema_core::{Cell, Error, Map};
+use pogema_core::{Cell, Error, Map, words};
 
 use crate::text::MapText;
 
@@ -27,16 +27,23 @@ pub struct Warehouse {
     pub vertical_gap: usize,
 }
 
-/// Where agents may start and have their goals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bays {
-    /// Nothing is said of it.
-    None,
-    /// As the toolbox lays them: starts in the gaps at both ends, in two rows of three; goals along the shelves.
-    Toolbox,
-    /// As in the published map: without the first and last row; starts in columns 1, 2, 4 and 5 and the mirrored
-    /// four, beside each shelf and the rows next to it.
-    Published,
+words! {
+    /// Where agents may start and have their goals.
+    #[derive(Default)]
+    pub enum Bays {
+        /// Unspecified.
+        #[default]
+        None = "none",
+        /// As the toolbox lays them.
+        ///
+        /// Starts are in the gaps at both ends, in two rows of three; goals are along the shelves.
+        Toolbox = "toolbox",
+        /// As in the published warehouse.
+        ///
+        /// The first and last row have none. Starts are in columns 1, 2, 4 and 5 and the mirrored four, beside each
+        /// shelf and the rows next to it.
+        Published = "published",
+    }
 }
 
 impl Default for Warehouse {

@@ -139,12 +139,16 @@ impl<'a> Run<'a> {
             for thread in 1..num_threads {
                 let (first, log, is_done) = (&first, &log, &is_done);
                 let seed = seed.wrapping_add(thread as u64);
-                scope.spawn(move || {
+                let refine = move || {
                     let mut refiner = Refiner::new(problem, costs, first, log, seed);
                     while !is_done.load(Ordering::Relaxed) && refiner.total_delay() > 0 {
                         refiner.improve();
                     }
-                });
+                };
+                // Where the system starts no more threads, those that run suffice.
+                if std::thread::Builder::new().spawn_scoped(scope, refine).is_err() {
+                    break;
+                }
             }
             let is_possible = self.refine_and_search(&mut refiner);
             is_done.store(true, Ordering::Relaxed);

@@ -36,8 +36,12 @@ enum CostTables {
 }
 
 impl PibtLifelong {
-    /// A planner for a number of agents on a map.
-    pub fn new(graph: Arc<Graph>, num_agents: usize, params: PibtParams) -> Self {
+    /// A planner for a map. The first step fixes the number of agents.
+    pub fn new(graph: Arc<Graph>, params: PibtParams) -> Self {
+        Self::for_agents(graph, 0, params)
+    }
+
+    fn for_agents(graph: Arc<Graph>, num_agents: usize, params: PibtParams) -> Self {
         let costs = match params.guidance {
             Some(guidance) => CostTables::Guided {
                 guidance: Guidance::new(graph.clone(), num_agents, guidance),
@@ -53,12 +57,16 @@ impl PibtLifelong {
         Self { graph, params, step, priorities, goals: vec![Vertex::MAX; num_agents], costs }
     }
 
-    /// Returns the next configuration. Goals may be equal or unreachable.
+    /// Returns the next configuration. Goals may be equal or unreachable. Another number of agents begins a new episode.
     ///
     /// # Errors
-    /// [`Error::Length`] for another number of agents; [`Error::Agent`] for an unknown vertex or a shared start vertex.
+    /// [`Error::Length`] for another number of goals than agents; [`Error::Agent`] for an unknown vertex or a shared
+    /// start vertex.
     pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
         self.check(now, goals)?;
+        if now.len() != self.goals.len() {
+            *self = Self::for_agents(self.graph.clone(), now.len(), self.params.clone());
+        }
         self.update_costs(now, goals);
         let graph = &self.graph;
         let order = self.priorities.order();
@@ -76,8 +84,7 @@ impl PibtLifelong {
     }
 
     fn check(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
-        Error::check_length("agents", self.goals.len(), now.len())?;
-        Error::check_length("goals", self.goals.len(), goals.len())?;
+        Error::check_length("goals", now.len(), goals.len())?;
         let num_vertices = self.graph.num_vertices() as Vertex;
         for (agent, (&place, &goal)) in now.iter().zip(goals).enumerate() {
             if place.max(goal) >= num_vertices {
@@ -114,13 +121,10 @@ impl PibtLifelong {
 
 impl Lifelong for PibtLifelong {
     fn reset(&mut self) {
-        *self = Self::new(self.graph.clone(), self.goals.len(), self.params.clone());
+        *self = Self::new(self.graph.clone(), self.params.clone());
     }
 
     fn next(&mut self, now: &[Vertex], goals: &[Vertex], _: &Budget) -> Result<Vec<Vertex>, Error> {
-        if now.len() != self.goals.len() {
-            *self = Self::new(self.graph.clone(), now.len(), self.params.clone());
-        }
         self.step(now, goals).map(<[Vertex]>::to_vec)
     }
 }

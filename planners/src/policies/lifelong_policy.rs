@@ -8,13 +8,13 @@ use crate::budget::Budget;
 use crate::graph::Graph;
 use crate::lifelong::Lifelong;
 use crate::policies::goal_forecast::GoalForecast;
-use crate::registry::{self, PlannerSettings};
+use crate::registry::{LifelongName, PlannerSettings};
 
 /// A lifelong planner that controls the agents of an environment.
 ///
 /// Inactive agents stay and are hidden from the planner.
 pub struct LifelongPolicy {
-    name: String,
+    name: LifelongName,
     settings: PlannerSettings,
     budget: Budget,
     planner: Option<(Map, Arc<Graph>, Box<dyn Lifelong>)>,
@@ -22,14 +22,9 @@ pub struct LifelongPolicy {
 }
 
 impl LifelongPolicy {
-    /// A policy of a planner of [`registry::LIFELONG`], with a budget for each step.
-    ///
-    /// # Errors
-    /// [`Error::Config`] for an unknown name.
-    pub fn new(name: &str, settings: PlannerSettings, budget: Budget) -> Result<Self, Error> {
-        let nowhere = Map::new(1, 1, vec![true])?;
-        registry::lifelong(name, Arc::new(Graph::new(&nowhere)), settings)?;
-        Ok(Self { name: name.to_owned(), settings, budget, planner: None, forecast: None })
+    /// A policy of a planner, with a budget for each step.
+    pub fn new(name: LifelongName, settings: PlannerSettings, budget: Budget) -> Self {
+        Self { name, settings, budget, planner: None, forecast: None }
     }
 
     /// Clears the state of the episode, including future goals.
@@ -44,11 +39,11 @@ impl LifelongPolicy {
     /// then be called in every step.
     ///
     /// # Errors
-    /// [`Error::Config`] for a planner that does not use future goals.
+    /// [`Error::Argument`] for a planner that does not use future goals.
     pub fn provide_future_goals(&mut self, instance: &Instance) -> Result<(), Error> {
-        let (_, planner) = self.planner_on(instance.map())?;
+        let (_, planner) = self.planner_on(instance.map());
         if !planner.uses_future_goals() {
-            return Err(Error::config("planner", &self.name, "`rhcr`, to make use of goals still to come"));
+            return Err(Error::argument("planner", self.name, "`rhcr`, to make use of goals still to come"));
         }
         self.forecast = Some(GoalForecast::new(instance));
         Ok(())
@@ -67,7 +62,7 @@ impl LifelongPolicy {
         });
         let future = future.transpose()?;
         let budget = self.budget.clone();
-        let (graph, planner) = self.planner_on(map)?;
+        let (graph, planner) = self.planner_on(map);
         let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
         let cells = graph.vertices_of("the agent's cell", &of(now.cells))?;
         let next = if let Some(goals) = future {
@@ -85,15 +80,15 @@ impl LifelongPolicy {
     }
 
     /// Returns the planner of a map, from the cache if the map is the same.
-    fn planner_on(&mut self, map: &Map) -> Result<(Arc<Graph>, &mut dyn Lifelong), Error> {
+    fn planner_on(&mut self, map: &Map) -> (Arc<Graph>, &mut dyn Lifelong) {
         let (_, graph, planner) = match self.planner.take() {
             Some(made) if made.0 == *map => self.planner.insert(made),
             _ => {
                 let graph = Arc::new(Graph::new(map));
-                let planner = registry::lifelong(&self.name, graph.clone(), self.settings)?;
+                let planner = self.name.make(graph.clone(), self.settings);
                 self.planner.insert((map.clone(), graph, planner))
             }
         };
-        Ok((graph.clone(), planner.as_mut()))
+        (graph.clone(), planner.as_mut())
     }
 }

@@ -13,7 +13,7 @@ mod pogema;
 
 pub use astar::{AStarAgent, AStarTeam};
 pub use lifelong_policy::LifelongPolicy;
-pub use named::{NamedPolicy, PolicySettings, SIMPLE};
+pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
 pub use observations::{PomapfObservation, PomapfObservations};
 pub use planner_policy::PlannerPolicy;
 pub use pogema::{pogema_team, sample};

@@ -1,6 +1,6 @@
 //! Policies by name.
 
-use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal};
+use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
 
 use crate::budget::Budget;
@@ -10,14 +10,19 @@ use crate::policies::lifelong_policy::LifelongPolicy;
 use crate::policies::observations::PomapfObservations;
 use crate::policies::planner_policy::PlannerPolicy;
 use crate::policies::pogema::{pogema_team, sample};
-use crate::registry::{LIFELONG, PLANNERS, PlannerSettings, planner};
+use crate::registry::{LifelongName, PlannerName, PlannerSettings};
 
-/// The names and descriptions of policies without a joint plan.
-pub const SIMPLE: [(&str, &str); 3] = [
-    ("random", "what POGEMA's `sample_actions` draws"),
-    ("astar", "POGEMA's own A* agent, one for each agent"),
-    ("stay", "all agents stay"),
-];
+words! {
+    /// The policies without a joint plan.
+    pub enum SimplePolicy {
+        /// What POGEMA's `sample_actions` draws.
+        Random = "random",
+        /// POGEMA's own A* agent, one for each agent.
+        Astar = "astar",
+        /// All agents stay.
+        Stay = "stay",
+    }
+}
 
 /// The settings of a policy.
 #[derive(Clone, Debug, Default)]
@@ -46,8 +51,13 @@ enum Kind {
 impl NamedPolicy {
     /// Returns the names and descriptions of all policies. A name may stand for a one-shot and a lifelong planner.
     pub fn all() -> Vec<(&'static str, &'static str)> {
+        fn listed<T: Words>() -> impl Iterator<Item = (&'static str, &'static str)> {
+            T::WORDS.iter().map(|known| (known.word, known.help()))
+        }
         let mut all: Vec<(&str, &str)> = Vec::new();
-        for (name, help) in SIMPLE.into_iter().chain(PLANNERS).chain(LIFELONG) {
+        for (name, help) in
+            listed::<SimplePolicy>().chain(listed::<PlannerName>()).chain(listed::<LifelongName>())
+        {
             if !all.iter().any(|(known, _)| *known == name) {
                 all.push((name, help));
             }
@@ -60,7 +70,7 @@ impl NamedPolicy {
     /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
     ///
     /// # Errors
-    /// [`Error::Config`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
+    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
     pub fn new(
         name: &str,
         settings: &PolicySettings,
@@ -68,34 +78,37 @@ impl NamedPolicy {
         instance: &Instance,
         generator: Generator,
     ) -> Result<Self, Error> {
-        let has = |known: &[(&str, &str)]| known.iter().any(|(known, _)| *known == name);
         let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt } =
             settings.clone();
-        let is_lifelong = has(&LIFELONG) && (config.on_goal == OnGoal::Restart || !has(&PLANNERS));
-        if future_goals && !is_lifelong {
+        let one_shot = PlannerName::of_word(name);
+        let lifelong = LifelongName::of_word(name);
+        let lifelong = lifelong.filter(|_| config.on_goal == OnGoal::Restart || one_shot.is_none());
+        if future_goals && lifelong.is_none() {
             let reason = format!("`{name}` does not use future goals; only lifelong planners do");
             return Err(Error::Request { reason });
         }
-        if single_attempt && (is_lifelong || !has(&PLANNERS)) {
+        if single_attempt && (lifelong.is_some() || one_shot.is_none()) {
             let reason = format!("`{name}` does not use a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
         }
-        Ok(Self(match name {
-            "random" => Kind::Random(Box::new(generator)),
-            "astar" => Kind::Astar(pogema_team()),
-            "stay" => Kind::Stay,
-            name if is_lifelong => {
-                let mut policy = LifelongPolicy::new(name, planner_settings, budget)?;
-                if future_goals {
-                    policy.provide_future_goals(instance)?;
-                }
-                Kind::Lifelong(Box::new(policy))
+        if let Some(planner) = lifelong {
+            let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
+            if future_goals {
+                policy.provide_future_goals(instance)?;
             }
-            name => {
-                let max_steps = u64::try_from(config.max_steps).ok();
-                let policy = PlannerPolicy::new(planner(name, planner_settings)?, budget, max_steps);
-                Kind::Planner(Box::new(if single_attempt { policy.with_single_attempt() } else { policy }))
-            }
+            return Ok(Self(Kind::Lifelong(Box::new(policy))));
+        }
+        if let Some(planner) = one_shot {
+            let max_steps = u64::try_from(config.max_steps).ok();
+            let policy = PlannerPolicy::new(planner.make(planner_settings), budget, max_steps);
+            return Ok(Self(Kind::Planner(Box::new(policy))));
+        }
+        let known = || Self::all().into_iter().map(|(known, _)| format!("`{known}`")).collect::<Vec<_>>();
+        Ok(Self(match SimplePolicy::of_word(name) {
+            Some(SimplePolicy::Random) => Kind::Random(Box::new(generator)),
+            Some(SimplePolicy::Astar) => Kind::Astar(pogema_team()),
+            Some(SimplePolicy::Stay) => Kind::Stay,
+            None => return Err(Error::argument("policy", name, format!("one of {}", known().join(", ")))),
         }))
     }
 

@@ -2,7 +2,7 @@
 
 use crate::common::joint_oracle::oracle;
 use pogema_core::{Cell, Map, OnGoal};
-use pogema_maps::{Doubt, PUZZLES, ScenarioStats};
+use pogema_maps::{Infeasibility, PUZZLES, ScenarioStats};
 use pogema_numpy::Generator;
 use pogema_planners::{Solvability, solvability};
 
@@ -84,12 +84,15 @@ fn a_pocket_in_which_two_are_locked() {
     let rows = ["..#...", ".##...", "##....", "......"];
     let agents = [[(0, 1), (1, 0)], [(1, 0), (0, 1)], [(3, 0), (0, 5)]];
     let stats = judge(&rows, &agents, OnGoal::Nothing);
-    assert_eq!(stats.doubts, [Doubt::WrongOrder(vec![0, 1])]);
+    assert_eq!(stats.infeasibilities, [Infeasibility::WrongOrder(vec![0, 1])]);
     let stats = judge(&rows, &agents, OnGoal::Finish);
-    assert_eq!(stats.doubts, [Doubt::Locked(vec![0, 1])]);
+    assert_eq!(stats.infeasibilities, [Infeasibility::Locked(vec![0, 1])]);
     let square = ["..#", "..#"];
     let full = [[(0, 0), (0, 1)], [(0, 1), (0, 0)], [(1, 0), (1, 0)], [(1, 1), (1, 1)]];
-    assert_eq!(judge(&square, &full, OnGoal::Nothing).doubts, [Doubt::Locked(vec![0, 1, 2, 3])]);
+    assert_eq!(
+        judge(&square, &full, OnGoal::Nothing).infeasibilities,
+        [Infeasibility::Locked(vec![0, 1, 2, 3])]
+    );
 }
 
 #[test]
@@ -98,7 +101,7 @@ fn puzzles_are_proven_solvable_where_the_proof_is_cheap() {
     for puzzle in &PUZZLES {
         let text = puzzle.text().unwrap();
         let stats = scenario(&text.map, &text.starts, &text.goals, OnGoal::Nothing);
-        assert_eq!(stats.doubts, [], "{}", puzzle.name);
+        assert_eq!(stats.infeasibilities, [], "{}", puzzle.name);
         assert!(stats.sum_of_distances <= puzzle.sum_of_costs, "{}", puzzle.name);
         num_proven += usize::from(stats.is_proven_solvable);
     }
@@ -124,7 +127,11 @@ fn what_is_proven_is_what_a_search_through_everything_finds() {
             let truth = oracle(&map, &starts, &goals, on_goal, usize::MAX);
             assert_eq!(solvability(&map, &starts, &goals, on_goal, usize::MAX).unwrap(), truth);
             let is_solvable = truth != Solvability::Unsolvable;
-            assert_eq!(judged.doubts.is_empty(), is_solvable, "{map:?} {starts:?} {goals:?} {on_goal:?}");
+            assert_eq!(
+                judged.infeasibilities.is_empty(),
+                is_solvable,
+                "{map:?} {starts:?} {goals:?} {on_goal:?}"
+            );
             assert_eq!(judged.is_proven_solvable, is_solvable);
             seen[usize::from(is_solvable)] += 1;
         }

@@ -77,7 +77,7 @@ proptest! {
     ) {
         let graph = Arc::new(Graph::new(&map));
         let guidance = is_guided.then(GuidanceParams::default);
-        let mut pibt = PibtLifelong::new(graph.clone(), starts.len(), PibtParams { seed, rules, guidance });
+        let mut pibt = PibtLifelong::new(graph.clone(), PibtParams { seed, rules, guidance });
         let mut now = graph.vertices_of("start", &starts).unwrap();
         let mut turns = vec![0; starts.len()];
         let mut steps = vec![starts.clone()];
@@ -138,9 +138,9 @@ fn a_budget_of_nothing_is_timed_out() {
 #[test]
 fn lifelong_agents_are_checked() {
     let graph = Arc::new(Graph::new(&Map::from_rows(&["..."]).unwrap()));
-    let mut pibt = PibtLifelong::new(graph, 2, PibtParams::default());
+    let mut pibt = PibtLifelong::new(graph, PibtParams::default());
     let mut error = |now: &[Vertex], goals: &[Vertex]| pibt.step(now, goals).unwrap_err().to_string();
-    assert_eq!(error(&[0], &[0, 1]), "agents has length 1, expected 2");
+    assert_eq!(error(&[0], &[0, 1]), "goals has length 2, expected 1");
     assert_eq!(error(&[0, 1], &[0]), "goals has length 1, expected 2");
     assert_eq!(error(&[0, 3], &[0, 1]), "instance: agent 1: the map has 3 free cells");
     assert_eq!(error(&[0, 1], &[0, 9]), "instance: agent 1: the map has 3 free cells");
@@ -169,8 +169,7 @@ fn agents_led_around_the_traffic_reach_more_goals() {
     let num_vertices = graph.num_vertices();
     let reached = |guidance| {
         let mut now: Vec<Vertex> = (0..num_vertices as Vertex).step_by(3).take(140).collect();
-        let mut pibt =
-            PibtLifelong::new(graph.clone(), now.len(), PibtParams { guidance, ..PibtParams::default() });
+        let mut pibt = PibtLifelong::new(graph.clone(), PibtParams { guidance, ..PibtParams::default() });
         let mut draws = 0;
         let mut goals: Vec<Vertex> =
             now.iter().map(|&start| (start * 7 + 5) % num_vertices as Vertex).collect();

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Action, Cell, Map};
+use pogema_core::{Action, Cell, Map, Words};
 use pogema_planners::{
-    Budget, ConflictKind, Distances, Graph, Outcome, PLANNERS, Plan, PlannerSettings, Problem, UNREACHABLE,
-    planner, validate,
+    Budget, ConflictKind, Distances, Graph, Outcome, Plan, PlannerName, PlannerSettings, Problem,
+    UNREACHABLE, validate,
 };
 
 fn cell((row, col): (u16, u16)) -> Cell {
@@ -130,12 +130,11 @@ fn what_makes_a_problem_impossible_is_told() {
         (&[".#."], [&[(0, 0)], &[(0, 2)]], "no path leads agent 0 from (0, 0) to (0, 2)"),
         (&["....."], [&[(0, 0)], &[(0, 4)]], "agent 0 needs 4 steps from (0, 0) to (0, 4), of 3"),
     ];
-    for (name, _) in PLANNERS {
+    for name in PlannerName::all() {
         for (rows, [starts, goals], reason) in cases {
             let map = Map::from_rows(rows).unwrap();
             let problem = Problem::new(&map, &cells(starts), &cells(goals)).unwrap().within(3);
-            let outcome =
-                planner(name, PlannerSettings::default()).unwrap().plan(&problem, &Budget::default());
+            let outcome = name.make(PlannerSettings::default()).plan(&problem, &Budget::default());
             assert_eq!(outcome, Outcome::Impossible { reason: reason.to_owned() }, "{name}");
         }
     }

@@ -14,6 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
 use self::drawn::Drawn;
+use crate::fields::Fields;
 use crate::lists::{Pairs, infos, read_actions};
 use crate::{config, errors};
 
@@ -40,12 +41,12 @@ pub struct Engine {
 
 #[pymethods]
 impl Engine {
-    /// An environment for a config in JSON; `registered` is the text of the map that its `map_name` names, and
+    /// An environment for the fields of a config; `registered` is the text of the map that its `map_name` names, and
     /// `exact` chooses exact occupancy.
     #[new]
     #[pyo3(signature = (config, registered=None, exact=false))]
-    fn new(py: Python<'_>, config: &str, registered: Option<&str>, exact: bool) -> PyResult<Self> {
-        let source = config::source(config, registered).map_err(|error| errors::config(py, &error))?;
+    fn new(py: Python<'_>, config: Fields, registered: Option<&str>, exact: bool) -> PyResult<Self> {
+        let source = config::source(&config, registered).map_err(|error| errors::config(py, &error))?;
         let time_limit = source.config().max_episode_steps;
         Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
@@ -55,12 +56,12 @@ impl Engine {
     #[pyo3(signature = (config=None, registered=None))]
     fn reset(
         this: &Bound<'_, Self>,
-        config: Option<&str>,
+        config: Option<Fields>,
         registered: Option<&str>,
     ) -> PyResult<Vec<String>> {
         let py = this.py();
         let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
-        this.begin(py, config, registered)
+        this.begin(py, config.as_ref(), registered)
     }
 
     /// Chooses the seed of the episodes from the next reset on; what resets did to pools stays.
@@ -285,7 +286,7 @@ impl Engine {
     fn begin(
         &mut self,
         py: Python<'_>,
-        config: Option<&str>,
+        config: Option<&Fields>,
         registered: Option<&str>,
     ) -> PyResult<Vec<String>> {
         let mut source = match config {

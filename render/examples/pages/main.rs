@@ -9,8 +9,8 @@ use std::path::Path;
 
 use pogema_core::{Error, Trace};
 use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
+use pogema_render::blocked_moves::{BlockedMove, Cause, blocked_moves};
 use pogema_render::html;
-use pogema_render::stays::{Cause, Stay, stays};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Error> {
@@ -82,7 +82,10 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     let mut reasons = Vec::new();
     for step in &trace.steps {
         reasons.push(
-            stays(config, map, before, &step.actions, &step.state).into_iter().map(told).collect::<Value>(),
+            blocked_moves(config, map, before, &step.actions, &step.state)
+                .into_iter()
+                .map(told)
+                .collect::<Value>(),
         );
         before = &step.state;
     }
@@ -93,14 +96,14 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     Ok(all.to_string())
 }
 
-fn told(stay: Stay) -> Value {
-    let (cause, other) = match stay.cause {
+fn told(blocked: BlockedMove) -> Value {
+    let (cause, other) = match blocked.cause {
         Cause::Wall => ("wall", None),
         Cause::Obstacle(_) => ("obstacle", None),
         Cause::Agent(other) => ("agent", Some(other)),
         Cause::Unknown => ("unknown", None),
     };
-    json!({"agent": stay.agent, "rule": stay.rule, "cause": cause, "other": other})
+    json!({"agent": blocked.agent, "rule": blocked.rule, "cause": cause, "other": other})
 }
 
 /// Prints what a saved map says, or what is wrong with it.

@@ -9,8 +9,8 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace, TraceStep};
 use serde::Serialize;
 
+use crate::blocked_moves::{BlockedMove, Cause, blocked_moves};
 use crate::check::check;
-use crate::stays::{Cause, Stay, stays};
 
 /// Levels above this take longer and save nearly nothing.
 const LEVEL: u8 = 7;
@@ -137,27 +137,27 @@ impl Parts {
                 put_cell(&mut self.goals, after.goals[agent]);
             }
         }
-        for stay in stays(&trace.header.config, &trace.header.map, before, &step.actions, after) {
-            self.add_stay(stay);
+        for blocked in blocked_moves(&trace.header.config, &trace.header.map, before, &step.actions, after) {
+            self.add_blocked(blocked);
         }
         self.add_marks(trace, after, at);
         Ok(())
     }
 
-    fn add_stay(&mut self, stay: Stay) {
-        let cause = match stay.cause {
+    fn add_blocked(&mut self, blocked: BlockedMove) {
+        let cause = match blocked.cause {
             Cause::Wall => "wall",
             Cause::Obstacle(_) => "obstacle",
             Cause::Agent(_) => "agent",
             Cause::Unknown => "unknown",
         };
-        let reason = Reason { rule: stay.rule, cause };
+        let reason = Reason { rule: blocked.rule, cause };
         let place = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
             self.reasons.push(reason);
             self.reasons.len() - 1
         });
         self.reverted.push(place as u8);
-        if let Cause::Agent(other) = stay.cause {
+        if let Cause::Agent(other) = blocked.cause {
             self.others.extend((other as u32).to_le_bytes());
         }
     }

@@ -3,7 +3,7 @@
 use pogema_core::{Cell, Error, Trace};
 
 use super::{editor, replay};
-use crate::stays::play::play;
+use crate::blocked_moves::play::play;
 
 fn trace() -> Trace {
     play("{size: 6, num_agents: 3, density: 0.1, seed: 1, on_target: restart, max_episode_steps: 5}", 0.3)

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
-use pogema_maps::files::write_whole;
+use pogema_core::files::write_whole;
 use pogema_maps::nearest;
 
 use super::{Format, ImageFormat, View, read_views};

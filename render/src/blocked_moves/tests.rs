@@ -20,13 +20,13 @@ fn drawn(collision: &str, mode: &str, seed: u64) -> Trace {
     play(&yaml, 0.6).unwrap()
 }
 
-/// What must be true of the states if `stay` is the reason.
-fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, stay: Stay) -> bool {
-    let (map, after, agent) = (&trace.header.map, &step.state, stay.agent);
+/// What must be true of the states if `blocked` is the reason.
+fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMove) -> bool {
+    let (map, after, agent) = (&trace.header.map, &step.state, blocked.agent);
     let own = before.cells[agent];
     let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
     let at = |cell: Cell| (i32::from(cell.row), i32::from(cell.col));
-    let other = match stay.cause {
+    let other = match blocked.cause {
         Cause::Wall => {
             let (row, col) = aim(agent);
             return row < 0 || col < 0 || row as usize >= map.height() || col as usize >= map.width();
@@ -41,7 +41,7 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, stay: Stay) -> bool
     let nobody_was_there =
         (0..before.cells.len()).all(|third| !before.active[third] || at(before.cells[third]) != aim(agent));
     let wants_mine = aim(other) == at(own);
-    let fits = match stay.rule {
+    let fits = match blocked.rule {
         "collide/priority/contest" | "collide/soft/contest" => came && other < agent,
         "collide/priority/follow" => was_there && !stayed && other > agent,
         "collide/priority/swap" => was_there && stayed && turns(before, &step.actions, agent),
@@ -83,15 +83,19 @@ fn every_reverted_move_has_one_true_reason() {
         let trace = drawn(collision, mode, seed);
         let mut before = &trace.start.state;
         for step in &trace.steps {
-            let got = stays(&trace.header.config, &trace.header.map, before, &step.actions, &step.state);
+            let got =
+                blocked_moves(&trace.header.config, &trace.header.map, before, &step.actions, &step.state);
             let reverted: Vec<usize> = (0..step.actions.len())
                 .filter(|&agent| before.active[agent] && step.actions[agent] != Action::Stay)
                 .filter(|&agent| before.cells[agent] == step.state.cells[agent])
                 .collect();
-            assert_eq!(got.iter().map(|stay| stay.agent).collect::<Vec<_>>(), reverted);
-            for stay in got {
-                assert!(holds(&trace, before, step, stay), "{collision} {mode} {seed}: {stay:?} {step:?}");
-                *seen.entry(stay.rule).or_default() += 1;
+            assert_eq!(got.iter().map(|blocked| blocked.agent).collect::<Vec<_>>(), reverted);
+            for blocked in got {
+                assert!(
+                    holds(&trace, before, step, blocked),
+                    "{collision} {mode} {seed}: {blocked:?} {step:?}"
+                );
+                *seen.entry(blocked.rule).or_default() += 1;
             }
             before = &step.state;
         }
@@ -119,8 +123,8 @@ fn a_ring_under_priority_is_a_swap() {
     let trace = play(yaml, 0.0).unwrap();
     let actions = [Action::Right, Action::Down, Action::Left, Action::Up];
     let state = &trace.start.state;
-    let got = stays(&trace.header.config, &trace.header.map, state, &actions, state);
-    let reasons: Vec<_> = got.iter().map(|stay| (stay.rule, stay.cause)).collect();
+    let got = blocked_moves(&trace.header.config, &trace.header.map, state, &actions, state);
+    let reasons: Vec<_> = got.iter().map(|blocked| (blocked.rule, blocked.cause)).collect();
     let swap = |other| ("collide/priority/swap", Cause::Agent(other));
     assert_eq!(reasons, [swap(1), swap(2), swap(3), swap(0)]);
 }
@@ -129,6 +133,6 @@ fn a_ring_under_priority_is_a_swap() {
 fn steps_of_other_rules_have_no_known_reason() {
     let trace = play("{map: \"a.A\"}", 0.0).unwrap();
     let state = &trace.start.state;
-    let got = stays(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
-    assert_eq!(got, [Stay { agent: 0, rule: "collide/priority", cause: Cause::Unknown }]);
+    let got = blocked_moves(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
+    assert_eq!(got, [BlockedMove { agent: 0, rule: "collide/priority", cause: Cause::Unknown }]);
 }

@@ -6,7 +6,7 @@ use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
 /// A move that an active agent wanted and did not get.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stay {
+pub struct BlockedMove {
     /// Whose move it is.
     pub agent: usize,
     /// The id of the rule that reverted it.
@@ -35,17 +35,17 @@ pub enum Cause {
 /// The four lists of agents are as long as each other; what goes beyond the shortest is left out.
 ///
 /// Rule: move/actions, collide/priority, collide/block-both, collide/soft
-pub fn stays(
+pub fn blocked_moves(
     config: &Config,
     map: &Map,
     before: &Snapshot,
     actions: &[Action],
     after: &Snapshot,
-) -> Vec<Stay> {
+) -> Vec<BlockedMove> {
     let step = Step::new(map, before, actions, after);
     let reason = |agent| {
         let (rule, cause) = step.reason(config.collision, agent);
-        Stay { agent, rule, cause }
+        BlockedMove { agent, rule, cause }
     };
     (0..step.num_agents).filter(|&agent| step.is_reverted(agent)).map(reason).collect()
 }

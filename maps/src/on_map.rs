@@ -1,0 +1,51 @@
+//! Configs on maps and scenarios from other files.
+
+use pogema_core::Error;
+use serde_json::{Map as Object, Value};
+
+use crate::config::{GridConfig, Targets};
+use crate::formats::Scenario;
+use crate::text::MapText;
+
+impl GridConfig {
+    /// Reads a config on a map from another source, which replaces the fields for the map and its sides.
+    ///
+    /// Starts and goals of the map are those of the first agents, unless the field `agents_xy` has others.
+    ///
+    /// # Errors
+    /// As for [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts.
+    pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
+        let has_scenario = !text.starts.is_empty() && !fields.contains_key("agents_xy");
+        let mut others = fields.clone();
+        others.retain(|field, _| {
+            !matches!(field.as_str(), "map" | "width" | "height" | "size")
+                && !(has_scenario && field == "targets_xy")
+        });
+        let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
+        let config = Self::read(&others, Some(plain))?;
+        if !has_scenario {
+            return Ok(config);
+        }
+        let scenario = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };
+        config.with_scenario(&scenario, fields)
+    }
+
+    /// Replaces starts and goals by those of a scenario: those of the first agents, if the fields of the config have
+    /// `num_agents`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for more agents than the scenario has, or goals that the config cannot have.
+    pub fn with_scenario(
+        mut self,
+        scenario: &Scenario,
+        fields: &Object<String, Value>,
+    ) -> Result<Self, Error> {
+        let num_agents = fields.get("num_agents").and_then(Value::as_u64);
+        let num_agents = num_agents.map_or(scenario.starts.len(), |number| number as usize);
+        let Scenario { starts, goals } = scenario.truncated(num_agents)?;
+        self.num_agents = num_agents.max(1);
+        (self.agents_xy, self.targets_xy) = (Some(starts), Some(goals));
+        self.check_places()?;
+        Ok(self)
+    }
+}

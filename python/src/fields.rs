@@ -1,0 +1,59 @@
+//! Python values as the fields of a config.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use serde_json::{Map as Object, Number, Value};
+
+/// The fields of a config, from a dictionary of Python values.
+///
+/// Errors: TypeError for a key that is no text, or a value that is neither number, text nor sequence; ValueError for a
+/// list that contains itself.
+pub struct Fields(pub Value);
+
+impl<'py> FromPyObject<'_, 'py> for Fields {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let mut fields = Object::new();
+        for (key, field) in object.cast::<PyDict>()?.iter() {
+            fields.insert(key.extract()?, value(&field, 0)?);
+        }
+        Ok(Self(Value::Object(fields)))
+    }
+}
+
+/// Lists in a config are at most three deep; what contains itself has no end.
+const DEEPEST: usize = 16;
+
+fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
+    if depth > DEEPEST {
+        return Err(PyValueError::new_err("a field holds lists in lists without end"));
+    }
+    if object.is_none() {
+        return Ok(Value::Null);
+    }
+    if let Ok(flag) = object.cast::<PyBool>() {
+        return Ok(flag.is_true().into());
+    }
+    if object.is_instance_of::<PyInt>() {
+        return Ok(object.extract::<i64>().map_or_else(|_| shown(object), Value::from));
+    }
+    if object.is_instance_of::<PyFloat>() {
+        return Ok(Number::from_f64(object.extract()?).map_or_else(|| shown(object), Value::Number));
+    }
+    if let Ok(text) = object.cast::<PyString>() {
+        return Ok(text.to_str()?.into());
+    }
+    // NumPy's numbers and arrays.
+    if let Ok(plain) = object.call_method0("tolist") {
+        return value(&plain, depth + 1);
+    }
+    let items = object.try_iter()?.map(|item| value(&item?, depth + 1));
+    Ok(Value::Array(items.collect::<PyResult<_>>()?))
+}
+
+/// A number that no field can hold, as the config's error shows it.
+fn shown(object: &Bound<'_, PyAny>) -> Value {
+    object.to_string().into()
+}
