@@ -22,6 +22,9 @@ use crate::threads::{note_threads, number_of_threads};
 pub struct Evaluate {
     /// What to play: a YAML file with environments, algorithms and views
     suite: PathBuf,
+    /// A YAML file whose `algorithms` replace those of the suite
+    #[arg(long, value_name = "FILE")]
+    algorithms: Option<PathBuf>,
     /// The folder for the results
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
@@ -44,6 +47,10 @@ pub struct Evaluate {
 impl Evaluate {
     pub fn run(&self) -> Result<(), Error> {
         let suite = Suite::read(&self.suite)?;
+        let suite = match &self.algorithms {
+            Some(path) => suite.with_algorithms(path)?,
+            None => suite,
+        };
         built_in(&suite)?;
         let environments = environments(&suite, &self.sources)?;
         let named = self.html.as_ref().and_then(|named| named.first());

@@ -75,7 +75,7 @@ fn main() -> ExitCode {
         Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
         Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
-        Command::Bench(bench) => bench.run(),
+        Command::Bench(bench) => bench.run().map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error}");

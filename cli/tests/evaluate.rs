@@ -303,6 +303,62 @@ fn a_suite_that_is_wrong_is_told_with_its_line() {
 }
 
 #[test]
+fn algorithms_of_another_file_replace_those_of_the_suite() {
+    let folder = folder_with(SUITE);
+    let path = |name: &str| folder.path().join(name);
+    let quick =
+        "algorithms:\n  Quick: {name: LaCAM, nodes: 100, single_attempt: true}\n  Dice: {name: random}\n";
+    fs::write(path("quick.yaml"), quick).unwrap();
+    let replaced =
+        |more: &[&str]| run(folder.path(), &[&EVALUATE[..], &["--algorithms", "quick.yaml"], more].concat());
+    let (text, error, _) = replaced(&[]);
+    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert_eq!(fs::read_to_string(path("out/suite.yaml")).unwrap(), SUITE);
+    assert_eq!(fs::read_to_string(path("out/algorithms.yaml")).unwrap(), quick);
+    assert!(!path("out/LaCAM.json").exists());
+    // What a planner proves is told of how it played alone.
+    let (rows, episodes) = (read(folder.path(), "Quick.json"), read(folder.path(), "Quick.episodes.json"));
+    for (row, episode) in rows.as_array().unwrap().iter().zip(episodes.as_array().unwrap()) {
+        assert!(row["metrics"].get("lower_bound").is_none());
+        assert!(episode["lower_bound"].as_u64().unwrap() <= row["metrics"]["SoC"].as_u64().unwrap());
+    }
+    assert!(read(folder.path(), "Dice.episodes.json")[0].get("lower_bound").is_none());
+    let (text, notes, status) = run(folder.path(), &["replay", "out", "Quick", "1"]);
+    assert_eq!((notes.as_str(), status), ("", 0), "{text}");
+    for (from, to, told) in [
+        ("nodes: 100", "nodes: 200", "results of `Quick` with other parameters"),
+        ("nodes", "nods", "quick.yaml: line 2: `Quick.nods` is unknown; the nearest known one is `nodes`"),
+        ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
+        ("true", "often", "quick.yaml: line 2: `Quick.single_attempt`, expected true or false"),
+        ("algorithms:", "algorithm:", "quick.yaml: line 2: unknown key `algorithm` in the file; the nearest"),
+        ("algorithms:", "maps: x\nalgorithms:", "quick.yaml: line 1: unknown key `maps` in the file"),
+    ] {
+        fs::write(path("quick.yaml"), quick.replacen(from, to, 1)).unwrap();
+        let (_, error, status) = replaced(&["--resume"]);
+        assert!(error.contains(told), "{to}: {error}");
+        assert_eq!((error.lines().count(), status), (1, 2), "{error}");
+    }
+    // The suite's own join the results that are there.
+    let (text, error, _) = run(folder.path(), &RESUME);
+    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert!(path("out/Quick.json").exists() && !path("out/algorithms.yaml").exists());
+}
+
+#[test]
+fn a_single_attempt_is_for_planners_of_one_goal() {
+    let folder = folder_with(&SUITE.replace("{name: random}", "{name: random, single_attempt: true}"));
+    let (_, error, status) = run(folder.path(), &EVALUATE);
+    assert!(error.contains("`random` does not use a single attempt; only one-shot planners do"), "{error}");
+    assert_eq!(status, 2);
+    let cbs = "{name: cbs, nodes: 1, single_attempt: true}";
+    let folder = folder_with(&SUITE.replace("{name: random}", cbs).replace("[3, 1, 2]", "[3]"));
+    assert_eq!(run(folder.path(), &EVALUATE).2, 0);
+    let (rows, episodes) = (read(folder.path(), "Dice.json"), read(folder.path(), "Dice.episodes.json"));
+    assert_eq!(rows[1]["metrics"]["ISR"], 0.0, "agents stay where there is no plan");
+    assert!(episodes[1]["lower_bound"].as_u64().unwrap() > 0);
+}
+
+#[test]
 fn the_maps_of_the_paper_are_known_by_name() {
     let suite = SUITE.replace(
         "size: 16",

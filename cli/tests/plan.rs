@@ -101,11 +101,6 @@ fn wrong_calls_are_one_line() {
         (vec!["plan", "--seconds=-1"], "`--seconds` is `-1`, expected a time of 0 or more"),
         (vec!["plan", "--threads", "1025"], "1025 is not in 1..=1024"),
         (vec!["plan", "--out", "no/such/folder"], "no/such"),
-        (vec!["bench", "planners", "--suite", "nowhere"], "nowhere/01-random.yaml"),
-        (vec!["bench", "planners", "--suite", ".", "--sets", "cities"], "a part of a set's name"),
-        (vec!["bench", "planners", "--suite", ".", "--future-goals"], "expected `--setting lmapf`"),
-        (vec!["bench", "planners", "--suite", ".", "--speed"], "04-movingai.yaml"),
-        (vec!["bench", "planners", "--suite", ".", "--speed", "--sets", "x"], "cannot be used with '--sets"),
         (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
         (
             vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],

@@ -103,6 +103,30 @@ fn a_view_that_cannot_be_shown_does_not_keep_others_from_being_shown() {
 }
 
 #[test]
+fn files_of_a_view_lie_beside_the_file_that_holds_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let view = "results_views:\n  A: {type: published, file: means.csv, setting: MAPF, algorithm: LaCAM, \
+                dataset: 01-random, metrics: CSR}\n";
+    let suite =
+        "environment: {name: Environment, on_target: nothing, seed: 1}\nalgorithms: {Stay: {name: stay}}\n";
+    let means = "setting,dataset,algorithm,num_agents,CSR\nMAPF,01-random,LaCAM,1,0.5\n";
+    fs::create_dir(folder.path().join("paper")).unwrap();
+    for (name, text) in [("suite.yaml", format!("{suite}{view}")), ("views.yaml", view.into())] {
+        fs::write(folder.path().join("paper").join(name), text).unwrap();
+    }
+    fs::write(folder.path().join("paper/means.csv"), means).unwrap();
+    assert_eq!(run(folder.path(), &["evaluate", "paper/suite.yaml", "--out", "out", "--html"]).2, 0);
+    for more in [&[][..], &["--config", "paper/views.yaml"]] {
+        let (text, notes, status) =
+            run(folder.path(), &[&["views", "out", "--format", "csv"], more].concat());
+        assert_eq!(status, 0, "{notes}");
+        assert_eq!(text, "Number of Agents,Episodes,CSR,CSR published,CSR ratio\n1,1,0,0.5,0");
+    }
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("CSR published"));
+}
+
+#[test]
 fn what_is_wrong_is_one_line() {
     let folder = results();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();

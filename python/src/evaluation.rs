@@ -123,7 +123,7 @@ impl Evaluation {
     fn keep(&self, index: usize, metrics: &str, runtime: f64, machine: String) -> PyResult<()> {
         let metrics: Pairs = read_json(metrics)?;
         let machine = (machine != pogema_toolbox::machine()).then_some(machine);
-        self.with(|progress| progress.keep(Done { index, metrics, runtime, machine, run: 0 }))
+        self.with(|progress| progress.keep(Done { index, metrics, runtime, machine, ..Done::default() }))
     }
 
     /// Notes an episode that could not be played.

@@ -10,7 +10,7 @@ use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
 
 /// The parameters of every built-in algorithm.
-const PARAMETERS: [&str; 5] = ["seed", "seconds", "nodes", "threads", "future_goals"];
+const PARAMETERS: [&str; 6] = ["seed", "seconds", "nodes", "threads", "future_goals", "single_attempt"];
 
 /// What pogema-toolbox's algorithms may say, and nothing built in makes use of.
 const IDLE: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
@@ -53,6 +53,7 @@ impl BuiltIn {
     fn set(&mut self, path: &str, key: &str, node: &Node) -> Result<(), Error> {
         let (value, settings) = (node.value(), &mut self.settings);
         let number = |expected: &str| value.as_u64().ok_or_else(|| wrong(node, path, expected));
+        let flag = || value.as_bool().ok_or_else(|| wrong(node, path, "true or false"));
         match key {
             "seconds" => {
                 let time = value.as_f64().and_then(|time| Duration::try_from_secs_f64(time).ok());
@@ -65,9 +66,8 @@ impl BuiltIn {
                 let expected = format!("1 to {MAX_THREADS}");
                 settings.planner.threads = threads.ok_or_else(|| wrong(node, path, &expected))? as usize;
             }
-            "future_goals" => {
-                settings.future_goals = value.as_bool().ok_or_else(|| wrong(node, path, "true or false"))?;
-            }
+            "future_goals" => settings.future_goals = flag()?,
+            "single_attempt" => settings.single_attempt = flag()?,
             idle if IDLE.contains(&idle) => {}
             _ => {
                 let hint = nearest(key, PARAMETERS).unwrap_or_default();

@@ -6,12 +6,13 @@ use pogema_core::{Episode, Error, Metrics, Trace};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
-use pogema_planners::NamedPolicy;
+use pogema_planners::{NamedPolicy, Outcome};
 
 use crate::built_in::BuiltIn;
+use crate::progress::Proof;
 
 /// The result of an episode.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Played {
     /// Its figures.
     pub metrics: Metrics,
@@ -19,6 +20,8 @@ pub struct Played {
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
+    /// What a one-shot planner proved about the episode.
+    pub proof: Proof,
 }
 
 /// Plays an episode to its end.
@@ -59,5 +62,15 @@ fn run(
         runtime += began.elapsed();
         episode.step(&actions)?;
     }
-    Ok((Played { metrics: episode.metrics(), runtime }, episode))
+    let proof = policy.first_outcome().map(proof).unwrap_or_default();
+    Ok((Played { metrics: episode.metrics(), runtime, proof }, episode))
+}
+
+/// What a planner proved, whether it found a plan or not.
+fn proof(outcome: &Outcome) -> Proof {
+    let unsolvable = match outcome {
+        Outcome::Impossible { reason } => Some(reason.clone()),
+        _ => None,
+    };
+    Proof { lower_bound: outcome.lower_bound(), unsolvable }
 }

@@ -13,8 +13,26 @@ use serde_json::Value;
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
 use crate::{Environments, Pairs};
 
+/// What a planner proved about an episode.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Proof {
+    /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_bound: Option<u64>,
+    /// Why there is no plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unsolvable: Option<String>,
+}
+
+impl Proof {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// An episode that is done.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Done {
     /// Its number.
@@ -29,6 +47,9 @@ pub struct Done {
     /// The number of the run that played it, which is set when it is kept.
     #[serde(default)]
     pub run: usize,
+    /// What its planner proved.
+    #[serde(default, skip_serializing_if = "Proof::is_empty")]
+    pub proof: Proof,
 }
 
 /// How an episode was played, which may differ where what came of it does not.
@@ -47,6 +68,12 @@ pub struct Episode {
     /// The machine, if it is not that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub machine: Option<String>,
+    /// The planner's lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_bound: Option<u64>,
+    /// The planner's proof that there is no plan, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unsolvable: Option<String>,
 }
 
 /// An episode that could not be played.
@@ -165,6 +192,8 @@ impl Progress {
                 seconds: Some(line.runtime),
                 run: line.run,
                 machine: line.machine,
+                lower_bound: line.proof.lower_bound,
+                unsolvable: line.proof.unsolvable,
             })?);
         }
         self.store.write(&format!("{}.{EPISODES}", self.key), list(&episodes).as_bytes())?;

@@ -12,7 +12,7 @@ use crate::pairs::Pairs;
 use crate::play::{play, record};
 use crate::results::{Row, figure};
 use crate::run::measured;
-use crate::store::SUITE;
+use crate::store::{ALGORITHMS, SUITE};
 use crate::suite::{Algorithm, Suite};
 
 impl Suite {
@@ -25,7 +25,9 @@ impl Suite {
         let manifest = manifest.ok_or_else(|| Error::io(folder, "holds no results of `pogema evaluate`"))?;
         let text = pogema_maps::files::read_text(&folder.join(SUITE))?;
         // What it names lies beside the file that it was read from.
-        Self::parse(&manifest.suite, &text)
+        let suite = Self::parse(&manifest.suite, &text)?;
+        let algorithms = folder.join(ALGORITHMS);
+        if algorithms.exists() { suite.with_algorithms(&algorithms) } else { Ok(suite) }
     }
 
     /// Its environments, with the maps of further files.

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::manifest;
 use crate::pairs::Pairs;
-use crate::progress::Episode;
+use crate::progress::{Episode, Proof};
 
 /// The column of the algorithm's name.
 pub const ALGORITHM: &str = "algorithm";
@@ -23,13 +23,16 @@ const EPISODES: &str = ".episodes.json";
 /// What is added to an algorithm's name for its file of episodes that could not be played.
 const FAILED: &str = ".failed.jsonl";
 
+/// The field of a config that names its map.
+const MAP_NAME: &str = "map_name";
+
 /// What is larger is no figure.
 const LARGEST: f64 = 1e100;
 
 /// One episode of one algorithm.
 ///
 /// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 pub struct Row {
     /// Figures by name; what is neither number nor truth value is left to others.
     pub metrics: Pairs,
@@ -41,12 +44,23 @@ pub struct Row {
     /// The name of the folder in which it was found.
     #[serde(skip)]
     pub set: String,
+    /// Numbers, truth values and the map's name in the environment's config, varied or not, if the folder has them.
+    #[serde(skip)]
+    pub config: Pairs,
+    /// What the planner proved, if the folder has it.
+    #[serde(skip)]
+    pub proof: Proof,
 }
 
 impl Row {
     /// A metric, if it is a number, and not one so large that only a mistake makes it.
     pub fn metric(&self, name: &str) -> Option<f64> {
         figure(self.metrics.get(name)?)
+    }
+
+    /// Returns a field of the environment, varied or not.
+    pub fn field(&self, name: &str) -> Option<&Value> {
+        self.settings.get(name).or_else(|| self.config.get(name))
     }
 
     /// What stands in a column that is no metric.
@@ -84,7 +98,8 @@ impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
     /// Each `<algorithm>.json` holds rows; `<algorithm>.episodes.json` how they were played, in their order, of which
-    /// the seconds are read as their metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm that is not finished.
+    /// the seconds are read as their metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm
+    /// that is not finished.
     ///
     /// # Errors
     /// One line with the file and the place in it for anything else, or if there are no rows at all.
@@ -113,7 +128,7 @@ impl Results {
                 self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
             } else if let Some(algorithm) = name.strip_suffix(".json").filter(|_| !is_apart(&name)) {
                 let mut rows = read_rows(&path, algorithm)?;
-                join_times(&mut rows, &folder.join(format!("{algorithm}{EPISODES}")))?;
+                join_episodes(&mut rows, &folder.join(format!("{algorithm}{EPISODES}")))?;
                 if rows.is_empty() {
                     self.notes.push(format!("{}: no rows", path.display()));
                 }
@@ -195,8 +210,8 @@ fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
     }
 }
 
-/// Adds the seconds of a file, if there is one, to the rows that have no runtime.
-fn join_times(rows: &mut [Row], path: &Path) -> Result<(), Error> {
+/// Adds to rows how they were played, if there is a file about that; rows with a runtime keep theirs.
+fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
     }
@@ -211,8 +226,19 @@ fn join_times(rows: &mut [Row], path: &Path) -> Result<(), Error> {
         if row.metrics.get(RUNTIME).is_none() {
             row.metrics.set(RUNTIME, episode.seconds.into());
         }
+        row.config = small_fields(episode.config);
+        row.proof = Proof { lower_bound: episode.lower_bound, unsolvable: episode.unsolvable };
     }
     Ok(())
+}
+
+/// The fields of a config that take little memory; a map's text may be as large as all results.
+fn small_fields(config: Value) -> Pairs {
+    let Value::Object(fields) = config else { return Pairs::default() };
+    let is_small = |(name, value): &(String, Value)| {
+        value.is_number() || value.is_boolean() || name == MAP_NAME && value.is_string()
+    };
+    Pairs(fields.into_iter().filter(is_small).collect())
 }
 
 /// The text with null in place of the numbers that Python writes though JSON does not have them.

@@ -89,7 +89,7 @@ pub fn run(
 pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
     let all = suite.algorithms.iter().map(|algorithm| {
         let built_in = BuiltIn::of(algorithm).unwrap_or_else(|| Err(unknown(algorithm)));
-        Ok((algorithm, built_in.map_err(|error| suite.in_file(error))?))
+        Ok((algorithm, built_in.map_err(|error| suite.in_algorithms_file(error))?))
     });
     all.collect()
 }
@@ -171,8 +171,8 @@ fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Resu
 }
 
 fn done(index: usize, played: Played) -> Done {
-    let metrics = measured(&played);
-    Done { index, metrics, runtime: played.runtime.as_secs_f64(), machine: None, run: 0 }
+    let (metrics, runtime) = (measured(&played), played.runtime.as_secs_f64());
+    Done { index, metrics, runtime, machine: None, run: 0, proof: played.proof }
 }
 
 /// The figures of an episode as results have them: what POGEMA counts is whole, and a mean is not.

@@ -46,6 +46,9 @@ struct Noted {
 
 /// The suite that was played.
 pub(crate) const SUITE: &str = "suite.yaml";
+
+/// The algorithms that replaced those of the suite; without this file, the suite's own played.
+pub(crate) const ALGORITHMS: &str = "algorithms.yaml";
 const LOCK: &str = ".lock";
 
 impl Store {
@@ -74,6 +77,10 @@ impl Store {
         // First what makes it a folder of results: a run may be killed between the two.
         store.tell(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
+        match &suite.replacement {
+            Some(file) => store.write(ALGORITHMS, file.text.as_bytes())?,
+            None => remove(&store.path(ALGORITHMS))?,
+        }
         Ok(store)
     }
 

@@ -9,7 +9,10 @@ use crate::tree::Node;
 use crate::variants::Variants;
 
 /// The keys of a file.
-const KEYS: [&str; 5] = ["environment", "algorithms", "results_views", "maps", "dask"];
+const KEYS: [&str; 5] = ["environment", ALGORITHMS, "results_views", "maps", "dask"];
+
+/// The key of the algorithms.
+const ALGORITHMS: &str = "algorithms";
 
 /// The name of POGEMA's environment; others are registered in Python, with fields of their own.
 pub(crate) const ENVIRONMENT: &str = "Environment";
@@ -35,6 +38,8 @@ pub struct Suite {
     pub path: PathBuf,
     /// What was read.
     pub text: String,
+    /// The file whose algorithms replace its own.
+    pub replacement: Option<Replacement>,
     /// One environment for each episode.
     pub environments: Variants,
     /// Who plays, each all episodes.
@@ -45,6 +50,15 @@ pub struct Suite {
     pub maps: Vec<PathBuf>,
     /// The address of a Dask scheduler.
     pub dask: Option<String>,
+}
+
+/// A file whose algorithms replace those of a suite.
+#[derive(Clone, Debug)]
+pub struct Replacement {
+    /// Where it was read.
+    pub path: PathBuf,
+    /// What was read.
+    pub text: String,
 }
 
 /// Who plays, under the name that results have.
@@ -81,6 +95,21 @@ impl Suite {
         Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
 
+    /// Replaces its algorithms by those of a file that has no other key.
+    ///
+    /// # Errors
+    /// As for [`Suite::read`].
+    pub fn with_algorithms(mut self, path: &Path) -> Result<Self, Error> {
+        let text = pogema_maps::files::read_text(path)?;
+        let read = |root: Node| {
+            check_keys(&root, "the file", &[ALGORITHMS], &[])?;
+            algorithms(&root)
+        };
+        self.algorithms = Node::parse(&text).and_then(read).map_err(|error| in_file(path, error))?;
+        self.replacement = Some(Replacement { path: path.to_owned(), text });
+        Ok(self)
+    }
+
     /// Whether its environments are others than POGEMA's.
     pub fn is_foreign(&self) -> bool {
         self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
@@ -89,6 +118,11 @@ impl Suite {
     /// Tells an error with the file.
     pub fn in_file(&self, error: Error) -> Error {
         in_file(&self.path, error)
+    }
+
+    /// Tells an error of an algorithm with the file that it was read from.
+    pub fn in_algorithms_file(&self, error: Error) -> Error {
+        in_file(self.replacement.as_ref().map_or(&self.path, |file| &file.path), error)
     }
 
     fn of(path: &Path, text: &str, root: &Node) -> Result<Self, Error> {
@@ -101,15 +135,13 @@ impl Suite {
         if environments.is_empty() {
             return Err(wrong(environment, "environment", "at least one value of each varied field"));
         }
-        let entries = required(root, "algorithms")?;
-        let algorithms = fields(entries, "algorithms")?.iter();
-        let algorithms =
-            algorithms.map(|(key, node)| Algorithm::read(key, node)).collect::<Result<_, _>>()?;
+        let algorithms = algorithms(root)?;
         let views = root.field("results_views").map(|node| fields(node, "results_views")).transpose()?;
         let dask = root.field("dask").map(|node| text_of(node, "dask", "an address such as tcp://host:8786"));
         Ok(Self {
             path: path.to_owned(),
             text: text.to_owned(),
+            replacement: None,
             environments,
             algorithms,
             views: views.unwrap_or_default().to_vec(),
@@ -117,6 +149,11 @@ impl Suite {
             dask: dask.transpose()?.map(str::to_owned),
         })
     }
+}
+
+fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
+    let entries = fields(required(root, ALGORITHMS)?, ALGORITHMS)?.iter();
+    entries.map(|(key, node)| Algorithm::read(key, node)).collect()
 }
 
 /// The files that are named, beside the suite's own.

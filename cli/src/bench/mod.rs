@@ -1,17 +1,16 @@
 //! `pogema bench`: how fast this machine steps and observes, beside the filling of memory and POGEMA.
 
 mod bars;
-mod planners;
 mod show;
 mod timing;
 mod work;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::{files, find_oracle_python};
 use pogema_core::Error;
@@ -24,10 +23,7 @@ use bars::{Bar, bars};
 use work::{Speed, Work};
 
 #[derive(Args, Debug)]
-#[command(args_conflicts_with_subcommands = true)]
 pub struct Bench {
-    #[command(subcommand)]
-    other: Option<Other>,
     /// Time POGEMA 1.4.0 in the same run too; needs Python 3.11
     #[arg(long)]
     peers: bool,
@@ -46,13 +42,6 @@ pub struct Bench {
     /// Write all figures to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-}
-
-/// What else can be measured.
-#[derive(Debug, Subcommand)]
-enum Other {
-    /// Solve the paper's instances, and put ours beside the published figures
-    Planners(planners::Planners),
 }
 
 /// One row of the table.
@@ -102,10 +91,7 @@ struct Report {
 const MOST_AGENTS_OF_POGEMA: usize = 10_000;
 
 impl Bench {
-    pub fn run(&self) -> Result<ExitCode, Error> {
-        if let Some(Other::Planners(planners)) = &self.other {
-            return planners.run().map(|()| ExitCode::SUCCESS);
-        }
+    pub fn run(&self) -> Result<(), Error> {
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let budget = Duration::try_from_secs_f64(self.seconds).ok().filter(|budget| !budget.is_zero());
         let budget = budget.ok_or_else(|| Error::argument("--seconds", self.seconds, "a time above 0"))?;
@@ -137,7 +123,7 @@ impl Bench {
             let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
             files::write(path, &text)?;
         }
-        Ok(ExitCode::SUCCESS)
+        Ok(())
     }
 }
 

@@ -1,17 +1,15 @@
 //! The budget and threads of a planner.
 
-use std::fmt;
 use std::time::Duration;
 
 use clap::Args;
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings, PolicySettings};
-use serde::{Deserialize, Serialize};
 
 use crate::threads::{note_threads, number_of_threads};
 
 /// How long a planner may think, and on how many threads.
-#[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Args, Clone, Debug)]
 pub struct Thinking {
     /// Most time for a plan, in seconds; 1 if `--nodes` is not given either
     #[arg(long, value_name = "S")]
@@ -35,7 +33,8 @@ impl Thinking {
 
     /// What a policy is made with.
     pub fn settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
-        Ok(PolicySettings { budget: self.budget()?, planner: self.choice(), future_goals })
+        let (budget, planner) = (self.budget()?, self.choice());
+        Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
     }
 
     /// The budget for one plan.
@@ -47,17 +46,5 @@ impl Thinking {
                 .map_err(|_| Error::argument("--seconds", seconds, "a time of 0 or more"))
         };
         Ok(Budget { time: seconds.map(time).transpose()?, nodes: self.nodes, cancelled: None })
-    }
-}
-
-impl fmt::Display for Thinking {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut bounds = Vec::new();
-        if let Some(seconds) = self.seconds.or(self.nodes.is_none().then_some(1.0)) {
-            bounds.push(format!("{seconds} s"));
-        }
-        bounds.extend(self.nodes.map(|nodes| format!("{nodes} nodes")));
-        let threads = if self.threads == 1 { "1 thread".into() } else { format!("{} threads", self.threads) };
-        write!(f, "{} on {threads}", bounds.join(" or "))
     }
 }

@@ -4,6 +4,7 @@ use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, 
 use pogema_numpy::Generator;
 
 use crate::budget::Budget;
+use crate::outcome::Outcome;
 use crate::policies::astar::AStarTeam;
 use crate::policies::lifelong_policy::LifelongPolicy;
 use crate::policies::observations::PomapfObservations;
@@ -32,6 +33,8 @@ pub struct PolicySettings {
     pub planner: PlannerSettings,
     /// Whether a lifelong planner knows future goals.
     pub future_goals: bool,
+    /// Whether a one-shot planner that finds no plan is not called again in that episode.
+    pub single_attempt: bool,
 }
 
 /// A policy for all agents of one episode, made by name.
@@ -67,7 +70,7 @@ impl NamedPolicy {
     /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for future goals that the policy does not use.
+    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
     pub fn new(
         name: &str,
         settings: &PolicySettings,
@@ -75,12 +78,17 @@ impl NamedPolicy {
         instance: &Instance,
         generator: Generator,
     ) -> Result<Self, Error> {
-        let PolicySettings { budget, planner: planner_settings, future_goals } = settings.clone();
+        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt } =
+            settings.clone();
         let one_shot = PlannerName::of_word(name);
         let lifelong = LifelongName::of_word(name);
         let lifelong = lifelong.filter(|_| config.on_goal == OnGoal::Restart || one_shot.is_none());
         if future_goals && lifelong.is_none() {
             let reason = format!("`{name}` does not use future goals; only lifelong planners do");
+            return Err(Error::Request { reason });
+        }
+        if single_attempt && (lifelong.is_some() || one_shot.is_none()) {
+            let reason = format!("`{name}` does not use a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
         }
         if let Some(planner) = lifelong {
@@ -102,6 +110,14 @@ impl NamedPolicy {
             Some(SimplePolicy::Stay) => Kind::Stay,
             None => return Err(Error::argument("policy", name, format!("one of {}", known().join(", ")))),
         }))
+    }
+
+    /// Returns the outcome of the first call of a one-shot planner, whose problem is the whole episode.
+    pub fn first_outcome(&self) -> Option<&Outcome> {
+        match &self.0 {
+            Kind::Planner(policy) => policy.outcomes().first(),
+            _ => None,
+        }
     }
 
     /// Returns the actions of the next step.

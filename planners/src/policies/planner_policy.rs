@@ -19,6 +19,7 @@ pub struct PlannerPolicy {
     planner: Box<dyn Planner>,
     budget: Budget,
     max_steps: Option<u64>,
+    is_single_attempt: bool,
     graph: Option<(Map, Arc<Graph>)>,
     current: Option<CurrentPlan>,
     outcomes: Vec<Outcome>,
@@ -39,7 +40,16 @@ struct CurrentPlan {
 impl PlannerPolicy {
     /// A policy with a budget for each plan, in episodes with a step limit.
     pub fn new(planner: Box<dyn Planner>, budget: Budget, max_steps: Option<u64>) -> Self {
-        Self { planner, budget, max_steps, graph: None, current: None, outcomes: Vec::new() }
+        let (graph, current, outcomes) = (None, None, Vec::new());
+        Self { planner, budget, max_steps, is_single_attempt: false, graph, current, outcomes }
+    }
+
+    /// Makes all agents stay to the end of the episode if the planner finds no plan. By default, the planner is called
+    /// again in each step, with the whole budget.
+    #[must_use]
+    pub fn with_single_attempt(mut self) -> Self {
+        self.is_single_attempt = true;
+        self
     }
 
     /// Clears the state of the episode.
@@ -84,8 +94,9 @@ impl PlannerPolicy {
             max_steps: self.max_steps.map(|limit| limit.saturating_sub(now.step) as usize),
         };
         let outcome = self.planner.plan(&problem, &self.budget);
+        let is_unfinished = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
+        let is_partial = is_unfinished && !(self.is_single_attempt && outcome.best().is_none());
         let plan = outcome.best().cloned().map_or_else(|| Plan::new(vec![cells]), Ok)?;
-        let is_partial = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
         self.outcomes.push(outcome);
         Ok(CurrentPlan { agents, goals, plan, start: now.step, is_partial })
     }

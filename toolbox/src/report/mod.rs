@@ -129,10 +129,16 @@ pub fn page(
         views: sections(suite, results)?,
         algorithms,
         runs: manifest.runs.clone(),
-        suite: suite.text.clone(),
+        suite: played(suite),
     };
     album.body = fill(include_str!("report.html"), page)?;
     album.text()
+}
+
+/// The suite's file, and the file that replaced its algorithms.
+fn played(suite: &Suite) -> String {
+    let Some(file) = &suite.replacement else { return suite.text.clone() };
+    format!("{}\n# In place of these algorithms: {}\n{}", suite.text, file.path.display(), file.text)
 }
 
 fn facts(suite: &Suite, results: &Results) -> Vec<(&'static str, String)> {
@@ -161,7 +167,7 @@ fn sections(suite: &Suite, results: &Results) -> Result<Vec<Section>, Error> {
     let usual = [("means".to_owned(), all)];
     let views = if suite.views.is_empty() { &usual[..] } else { &suite.views };
     let show = |(name, node): &(String, Node)| {
-        let view = View::read(name, node).map_err(|error| suite.in_file(error))?;
+        let view = View::read(name, node).map_err(|error| suite.in_file(error))?.beside(&suite.path);
         // What cannot be shown is no reason to show nothing.
         let shown = view
             .show(name, results, None)

@@ -129,7 +129,7 @@ mod tests {
             metrics: Pairs(vec![("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
             settings: Pairs(vec![("seed".into(), seed.into())]),
             algorithm: algorithm.to_owned(),
-            set: String::new(),
+            ..Row::default()
         };
         Results { rows: rows.iter().map(row).collect(), notes: Vec::new() }
     }

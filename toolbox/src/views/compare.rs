@@ -1,7 +1,5 @@
 //! Two algorithms side by side, instance by instance.
 
-use std::collections::HashMap;
-
 use kuva::plot::line::LinePlot;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
@@ -10,6 +8,7 @@ use pogema_core::Error;
 use super::axes::Axis;
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
+use super::pairing::{Pairing, is_solved};
 use super::panel::framed;
 use super::picture::Picture;
 use super::style::Style;
@@ -18,9 +17,6 @@ use crate::frame::lacking;
 use crate::results::{Results, Row};
 use crate::six::instance;
 use crate::tree::Node;
-
-/// What tells whether an instance was solved.
-const SOLVED: &str = "CSR";
 
 /// Metrics of which more is better.
 const MORE_IS_BETTER: [&str; 3] = ["CSR", "ISR", "avg_throughput"];
@@ -110,24 +106,12 @@ impl CompareView {
         Ok([first, second])
     }
 
-    fn score(&self, results: &Results, [first, second]: &[String; 2]) -> Score {
-        let mut played: HashMap<String, [Option<&Row>; 2]> = HashMap::new();
-        for row in &results.rows {
-            for (place, algorithm) in [first, second].into_iter().enumerate() {
-                if row.algorithm == *algorithm {
-                    played.entry(instance(row)).or_default()[place] = Some(row);
-                }
-            }
-        }
-        let mut played: Vec<(String, [Option<&Row>; 2])> = played.into_iter().collect();
-        played.sort_by(|one, other| one.0.cmp(&other.0));
-        let mut score = Score::default();
-        for (_, rows) in played {
-            let [Some(one), Some(other)] = rows else {
-                score.alone += 1;
-                continue;
-            };
-            match (self.is_solved(one), self.is_solved(other)) {
+    fn score<'a>(&self, results: &'a Results, [first, second]: &'a [String; 2]) -> Score {
+        let of = |algorithm: &'a String| results.rows.iter().filter(move |row| row.algorithm == *algorithm);
+        let pairing = Pairing::of(of(first), of(second), instance);
+        let mut score = Score { alone: pairing.alone, ..Score::default() };
+        for (one, other) in pairing.pairs {
+            match (self.counts(one), self.counts(other)) {
                 (true, true) => match (one.metric(&self.metric), other.metric(&self.metric)) {
                     (Some(one), Some(other)) => score.both.push((one, other)),
                     _ => score.alone += 1,
@@ -141,8 +125,8 @@ impl CompareView {
     }
 
     /// Whether a row's figure counts: that of the share of solved ones always does.
-    fn is_solved(&self, row: &Row) -> bool {
-        MORE_IS_BETTER.contains(&self.metric.as_str()) || row.metric(SOLVED).is_none_or(|share| share > 0.0)
+    fn counts(&self, row: &Row) -> bool {
+        MORE_IS_BETTER.contains(&self.metric.as_str()) || is_solved(row)
     }
 
     fn table(&self, pair: &[String; 2], score: &Score) -> Table {

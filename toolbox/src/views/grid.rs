@@ -26,6 +26,8 @@ pub enum Cell {
     Count(usize),
     /// A figure that leaves no doubt, or nothing where there is none, to the right.
     Number(Option<f64>),
+    /// The same for shares and ratios, with four decimals at least.
+    Ratio(Option<f64>),
     /// A mean and its doubt, or nothing where no row had a number.
     Mean(Option<Estimate>),
 }
@@ -85,8 +87,9 @@ impl Table {
         match cell {
             Cell::Text(text) => text.clone(),
             Cell::Count(count) => count.to_string(),
-            Cell::Number(None) | Cell::Mean(None) => "-".to_owned(),
+            Cell::Number(None) | Cell::Ratio(None) | Cell::Mean(None) => "-".to_owned(),
             Cell::Number(Some(number)) => format!("{number:.*}", self.digits),
+            Cell::Ratio(Some(ratio)) => format!("{ratio:.*}", self.digits.max(4)),
             Cell::Mean(Some(estimate)) => self.parts(estimate).join(" ± "),
         }
     }
@@ -136,7 +139,9 @@ fn csv_cells(cell: &Cell) -> Vec<String> {
     match cell {
         Cell::Text(text) => vec![text.clone()],
         Cell::Count(count) => vec![count.to_string()],
-        Cell::Number(number) => vec![number.map(|number| number.to_string()).unwrap_or_default()],
+        Cell::Number(number) | Cell::Ratio(number) => {
+            vec![number.map(|number| number.to_string()).unwrap_or_default()]
+        }
         Cell::Mean(None) => vec![String::new(), String::new(), String::new(), "0".to_owned()],
         Cell::Mean(Some(Estimate { mean, interval, count })) => {
             let end = |end: Option<f64>| end.map(|end| end.to_string()).unwrap_or_default();

@@ -12,9 +12,11 @@ mod grid;
 mod image_format;
 mod legend;
 mod options;
+mod pairing;
 mod panel;
 mod picture;
 mod plot;
+mod published;
 mod radar;
 mod seeds;
 mod series;
@@ -34,12 +36,15 @@ pub use grid::{Cell, Format, Table};
 pub use image_format::ImageFormat;
 pub use picture::Picture;
 pub use plot::PlotView;
+pub use published::PublishedView;
 pub use radar::RadarView;
 pub use seeds::SeedsView;
 pub use table::TableView;
 
+use crate::manifest::Manifest;
 use crate::results::Results;
 use crate::six::Definition;
+use crate::store::SUITE;
 use crate::suite::{in_file, wrong};
 use crate::tree::Node;
 
@@ -47,7 +52,8 @@ use crate::tree::Node;
 const VIEWS: &str = "results_views";
 
 /// The types of views.
-const TYPES: [&str; 8] = ["tabular", "plot", "multi-plot", "radar", "box", "cactus", "compare", "seeds"];
+const TYPES: [&str; 9] =
+    ["tabular", "plot", "multi-plot", "radar", "box", "cactus", "compare", "seeds", "published"];
 
 /// One way to look at results.
 #[derive(Clone, Debug)]
@@ -66,6 +72,8 @@ pub enum View {
     Compare(Box<CompareView>),
     /// `type: seeds`
     Seeds(SeedsView),
+    /// `type: published`
+    Published(Box<PublishedView>),
 }
 
 /// What a view shows.
@@ -91,7 +99,11 @@ pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
         return Err(Error::io(path, format!("expected a field `{VIEWS}`")));
     };
     let fields = node.fields().ok_or_else(|| in_file(wrong(node, VIEWS, "names and their fields")))?;
-    let views = fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?)));
+    // What the suite of results names lies beside the file that it was copied from.
+    let copied = if path.file_name().is_some_and(|name| name == SUITE) { path.parent() } else { None };
+    let original = copied.and_then(|folder| Manifest::read(folder).ok().flatten()).map(|known| known.suite);
+    let origin = original.as_deref().unwrap_or(path);
+    let views = fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?.beside(origin))));
     views.collect::<Result<_, _>>().map_err(in_file)
 }
 
@@ -112,6 +124,7 @@ impl View {
             "cactus" => CactusView::read(name, node).map(|view| Self::Cactus(Box::new(view))),
             "compare" => CompareView::read(name, node).map(|view| Self::Compare(Box::new(view))),
             "seeds" => SeedsView::read(name, node).map(Self::Seeds),
+            "published" => PublishedView::read(name, node).map(|view| Self::Published(Box::new(view))),
             other => {
                 let hint = nearest(other, TYPES).unwrap_or_default();
                 let types = TYPES.join(", ");
@@ -119,6 +132,15 @@ impl View {
                 Err(wrong(kind, &format!("{name}.type"), &expected))
             }
         }
+    }
+
+    /// Takes the paths of files that it names as relative to the folder of the file that holds it.
+    #[must_use]
+    pub fn beside(mut self, file: &Path) -> Self {
+        if let Self::Published(view) = &mut self {
+            view.beside(file.parent().unwrap_or(Path::new("")));
+        }
+        self
     }
 
     /// The format of its tables, if it asks for one.
@@ -149,6 +171,7 @@ impl View {
             Self::Cactus(view) => view.show(name, results),
             Self::Compare(view) => view.show(name, results),
             Self::Seeds(view) => view.show(name, results),
+            Self::Published(view) => view.show(name, results),
         }
     }
 }

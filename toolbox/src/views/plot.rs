@@ -293,7 +293,7 @@ mod tests {
     fn results() -> Results {
         let row = |number: u64, algorithm: &str, soc: Value| {
             let (metrics, settings) = (json(&[("SoC", soc)]), json(&[("num_agents", (number % 3).into())]));
-            Row { metrics, settings, algorithm: algorithm.into(), set: String::new() }
+            Row { metrics, settings, algorithm: algorithm.into(), ..Row::default() }
         };
         let rows =
             (0..12).flat_map(|number| [row(number, "A", number.into()), row(number, "B & <C>", Value::Null)]);

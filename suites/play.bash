@@ -1,0 +1,14 @@
+# Shared by the scripts in this folder, which source it in the root of the repository.
+cargo build --quiet --release
+pogema=${CARGO_TARGET_DIR:-target}/release/pogema
+
+# Plays all suites of a setting, or continues: play SETTING MAPS RESULTS [OPTION...]
+play() {
+    local setting=$1 maps=$2 results=$3 suite name
+    shift 3
+    for suite in suites/"$setting"/*.yaml; do
+        name=$(basename "$suite" .yaml)
+        echo "== $setting/$name" >&2
+        "$pogema" evaluate "$suite" --maps "$maps" --out "$results/$name" --resume "$@" >&2
+    done
+}

@@ -1,0 +1,47 @@
+//! Rows of two algorithms, paired by instance.
+
+use std::collections::BTreeMap;
+
+use crate::results::Row;
+
+/// The metric that tells whether an instance was solved.
+const SOLVED: &str = "CSR";
+
+/// The rows of the instances that two algorithms played.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairing<'a> {
+    /// The rows of both, sorted by instance.
+    pub pairs: Vec<(&'a Row, &'a Row)>,
+    /// Number of instances that only one of them played.
+    pub alone: usize,
+}
+
+impl<'a> Pairing<'a> {
+    /// Pairs rows with the same key; of rows of one algorithm with the same key, the last one counts.
+    pub fn of(
+        first: impl IntoIterator<Item = &'a Row>,
+        second: impl IntoIterator<Item = &'a Row>,
+        key: impl Fn(&Row) -> String,
+    ) -> Self {
+        let mut played: BTreeMap<String, [Option<&Row>; 2]> = BTreeMap::new();
+        for row in first {
+            played.entry(key(row)).or_default()[0] = Some(row);
+        }
+        for row in second {
+            played.entry(key(row)).or_default()[1] = Some(row);
+        }
+        let mut pairing = Self::default();
+        for rows in played.into_values() {
+            match rows {
+                [Some(one), Some(other)] => pairing.pairs.push((one, other)),
+                _ => pairing.alone += 1,
+            }
+        }
+        pairing
+    }
+}
+
+/// Whether a row's instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
+pub(super) fn is_solved(row: &Row) -> bool {
+    row.metric(SOLVED).is_none_or(|share| share > 0.0)
+}

@@ -1,0 +1,211 @@
+//! `type: published`: small made-up results beside made-up published ones, and files that are wrong.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::Path;
+
+use pogema_toolbox::views::{Format, Shown, View};
+use pogema_toolbox::{Node, Pairs, Proof, Results, Row};
+
+const MEANS: &str = "\
+setting,dataset,algorithm,num_agents,n,CSR,SoC,avg_throughput,remark
+MAPF,01-random,LaCAM,2,3,1,10,,none
+MAPF,01-random,LaCAM,4,2,0.5,40,,none
+MAPF,01-random,DCC,2,3,1,30,,none
+MAPF,03-warehouse,LaCAM,2,2,1,8,,none
+LMAPF,01-random,RHCR,2,3,,,0.5,none
+";
+
+const VIEW: &str = "{type: published, file: means.csv, setting: MAPF, algorithm: LaCAM, metrics: [CSR, SoC]}";
+
+/// A row of `LaCAM` with what was varied, in JSON; nothing costs what was not solved.
+fn row(set: &str, settings: &str, cost: Option<u64>) -> Row {
+    let (csr, soc) = (u8::from(cost.is_some()), cost.unwrap_or(99));
+    let text = format!(
+        r#"{{"metrics": {{"CSR": {csr}, "SoC": {soc}, "runtime": {soc}, "avg_throughput": 0.75}},
+            "env_grid_search": {settings}, "algorithm": "LaCAM"}}"#
+    );
+    Row { set: set.to_owned(), ..serde_json::from_str(&text).unwrap() }
+}
+
+fn of(num_agents: u64, seed: u64, cost: Option<u64>) -> Row {
+    row("01-random", &format!(r#"{{"num_agents": {num_agents}, "seed": {seed}}}"#), cost)
+}
+
+fn results() -> Results {
+    let proof = |lower_bound| Proof { lower_bound: Some(lower_bound), unsolvable: None };
+    let unsolvable = Proof { lower_bound: None, unsolvable: Some("agents 0 and 1 block each other".into()) };
+    let rows = vec![
+        Row { proof: proof(8), ..of(2, 0, Some(9)) },
+        Row { proof: proof(8), ..of(2, 1, Some(9)) },
+        Row { proof: proof(8), ..of(2, 2, Some(9)) },
+        Row { proof: proof(16), ..of(4, 0, Some(18)) },
+        Row { proof: unsolvable, ..of(4, 1, None) },
+    ];
+    Results { rows, notes: Vec::new() }
+}
+
+/// A folder with `means.csv`, and `episodes` with published rows of a dataset.
+fn folder(means: &str, dataset: &str, rows: &[(&str, u64)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("means.csv"), means).unwrap();
+    let episodes = folder.path().join("episodes").join(dataset);
+    fs::create_dir_all(&episodes).unwrap();
+    let rows: Vec<String> = rows
+        .iter()
+        .map(|(settings, cost)| {
+            let metrics = format!(r#"{{"CSR": 1.0, "SoC": {cost}}}"#);
+            format!(r#"{{"metrics": {metrics}, "env_grid_search": {settings}, "algorithm": "LaCAM"}}"#)
+        })
+        .collect();
+    fs::write(episodes.join("LaCAM.json"), format!("[{}]", rows.join(","))).unwrap();
+    folder
+}
+
+fn show(folder: &Path, fields: &str, results: &Results) -> Result<Shown, String> {
+    let view = View::read("A", &Node::parse(fields).unwrap());
+    let view = view.map(|view| view.beside(&folder.join("views.yaml")));
+    view.and_then(|view| view.show("A", results, None)).map_err(|error| error.to_string())
+}
+
+fn csv(shown: &Shown) -> Vec<String> {
+    shown.tables[0].text(Format::Csv).lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn without_episodes_costs_are_compared_where_all_is_solved() {
+    let folder = folder(MEANS, "01-random", &[]);
+    let shown = show(folder.path(), VIEW, &results()).unwrap();
+    assert_eq!(
+        csv(&shown),
+        [
+            "Number of Agents,Episodes,CSR,CSR published,CSR ratio,SoC,SoC published,SoC ratio,SoC at least",
+            "2,3,1,1,1,9,10,0.9,0.8",
+            "4,2,0.5,0.5,1,18,,,",
+        ]
+    );
+    let text = shown.tables[0].text(Format::Markdown);
+    assert!(text.contains("| 1.0000 |        1.0000 |    1.0000 |  9.00 |         10.00 |"), "{text}");
+    assert!(text.ends_with("`LaCAM` beside the published `LaCAM`, MAPF"), "{text}");
+    let [compared, unsolvable] = &shown.notes[..] else { panic!("{:?}", shown.notes) };
+    assert!(compared.starts_with("`01-random` with 4 agents: `SoC` is not compared"), "{compared}");
+    let told = "01-random, num_agents=4, seed=1: proved unsolvable: agents 0 and 1 block each other";
+    assert_eq!(unsolvable, told);
+}
+
+#[test]
+fn with_episodes_costs_are_compared_on_the_instances_that_both_solve() {
+    let published = [
+        (r#"{"num_agents": 2, "seed": 0}"#, 10),
+        (r#"{"num_agents": 2, "seed": 2}"#, 20),
+        (r#"{"num_agents": 4, "seed": 0}"#, 20),
+        (r#"{"num_agents": 4, "seed": 1}"#, 40),
+    ];
+    let folder = folder(MEANS, "01-random", &published);
+    let fields = VIEW.replace("means.csv", "means.csv, episodes: episodes");
+    let shown = show(folder.path(), &fields, &results()).unwrap();
+    assert_eq!(csv(&shown)[1], format!("2,3,1,1,1,9,15,0.6,{}", 8.0 / 15.0));
+    // The bound counts what the published algorithm solved; there is none for what is unsolvable.
+    assert_eq!(csv(&shown)[2], "4,2,0.5,0.5,1,18,20,0.9,0.8");
+    assert_eq!(shown.notes.len(), 1, "{:?}", shown.notes);
+    let fields = fields.replace("CSR, SoC", "runtime");
+    assert!(show(folder.path(), &fields, &results()).unwrap_err().contains("no column `runtime`"));
+}
+
+#[test]
+fn folders_are_datasets_and_the_longest_time_is_shown() {
+    let means = MEANS.replace("remark", "runtime").replace("none", "3");
+    let folder = folder(&means, "01-random", &[]);
+    let mut results = results();
+    results.rows.push(row("03-warehouse", r#"{"num_agents": 2}"#, Some(4)));
+    let fields = VIEW.replace("[CSR, SoC]", "runtime");
+    let shown = show(folder.path(), &fields, &results).unwrap();
+    let head = "Folder,Number of Agents,Episodes,Runtime (seconds),Runtime (seconds) published,Runtime (seconds) ratio,longest";
+    assert_eq!(csv(&shown)[..2], [head.to_owned(), "01-random,2,3,9,3,3,9".to_owned()]);
+    assert_eq!(csv(&shown)[3], format!("03-warehouse,2,1,4,3,{},4", 4.0 / 3.0));
+    // A named dataset stands for that of every folder.
+    let fields = fields.replace("runtime", "SoC").replace("setting", "dataset: 03-warehouse, setting");
+    let shown = show(folder.path(), &fields, &results).unwrap();
+    assert!(csv(&shown)[1].starts_with("01-random,2,3,9,8,1.125"), "{:?}", csv(&shown));
+}
+
+#[test]
+fn lifelong_results_are_compared_by_throughput() {
+    let folder = folder(MEANS, "01-random", &[]);
+    let fields =
+        "{type: published, file: means.csv, setting: LMAPF, algorithm: RHCR, metrics: avg_throughput}";
+    let shown = show(folder.path(), fields, &results()).unwrap();
+    assert_eq!(csv(&shown)[1..], ["2,3,0.75,0.5,1.5", "4,2,0.75,,"]);
+    let note = "`01-random` with 4 agents: there are no published means";
+    assert_eq!(shown.notes[0], note);
+}
+
+/// Published rows name no map if there is only one, and results name none that was not varied.
+#[test]
+fn instances_are_known_by_what_is_varied_in_the_published_rows() {
+    let published = [(r#"{"num_agents": 2, "seed": 5}"#, 8)];
+    let folder = folder(MEANS, "03-warehouse", &published);
+    let fields = VIEW.replace("means.csv", "means.csv, episodes: episodes");
+    let of = |settings: &str| row("03-warehouse", settings, Some(6));
+    let named = of(r#"{"num_agents": 2, "seed": 5, "map_name": "wfi_warehouse"}"#);
+    let fixed = Row {
+        config: Pairs(vec![("num_agents".into(), 2.into()), ("seed".into(), 9.into())]),
+        ..of(r#"{"seed": 5}"#)
+    };
+    for row in [named.clone(), fixed] {
+        let results = Results { rows: vec![row], notes: Vec::new() };
+        let shown = show(folder.path(), &fields, &results).unwrap();
+        assert_eq!(csv(&shown)[1], "2,1,1,1,1,6,8,0.75");
+    }
+    let other = of(r#"{"num_agents": 2, "seed": 5, "map_name": "another"}"#);
+    let results = Results { rows: vec![named, other], notes: Vec::new() };
+    assert_eq!(
+        show(folder.path(), &fields, &results).unwrap_err(),
+        "view `A`: `map_name` has 2 values in `03-warehouse` and is not varied in the published episodes"
+    );
+    let elsewhere = of(r#"{"num_agents": 2, "seed": 6}"#);
+    let results = Results { rows: vec![elsewhere], notes: Vec::new() };
+    let shown = show(folder.path(), &fields, &results).unwrap();
+    assert_eq!(csv(&shown)[1], "2,1,1,1,1,");
+    let note = "`03-warehouse` with 2 agents: none of the instances is among the published episodes";
+    assert_eq!(shown.notes, [note]);
+}
+
+#[test]
+fn what_is_wrong_is_told_with_the_nearest_that_is_right() {
+    let folder = folder(MEANS, "01-random", &[(r#"{"num_agents": 2}"#, 8)]);
+    for (from, to, told) in [
+        ("means.csv", "mean.csv", "mean.csv: No such file"),
+        ("MAPF", "MAPE", "expected one of MAPF, LMAPF (such as `MAPF`), found `\"MAPE\"`"),
+        ("setting: MAPF, ", "", "`A`, expected a field `setting`"),
+        ("file", "fil", "unknown key `fil` in view `A`; the nearest known one is `file`"),
+        ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; the nearest one is `LaCAM`"),
+        (
+            "LaCAM",
+            "LaCAM, dataset: 01-randm",
+            "no dataset `01-randm` of MAPF; the nearest one is `01-random`",
+        ),
+        ("LaCAM", "LaCAM, ours: LaCam", "view `A`: expected `ours`, one of LaCAM, found `LaCam`"),
+        ("[CSR, SoC]", "[CSR, SOC]", "`metrics` is `SOC`, expected a column of the results"),
+        ("LaCAM", "DCC, episodes: episodes", "no `DCC.json` in"),
+        ("LaCAM", "LaCAM, episodes: nowhere", "nowhere/01-random: No such file"),
+    ] {
+        assert!(VIEW.contains(from), "{from}");
+        let error = show(folder.path(), &VIEW.replacen(from, to, 1), &results()).unwrap_err();
+        assert!(error.contains(told), "{to}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+    for (from, to, told) in [
+        ("dataset,", "data,", "means.csv: no column `dataset`; the nearest one is `data`"),
+        ("SoC", "soc", "means.csv: no column `SoC`; the nearest one is `soc`"),
+        (",10,", ",ten,", "means.csv: line 2: `SoC` is `ten`, expected a number or nothing"),
+        (",10,", ",NaN,", "means.csv: line 2: `SoC` is `NaN`, expected a number or nothing"),
+        (",10,,none", ",10", "means.csv: CSV error: record 1 (line: 2"),
+    ] {
+        assert!(MEANS.contains(from), "{from}");
+        fs::write(folder.path().join("means.csv"), MEANS.replacen(from, to, 1)).unwrap();
+        let error = show(folder.path(), VIEW, &results()).unwrap_err();
+        assert!(error.contains(told), "{to}: {error}");
+    }
+}
