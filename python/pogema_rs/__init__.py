@@ -12,7 +12,7 @@ Modules under POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `poge
 with `pogema_rs.wrappers.metrics` and `pogema_rs.wrappers.persistence`.
 
 Modules of our own: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
-`pogema_rs.errors`, `pogema_rs.install` and `pogema_rs.wrappers.forwarding`.
+`pogema_rs.errors`, `pogema_rs.install`, `pogema_rs.svg_animation.filmed` and `pogema_rs.wrappers.forwarding`.
 
 Evaluations, under the names of pogema-toolbox, in `pogema_rs.toolbox`, which `python -m` runs:
 `pogema_rs.toolbox.evaluator`, `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`,

@@ -14,7 +14,7 @@ from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError, No
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.semantics import Semantics
-from pogema_rs.svg_animation.animation_wrapper import Filmed
+from pogema_rs.svg_animation.filmed import Filmed
 from pogema_rs.wrappers import persistence
 
 __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
