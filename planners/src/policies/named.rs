@@ -101,6 +101,7 @@ impl NamedPolicy {
         if let Some(planner) = one_shot {
             let max_steps = u64::try_from(config.max_steps).ok();
             let policy = PlannerPolicy::new(planner.make(planner_settings), budget, max_steps);
+            let policy = if single_attempt { policy.with_single_attempt() } else { policy };
             return Ok(Self(Kind::Planner(Box::new(policy))));
         }
         let known = || Self::all().into_iter().map(|(known, _)| format!("`{known}`")).collect::<Vec<_>>();
