@@ -5,11 +5,11 @@ use pogema_numpy::Generator;
 
 use crate::budget::Budget;
 use crate::outcome::Outcome;
-use crate::policies::astar::AStarTeam;
+use crate::policies::astar::{AStarTeam, pogema_team};
 use crate::policies::lifelong_policy::LifelongPolicy;
 use crate::policies::observations::PomapfObservations;
 use crate::policies::planner_policy::PlannerPolicy;
-use crate::policies::pogema::{pogema_team, sample};
+use crate::policies::pogema::sample;
 use crate::registry::{LifelongName, PlannerName, PlannerSettings};
 
 words! {
