@@ -40,7 +40,6 @@ pub struct Case {
     /// A POGEMA config.
     pub config: Value,
     /// A map to register first.
-    #[serde(default)]
     pub register: Option<Registered>,
     /// Whether to measure the density of agents.
     #[serde(default)]
@@ -55,10 +54,8 @@ pub struct Case {
     #[serde(default)]
     pub steps: Vec<CaseStep>,
     /// A part of the error that the config, the reset or the last step gives.
-    #[serde(default)]
     pub error: Option<String>,
     /// Where POGEMA 1.4.0 does something else, by decision: what it does.
-    #[serde(default)]
     pub pogema: Option<String>,
 }
 
@@ -66,10 +63,9 @@ pub struct Case {
 #[derive(Clone, Debug, Deserialize)]
 pub struct CaseStep {
     /// A step with these actions.
-    #[serde(default, rename = "do")]
+    #[serde(rename = "do")]
     actions: Option<Vec<ActionWord>>,
     /// Any other operation: `reset`, `back`, `astar`, `sample` or `history`.
-    #[serde(default)]
     op: Option<String>,
     /// What holds then.
     #[serde(flatten)]
@@ -153,9 +149,8 @@ impl Case {
         if let Some(error) = &response.error {
             return Some(format!("unexpected error: {}", error.message));
         }
-        let expectations = std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect));
         let mut map: Option<Map> = None;
-        for (op, (record, expect)) in response.records.iter().zip(expectations).enumerate() {
+        for (op, (record, expect)) in response.records.iter().zip(self.expectations()).enumerate() {
             if let Record::Reset(reset) = record {
                 map = Map::from_rows(&reset.map).ok();
             }
@@ -170,8 +165,12 @@ impl Case {
 
     /// Whether the case says anything that could fail.
     pub fn checks_something(&self) -> bool {
-        let expectations = std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect));
-        self.error.is_some() || expectations.into_iter().any(|expect| !expect.is_empty())
+        self.error.is_some() || self.expectations().any(|expect| !expect.is_empty())
+    }
+
+    /// What holds after each operation.
+    fn expectations(&self) -> impl Iterator<Item = &Expect> {
+        std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect))
     }
 }
 
@@ -181,12 +180,11 @@ impl CaseStep {
             (Some(actions), None) => {
                 actions.iter().map(ActionWord::number).collect::<Result<_, _>>().map(Op::Step)
             }
-            (None, Some("reset")) => Ok(Op::Reset(None)),
-            (None, Some("back")) => Ok(Op::Back),
-            (None, Some("astar")) => Ok(Op::Astar),
-            (None, Some("sample")) => Ok(Op::Sample),
-            (None, Some("history")) => Ok(Op::History),
-            (_, other) => Err(Error::config("op", other.unwrap_or("absent"), "a known operation, or `do`")),
+            (actions, word) => {
+                let op = word.filter(|_| actions.is_none()).and_then(Op::of_word);
+                let word = word.unwrap_or("absent");
+                op.ok_or_else(|| Error::config("op", word, "a known operation, or `do`"))
+            }
         }
     }
 }

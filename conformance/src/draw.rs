@@ -107,25 +107,12 @@ fn draw_ground(dice: &mut Dice, on_target: &str) -> Ground {
     use Ground::{
         Explicit, GoalPool, Letters, Named, PoolText, Pools, RandomStarts, Rows, Seeded, Sequences, Text,
     };
-    let grounds: &[Ground] = if on_target == "restart" {
-        &[
-            Seeded,
-            Seeded,
-            Seeded,
-            Seeded,
-            Text,
-            Rows,
-            PoolText,
-            Pools,
-            GoalPool,
-            Sequences,
-            RandomStarts,
-            Named,
-        ]
+    let (num_seeded, others): (usize, &[Ground]) = if on_target == "restart" {
+        (4, &[Text, Rows, PoolText, Pools, GoalPool, Sequences, RandomStarts, Named])
     } else {
-        &[Seeded, Seeded, Seeded, Text, Rows, Letters, PoolText, Pools, Explicit, Explicit, Sequences, Named]
+        (3, &[Text, Rows, Letters, PoolText, Pools, Explicit, Explicit, Sequences, Named])
     };
-    dice.pick(grounds)
+    dice.pick(&[&vec![Seeded; num_seeded], others].concat())
 }
 
 /// Writes map, starts and goals into the config; gives the map to register, if there is one.

@@ -5,62 +5,53 @@ use serde::Serialize;
 
 use crate::request::{Record, Response};
 
-/// Counts of what happened in the episodes that were compared.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Events {
+/// Defines counters, each with its name in reports.
+macro_rules! counters {
+    ($($(#[$attribute:meta])* $field:ident = $name:literal,)+) => {
+        /// Counts of what happened in the episodes that were compared.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+        pub struct Events {
+            $($(#[$attribute])* pub $field: u64,)+
+        }
+
+        impl Events {
+            /// The counts by name.
+            pub fn named(&self) -> impl Iterator<Item = (&'static str, u64)> {
+                [$(($name, self.$field)),+].into_iter()
+            }
+
+            /// Adds other counts.
+            pub fn add(&mut self, other: &Self) {
+                $(self.$field += other.$field;)+
+            }
+        }
+    };
+}
+
+counters! {
     /// Episodes.
-    pub episodes: u64,
+    episodes = "episodes",
     /// Steps.
-    pub steps: u64,
+    steps = "steps",
     /// Pairs of agents that wanted each other's cells.
-    pub swaps: u64,
+    swaps = "swaps",
     /// Cells that two or more agents wanted.
-    pub contests: u64,
+    contests = "contests",
     /// Agents that entered a cell another agent left in the same step.
-    pub chains: u64,
+    chains = "chains",
     /// Rings of three or more agents that moved all at once.
-    pub cycles: u64,
+    cycles = "cycles",
     /// Agents that stayed because the agent ahead wanted to move and could not.
-    pub cascades: u64,
+    cascades = "cascades",
     /// Active agents that the occupancy grid does not show.
-    pub vanished: u64,
+    vanished = "vanished",
     /// Agents that left the map on their goals.
-    pub finished: u64,
+    finished = "finished",
     /// Goals that were replaced by others.
-    pub new_goals: u64,
+    new_goals = "new goals",
 }
 
 impl Events {
-    /// The counts by name.
-    pub fn named(&self) -> [(&'static str, u64); 10] {
-        [
-            ("episodes", self.episodes),
-            ("steps", self.steps),
-            ("swaps", self.swaps),
-            ("contests", self.contests),
-            ("chains", self.chains),
-            ("cycles", self.cycles),
-            ("cascades", self.cascades),
-            ("vanished", self.vanished),
-            ("finished", self.finished),
-            ("new goals", self.new_goals),
-        ]
-    }
-
-    /// Adds other counts.
-    pub fn add(&mut self, other: &Self) {
-        self.episodes += other.episodes;
-        self.steps += other.steps;
-        self.swaps += other.swaps;
-        self.contests += other.contests;
-        self.chains += other.chains;
-        self.cycles += other.cycles;
-        self.cascades += other.cascades;
-        self.vanished += other.vanished;
-        self.finished += other.finished;
-        self.new_goals += other.new_goals;
-    }
-
     /// Counts what happened in a response.
     pub fn watch(&mut self, response: &Response) {
         let mut before: Option<&Snapshot> = None;

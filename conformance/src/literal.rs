@@ -14,7 +14,7 @@ use pogema_core::{
 type Place = (usize, usize);
 
 /// One environment that proceeds as POGEMA 1.4.0 does.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Literal {
     config: Config,
     obstacles: Vec<Vec<u8>>,
@@ -31,25 +31,13 @@ pub struct Literal {
 }
 
 impl Literal {
-    /// An environment for a config; it wants a reset first.
+    /// An environment for a config. Call `reset` before `step`.
     ///
     /// # Errors
     /// If the config is out of range.
     pub fn new(config: Config) -> Result<Self, Error> {
         config.check()?;
-        Ok(Self {
-            config,
-            obstacles: Vec::new(),
-            positions: Vec::new(),
-            places: Vec::new(),
-            goals: Vec::new(),
-            cells: Vec::new(),
-            goal_cells: Vec::new(),
-            active: Vec::new(),
-            was_on_goal: Vec::new(),
-            streams: Vec::new(),
-            elapsed: 0,
-        })
+        Ok(Self { config, ..Self::default() })
     }
 
     fn pad(&self, cell: Cell) -> Place {

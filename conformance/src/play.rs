@@ -46,29 +46,15 @@ pub fn play(request: &Request) -> Response {
 
 /// Plays a request on an engine.
 pub fn play_on(engine: Engine, request: &Request) -> Response {
-    let mut response = Response { id: Some(request.id), ..Response::default() };
-    let mut player = match Player::new(&engine.make, request) {
-        Ok(player) => player,
-        Err(error) => {
-            response.error = Some(failure(When::Phase("config".into()), &error));
-            return response;
+    let mut response = Response::to(request);
+    match Player::new(&engine.make, request) {
+        Ok(mut player) => {
+            response.record(request, |_, op| player.perform(op));
+            response.warnings = player.warnings;
         }
-    };
-    for (index, op) in request.ops.iter().enumerate() {
-        match player.perform(op) {
-            Ok(record) => response.records.push(record),
-            Err(error) => {
-                response.error = Some(failure(When::Op(index), &error));
-                break;
-            }
-        }
+        Err(error) => response.error = Some(Failure::new(When::Phase("config".into()), &error)),
     }
-    response.warnings = player.warnings;
     response
-}
-
-fn failure(when: When, error: &Error) -> Failure {
-    Failure { when, kind: "Error".into(), message: error.to_string() }
 }
 
 /// Where the instances of the episodes come from.
@@ -116,15 +102,9 @@ pub(crate) struct Player {
 impl Player {
     pub(crate) fn new(make: &Make<'_>, request: &Request) -> Result<Self, Error> {
         let config = GridConfig::from_value(&request.config)?;
-        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
-        let registered = named.map(|map| pogema_core::Map::from_rows(&map.rows)).transpose()?;
-        let source = Source::Drawn(Box::new(InstanceSource::new(config.clone(), registered)?));
-        Self::with_source(
-            make,
-            config,
-            source,
-            Measured { density: request.density, collisions: request.collisions },
-        )
+        let source = Source::Drawn(Box::new(request.source(&config)?));
+        let measured = Measured { density: request.density, collisions: request.collisions };
+        Self::with_source(make, config, source, measured)
     }
 
     /// A player of one instance, whose episodes all begin alike. It measures the figures named.

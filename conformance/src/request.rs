@@ -1,7 +1,7 @@
 //! What is asked of an implementation, and what it answers: the same JSON for every implementation.
 
 use pogema_core::{Action, Cell, Change, Error, Map, Observed, Padded, Snapshot, TraceStep};
-use pogema_maps::GridConfig;
+use pogema_maps::{GridConfig, InstanceSource};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -79,6 +79,12 @@ pub struct Failure {
     pub kind: String,
     /// The error's text.
     pub message: String,
+}
+
+impl Failure {
+    pub(crate) fn new(when: When, error: &Error) -> Self {
+        Self { when, kind: "Error".into(), message: error.to_string() }
+    }
 }
 
 /// During what an error came.
@@ -192,7 +198,41 @@ impl Record {
     }
 }
 
+impl Request {
+    /// The source of the instances of its config.
+    ///
+    /// # Errors
+    /// If the registered map cannot be read, or the config names another.
+    pub(crate) fn source(&self, config: &GridConfig) -> Result<InstanceSource, Error> {
+        let named = self.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
+        let registered = named.map(|map| Map::from_rows(&map.rows)).transpose()?;
+        InstanceSource::new(config.clone(), registered)
+    }
+}
+
 impl Response {
+    /// An answer to a request, without a record.
+    pub(crate) fn to(request: &Request) -> Self {
+        Self { id: Some(request.id), ..Self::default() }
+    }
+
+    /// Records what each operation of a request gives, up to the first error.
+    pub(crate) fn record(
+        &mut self,
+        request: &Request,
+        mut perform: impl FnMut(usize, &Op) -> Result<Record, Error>,
+    ) {
+        for (index, op) in request.ops.iter().enumerate() {
+            match perform(index, op) {
+                Ok(record) => self.records.push(record),
+                Err(error) => {
+                    self.error = Some(Failure::new(When::Op(index), &error));
+                    return;
+                }
+            }
+        }
+    }
+
     /// The map of the episode that an operation belongs to.
     pub fn map_at(&self, op: usize) -> Option<Map> {
         self.records.iter().take(op + 1).rev().find_map(|record| match record {
@@ -230,6 +270,28 @@ pub fn numbers(actions: &[Action]) -> Vec<i64> {
     actions.iter().map(|&action| action as i64).collect()
 }
 
+impl Op {
+    /// The operations without an argument.
+    const PLAIN: [Self; 4] = [Self::Astar, Self::Sample, Self::Back, Self::History];
+
+    /// The operation of a word, if it needs no argument; a reset then has no seed.
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        Self::PLAIN.into_iter().chain([Self::Reset(None)]).find(|op| op.word() == word)
+    }
+
+    /// The word that names the operation.
+    pub(crate) fn word(&self) -> &'static str {
+        match self {
+            Self::Reset(_) => "reset",
+            Self::Step(_) => "step",
+            Self::Astar => "astar",
+            Self::Sample => "sample",
+            Self::Back => "back",
+            Self::History => "history",
+        }
+    }
+}
+
 impl TryFrom<Vec<Value>> for Op {
     type Error = String;
 
@@ -241,10 +303,7 @@ impl TryFrom<Vec<Value>> for Op {
             ("step", [actions]) => {
                 serde_json::from_value(actions.clone()).map(Self::Step).map_err(|error| error.to_string())
             }
-            ("astar", []) => Ok(Self::Astar),
-            ("sample", []) => Ok(Self::Sample),
-            ("back", []) => Ok(Self::Back),
-            ("history", []) => Ok(Self::History),
+            (word, []) => Self::PLAIN.into_iter().find(|op| op.word() == word).ok_or_else(unknown),
             _ => Err(unknown()),
         }
     }
@@ -252,13 +311,11 @@ impl TryFrom<Vec<Value>> for Op {
 
 impl From<Op> for Vec<Value> {
     fn from(op: Op) -> Self {
+        let word = op.word().into();
         match op {
-            Op::Reset(seed) => vec!["reset".into(), seed.into()],
-            Op::Step(actions) => vec!["step".into(), actions.into()],
-            Op::Astar => vec!["astar".into()],
-            Op::Sample => vec!["sample".into()],
-            Op::Back => vec!["back".into()],
-            Op::History => vec!["history".into()],
+            Op::Reset(seed) => vec![word, seed.into()],
+            Op::Step(actions) => vec![word, actions.into()],
+            Op::Astar | Op::Sample | Op::Back | Op::History => vec![word],
         }
     }
 }

@@ -75,6 +75,13 @@ struct Checked {
 }
 
 impl Checked {
+    /// A case whose episodes are counted.
+    fn of(response: &Response) -> Self {
+        let mut checked = Self::default();
+        checked.events.watch(response);
+        checked
+    }
+
     /// Compares one engine's answer; the first fault stays.
     fn compare(
         &mut self,
@@ -140,8 +147,7 @@ impl Report {
         for path in golden::files(folder, ".yaml")? {
             let case = cases::read(&path)?;
             let response = play_on(engine, &case.request()?);
-            let mut checked = Checked::default();
-            checked.events.watch(&response);
+            let mut checked = Checked::of(&response);
             let mismatch = case.mismatch(&response);
             checked.tally.count(&case.rule, mismatch.is_none());
             checked.fault = mismatch.map(|text| fault(part, &path.display().to_string(), text));
@@ -164,30 +170,24 @@ impl Report {
         progress: Progress<'_>,
     ) -> Result<(), Error> {
         let Some((&first, others)) = engines.split_first() else { return Ok(()) };
-        let results = on_workers(
-            None,
-            num_cases,
-            || Ok(()),
-            |(), case| {
-                let (request, expected) = play_script(first, draw_request(seed, case), seed);
-                let name = format!("case {case} of seed {seed}");
-                let mut checked = Checked::default();
-                checked.events.watch(&expected);
-                if let Some(law) = broken_law(&request, &expected) {
-                    checked.tally.count(law.rule, false);
-                    let text = format!("operation {}: {} (rule {})", law.op, law.text, law.rule);
-                    checked.fault = Some(fault("fresh", &name, text));
-                }
-                for &engine in others {
-                    let got = play_on(engine, &request);
-                    checked.compare("fresh", &name, engine, (&request, &expected), &got);
-                }
-                keep_fault(&mut checked, keep, &request, &expected);
-                progress();
-                Ok(checked)
-            },
-        )?;
-        self.take("fresh", results);
+        let check = |(): &mut (), case| {
+            let (request, expected) = play_script(first, draw_request(seed, case), seed);
+            let name = format!("case {case} of seed {seed}");
+            let mut checked = Checked::of(&expected);
+            if let Some(law) = broken_law(&request, &expected) {
+                checked.tally.count(law.rule, false);
+                let text = format!("operation {}: {} (rule {})", law.op, law.text, law.rule);
+                checked.fault = Some(fault("fresh", &name, text));
+            }
+            for &engine in others {
+                let got = play_on(engine, &request);
+                checked.compare("fresh", &name, engine, (&request, &expected), &got);
+            }
+            keep_fault(&mut checked, keep, &request, &expected);
+            progress();
+            Ok(checked)
+        };
+        self.take("fresh", on_workers(None, num_cases, || Ok(()), check)?);
         Ok(())
     }
 
@@ -204,28 +204,22 @@ impl Report {
         keep: &Path,
         progress: Progress<'_>,
     ) -> Result<(), Error> {
-        let results = on_workers(
-            None,
-            num_cases,
-            || Oracle::start(python),
-            |oracle, case| {
-                let request = play_script(Engine::REFERENCE, draw_request(seed, case), seed).0;
-                // POGEMA works on its answer while we work on ours.
-                oracle.send(&request)?;
-                let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
-                let expected = oracle.receive()?;
-                let name = format!("case {case} of seed {seed}");
-                let mut checked = Checked::default();
-                checked.events.watch(&expected);
-                for (engine, got) in engines.iter().zip(&answers) {
-                    checked.compare("oracle", &name, *engine, (&request, &expected), got);
-                }
-                keep_fault(&mut checked, keep, &request, &expected);
-                progress();
-                Ok(checked)
-            },
-        )?;
-        self.take("oracle", results);
+        let check = |oracle: &mut Oracle, case| {
+            let request = play_script(Engine::REFERENCE, draw_request(seed, case), seed).0;
+            // POGEMA works on its answer while we work on ours.
+            oracle.send(&request)?;
+            let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
+            let expected = oracle.receive()?;
+            let name = format!("case {case} of seed {seed}");
+            let mut checked = Checked::of(&expected);
+            for (engine, got) in engines.iter().zip(&answers) {
+                checked.compare("oracle", &name, *engine, (&request, &expected), got);
+            }
+            keep_fault(&mut checked, keep, &request, &expected);
+            progress();
+            Ok(checked)
+        };
+        self.take("oracle", on_workers(None, num_cases, || Oracle::start(python), check)?);
         Ok(())
     }
 
@@ -263,8 +257,7 @@ impl Report {
 }
 
 fn check(part: &str, name: &str, request: &Request, expected: &Response, got: &Response) -> Checked {
-    let mut checked = Checked::default();
-    checked.events.watch(expected);
+    let mut checked = Checked::of(expected);
     checked.fault =
         compare(request, expected, got, &mut checked.tally).map(|found| diverged(part, name, found));
     checked
@@ -281,8 +274,7 @@ fn diverged(part: &str, name: &str, found: Divergence) -> Fault {
 /// Keeps a failed case on disk, with the expected answer; a failure to do so is told along with it.
 fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected: &Response) {
     let Some(fault) = &mut checked.fault else { return };
-    let name: String = fault.name.chars().map(|letter| if letter == ' ' { '-' } else { letter }).collect();
-    let path = folder.join(format!("{}-{name}.jsonl", fault.part));
+    let path = folder.join(format!("{}-{}.jsonl", fault.part, fault.name.replace(' ', "-")));
     let recording = Recording { request: request.clone(), response: expected.clone() };
     let kept = std::fs::create_dir_all(folder)
         .map_err(|error| Error::io(folder, error))

@@ -194,3 +194,17 @@ fn a_policy_plans_anew_when_the_world_is_another() {
     policy.reset();
     assert!(policy.outcomes().is_empty());
 }
+
+#[test]
+fn a_single_attempt_is_not_repeated() {
+    let (config, instance) = drawn(3, 8, 4, "nothing");
+    let num_attempts = |is_single: bool| {
+        let planner = PlannerName::Cbs.make(PlannerSettings::default());
+        let policy = PlannerPolicy::new(planner, Budget::of_nodes(0), Some(64));
+        let mut policy = if is_single { policy.with_single_attempt() } else { policy };
+        play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
+        policy.outcomes().len()
+    };
+    assert_eq!(num_attempts(true), 1);
+    assert!(num_attempts(false) > 1);
+}

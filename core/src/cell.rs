@@ -93,8 +93,7 @@ impl Action {
     ///
     /// Rule: move/invalid
     pub fn from_number(agent: usize, number: i64) -> Result<Self, Error> {
-        let known = usize::try_from(number).ok().and_then(|at| Self::ALL.get(at));
-        known.copied().ok_or(Error::Action { agent: Some(agent), number })
+        Self::try_from(number).map_err(|_| Error::Action { agent: Some(agent), number })
     }
 }
 

@@ -206,16 +206,13 @@ pub struct State<'a> {
     pub on_goal: &'a [bool],
 }
 
-/// A copy of the visible state between two steps, as traces keep it.
+/// A copy of the visible state between two steps, as traces keep it. The lists are those of [`State`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "State describes them")]
 pub struct Snapshot {
-    /// Current cells; a finished agent stays where it finished.
     pub cells: Vec<Cell>,
-    /// Current goals.
     pub goals: Vec<Cell>,
-    /// Which agents still take part.
     pub active: Vec<bool>,
-    /// Which active agents stood on their goals after the last move, before goals changed.
     pub on_goal: Vec<bool>,
     /// The cells that the occupancy grid marks, row by row.
     pub occupied: Vec<Cell>,

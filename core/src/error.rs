@@ -4,30 +4,18 @@ use std::sync::Arc;
 
 /// Everything that can be wrong with input, each told in one line.
 ///
-/// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line.
+/// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line. Lines and
+/// columns count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the fields are named as in the messages")]
 pub enum Error {
-    /// A config field holds what it may not hold.
+    /// A config field, by the name the file gives it, holds what it may not hold.
     #[error("{}", one_line(format_args!("config: {}", wrong_field(field, value, expected))))]
-    Config {
-        /// The field, by the name the file gives it.
-        field: String,
-        /// The offending value.
-        value: String,
-        /// What would have been right.
-        expected: String,
-    },
-    /// An argument of a call, or a flag of the program, holds what it may not hold.
+    Config { field: String, value: String, expected: String },
+    /// An argument of a call, or a flag of the program with its hyphens, holds what it may not hold.
     #[error("{}", one_line(wrong_field(name, value, expected)))]
-    Argument {
-        /// The argument, or the flag with its hyphens.
-        name: String,
-        /// The offending value.
-        value: String,
-        /// What is accepted.
-        expected: String,
-    },
+    Argument { name: String, value: String, expected: String },
     /// A config field names a cell outside the map.
     #[error(
         "{}",
@@ -35,74 +23,28 @@ pub enum Error {
             "config: `{field}` is `{cell}`, expected cells inside the map of {height} rows and {width} columns"
         ))
     )]
-    CellOutside {
-        /// The field.
-        field: String,
-        /// The cell.
-        cell: String,
-        /// Rows of the map.
-        height: usize,
-        /// Columns of the map.
-        width: usize,
-    },
-    /// A config could not be read at all.
+    CellOutside { field: String, cell: String, height: usize, width: usize },
+    /// A config could not be read at all. The reason is what the parser says, with its place.
     #[error("{}", one_line(format_args!("config: {reason}")))]
-    Syntax {
-        /// What the parser says, with its place.
-        reason: String,
-    },
+    Syntax { reason: String },
     /// A map text is wrong.
     #[error("{}", one_line(format_args!("map: line {line}, column {column}: {reason}")))]
-    Map {
-        /// Line of the map, counted from 1.
-        line: usize,
-        /// Column of the map, counted from 1.
-        column: usize,
-        /// What is wrong there.
-        reason: String,
-    },
+    Map { line: usize, column: usize, reason: String },
     /// A map text holds a character without a meaning.
     #[error("{}", one_line(format_args!("map: line {line}, column {column}: {}", unknown_letter(*letter))))]
-    UnknownLetter {
-        /// Line of the map, counted from 1.
-        line: usize,
-        /// Column of the map, counted from 1.
-        column: usize,
-        /// The character.
-        letter: char,
-    },
+    UnknownLetter { line: usize, column: usize, letter: char },
     /// The instance as a whole cannot be played.
     #[error("{}", one_line(format_args!("instance: {reason}")))]
-    Instance {
-        /// What is wrong.
-        reason: String,
-    },
-    /// One agent of an instance cannot be played.
+    Instance { reason: String },
+    /// One agent of an instance, by index, cannot be played.
     #[error("{}", one_line(format_args!("instance: agent {agent}: {reason}")))]
-    Agent {
-        /// The agent's index.
-        agent: usize,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A number that is no action.
+    Agent { agent: usize, reason: String },
+    /// A number that is no action, with the agent where it is known.
     #[error("action{} is `{number}`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)", of_agent(*.agent))]
-    Action {
-        /// The agent, where it is known.
-        agent: Option<usize>,
-        /// The number given.
-        number: i64,
-    },
+    Action { agent: Option<usize>, number: i64 },
     /// A list or buffer has the wrong length.
     #[error("{what} has length {got}, expected {want}")]
-    Length {
-        /// Which list or buffer.
-        what: &'static str,
-        /// The length that was needed.
-        want: usize,
-        /// The length that was given.
-        got: usize,
-    },
+    Length { what: &'static str, want: usize, got: usize },
     /// A call that needs an episode, before the first reset.
     #[error("the environment was not reset yet")]
     NotReset,
@@ -120,87 +62,48 @@ pub enum Error {
     ForeignState,
     /// A request for something that does not exist, such as a frame after the end.
     #[error("{}", one_line(format_args!("{what} is `{value}`, expected {expected}")))]
-    OutOfRange {
-        /// What was requested.
-        what: String,
-        /// The value given.
-        value: String,
-        /// The values that exist.
-        expected: String,
-    },
+    OutOfRange { what: String, value: String, expected: String },
     /// Saved goals that belong to another episode.
     #[error("the saved goals belong to another episode")]
     ForeignGoals,
     /// A lane of a batch whose first episode has not ended.
     #[error("no episode of lane {lane} ended yet")]
-    NotEnded {
-        /// The lane.
-        lane: usize,
-    },
-    /// An object that another thread is using.
+    NotEnded { lane: usize },
+    /// An object, named with its article, that another thread is using.
     #[error("another thread is using {what}, expected one thread at a time")]
-    Busy {
-        /// The object, with its article.
-        what: &'static str,
-    },
+    Busy { what: &'static str },
     /// A policy that sees a state which is not the next one of its episode.
     #[error("{}", one_line(reason))]
-    OutOfStep {
-        /// What was expected.
-        reason: String,
-    },
-    /// A plan that breaks a rule or does not fit its text format.
+    OutOfStep { reason: String },
+    /// A plan that breaks a rule or does not fit its text format. The reason names the line where there is one.
     #[error("{}", one_line(reason))]
-    Plan {
-        /// What is wrong, with the line where there is one.
-        reason: String,
-    },
-    /// A request that contradicts itself or has nothing to work on; flags and keys stand in it by name.
+    Plan { reason: String },
+    /// A request that contradicts itself or has nothing to work on. The reason names flags and keys, and what is accepted.
     #[error("{}", one_line(reason))]
-    Request {
-        /// What is wrong, and what is accepted.
-        reason: String,
-    },
-    /// An answer of a port that is no answer to its question, or a refusal.
+    Request { reason: String },
+    /// An answer of a port that is no answer to its question, or a refusal: what the port said or did.
     #[error("{}", one_line(reason))]
-    Port {
-        /// What the port said or did.
-        reason: String,
-    },
+    Port { reason: String },
     /// Data from elsewhere that is not what it should be.
     #[error("{}", one_line(format_args!("{what}: {reason}")))]
-    Corrupt {
-        /// The data.
-        what: String,
-        /// What is wrong with it.
-        reason: String,
-    },
+    Corrupt { what: String, reason: String },
     /// A failure of the operating system or of a library.
     #[error("{}", one_line(format_args!("{what}: {cause}")))]
     External {
-        /// What failed.
         what: String,
-        /// Why it failed.
         #[source]
         cause: Cause,
     },
     /// A file could not be read or written, or its content is wrong.
     #[error("{}", one_line(format_args!("{path}: {cause}")))]
     Io {
-        /// The file.
         path: String,
-        /// What the system says, or what is wrong with the content.
         #[source]
         cause: Cause,
     },
     /// A trace that cannot be read.
     #[error("{}", one_line(format_args!("trace: line {line}: {reason}")))]
-    Trace {
-        /// Line of the trace, counted from 1.
-        line: usize,
-        /// What is wrong there.
-        reason: String,
-    },
+    Trace { line: usize, reason: String },
 }
 
 /// Any error, or a text.

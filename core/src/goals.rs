@@ -57,10 +57,6 @@ pub enum StreamState {
     Drawn(String),
 }
 
-fn unfit() -> Error {
-    Error::ForeignGoals
-}
-
 impl GoalStream {
     /// One goal for ever; as the next goal it gives itself.
     pub fn single(goal: Cell) -> Self {
@@ -107,7 +103,7 @@ impl GoalStream {
         let state = match &self.rest {
             Rest::Same => StreamState::Same,
             Rest::Cycle { index, .. } => StreamState::Turn(*index),
-            Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or_else(unfit)?),
+            Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or(Error::ForeignGoals)?),
         };
         Ok(state)
     }
@@ -126,7 +122,7 @@ impl GoalStream {
             (Rest::Drawn(source), StreamState::Drawn(saved)) => source.restore(saved),
             _ => false,
         };
-        if fits { Ok(()) } else { Err(unfit()) }
+        if fits { Ok(()) } else { Err(Error::ForeignGoals) }
     }
 
     /// The goal that follows the one reached at `at`.

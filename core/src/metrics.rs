@@ -12,57 +12,51 @@ use crate::{Config, OnGoal};
 pub use collisions::CollisionMeter;
 pub use density::{DensityMeter, Seen, pairwise_mean};
 
-/// The figures of one episode, under POGEMA's names; a figure that its mode does not have is absent.
-///
-/// Rule: metrics/finish, metrics/nothing, metrics/restart
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Metrics {
-    /// Share of agents that reached their goals.
-    #[serde(rename = "ISR", skip_serializing_if = "Option::is_none")]
-    pub isr: Option<f64>,
-    /// 1 if all agents reached their goals, else 0.
-    #[serde(rename = "CSR", skip_serializing_if = "Option::is_none")]
-    pub csr: Option<f64>,
-    /// Units: steps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ep_length: Option<f64>,
-    /// Sum of costs. Units: steps.
-    #[serde(rename = "SoC", skip_serializing_if = "Option::is_none")]
-    pub soc: Option<f64>,
-    /// Units: steps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub makespan: Option<f64>,
-    /// Units: goals per step, all agents together.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub avg_throughput: Option<f64>,
-    /// Agents per free cell of a window.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub avg_agents_density: Option<f64>,
-    /// Moves that another agent prevented.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub a_collisions: Option<f64>,
-    /// Moves that an obstacle prevented.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub o_collisions: Option<f64>,
+/// Defines the figures, each with POGEMA's name for it.
+macro_rules! figures {
+    ($(#[doc = $doc:literal] $field:ident = $name:literal,)+) => {
+        /// The figures of one episode, under POGEMA's names; a figure that its mode does not have is absent.
+        ///
+        /// Rule: metrics/finish, metrics/nothing, metrics/restart
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(default)]
+        pub struct Metrics {
+            $(
+                #[doc = $doc]
+                #[serde(rename = $name, skip_serializing_if = "Option::is_none")]
+                pub $field: Option<f64>,
+            )+
+        }
+
+        impl Metrics {
+            /// The figures that are there, by name.
+            pub fn named(&self) -> Vec<(&'static str, f64)> {
+                let all = [$(($name, self.$field)),+];
+                all.into_iter().filter_map(|(name, value)| value.map(|value| (name, value))).collect()
+            }
+        }
+    };
 }
 
-impl Metrics {
-    /// The figures that are there, by name.
-    pub fn named(&self) -> Vec<(&'static str, f64)> {
-        let all = [
-            ("ISR", self.isr),
-            ("CSR", self.csr),
-            ("ep_length", self.ep_length),
-            ("SoC", self.soc),
-            ("makespan", self.makespan),
-            ("avg_throughput", self.avg_throughput),
-            ("avg_agents_density", self.avg_agents_density),
-            ("a_collisions", self.a_collisions),
-            ("o_collisions", self.o_collisions),
-        ];
-        all.into_iter().filter_map(|(name, value)| value.map(|value| (name, value))).collect()
-    }
+figures! {
+    /// Share of agents that reached their goals.
+    isr = "ISR",
+    /// 1 if all agents reached their goals, else 0.
+    csr = "CSR",
+    /// Units: steps.
+    ep_length = "ep_length",
+    /// Sum of costs. Units: steps.
+    soc = "SoC",
+    /// Units: steps.
+    makespan = "makespan",
+    /// Units: goals per step, all agents together.
+    avg_throughput = "avg_throughput",
+    /// Agents per free cell of a window.
+    avg_agents_density = "avg_agents_density",
+    /// Moves that another agent prevented.
+    a_collisions = "a_collisions",
+    /// Moves that an obstacle prevented.
+    o_collisions = "o_collisions",
 }
 
 /// Counts goals and steps and gives the figures of the episode when it ends.

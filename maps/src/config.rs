@@ -7,6 +7,7 @@ mod read;
 mod write;
 
 use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, Reward, words};
+use serde::Serialize;
 
 pub(crate) use fields::cells as cells_of;
 pub use fields::{FIELDS, nearest};
@@ -73,7 +74,8 @@ pub struct GridConfig {
 }
 
 /// Explicit goals: one per agent, or a sequence per agent.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
 pub enum Targets {
     /// One goal per agent.
     Single(Vec<Cell>),
@@ -102,6 +104,14 @@ impl Targets {
             Self::Sequences(sequences) => {
                 sequences.iter().filter_map(|goals| goals.first().copied()).collect()
             }
+        }
+    }
+
+    /// The goals of all agents.
+    pub(crate) fn all(&self) -> Vec<Cell> {
+        match self {
+            Self::Single(goals) => goals.clone(),
+            Self::Sequences(sequences) => sequences.concat(),
         }
     }
 }

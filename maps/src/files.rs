@@ -146,5 +146,5 @@ pub fn ending(path: &Path) -> &str {
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -17,9 +17,10 @@ impl GridConfig {
     pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
         let has_scenario = !text.starts.is_empty() && !fields.contains_key("agents_xy");
         let mut others = fields.clone();
-        others.retain(|field, _| {
-            !matches!(field.as_str(), "map" | "width" | "height" | "size")
-                && !(has_scenario && field == "targets_xy")
+        others.retain(|field, _| match field.as_str() {
+            "map" | "width" | "height" | "size" => false,
+            "targets_xy" => !has_scenario,
+            _ => true,
         });
         let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
         let config = Self::read(&others, Some(plain))?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::components::Components;
 use crate::config::{GridConfig, Targets};
 use crate::place::{capacity, place_at_random};
-use crate::streams::{ComponentSource, PoolSource, Reach};
+use crate::streams::{Choice, DrawnGoals, Reach};
 use pogema_numpy::{Generator, SeedSequence};
 
 /// How often POGEMA tries to place the agents before it gives up.
@@ -283,23 +283,20 @@ impl InstanceSource {
         }
         let seeds = self.stream()?.integers_array(0, AGENT_SEEDS, goals.len());
         let seeds = seeds.map_err(|error| Error::instance(error.to_string()))?;
-        let generators = seeds.into_iter().map(|seed| Generator::seeded(seed as u64));
         let pool = pools.map(|pools| &pools.goals).or(self.config.possible_targets_xy.as_ref());
-        if let Some(pool) = pool {
-            let pool: Arc<[Cell]> = pool.clone().into();
-            let radius = self.config.obs_radius as u16;
-            check_pool(map, &pool, radius, goals)?;
-            let source = |generator| Box::new(PoolSource::new(generator, Arc::clone(&pool), radius));
-            return Ok(goals
-                .iter()
-                .zip(generators)
-                .map(|(&goal, rng)| GoalStream::drawn(goal, source(rng)))
-                .collect());
+        let (choice, reason) = if let Some(pool) = pool {
+            check_on_map(map, "possible_targets_xy", pool)?;
+            let pool = Choice::Pool { cells: pool.clone().into(), radius: self.config.obs_radius as u16 };
+            (pool, "no next goal can be drawn from possible_targets_xy")
+        } else {
+            let reach = Choice::Reach(Arc::new(Reach::new(Components::of(map))));
+            (reach, "no next goal can be drawn: its goal has no free neighbour")
+        };
+        if let Some(agent) = goals.iter().position(|&goal| !choice.can_draw(goal)) {
+            return Err(Error::agent(agent, reason));
         }
-        let reach = Arc::new(Reach::new(Components::of(map)));
-        check_reach(&reach, goals)?;
-        let source = |generator| Box::new(ComponentSource::new(generator, Arc::clone(&reach)));
-        Ok(goals.iter().zip(generators).map(|(&goal, rng)| GoalStream::drawn(goal, source(rng))).collect())
+        let source = |seed: i64| Box::new(DrawnGoals::new(Generator::seeded(seed as u64), choice.clone()));
+        Ok(goals.iter().zip(seeds).map(|(&goal, seed)| GoalStream::drawn(goal, source(seed))).collect())
     }
 
     fn warn_of_unreachable(&self, instance: &Instance, warnings: &mut Vec<String>) {
@@ -343,21 +340,4 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
 pub(crate) fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
     let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
     Err(Error::cell_outside(field, cell, (map.height(), map.width())))
-}
-
-/// Passes if every draw from the pool ends and hits the map.
-fn check_pool(map: &Map, pool: &[Cell], radius: u16, goals: &[Cell]) -> Result<(), Error> {
-    check_on_map(map, "possible_targets_xy", pool)?;
-    let stuck = goals.iter().position(|&goal| !PoolSource::can_draw(pool, radius, goal));
-    stuck.map_or(Ok(()), |agent| {
-        Err(Error::agent(agent, "no next goal can be drawn from possible_targets_xy"))
-    })
-}
-
-/// Passes if every agent has a cell besides its goal to go to.
-fn check_reach(reach: &Reach, goals: &[Cell]) -> Result<(), Error> {
-    let stuck = goals.iter().position(|&goal| reach.from(goal).len() < 2);
-    stuck.map_or(Ok(()), |agent| {
-        Err(Error::agent(agent, "no next goal can be drawn: its goal has no free neighbour"))
-    })
 }

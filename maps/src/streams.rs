@@ -7,18 +7,34 @@ use pogema_core::{Cell, GoalSource};
 use crate::components::{ComponentCells, Components};
 use pogema_numpy::Generator;
 
-/// Draws from the cells that the agent can reach, all but the one it stands on.
+/// Draws the next goals of one agent.
 ///
 /// Rule: goal/restart/draw, seed/goals
-///
-/// Source: POGEMA 1.4.0, `generator.py`, `generate_new_target`
 #[derive(Clone, Debug)]
-pub struct ComponentSource {
+pub struct DrawnGoals {
     generator: Generator,
-    reach: Arc<Reach>,
+    choice: Choice,
 }
 
-/// What all agents of a map share to draw goals from.
+/// The cells that a goal is drawn from. All agents of a map share them.
+#[derive(Clone, Debug)]
+pub enum Choice {
+    /// The cells that the agent can reach, all but the one it stands on.
+    ///
+    /// Source: POGEMA 1.4.0, `generator.py`, `generate_new_target`
+    Reach(Arc<Reach>),
+    /// The possible goals.
+    ///
+    /// POGEMA means to leave out the cell the agent stands on, but compares a cell of the map with one that counts
+    /// the border, so it leaves out the cell that lies one radius below and to the right.
+    ///
+    /// Rule: goal/restart/pool
+    ///
+    /// Source: POGEMA 1.4.0, `generator.py`, `generate_from_possible_targets`
+    Pool { cells: Arc<[Cell]>, radius: u16 },
+}
+
+/// The cells that can be reached from each cell of a map.
 #[derive(Debug)]
 pub struct Reach {
     components: Components,
@@ -33,67 +49,49 @@ impl Reach {
     }
 
     /// The cells that can be reached from a cell, itself included; none from an obstacle.
-    pub fn from(&self, cell: Cell) -> &[Cell] {
+    fn from(&self, cell: Cell) -> &[Cell] {
         self.components.label(cell).map_or(&[], |label| self.cells.of(label))
     }
 }
 
-impl ComponentSource {
-    /// A source with its own random numbers.
-    pub fn new(generator: Generator, reach: Arc<Reach>) -> Self {
-        Self { generator, reach }
-    }
-}
-
-impl GoalSource for ComponentSource {
-    fn next_goal(&mut self, at: Cell) -> Cell {
-        draw_until(&mut self.generator, self.reach.from(at), |cell| cell != at).unwrap_or(at)
-    }
-
-    fn save(&self) -> Option<String> {
-        serde_json::to_string(&self.generator).ok()
-    }
-
-    fn restore(&mut self, saved: &str) -> bool {
-        restore(&mut self.generator, saved)
-    }
-
-    fn boxed_clone(&self) -> Box<dyn GoalSource> {
-        Box::new(self.clone())
-    }
-}
-
-/// Draws from the possible goals.
-///
-/// POGEMA means to leave out the cell the agent stands on, but compares a cell of the map with one that counts
-/// the border, so it leaves out the cell that lies one radius below and to the right.
-///
-/// Rule: goal/restart/pool
-///
-/// Source: POGEMA 1.4.0, `generator.py`, `generate_from_possible_targets`
-#[derive(Clone, Debug)]
-pub struct PoolSource {
-    generator: Generator,
-    pool: Arc<[Cell]>,
-    radius: u16,
-}
-
-impl PoolSource {
-    /// A source with its own random numbers.
-    pub fn new(generator: Generator, pool: Arc<[Cell]>, radius: u16) -> Self {
-        Self { generator, pool, radius }
+impl Choice {
+    /// The cells to draw from for an agent at `at`, and the one among them that does not count.
+    fn cells(&self, at: Cell) -> (&[Cell], Cell) {
+        match self {
+            Self::Reach(reach) => (reach.from(at), at),
+            Self::Pool { cells, radius } => {
+                (cells, Cell::new(at.row.saturating_add(*radius), at.col.saturating_add(*radius)))
+            }
+        }
     }
 
     /// Whether a goal can be drawn at all for an agent at `at`.
-    pub fn can_draw(pool: &[Cell], radius: u16, at: Cell) -> bool {
-        pool.iter().any(|&cell| cell != left_out(radius, at))
+    pub fn can_draw(&self, at: Cell) -> bool {
+        let (cells, left_out) = self.cells(at);
+        cells.iter().any(|&cell| cell != left_out)
     }
 }
 
-impl GoalSource for PoolSource {
+impl DrawnGoals {
+    /// A source with its own random numbers.
+    pub fn new(generator: Generator, choice: Choice) -> Self {
+        Self { generator, choice }
+    }
+}
+
+impl GoalSource for DrawnGoals {
+    /// Draws until a cell counts. Where none does, POGEMA would draw for ever; the agent keeps its goal here.
     fn next_goal(&mut self, at: Cell) -> Cell {
-        let left_out = left_out(self.radius, at);
-        draw_until(&mut self.generator, &self.pool, |cell| cell != left_out).unwrap_or(at)
+        let (cells, left_out) = self.choice.cells(at);
+        if cells.iter().all(|&cell| cell == left_out) {
+            return at;
+        }
+        loop {
+            let Ok(index) = self.generator.choice_index(cells.len()) else { return at };
+            if cells[index] != left_out {
+                return cells[index];
+            }
+        }
     }
 
     fn save(&self) -> Option<String> {
@@ -101,33 +99,10 @@ impl GoalSource for PoolSource {
     }
 
     fn restore(&mut self, saved: &str) -> bool {
-        restore(&mut self.generator, saved)
+        serde_json::from_str(saved).map(|generator| self.generator = generator).is_ok()
     }
 
     fn boxed_clone(&self) -> Box<dyn GoalSource> {
         Box::new(self.clone())
-    }
-}
-
-/// Puts a saved generator into the place of another; says whether the text was one.
-fn restore(generator: &mut Generator, saved: &str) -> bool {
-    let read = serde_json::from_str(saved);
-    read.map(|read| *generator = read).is_ok()
-}
-
-fn left_out(radius: u16, at: Cell) -> Cell {
-    Cell::new(at.row.saturating_add(radius), at.col.saturating_add(radius))
-}
-
-/// Draws until a cell fits; none if no cell does, where POGEMA would draw for ever.
-fn draw_until(generator: &mut Generator, cells: &[Cell], fits: impl Fn(Cell) -> bool) -> Option<Cell> {
-    if !cells.iter().any(|&cell| fits(cell)) {
-        return None;
-    }
-    loop {
-        let cell = cells[generator.choice_index(cells.len()).ok()?];
-        if fits(cell) {
-            return Some(cell);
-        }
     }
 }

@@ -5,35 +5,20 @@ use std::fmt;
 use crate::plan::Plan;
 
 /// The result of one call of a planner.
+///
+/// `lower_bound` is a lower bound on the sum of costs of any plan. Units: steps, summed over all agents. `best` is the plan
+/// that came closest, if there is one; it is valid, but does not bring all agents to their goals.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the fields are described above")]
 pub enum Outcome {
     /// A valid plan that brings all agents to their goals. If its sum of costs equals the lower bound, it is optimal.
-    Solved {
-        /// The plan.
-        plan: Plan,
-        /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-        lower_bound: u64,
-    },
-    /// The budget ran out. The best plan is valid, but does not bring all agents to their goals.
-    TimedOut {
-        /// The plan that came closest, if there is one.
-        best: Option<Plan>,
-        /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-        lower_bound: u64,
-    },
-    /// The planner gave up within the budget; another planner may find a plan. The best plan is valid, but does not
-    /// bring all agents to their goals.
-    GaveUp {
-        /// The plan that came closest, if there is one.
-        best: Option<Plan>,
-        /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-        lower_bound: u64,
-    },
-    /// The planner proved that there is no plan.
-    Impossible {
-        /// The proof, in words.
-        reason: String,
-    },
+    Solved { plan: Plan, lower_bound: u64 },
+    /// The budget ran out.
+    TimedOut { best: Option<Plan>, lower_bound: u64 },
+    /// The planner gave up within the budget; another planner may find a plan.
+    GaveUp { best: Option<Plan>, lower_bound: u64 },
+    /// The planner proved that there is no plan. The reason is the proof, in words.
+    Impossible { reason: String },
 }
 
 impl Outcome {

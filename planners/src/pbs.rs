@@ -18,7 +18,7 @@ use crate::paths::Paths;
 use crate::planner::Planner;
 use crate::problem::Problem;
 use crate::reservations::Reservations;
-use crate::sipp::{Order, Sipp, Task};
+use crate::sipp::Sipp;
 use crate::team_task::{TeamTask, one_leg_each};
 
 /// Parameters of [`Pbs`].
@@ -45,19 +45,16 @@ impl Pbs {
 
 impl Planner for Pbs {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let mut clock = budget.start();
-        let costs = match problem.costs_to_go(&mut clock) {
-            Ok(costs) => costs,
-            Err(outcome) => return outcome,
-        };
-        let legs = one_leg_each(&costs);
-        let team = TeamTask::one_shot(problem, &legs, self.params.seed);
-        let mut sipp = Sipp::new(problem.graph.clone());
-        let lower_bound = problem.lower_bound(&costs);
-        match search(&mut sipp, &problem.graph, &team, &mut clock) {
-            Some(paths) => paths.outcome(problem, lower_bound),
-            None => clock.unsolved(None, lower_bound),
-        }
+        problem.solve(budget, |costs, mut clock| {
+            let legs = one_leg_each(costs);
+            let team = TeamTask::one_shot(problem, &legs, self.params.seed);
+            let mut sipp = Sipp::new(problem.graph.clone());
+            let lower_bound = problem.lower_bound(costs);
+            match search(&mut sipp, &problem.graph, &team, &mut clock) {
+                Some(paths) => paths.outcome(problem, lower_bound),
+                None => clock.unsolved(None, lower_bound),
+            }
+        })
     }
 }
 
@@ -139,17 +136,7 @@ impl Search<'_> {
         for &higher in above {
             self.reserved.add(higher, paths.path(higher), paths.stays);
         }
-        let task = Task {
-            start: self.team.starts[agent],
-            legs: &self.team.legs[agent],
-            reserved: &self.reserved,
-            avoided: None,
-            banned: &[],
-            horizon: self.team.horizon,
-            order: Order::Cost,
-            salt: self.team.salt,
-        };
-        let found = self.sipp.find(&task);
+        let found = self.sipp.find(&self.team.task(agent, &self.reserved));
         for &higher in above {
             self.reserved.remove(higher, paths.path(higher), paths.stays);
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pogema_core::{Cell, Error, Instance, Map};
 
 use crate::bfs::{Bfs, UNREACHABLE};
-use crate::budget::Clock;
+use crate::budget::{Budget, Clock};
 use crate::distances::CostToGo;
 use crate::graph::{Graph, Vertex};
 use crate::outcome::Outcome;
@@ -77,12 +77,18 @@ impl Problem {
         Plan::new(steps.iter().map(cells).collect())
     }
 
+    /// Plans with the costs to go of each agent, unless they prove that there is no plan or the budget runs out.
+    pub(crate) fn solve(&self, budget: &Budget, plan: impl FnOnce(&[CostToGo], Clock) -> Outcome) -> Outcome {
+        let mut clock = budget.start();
+        self.costs_to_go(&mut clock).map_or_else(|outcome| outcome, |costs| plan(&costs, clock))
+    }
+
     /// Computes the costs to go of each agent.
     ///
     /// # Errors
     /// [`Outcome::Impossible`] if two agents share a start or a goal, or if one cannot reach its goal even alone;
     /// [`Outcome::TimedOut`] if the budget runs out.
-    pub(crate) fn costs_to_go(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
+    fn costs_to_go(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
         for (what, vertices) in [("start at", &self.starts), ("want to stay at", &self.goals)] {
             if let Some((first, second, vertex)) = shared_vertex(vertices) {
                 let cell = self.graph.cell(vertex);

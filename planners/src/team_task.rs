@@ -3,7 +3,8 @@
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
 use crate::problem::Problem;
-use crate::sipp::{Horizon, Leg};
+use crate::reservations::Reservations;
+use crate::sipp::{Horizon, Leg, Order, Task};
 
 /// Starts, goals and horizon of all agents.
 pub(crate) struct TeamTask<'a> {
@@ -18,6 +19,20 @@ impl<'a> TeamTask<'a> {
     pub(crate) fn one_shot(problem: &'a Problem, legs: &'a [Vec<Leg>], seed: u64) -> Self {
         let max_steps = problem.max_steps.map_or(u32::MAX, |limit| u32::try_from(limit).unwrap_or(u32::MAX));
         Self { starts: &problem.starts, legs, horizon: Horizon::Stay { max_steps }, salt: seed as u32 }
+    }
+
+    /// The task of one agent, without soft constraints and forbidden moves.
+    pub(crate) fn task<'t>(&'t self, agent: usize, reserved: &'t Reservations) -> Task<'t> {
+        Task {
+            start: self.starts[agent],
+            legs: &self.legs[agent],
+            reserved,
+            avoided: None,
+            banned: &[],
+            horizon: self.horizon,
+            order: Order::Cost,
+            salt: self.salt,
+        }
     }
 
     /// Whether agents stay at the ends of their paths.

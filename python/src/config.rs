@@ -10,7 +10,7 @@ use crate::fields::Fields;
 
 /// Returns what POGEMA derives of a config.
 #[pyfunction]
-pub fn derive_config<'py>(py: Python<'py>, fields: Fields) -> PyResult<Bound<'py, PyDict>> {
+pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDict>> {
     let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
     let derived = PyDict::new(py);
     derived.set_item("width", config.width)?;

@@ -11,7 +11,7 @@ fn of_class(py: Python<'_>, class: &str, error: impl std::fmt::Display) -> PyErr
     made(py, class, (error.to_string(),))
 }
 
-fn made(py: Python<'_>, class: &str, arguments: impl PyErrArguments + Send + Sync + 'static) -> PyErr {
+fn made(py: Python<'_>, class: &str, arguments: impl PyErrArguments + 'static) -> PyErr {
     let class = py
         .import("pogema_rs.errors")
         .and_then(|module| module.getattr(class)?.cast_into::<PyType>().map_err(PyErr::from));

@@ -7,8 +7,8 @@ use serde_json::{Map as Object, Number, Value};
 
 /// The fields of a config, from a dictionary of Python values.
 ///
-/// Errors: TypeError for a key that is no text, or a value that is neither number, text nor sequence; ValueError for a
-/// list that contains itself.
+/// Errors: `TypeError` for a key that is no text, or a value that is neither number, text nor sequence; `ValueError`
+/// for a list that contains itself.
 pub struct Fields(pub Value);
 
 impl<'py> FromPyObject<'_, 'py> for Fields {

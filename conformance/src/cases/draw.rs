@@ -31,8 +31,7 @@ impl Case {
             text.push('\n');
             text.push_str(&beside(abreast));
         }
-        let expectations = std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect));
-        for (op, (record, expect)) in response.records.iter().zip(expectations).enumerate() {
+        for (op, (record, expect)) in response.records.iter().zip(self.expectations()).enumerate() {
             text.push_str(&draw_facts(op, record, expect));
         }
         if let Some(error) = &response.error {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pogema_core::{Cell, Change, Map, Metrics, Observed, Snapshot, picture};
+use pogema_core::{Cell, Change, Map, Metrics, Observed, ObservedMapf, Snapshot, picture};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -146,10 +146,8 @@ impl Expect {
         {
             return Some(mismatch);
         }
-        let pomapf = match observed {
-            Observed::Default { .. } => return None,
-            Observed::Pomapf(pomapf) => pomapf,
-            Observed::Mapf(mapf) => &mapf.pomapf,
+        let (Observed::Pomapf(pomapf) | Observed::Mapf(ObservedMapf { pomapf, .. })) = observed else {
+            return None;
         };
         let own = differ("xy", self.xy.as_ref(), &pomapf.xy)
             .or_else(|| differ("target_xy", self.target_xy.as_ref(), &pomapf.target_xy));
@@ -162,26 +160,18 @@ impl Expect {
 impl Sees {
     fn mismatch(&self, observed: &Observed) -> Option<String> {
         let agent = self.agent;
-        let (obstacles, agents, goal) = match observed {
+        let windows: Vec<Vec<bool>> = match observed {
             Observed::Default { windows, .. } => {
                 let flags = unpack(windows.get(agent)?);
-                let area = area_of(flags.len())?;
-                (
-                    flags[..area].to_vec(),
-                    flags[area..2 * area].to_vec(),
-                    Some(flags[2 * area..3 * area].to_vec()),
-                )
+                flags.chunks(area_of(flags.len())?).map(<[bool]>::to_vec).collect()
             }
-            Observed::Pomapf(pomapf) => {
-                (unpack(&pomapf.obstacles[agent]), unpack(&pomapf.agents[agent]), None)
-            }
-            Observed::Mapf(mapf) => {
-                (unpack(&mapf.pomapf.obstacles[agent]), unpack(&mapf.pomapf.agents[agent]), None)
+            Observed::Pomapf(pomapf) | Observed::Mapf(ObservedMapf { pomapf, .. }) => {
+                [&pomapf.obstacles[agent], &pomapf.agents[agent]].map(|window| unpack(window)).into()
             }
         };
-        differ_in_window("obstacles", self.obstacles.as_deref(), &obstacles)
-            .or_else(|| differ_in_window("agents", self.agents.as_deref(), &agents))
-            .or_else(|| differ_in_window("goal", self.goal.as_deref(), &goal?))
+        let expected = [("obstacles", &self.obstacles), ("agents", &self.agents), ("goal", &self.goal)];
+        let mut pairs = expected.into_iter().zip(&windows);
+        pairs.find_map(|((what, expected), window)| differ_in_window(what, expected.as_deref(), window))
     }
 }
 

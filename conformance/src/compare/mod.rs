@@ -126,6 +126,11 @@ fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) 
     }
 }
 
+/// A part of an answer that can be compared and shown.
+trait Comparable: PartialEq + Serialize {}
+
+impl<T: PartialEq + Serialize> Comparable for T {}
+
 struct Comparison<'a> {
     scope: &'a Scope,
     side: usize,
@@ -291,24 +296,12 @@ impl Comparison<'_> {
     }
 
     /// A part of the state, without which nothing that follows can be right.
-    fn state_list<T: PartialEq + Serialize>(
-        &mut self,
-        rule: &str,
-        name: &'static str,
-        expected: &[T],
-        got: &[T],
-    ) {
+    fn state_list<T: Comparable>(&mut self, rule: &str, name: &'static str, expected: &[T], got: &[T]) {
         self.list(rule, name, expected, got);
         self.is_lost |= expected != got;
     }
 
-    fn list<T: PartialEq + Serialize>(
-        &mut self,
-        rule: &str,
-        name: &'static str,
-        expected: &[T],
-        got: &[T],
-    ) -> bool {
+    fn list<T: Comparable>(&mut self, rule: &str, name: &'static str, expected: &[T], got: &[T]) -> bool {
         let holds = expected == got;
         self.tally.count(rule, holds);
         if expected.len() != got.len() {
@@ -319,7 +312,7 @@ impl Comparison<'_> {
         holds
     }
 
-    fn value<T: PartialEq + Serialize>(&mut self, rule: &str, name: &'static str, expected: &T, got: &T) {
+    fn value<T: Comparable>(&mut self, rule: &str, name: &'static str, expected: &T, got: &T) {
         let holds = expected == got;
         self.tally.count(rule, holds);
         if !holds {

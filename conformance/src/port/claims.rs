@@ -1,6 +1,6 @@
 //! What follows from what a port claims: which requests it can play, and which comparisons count.
 
-use pogema_core::{Observation, OnGoal};
+use pogema_core::{Observation, OnGoal, Words};
 use pogema_maps::{GridConfig, Targets};
 use serde_json::json;
 
@@ -130,23 +130,17 @@ fn refused(hello: &Hello) -> Result<(), Unclaimed> {
 fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
     let rules = config.rules();
     let families = families_of(config);
-    if !hello.collision.contains(&rules.collision) {
-        return Err(Unclaimed::new(format!("collision {}", word(&rules.collision)), families.collide));
-    }
-    if !hello.on_goal.contains(&rules.on_goal) {
-        return Err(Unclaimed::new(format!("on_goal {}", word(&rules.on_goal)), families.goal));
-    }
-    if !hello.occupancy.contains(&rules.occupancy) {
-        return Err(Unclaimed::new(format!("occupancy {}", word(&rules.occupancy)), families.occupancy));
-    }
-    if !hello.reward.contains(&rules.reward) {
-        return Err(Unclaimed::new(format!("reward {}", word(&rules.reward)), "reward/shared"));
-    }
-    Ok(())
+    check_claimed("collision", &hello.collision, rules.collision, families.collide)?;
+    check_claimed("on_goal", &hello.on_goal, rules.on_goal, families.goal)?;
+    check_claimed("occupancy", &hello.occupancy, rules.occupancy, families.occupancy)?;
+    check_claimed("reward", &hello.reward, rules.reward, "reward/shared")
 }
 
-fn word(value: &impl serde::Serialize) -> String {
-    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+fn check_claimed<T: Words>(key: &str, claimed: &[T], value: T, rule: &'static str) -> Result<(), Unclaimed> {
+    if claimed.contains(&value) {
+        return Ok(());
+    }
+    Err(Unclaimed::new(format!("{key} {}", value.word()), rule))
 }
 
 fn check_sizes(hello: &Hello, config: &GridConfig, expected: &Response) -> Result<(), Unclaimed> {
@@ -178,9 +172,10 @@ fn leave_out(
     let mut left_out = Vec::new();
     if !claims(Profile::Observations) {
         left_out.push(Unclaimed::new("profile observations", families_of(config).observe));
-    } else if !hello.observation.contains(&config.observation_type) {
-        let what = format!("observation {}", word(&config.observation_type));
-        left_out.push(Unclaimed::new(what, families_of(config).observe));
+    } else if let Err(unclaimed) =
+        check_claimed("observation", &hello.observation, config.observation_type, families_of(config).observe)
+    {
+        left_out.push(unclaimed);
         let other = hello.observation.first().copied().unwrap_or(Observation::Default);
         request.config["observation_type"] = json!(other);
     }
@@ -265,7 +260,7 @@ fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Uncl
 pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     let profile = profile_of(rule);
     if !hello.profiles.contains(&profile) {
-        return Some(Unclaimed::new(format!("profile {}", word(&profile)), "config"));
+        return Some(Unclaimed::new(format!("profile {profile}"), "config"));
     }
     let needed = [
         (Told::ActionsAfter, "collide/soft/rewrite"),
@@ -275,5 +270,5 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     let lacking = needed
         .into_iter()
         .find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
-    lacking.map(|(key, of)| Unclaimed::new(format!("tells {}", word(&key)), of))
+    lacking.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
 }

@@ -37,17 +37,11 @@ pub fn judge(
     request: &Request,
     expected: &Response,
 ) -> Judged {
-    let mut judged = Judged::default();
-    let adapted = match adapt(hello, mode, request, expected) {
-        Ok((adapted, left_out)) => {
-            judged.not_claimed = left_out;
-            adapted
-        }
-        Err(unclaimed) => {
-            judged.not_claimed.push(unclaimed);
-            return judged;
-        }
+    let (adapted, not_claimed) = match adapt(hello, mode, request, expected) {
+        Ok(adapted) => adapted,
+        Err(unclaimed) => return Judged { not_claimed: vec![unclaimed], ..Judged::default() },
     };
+    let mut judged = Judged { not_claimed, ..Judged::default() };
     if mode == Mode::Instance && expected.records.is_empty() {
         return judged;
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use pogema_core::{Action, Error, Map, Observed, picture};
+use pogema_core::{Action, Error, Map, Observed, ObservedMapf, picture};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -108,11 +108,7 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
 fn step_of(op: &Op, expected: BTreeMap<&'static str, Value>) -> StepOfFile {
     let (actions, op) = match op {
         Op::Step(actions) => (Some(actions.iter().copied().map(word).collect()), None),
-        Op::Reset(_) => (None, Some("reset")),
-        Op::Astar => (None, Some("astar")),
-        Op::Sample => (None, Some("sample")),
-        Op::Back => (None, Some("back")),
-        Op::History => (None, Some("history")),
+        other => (None, Some(other.word())),
     };
     StepOfFile { actions, op, expected }
 }
@@ -183,15 +179,12 @@ fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observe
                 json!({ "agent": agent, "obstacles": obstacles, "agents": agents, "goal": goal }),
             );
         }
-        Some(Observed::Pomapf(pomapf)) => add_pairs(facts, &pomapf.xy, &pomapf.target_xy),
-        Some(Observed::Mapf(mapf)) => add_pairs(facts, &mapf.pomapf.xy, &mapf.pomapf.target_xy),
+        Some(Observed::Pomapf(pomapf) | Observed::Mapf(ObservedMapf { pomapf, .. })) => {
+            facts.insert("xy", json!(pomapf.xy));
+            facts.insert("target_xy", json!(pomapf.target_xy));
+        }
         _ => {}
     }
-}
-
-fn add_pairs(facts: &mut BTreeMap<&'static str, Value>, xy: &[[i32; 2]], target_xy: &[[i32; 2]]) {
-    facts.insert("xy", json!(xy));
-    facts.insert("target_xy", json!(target_xy));
 }
 
 fn lines(bits: &[bool]) -> String {

@@ -1,7 +1,5 @@
 //! What a port says its agents see, in the form that records keep.
 
-use std::fmt::Write as _;
-
 use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -71,15 +69,16 @@ pub fn resolve_hashes(expected: &Observed, told: &mut Observed, side: usize) {
         (Observed::Default { windows: one, .. }, Observed::Default { windows: other, .. }) => {
             resolve(one, other, 3 * area);
         }
-        (Observed::Pomapf(one), Observed::Pomapf(other)) => resolve_both(one, other, area),
-        (Observed::Mapf(one), Observed::Mapf(other)) => resolve_both(&one.pomapf, &mut other.pomapf, area),
+        (Observed::Pomapf(one), Observed::Pomapf(other))
+        | (
+            Observed::Mapf(ObservedMapf { pomapf: one, .. }),
+            Observed::Mapf(ObservedMapf { pomapf: other, .. }),
+        ) => {
+            resolve(&one.obstacles, &mut other.obstacles, area);
+            resolve(&one.agents, &mut other.agents, area);
+        }
         _ => {}
     }
-}
-
-fn resolve_both(expected: &ObservedPomapf, told: &mut ObservedPomapf, area: usize) {
-    resolve(&expected.obstacles, &mut told.obstacles, area);
-    resolve(&expected.agents, &mut told.agents, area);
 }
 
 fn resolve(expected: &[String], told: &mut [String], num_values: usize) {
@@ -96,12 +95,9 @@ fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
     let bytes: Vec<u8> = values.map(u8::from).collect();
     match algorithm {
         "sha256" => {
-            let mut text = String::from("sha256:");
-            for byte in Sha256::digest(&bytes) {
-                // INVARIANT: writing to a text cannot fail.
-                let _ = write!(text, "{byte:02x}");
-            }
-            Some(text)
+            let digits = Sha256::digest(&bytes).into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
+            let digits = digits.filter_map(|digit| char::from_digit(digit.into(), 16));
+            Some(format!("sha256:{}", digits.collect::<String>()))
         }
         "fnv1a64" => Some(format!("fnv1a64:{:016x}", fnv1a64(&bytes))),
         _ => None,

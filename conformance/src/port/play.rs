@@ -1,6 +1,6 @@
 //! A port's answer to a whole request, in the form of every other answer.
 
-use pogema_core::{Error, Map, Metrics, Padded, TraceStep};
+use pogema_core::{Error, Metrics, Padded, TraceStep};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
 
@@ -32,50 +32,34 @@ pub fn play_on_port(
     request: &Request,
     expected: &Response,
 ) -> Answered {
-    let mut answered =
-        Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
-    let mut play = match PortPlay::new(link, hello, mode, request, expected) {
-        Ok(play) => play,
-        Err(Unplayable::Config(link)) => return refuse_config(link, request),
-        Err(Unplayable::Instance(error)) => {
-            answered.response.error = Some(failure(When::Phase("instance".into()), &error));
-            return answered;
+    let mut answered = Answered { response: Response::to(request), fault: None };
+    match PortPlay::new(link, hello, mode, request, expected) {
+        Ok(mut play) => {
+            answered.response.record(request, |index, op| play.perform(index, op));
+            answered.fault = play.port.fault().cloned();
         }
-    };
-    for (index, op) in request.ops.iter().enumerate() {
-        match play.perform(index, op) {
-            Ok(record) => answered.response.records.push(record),
-            Err(error) => {
-                answered.response.error = Some(failure(When::Op(index), &error));
-                break;
-            }
+        Err(Unplayable::Config(link)) => refuse_config(link, request, &mut answered),
+        Err(Unplayable::Instance(error)) => {
+            answered.response.error = Some(Failure::new(When::Phase("instance".into()), &error));
         }
     }
-    answered.fault = play.port.fault().cloned();
     answered
 }
 
 /// A config that must be refused: there is nothing to play, and no form that an answer would have to keep.
-fn refuse_config(link: &mut dyn Link, request: &Request) -> Answered {
+fn refuse_config(link: &mut dyn Link, request: &Request, answered: &mut Answered) {
     let beginning = Beginning {
         config: Some(request.config.clone()),
         register: request.register.clone(),
         ..Beginning::default()
     };
-    let mut answered =
-        Answered { response: Response { id: Some(request.id), ..Response::default() }, fault: None };
     match link.ask(&Ask::Reset(Box::new(beginning))) {
         Ok(reply) => {
-            let failed = |reason| failure(When::Phase("config".into()), &Error::Port { reason });
+            let failed = |reason| Failure::new(When::Phase("config".into()), &Error::Port { reason });
             answered.response.error = reply.error.map(failed);
         }
         Err(fault) => answered.fault = Some(fault),
     }
-    answered
-}
-
-fn failure(when: When, error: &Error) -> Failure {
-    Failure { when, kind: "Error".into(), message: error.to_string() }
 }
 
 enum Unplayable<'l> {
@@ -109,10 +93,7 @@ impl<'l> PortPlay<'l> {
         let Ok(config) = GridConfig::from_value(&request.config) else {
             return Err(Unplayable::Config(link));
         };
-        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
-        let registered =
-            named.map(|map| Map::from_rows(&map.rows)).transpose().map_err(Unplayable::Instance)?;
-        let source = InstanceSource::new(config.clone(), registered).map_err(Unplayable::Instance)?;
+        let source = request.source(&config).map_err(Unplayable::Instance)?;
         let mut port = Port::new(link, hello, config.rules());
         port.set_padded_dtype(padded_dtype(&config));
         let plays_policies = mode == Mode::Config && hello.profiles.contains(&Profile::Policies);

@@ -16,24 +16,16 @@ pub const PROTOCOL: &str = "pogema-conform/1";
 /// One question to a port.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
+#[expect(missing_docs, reason = "the questions describe their fields")]
 pub enum Ask {
-    /// Who are you, and what do you claim? Always the first.
-    Hello {
-        /// The protocol that the runner speaks.
-        protocol: String,
-    },
+    /// Who are you, and what do you claim? Always the first. Names the protocol that the runner speaks.
+    Hello { protocol: String },
     /// Begin an episode.
     Reset(Box<Beginning>),
-    /// Play one step.
-    Step {
-        /// One number for each agent.
-        actions: Vec<i64>,
-    },
-    /// Play one step with actions of your own choice.
-    Act {
-        /// Who chooses.
-        policy: Policy,
-    },
+    /// Play one step, with one number for each agent.
+    Step { actions: Vec<i64> },
+    /// Play one step with the actions that a policy of your own chooses.
+    Act { policy: Policy },
     /// What do the agents see? Asked where an answer left it out.
     Observe,
     /// What are the figures of the episode? Asked where an answer left them out.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pogema_core::Error;
 
-use super::claims::{Mode, Unclaimed, needed_by, profile_of};
+use super::claims::{Mode, needed_by, profile_of};
 use super::items::{Item, items};
 use super::judge::{Judged, judge};
 use super::keep::keep;
@@ -136,7 +136,7 @@ fn show(
         if !is_played_in(mode, &running.hello, plan, item) {
             continue;
         }
-        let mut judged = match unclaimed_rule(&running.hello, item) {
+        let mut judged = match item.case_rule().and_then(|rule| needed_by(&running.hello, rule)) {
             Some(unclaimed) => Judged { not_claimed: vec![unclaimed], ..Judged::default() },
             None => judge(running.link.as_mut(), &running.hello, mode, &request, &expected),
         };
@@ -175,20 +175,11 @@ fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
     let seeds = hello.profiles.contains(&Profile::Seeding);
     let only_seeding =
         plan.profiles.iter().all(|profile| *profile == Profile::Seeding) && !plan.profiles.is_empty();
-    let is_about_seeding = item.case_rule().is_some_and(from_config_only);
+    let is_about_seeding =
+        item.case_rule().is_some_and(|rule| profile_of(rule) == Profile::Seeding || rule == "seed/actions");
     match mode {
         Mode::Instance => !is_about_seeding && !only_seeding,
         // What is not claimed is noted once.
         Mode::Config => seeds || is_about_seeding,
     }
-}
-
-fn from_config_only(rule: &str) -> bool {
-    profile_of(rule) == Profile::Seeding || rule == "seed/actions"
-}
-
-/// Why a hand-written case is not asked of a port at all.
-fn unclaimed_rule(hello: &Hello, item: &Item) -> Option<Unclaimed> {
-    let rule = item.case_rule()?;
-    needed_by(hello, rule)
 }

@@ -1,7 +1,7 @@
 //! One episode with everything given, to be made smaller piece by piece.
 
-use pogema_core::{Cell, Map, OnGoal};
-use pogema_maps::{GridConfig, InstanceSource};
+use pogema_core::{Cell, OnGoal};
+use pogema_maps::GridConfig;
 use serde_json::{Map as Object, Value, json};
 
 use crate::draw::text;
@@ -36,9 +36,7 @@ impl Scene {
         let config = GridConfig::from_value(&request.config).ok()?;
         let until = until.min(request.ops.len().checked_sub(1)?);
         let begin = (0..=until).rev().find(|&at| matches!(request.ops[at], Op::Reset(_)))?;
-        let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
-        let registered = named.and_then(|map| Map::from_rows(&map.rows).ok());
-        let mut source = InstanceSource::new(config.clone(), registered).ok()?;
+        let mut source = request.source(&config).ok()?;
         let num_resets = request.ops[..=begin].iter().filter(|op| matches!(op, Op::Reset(_))).count();
         let mut instance = source.generate().ok()?.instance;
         for _ in 1..num_resets {
@@ -136,10 +134,8 @@ impl Scene {
     pub fn without_row(&self, row: usize) -> Self {
         let mut smaller = self.clone();
         smaller.rows.remove(row);
-        let last = smaller.rows.len().saturating_sub(1) as u16;
-        smaller.move_cells(|cell| {
-            Cell::new((cell.row - u16::from(usize::from(cell.row) > row)).min(last), cell.col)
-        });
+        let num_left = smaller.rows.len();
+        smaller.move_cells(|cell| Cell::new(without_line(cell.row, row, num_left), cell.col));
         smaller
     }
 
@@ -149,16 +145,19 @@ impl Scene {
         for row in &mut smaller.rows {
             row.remove(col);
         }
-        let last = smaller.rows.first().map_or(0, |row| row.len().saturating_sub(1)) as u16;
-        smaller.move_cells(|cell| {
-            Cell::new(cell.row, (cell.col - u16::from(usize::from(cell.col) > col)).min(last))
-        });
+        let num_left = smaller.rows.first().map_or(0, Vec::len);
+        smaller.move_cells(|cell| Cell::new(cell.row, without_line(cell.col, col, num_left)));
         smaller
     }
 
     fn move_cells(&mut self, to: impl Fn(Cell) -> Cell) {
         self.starts.iter_mut().chain(self.goals.iter_mut().flatten()).for_each(|cell| *cell = to(*cell));
     }
+}
+
+/// The index of a row or column after one of them is removed.
+fn without_line(index: u16, removed: usize, num_left: usize) -> u16 {
+    (index - u16::from(usize::from(index) > removed)).min(num_left.saturating_sub(1) as u16)
 }
 
 /// An operation without a policy.
@@ -172,24 +171,21 @@ fn plain(op: &Op, at: usize, expected: &Response) -> Op {
 
 /// The fields that say nothing of map and agents, where they differ from what they are by default.
 fn fields(config: &GridConfig) -> Object<String, Value> {
-    let default = GridConfig::default();
-    let mut fields = Object::new();
-    let mut put = |name: &str, value: Value, default: Value| {
-        if value != default {
-            fields.insert(name.into(), value);
-        }
-    };
-    put("on_target", json!(config.on_target), json!(default.on_target));
-    put("collision_system", json!(config.collision_system), json!(default.collision_system));
-    put("observation_type", json!(config.observation_type), json!(default.observation_type));
-    put("obs_radius", json!(config.obs_radius), json!(default.obs_radius));
-    put("max_episode_steps", json!(config.max_episode_steps), json!(default.max_episode_steps));
-    put("persistent", json!(config.persistent), json!(default.persistent));
-    put("empty_outside", json!(config.empty_outside), json!(default.empty_outside));
-    put("occupancy", json!(config.occupancy), json!(default.occupancy));
-    put("reward", json!(config.reward), json!(default.reward));
-    if !config.empty_outside {
-        put("seed", json!(config.seed), Value::Null);
-    }
-    fields
+    const FIELDS: [&str; 10] = [
+        "on_target",
+        "collision_system",
+        "observation_type",
+        "obs_radius",
+        "max_episode_steps",
+        "persistent",
+        "empty_outside",
+        "occupancy",
+        "reward",
+        "seed",
+    ];
+    let (values, default) = (config.to_value(), GridConfig::default().to_value());
+    // Without noise, the seed has nothing to draw.
+    let counts = |name: &&str| *name != "seed" || !config.empty_outside;
+    let differing = FIELDS.into_iter().filter(counts).filter(|name| values[name] != default[name]);
+    differing.map(|name| (name.to_owned(), values[name].clone())).collect()
 }

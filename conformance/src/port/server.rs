@@ -2,11 +2,11 @@
 
 use std::io::{BufRead, Write};
 
-use pogema_core::{Collision, Config, Environment, Error, Instance, Observation, Occupancy, OnGoal, Reward};
+use pogema_core::{Config, Environment, Error, Instance, Words};
 
 use super::link::{Link, Misbehaviour};
 use super::observations;
-use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
+use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, ToldCell};
 use crate::play::{Engine, Make, Measured, Player};
 use crate::request::{Op, Record, Request, numbers};
 
@@ -24,7 +24,10 @@ impl Server {
     }
 
     /// A port that plays on whatever environments are made for it.
-    pub fn with(name: &str, make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'static) -> Self {
+    pub fn with(
+        name: &str,
+        make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'static,
+    ) -> Self {
         Self { name: name.into(), make: Box::new(make), player: None }
     }
 
@@ -83,29 +86,15 @@ impl Link for Server {
             protocol: PROTOCOL.into(),
             name: self.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
-            profiles: vec![
-                Profile::Core,
-                Profile::Observations,
-                Profile::Metrics,
-                Profile::Seeding,
-                Profile::History,
-                Profile::Policies,
-            ],
-            collision: vec![Collision::Priority, Collision::BlockBoth, Collision::Soft],
-            on_goal: vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart],
-            observation: vec![Observation::Default, Observation::Pomapf, Observation::Mapf],
-            occupancy: vec![Occupancy::AsReleased, Occupancy::Exact],
-            reward: vec![Reward::Own, Reward::Shared],
+            profiles: all(),
+            collision: all(),
+            on_goal: all(),
+            observation: all(),
+            occupancy: all(),
+            reward: all(),
             noise: true,
             metrics: figures.split(' ').map(str::to_owned).collect(),
-            tells: vec![
-                Told::OnGoal,
-                Told::Occupied,
-                Told::Padded,
-                Told::Derived,
-                Told::Foretold,
-                Told::ActionsAfter,
-            ],
+            tells: all(),
             max_agents: usize::MAX,
             max_side: usize::MAX,
             max_radius: usize::MAX,
@@ -116,6 +105,10 @@ impl Link for Server {
         let refused = |error: Error| Reply { error: Some(error.to_string()), ..Reply::default() };
         Ok(self.answer(ask).unwrap_or_else(refused))
     }
+}
+
+fn all<T: Words>() -> Vec<T> {
+    T::all().collect()
 }
 
 /// Serves an engine over a pair of pipes until the other side says goodbye; this is all that a port in Rust needs.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use pogema_core::{Error, Trace, TraceStep};
+use pogema_core::{Error, Trace};
 
 use super::claims::{Mode, Scope};
 use super::judge::Judged;
@@ -55,7 +55,9 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     for step in &trace.steps {
         let op = Op::Step(numbers(&step.actions));
         expected.records.push(player.perform(&op)?);
-        got.records.push(Record::Step(Box::new(record_of(step))));
+        let (infos_active, actions_after) = (step.state.active.clone(), Vec::new());
+        let step = step.clone();
+        got.records.push(Record::Step(Box::new(StepRecord { step, actions_after, infos_active })));
         request.ops.push(op);
     }
     let mut judged = Judged { is_played: true, ..Judged::default() };
@@ -63,10 +65,6 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     judged.divergences = compare_in(&scope, &request, &expected, &got, &mut judged.tally);
     judged.request = request;
     Ok(judged)
-}
-
-fn record_of(step: &TraceStep) -> StepRecord {
-    StepRecord { infos_active: step.state.active.clone(), actions_after: Vec::new(), step: step.clone() }
 }
 
 /// The figures that a trace gives anywhere.

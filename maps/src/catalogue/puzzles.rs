@@ -2,188 +2,72 @@
 
 use super::Puzzle;
 
+/// A table of puzzles: the name without `puzzle-`, the least sum of costs, what has to be done, and the rows of the map
+/// with the starts and with the goals.
+macro_rules! puzzles {
+    ($($name:literal, $sum_of_costs:literal, $says:literal: [$($starts:literal)+] => [$($goals:literal)+];)+) => {
+        [$(Puzzle {
+            name: concat!("puzzle-", $name),
+            says: $says,
+            starts: [$($starts),+],
+            goals: [$($goals),+],
+            sum_of_costs: $sum_of_costs,
+        }),+]
+    };
+}
+
 /// Each is solvable, and none without agents that make way for each other.
-pub const PUZZLES: [Puzzle; 26] = [
-    Puzzle {
-        name: "puzzle-passing-bay",
-        says: "One of two agents in a corridor steps into the bay and lets the other pass.",
-        starts: ["#####", "##.##", "a...b", "#####", "#####"],
-        goals: ["#####", "##.##", "b...a", "#####", "#####"],
-        sum_of_costs: 11,
-    },
-    Puzzle {
-        name: "puzzle-far-bay",
-        says: "The bay is far away, so both agents go there to change places and come back.",
-        starts: ["#####", "###.#", "ab...", "#####", "#####"],
-        goals: ["#####", "###.#", "ba...", "#####", "#####"],
-        sum_of_costs: 14,
-    },
-    Puzzle {
-        name: "puzzle-swap-in-dead-end",
-        says: "Two agents in a dead end change places at its mouth.",
-        starts: ["##a##", "##b##", ".....", "#####", "#####"],
-        goals: ["##b##", "##a##", ".....", "#####", "#####"],
-        sum_of_costs: 10,
-    },
-    Puzzle {
-        name: "puzzle-two-bays",
-        says: "Three agents in a corridor change places at two bays.",
-        starts: ["#####", "#.#.#", "ab.c.", "#####", "#####"],
-        goals: ["#####", "#.#.#", "cb.a.", "#####", "#####"],
-        sum_of_costs: 19,
-    },
-    Puzzle {
-        name: "puzzle-three-reversed",
-        says: "Three agents leave a corridor and come back in reverse.",
-        starts: ["a####", "b#.##", "c....", "##.##", "#####"],
-        goals: ["c####", "b#.##", "a....", "##.##", "#####"],
-        sum_of_costs: 27,
-    },
-    Puzzle {
-        name: "puzzle-crossroads",
-        says: "Four agents cross one square, each to the opposite arm.",
-        starts: ["##a##", "##.##", "b...d", "##.##", "##c##"],
-        goals: ["##c##", "##.##", "d...b", "##.##", "##a##"],
-        sum_of_costs: 28,
-    },
-    Puzzle {
-        name: "puzzle-full-ring",
-        says: "Eight agents fill a ring: it turns only if all of them step at once.",
-        starts: ["#####", "#abc#", "#h#d#", "#gfe#", "#####"],
-        goals: ["#####", "#hab#", "#g#c#", "#fed#", "#####"],
-        sum_of_costs: 8,
-    },
-    Puzzle {
-        name: "puzzle-square-turn",
-        says: "Four agents in a square turn it without a free cell.",
-        starts: ["#####", "#ab##", "#dc##", "#####", "#####"],
-        goals: ["#####", "#da##", "#cb##", "#####", "#####"],
-        sum_of_costs: 4,
-    },
-    Puzzle {
-        name: "puzzle-side-street",
-        says: "A side street two cells deep holds two agents while the third passes.",
-        starts: ["##.##", "##.##", "ab..c", "#####", "#####"],
-        goals: ["##.##", "##.##", "cb..a", "#####", "#####"],
-        sum_of_costs: 17,
-    },
-    Puzzle {
-        name: "puzzle-hostage",
-        says: "An agent that is home already leaves its goal for another and comes back.",
-        starts: ["#####", "##.##", "a.b..", "#####", "#####"],
-        goals: ["#####", "##.##", "..b.a", "#####", "#####"],
-        sum_of_costs: 7,
-    },
-    Puzzle {
-        name: "puzzle-deep-hostage",
-        says: "An agent that is home in a dead end lets the other in behind it.",
-        starts: ["#####", "##.##", "a.b..", "##.##", "#####"],
-        goals: ["#####", "##.##", "..b.a", "##.##", "#####"],
-        sum_of_costs: 7,
-    },
-    Puzzle {
-        name: "puzzle-revolving-door",
-        says: "Two agents enter a room through one door while two come out.",
-        starts: ["ab...", ".....", "##.##", ".....", "cd..."],
-        goals: ["cd...", ".....", "##.##", ".....", "ab..."],
-        sum_of_costs: 36,
-    },
-    Puzzle {
-        name: "puzzle-elevator",
-        says: "One agent waits on the landing while the shaft is used.",
-        starts: ["a####", ".#.##", ".....", "####.", "####b"],
-        goals: ["b####", ".#.##", ".....", "####.", "####a"],
-        sum_of_costs: 19,
-    },
-    Puzzle {
-        name: "puzzle-comb",
-        says: "Three agents in the teeth of a comb move on by one tooth.",
-        starts: ["a#b#c", ".#.#.", ".....", "#####", "#####"],
-        goals: ["c#a#b", ".#.#.", ".....", "#####", "#####"],
-        sum_of_costs: 27,
-    },
-    Puzzle {
-        name: "puzzle-comb-reversed",
-        says: "Three agents in the teeth of a comb; the outer two change places past the middle.",
-        starts: ["a#b#c", ".....", "#####", "#####", "#####"],
-        goals: ["c#b#a", ".....", "#####", "#####", "#####"],
-        sum_of_costs: 30,
-    },
-    Puzzle {
-        name: "puzzle-shunting",
-        says: "Two agents in a siding are put into the other order.",
-        starts: [".....", "##.##", "##a##", "##b##", "#####"],
-        goals: [".....", "##.##", "##b##", "##a##", "#####"],
-        sum_of_costs: 14,
-    },
-    Puzzle {
-        name: "puzzle-three-shunted",
-        says: "Three agents in a siding are put into another order.",
-        starts: [".....", "##a##", "##b##", "##c##", "#####"],
-        goals: [".....", "##c##", "##a##", "##b##", "#####"],
-        sum_of_costs: 21,
-    },
-    Puzzle {
-        name: "puzzle-figure-eight",
-        says: "Two rings with one cell in common, and an agent on each that wants to the other.",
-        starts: ["a..##", ".#.##", ".....", "##.#.", "##..b"],
-        goals: ["b..##", ".#.##", ".....", "##.#.", "##..a"],
-        sum_of_costs: 17,
-    },
-    Puzzle {
-        name: "puzzle-tight-eight",
-        says: "Two rings with one cell in common, three agents on each.",
-        starts: ["ab.##", "c#.##", ".....", "##.#d", "##.ef"],
-        goals: ["fe.##", "d#.##", ".....", "##.#c", "##.ba"],
-        sum_of_costs: 55,
-    },
-    Puzzle {
-        name: "puzzle-lobby",
-        says: "Three agents behind each other leave a lobby that one enters.",
-        starts: ["#####", ".abc.", "##.##", "##d##", "#####"],
-        goals: ["#####", "d.abc", "##.##", "##.##", "#####"],
-        sum_of_costs: 24,
-    },
-    Puzzle {
-        name: "puzzle-bottleneck",
-        says: "Two agents that want the same way, and one that comes through it.",
-        starts: ["a###b", "..#..", "#...#", "..#..", "c###."],
-        goals: ["c###.", "..#..", "#...#", "..#..", "b###a"],
-        sum_of_costs: 26,
-    },
-    Puzzle {
-        name: "puzzle-double-shunt",
-        says: "Two sidings, two agents in each, one of each pair changes sidings.",
-        starts: ["a#..c", "b#.#d", ".....", "#####", "#####"],
-        goals: ["b#..d", "a#.#c", ".....", "#####", "#####"],
-        sum_of_costs: 28,
-    },
-    Puzzle {
-        name: "puzzle-guarded-gate",
-        says: "Two agents at home in a gate open it for a third.",
-        starts: ["##.##", "a.b..", "##c##", "##.##", "#####"],
-        goals: ["##.##", "..b.a", "##c##", "##.##", "#####"],
-        sum_of_costs: 7,
-    },
-    Puzzle {
-        name: "puzzle-parade",
-        says: "Three agents in a row turn around in one square.",
-        starts: ["#####", ".###.", "abc..", ".###.", "#####"],
-        goals: ["#####", ".###.", "cba..", ".###.", "#####"],
-        sum_of_costs: 36,
-    },
-    Puzzle {
-        name: "puzzle-long-way-round",
-        says: "The short way is taken, so one of two goes around.",
-        starts: ["a...b", ".###.", ".###.", ".###.", "....."],
-        goals: ["b...a", ".###.", ".###.", ".###.", "....."],
-        sum_of_costs: 16,
-    },
-    Puzzle {
-        name: "puzzle-last-cell",
-        says: "Five agents and one free cell: three of them change places.",
-        starts: ["#####", "#####", "#abc#", "#d.e#", "#####"],
-        goals: ["#####", "#####", "#cab#", "#d.e#", "#####"],
-        sum_of_costs: 17,
-    },
-];
+pub const PUZZLES: [Puzzle; 26] = puzzles! {
+    "passing-bay", 11, "One of two agents in a corridor steps into the bay and lets the other pass.":
+        ["#####" "##.##" "a...b" "#####" "#####"] => ["#####" "##.##" "b...a" "#####" "#####"];
+    "far-bay", 14, "The bay is far away, so both agents go there to change places and come back.":
+        ["#####" "###.#" "ab..." "#####" "#####"] => ["#####" "###.#" "ba..." "#####" "#####"];
+    "swap-in-dead-end", 10, "Two agents in a dead end change places at its mouth.":
+        ["##a##" "##b##" "....." "#####" "#####"] => ["##b##" "##a##" "....." "#####" "#####"];
+    "two-bays", 19, "Three agents in a corridor change places at two bays.":
+        ["#####" "#.#.#" "ab.c." "#####" "#####"] => ["#####" "#.#.#" "cb.a." "#####" "#####"];
+    "three-reversed", 27, "Three agents leave a corridor and come back in reverse.":
+        ["a####" "b#.##" "c...." "##.##" "#####"] => ["c####" "b#.##" "a...." "##.##" "#####"];
+    "crossroads", 28, "Four agents cross one square, each to the opposite arm.":
+        ["##a##" "##.##" "b...d" "##.##" "##c##"] => ["##c##" "##.##" "d...b" "##.##" "##a##"];
+    "full-ring", 8, "Eight agents fill a ring: it turns only if all of them step at once.":
+        ["#####" "#abc#" "#h#d#" "#gfe#" "#####"] => ["#####" "#hab#" "#g#c#" "#fed#" "#####"];
+    "square-turn", 4, "Four agents in a square turn it without a free cell.":
+        ["#####" "#ab##" "#dc##" "#####" "#####"] => ["#####" "#da##" "#cb##" "#####" "#####"];
+    "side-street", 17, "A side street two cells deep holds two agents while the third passes.":
+        ["##.##" "##.##" "ab..c" "#####" "#####"] => ["##.##" "##.##" "cb..a" "#####" "#####"];
+    "hostage", 7, "An agent that is home already leaves its goal for another and comes back.":
+        ["#####" "##.##" "a.b.." "#####" "#####"] => ["#####" "##.##" "..b.a" "#####" "#####"];
+    "deep-hostage", 7, "An agent that is home in a dead end lets the other in behind it.":
+        ["#####" "##.##" "a.b.." "##.##" "#####"] => ["#####" "##.##" "..b.a" "##.##" "#####"];
+    "revolving-door", 36, "Two agents enter a room through one door while two come out.":
+        ["ab..." "....." "##.##" "....." "cd..."] => ["cd..." "....." "##.##" "....." "ab..."];
+    "elevator", 19, "One agent waits on the landing while the shaft is used.":
+        ["a####" ".#.##" "....." "####." "####b"] => ["b####" ".#.##" "....." "####." "####a"];
+    "comb", 27, "Three agents in the teeth of a comb move on by one tooth.":
+        ["a#b#c" ".#.#." "....." "#####" "#####"] => ["c#a#b" ".#.#." "....." "#####" "#####"];
+    "comb-reversed", 30, "Three agents in the teeth of a comb; the outer two change places past the middle.":
+        ["a#b#c" "....." "#####" "#####" "#####"] => ["c#b#a" "....." "#####" "#####" "#####"];
+    "shunting", 14, "Two agents in a siding are put into the other order.":
+        ["....." "##.##" "##a##" "##b##" "#####"] => ["....." "##.##" "##b##" "##a##" "#####"];
+    "three-shunted", 21, "Three agents in a siding are put into another order.":
+        ["....." "##a##" "##b##" "##c##" "#####"] => ["....." "##c##" "##a##" "##b##" "#####"];
+    "figure-eight", 17, "Two rings with one cell in common, and an agent on each that wants to the other.":
+        ["a..##" ".#.##" "....." "##.#." "##..b"] => ["b..##" ".#.##" "....." "##.#." "##..a"];
+    "tight-eight", 55, "Two rings with one cell in common, three agents on each.":
+        ["ab.##" "c#.##" "....." "##.#d" "##.ef"] => ["fe.##" "d#.##" "....." "##.#c" "##.ba"];
+    "lobby", 24, "Three agents behind each other leave a lobby that one enters.":
+        ["#####" ".abc." "##.##" "##d##" "#####"] => ["#####" "d.abc" "##.##" "##.##" "#####"];
+    "bottleneck", 26, "Two agents that want the same way, and one that comes through it.":
+        ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];
+    "double-shunt", 28, "Two sidings, two agents in each, one of each pair changes sidings.":
+        ["a#..c" "b#.#d" "....." "#####" "#####"] => ["b#..d" "a#.#c" "....." "#####" "#####"];
+    "guarded-gate", 7, "Two agents at home in a gate open it for a third.":
+        ["##.##" "a.b.." "##c##" "##.##" "#####"] => ["##.##" "..b.a" "##c##" "##.##" "#####"];
+    "parade", 36, "Three agents in a row turn around in one square.":
+        ["#####" ".###." "abc.." ".###." "#####"] => ["#####" ".###." "cba.." ".###." "#####"];
+    "long-way-round", 16, "The short way is taken, so one of two goes around.":
+        ["a...b" ".###." ".###." ".###." "....."] => ["b...a" ".###." ".###." ".###." "....."];
+    "last-cell", 17, "Five agents and one free cell: three of them change places.":
+        ["#####" "#####" "#abc#" "#d.e#" "#####"] => ["#####" "#####" "#cab#" "#d.e#" "#####"];
+};

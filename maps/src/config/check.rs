@@ -7,12 +7,8 @@ use super::{GridConfig, Integration, Targets};
 impl GridConfig {
     /// Rule: config/positions, config/fields
     pub(crate) fn check_places(&self) -> Result<(), Error> {
-        self.check_inside("agents_xy", self.agents_xy.iter().flatten())?;
-        match &self.targets_xy {
-            Some(Targets::Single(goals)) => self.check_inside("targets_xy", goals)?,
-            Some(Targets::Sequences(all)) => self.check_inside("targets_xy", all.iter().flatten())?,
-            None => {}
-        }
+        self.check_inside("agents_xy", self.agents_xy.as_deref().unwrap_or_default())?;
+        self.check_inside("targets_xy", &self.targets_xy.as_ref().map(Targets::all).unwrap_or_default())?;
         if self.on_target == OnGoal::Restart && matches!(self.targets_xy, Some(Targets::Single(_))) {
             let expected = "goal sequences such as [[[0, 0], [1, 1]]] with on_target `restart`";
             return Err(Error::config("targets_xy", "one goal per agent", expected));
@@ -31,10 +27,10 @@ impl GridConfig {
         Ok(())
     }
 
-    fn check_inside<'a>(&self, field: &str, cells: impl IntoIterator<Item = &'a Cell>) -> Result<(), Error> {
+    fn check_inside(&self, field: &str, cells: &[Cell]) -> Result<(), Error> {
         let (height, width) = (self.height, self.width);
         let inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
-        match cells.into_iter().find(|cell| !inside(cell)) {
+        match cells.iter().find(|cell| !inside(cell)) {
             Some(cell) => Err(Error::cell_outside(field, cell, (height, width))),
             None => Ok(()),
         }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{GridConfig, Targets};
+use super::GridConfig;
 
 impl GridConfig {
     /// The config as an object under POGEMA's names, everything derived written out but for the sides of a given
@@ -17,7 +17,7 @@ impl GridConfig {
             "density": self.density,
             "obs_radius": self.obs_radius,
             "agents_xy": self.agents_xy,
-            "targets_xy": self.targets_xy.as_ref().map(targets),
+            "targets_xy": self.targets_xy,
             "num_agents": self.num_agents,
             "possible_agents_xy": self.possible_agents_xy,
             "possible_targets_xy": self.possible_targets_xy,
@@ -34,13 +34,6 @@ impl GridConfig {
             "reward": self.reward,
             "limits": self.limits,
         })
-    }
-}
-
-fn targets(targets: &Targets) -> Value {
-    match targets {
-        Targets::Single(goals) => json!(goals),
-        Targets::Sequences(sequences) => json!(sequences),
     }
 }
 

@@ -48,7 +48,7 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         })?;
         let text = String::from_utf8(bytes).map_err(|error| failed(error.utf8_error().into()))?;
         let map = read_movingai(&text, water).map_err(|error| failed(error.into()))?;
-        let name = inside.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = inside.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if maps.insert(name.clone(), MapText::from(map)).is_some() {
             return Err(failed(format!("a second map named `{name}`").into()));
         }

@@ -65,12 +65,7 @@ impl Scenario {
     /// [`Error::Config`] about the first cell that is not.
     pub fn check_on(&self, map: &Map) -> Result<(), Error> {
         check_on_map(map, "agents_xy", &self.starts)?;
-        match &self.goals {
-            Targets::Single(goals) => check_on_map(map, "targets_xy", goals),
-            Targets::Sequences(sequences) => {
-                sequences.iter().try_for_each(|goals| check_on_map(map, "targets_xy", goals))
-            }
-        }
+        check_on_map(map, "targets_xy", &self.goals.all())
     }
 
     /// The first agents alone.
@@ -91,10 +86,9 @@ impl Scenario {
 
     /// The fields that a config has for it.
     pub fn fields(&self) -> Object<String, Value> {
-        let goals = match &self.goals {
-            Targets::Single(goals) => json!(goals),
-            Targets::Sequences(sequences) => json!(sequences),
-        };
-        Object::from_iter([("agents_xy".into(), json!(self.starts)), ("targets_xy".into(), goals)])
+        Object::from_iter([
+            ("agents_xy".into(), json!(self.starts)),
+            ("targets_xy".into(), json!(self.goals)),
+        ])
     }
 }

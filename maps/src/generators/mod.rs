@@ -17,6 +17,8 @@ pub use preset::{Preset, of_seeds, seed_name};
 pub use random::{RandomMap, RandomRanges};
 pub use warehouse::{Bays, Warehouse};
 
+use std::fmt::Display;
+
 use pogema_core::{Error, Map};
 
 use pogema_numpy::Generator;
@@ -36,14 +38,14 @@ fn check_sides(width: i64, height: i64) -> Result<(), Error> {
 fn draw_between(generator: &mut Generator, field: &str, (lowest, highest): (i64, i64)) -> Result<i64, Error> {
     let end = highest.checked_add(1).filter(|_| lowest <= highest);
     let drawn = end.and_then(|end| generator.integers(lowest, end).ok());
-    drawn.ok_or_else(|| {
-        Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
-    })
+    drawn.ok_or_else(|| empty_range(field, lowest, highest))
 }
 
 /// A number from `lowest` to `highest`.
 fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f64)) -> Result<f64, Error> {
-    generator.uniform(lowest, highest).map_err(|_| {
-        Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
-    })
+    generator.uniform(lowest, highest).map_err(|_| empty_range(field, lowest, highest))
+}
+
+fn empty_range(field: &str, lowest: impl Display, highest: impl Display) -> Error {
+    Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
 }

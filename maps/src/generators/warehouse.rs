@@ -81,7 +81,7 @@ impl Warehouse {
     pub fn generate(&self, bays: Bays) -> Result<MapText, Error> {
         let map = self.shelves(usize::from(bays == Bays::Published))?;
         if bays == Bays::None {
-            return Ok(MapText { map, starts: Vec::new(), goals: Vec::new(), pools: None });
+            return Ok(MapText::from(map));
         }
         if self.vertical_gap < 2 {
             return Err(Error::config("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
@@ -90,16 +90,12 @@ impl Warehouse {
             Bays::Published => self.is_published_start(&map, cell),
             Bays::None | Bays::Toolbox => self.is_toolbox_start(&map, cell),
         };
-        let cells = || (0..map.obstacles().len()).map(|index| map.cell_at(index));
-        let free = |cell: &Cell| !map.is_obstacle(*cell);
-        let starts: Vec<Cell> = cells().filter(free).filter(|&cell| is_start(cell)).collect();
-        let goals: Vec<Cell> = cells()
-            .filter(free)
-            // A cell marked as both is written as a goal.
-            .filter(|&cell| self.is_goal(&map, cell))
-            .collect();
-        let starts = starts.into_iter().filter(|start| goals.binary_search(start).is_err()).collect();
-        Ok(MapText { map, starts: Vec::new(), goals: Vec::new(), pools: Some((starts, goals)) })
+        let cells = (0..map.obstacles().len()).map(|index| map.cell_at(index));
+        let free = cells.filter(|&cell| !map.is_obstacle(cell));
+        let (goals, others): (Vec<Cell>, Vec<Cell>) = free.partition(|&cell| self.is_goal(&map, cell));
+        // A cell marked as both is written as a goal.
+        let starts = others.into_iter().filter(|&cell| is_start(cell)).collect();
+        Ok(MapText { pools: Some((starts, goals)), ..MapText::from(map) })
     }
 
     /// The shelves, without so many rows at the top and at the bottom.

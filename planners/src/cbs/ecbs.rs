@@ -61,23 +61,20 @@ impl Ecbs {
 
 impl Planner for Ecbs {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let mut clock = budget.start();
-        let costs = match problem.costs_to_go(&mut clock) {
-            Ok(costs) => costs,
-            Err(outcome) => return outcome,
-        };
-        let legs = one_leg_each(&costs);
-        let team = TeamTask::one_shot(problem, &legs, self.params.seed);
-        let mut sipp = Sipp::new(problem.graph.clone());
-        let mut check = UnsolvabilityCheck::default();
-        let give_up = |clock: &mut Clock| check.count(problem, clock);
-        match search(&mut sipp, &problem.graph, &team, &self.params, &mut clock, give_up) {
-            Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
-            Found::Nothing { lower_bound } => {
-                clock.unsolved(None, lower_bound.max(problem.lower_bound(&costs)))
+        problem.solve(budget, |costs, mut clock| {
+            let legs = one_leg_each(costs);
+            let team = TeamTask::one_shot(problem, &legs, self.params.seed);
+            let mut sipp = Sipp::new(problem.graph.clone());
+            let mut check = UnsolvabilityCheck::default();
+            let give_up = |clock: &mut Clock| check.count(problem, clock);
+            match search(&mut sipp, &problem.graph, &team, &self.params, &mut clock, give_up) {
+                Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
+                Found::Nothing { lower_bound } => {
+                    clock.unsolved(None, lower_bound.max(problem.lower_bound(costs)))
+                }
+                Found::Proof(reason) => Outcome::Impossible { reason },
             }
-            Found::Proof(reason) => Outcome::Impossible { reason },
-        }
+        })
     }
 }
 

@@ -101,16 +101,8 @@ impl<'a> LowLevel<'a> {
                 None => self.forbidden.block(at, step as u32, step as u32, number),
             }
         }
-        let task = Task {
-            start: self.team.starts[agent],
-            legs: &self.team.legs[agent],
-            reserved: &self.forbidden,
-            avoided: Some(&self.others),
-            banned: &banned,
-            horizon: self.team.horizon,
-            order: Order::Cost,
-            salt: self.team.salt,
-        };
+        let task = self.team.task(agent, &self.forbidden);
+        let task = Task { avoided: Some(&self.others), banned: &banned, ..task };
         let found = self.sipp.find(&task).and_then(|path| match self.aim {
             Aim::Best => Some((path.cost, path)),
             Aim::Within(_) if path.conflicts == 0 => Some((path.cost, path)),

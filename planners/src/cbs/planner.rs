@@ -25,14 +25,11 @@ impl Cbs {
 
 impl Planner for Cbs {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let mut clock = budget.start();
-        let costs = match problem.costs_to_go(&mut clock) {
-            Ok(costs) => costs,
-            Err(outcome) => return outcome,
-        };
-        if clock.count_node() {
-            return clock.unsolved(None, problem.lower_bound(&costs));
-        }
-        Groups::new(problem, &costs, &self.params).plan(&mut clock)
+        problem.solve(budget, |costs, mut clock| {
+            if clock.count_node() {
+                return clock.unsolved(None, problem.lower_bound(costs));
+            }
+            Groups::new(problem, costs, &self.params).plan(&mut clock)
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! The high level of CBS: best-first search through the constraint tree.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::budget::Clock;
@@ -69,16 +69,16 @@ pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, cl
         graph: &problem.graph,
         team: &team,
         low,
-        open: BinaryHeap::new(),
+        open: BTreeMap::new(),
         num_entries: 0,
         memory: MemoryUse::new(params.max_bytes),
     };
     search.insert(root, vec![None; problem.num_agents()]);
     let (mut check, mut lower_bound) = (UnsolvabilityCheck::default(), 0);
     for num_nodes in 0.. {
-        let Some(entry) = search.open.pop() else { break };
+        let Some(((bound, ..), entry)) = search.open.pop_first() else { break };
         // The bounds of nodes are not monotonic, but a proved bound stays valid.
-        lower_bound = entry.bound.max(lower_bound);
+        lower_bound = bound.max(lower_bound);
         let is_full = search.memory.is_full();
         if lower_bound > task.max_cost {
             return Found::Unknown { lower_bound, is_full };
@@ -101,46 +101,17 @@ struct Entry {
     node: Node,
     /// The MDD of each agent, where it was needed.
     mdds: Vec<Option<Arc<Mdd>>>,
-    bound: u64,
     num_conflicts: usize,
     /// The conflict to be resolved next.
     choice: Option<PathConflict>,
-    /// The serial number of the entry.
-    number: u64,
-}
-
-impl Entry {
-    /// The least key is expanded first; of equal entries, the newest.
-    fn key(&self) -> (u64, usize, Reverse<u64>) {
-        (self.bound, self.num_conflicts, Reverse(self.number))
-    }
-}
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl Eq for Entry {}
-
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.key().cmp(&self.key())
-    }
 }
 
 struct Search<'a> {
     graph: &'a Graph,
     team: &'a TeamTask<'a>,
     low: LowLevel<'a>,
-    open: BinaryHeap<Entry>,
+    /// Nodes by lower bound, number of conflicts and age, newest first.
+    open: BTreeMap<(u64, usize, Reverse<u64>), Entry>,
     num_entries: u64,
     memory: MemoryUse,
 }
@@ -174,8 +145,9 @@ impl Search<'_> {
         let choice = choice.map(|(_, conflict)| conflict);
         self.num_entries += 1;
         self.memory.add_node(&node);
-        let number = self.num_entries;
-        self.open.push(Entry { node, mdds, bound, num_conflicts: conflicts.len(), choice, number });
+        let num_conflicts = conflicts.len();
+        let key = (bound, num_conflicts, Reverse(self.num_entries));
+        self.open.insert(key, Entry { node, mdds, num_conflicts, choice });
     }
 
     /// Returns the MDD of an agent in a node.

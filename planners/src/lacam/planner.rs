@@ -22,11 +22,6 @@ impl Lacam {
 
 impl Planner for Lacam {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let mut clock = budget.start();
-        let costs = match problem.costs_to_go(&mut clock) {
-            Ok(costs) => costs,
-            Err(outcome) => return outcome,
-        };
-        Run::new(&self.params, problem, &costs, budget, clock).run()
+        problem.solve(budget, |costs, clock| Run::new(&self.params, problem, costs, budget, clock).run())
     }
 }

@@ -68,19 +68,16 @@ impl Pibt {
 
 impl Planner for Pibt {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        let mut clock = budget.start();
-        let costs = match problem.costs_to_go(&mut clock) {
-            Ok(costs) => costs,
-            Err(outcome) => return outcome,
-        };
-        let least = |agent: Agent| costs[agent as usize][problem.starts[agent as usize] as usize];
-        let lower_bound = problem.lower_bound(&costs);
-        let priorities = Priorities::new(problem.num_agents(), least);
-        let steps = self.run(problem, &costs, priorities, &mut clock);
-        let is_solved = steps.last() == Some(&problem.goals);
-        match problem.plan(&steps).ok() {
-            Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
-            best => clock.unsolved(best, lower_bound),
-        }
+        problem.solve(budget, |costs, mut clock| {
+            let least = |agent: Agent| costs[agent as usize][problem.starts[agent as usize] as usize];
+            let lower_bound = problem.lower_bound(costs);
+            let priorities = Priorities::new(problem.num_agents(), least);
+            let steps = self.run(problem, costs, priorities, &mut clock);
+            let is_solved = steps.last() == Some(&problem.goals);
+            match problem.plan(&steps).ok() {
+                Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
+                best => clock.unsolved(best, lower_bound),
+            }
+        })
     }
 }

@@ -5,9 +5,11 @@
 use std::collections::{HashMap, HashSet};
 
 use pogema_core::{Action, Error};
+use pogema_numpy::Generator;
 
 use crate::policies::heapq::HeapQ;
 use crate::policies::observations::PomapfObservation;
+use crate::policies::pogema::random_action;
 
 /// A cell relative to the start of the agent, (row, col).
 type Place = (i32, i32);
@@ -85,20 +87,23 @@ impl std::fmt::Debug for AStarAgent {
     }
 }
 
-/// One [`AStarAgent`] for each agent of an environment.
+/// POGEMA's A* policy: one [`AStarAgent`] for each agent of an environment, each of which draws its random moves from a
+/// generator with seed 0.
 ///
 /// Rule: policy/astar
+#[derive(Debug, Default)]
 pub struct AStarTeam {
     agents: Vec<AStarAgent>,
-    make_random: Box<dyn Fn() -> Box<dyn FnMut() -> Action + Send> + Send>,
+}
+
+/// Returns POGEMA's A* policy before the first step of an episode.
+///
+/// Rule: policy/astar
+pub fn pogema_team() -> AStarTeam {
+    AStarTeam::default()
 }
 
 impl AStarTeam {
-    /// A team. `make_random` makes the source of random actions of each agent.
-    pub fn new(make_random: Box<dyn Fn() -> Box<dyn FnMut() -> Action + Send> + Send>) -> Self {
-        Self { agents: Vec::new(), make_random }
-    }
-
     /// Clears the state of the episode.
     pub fn reset(&mut self) {
         self.agents.clear();
@@ -115,17 +120,12 @@ impl AStarTeam {
         let mut actions = Vec::new();
         for (index, observation) in observations.into_iter().enumerate() {
             if index == self.agents.len() {
-                self.agents.push(AStarAgent::new((self.make_random)()));
+                let mut generator = Generator::seeded(0);
+                self.agents.push(AStarAgent::new(Box::new(move || random_action(&mut generator))));
             }
             actions.push(self.agents[index].act(observation)?);
         }
         Ok(actions)
-    }
-}
-
-impl std::fmt::Debug for AStarTeam {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("AStarTeam").field("agents", &self.agents).finish_non_exhaustive()
     }
 }
 

@@ -11,9 +11,9 @@ mod observations;
 mod planner_policy;
 mod pogema;
 
-pub use astar::{AStarAgent, AStarTeam};
+pub use astar::{AStarAgent, AStarTeam, pogema_team};
 pub use lifelong_policy::LifelongPolicy;
 pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
 pub use observations::{PomapfObservation, PomapfObservations};
 pub use planner_policy::PlannerPolicy;
-pub use pogema::{pogema_team, sample};
+pub use pogema::sample;

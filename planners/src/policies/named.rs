@@ -5,11 +5,11 @@ use pogema_numpy::Generator;
 
 use crate::budget::Budget;
 use crate::outcome::Outcome;
-use crate::policies::astar::AStarTeam;
+use crate::policies::astar::{AStarTeam, pogema_team};
 use crate::policies::lifelong_policy::LifelongPolicy;
 use crate::policies::observations::PomapfObservations;
 use crate::policies::planner_policy::PlannerPolicy;
-use crate::policies::pogema::{pogema_team, sample};
+use crate::policies::pogema::sample;
 use crate::registry::{LifelongName, PlannerName, PlannerSettings};
 
 words! {
@@ -101,6 +101,7 @@ impl NamedPolicy {
         if let Some(planner) = one_shot {
             let max_steps = u64::try_from(config.max_steps).ok();
             let policy = PlannerPolicy::new(planner.make(planner_settings), budget, max_steps);
+            let policy = if single_attempt { policy.with_single_attempt() } else { policy };
             return Ok(Self(Kind::Planner(Box::new(policy))));
         }
         let known = || Self::all().into_iter().map(|(known, _)| format!("`{known}`")).collect::<Vec<_>>();

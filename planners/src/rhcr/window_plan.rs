@@ -100,9 +100,7 @@ impl WindowPlan {
             let next = self.step.run(&input, &[]).map_or_else(|| now.clone(), <[Vertex]>::to_vec);
             for (agent, &to) in next.iter().enumerate() {
                 self.paths[agent].push(to);
-                while legs[agent].get(phases[agent]).is_some_and(|leg| leg.to_go[to as usize] == 0) {
-                    phases[agent] += 1;
-                }
+                phases[agent] = phase_at(to, phases[agent], &legs[agent]);
             }
             length += 1;
         }
@@ -138,22 +136,19 @@ impl Costs for Target<'_> {
 
 /// Number of goals that a path reaches.
 pub(super) fn num_reached(path: &[Vertex], legs: &[Leg]) -> usize {
-    let mut phase = 0;
-    for &vertex in path {
-        while legs.get(phase).is_some_and(|leg| leg.to_go[vertex as usize] == 0) {
-            phase += 1;
-        }
-    }
-    phase
+    path.iter().fold(0, |phase, &vertex| phase_at(vertex, phase, legs))
+}
+
+/// Number of goals reached after a visit to a vertex, of which `phase` were reached before.
+fn phase_at(vertex: Vertex, phase: usize, legs: &[Leg]) -> usize {
+    phase + legs[phase..].iter().take_while(|leg| leg.to_go[vertex as usize] == 0).count()
 }
 
 /// Returns the steps until a path reaches its last goal, with the costs to go beyond its end.
 fn cost(path: &[Vertex], legs: &[Leg]) -> u32 {
     let mut phase = 0;
     for (step, &vertex) in path.iter().enumerate() {
-        while legs.get(phase).is_some_and(|leg| leg.to_go[vertex as usize] == 0) {
-            phase += 1;
-        }
+        phase = phase_at(vertex, phase, legs);
         if phase == legs.len() {
             return step as u32;
         }

@@ -163,10 +163,7 @@ impl<'a> Refiner<'a> {
         for index in 0..self.agents.len() {
             let agent = self.agents[index];
             if stop() || !self.find(agent, left, index) {
-                self.agents[..index].iter().for_each(|&agent| self.solution.remove(agent));
-                for (&agent, path) in self.agents.iter().zip(&self.old) {
-                    self.solution.insert(agent, path);
-                }
+                self.restore(index);
                 return false;
             }
             self.solution.insert(agent, &self.new[index]);
@@ -214,13 +211,18 @@ impl<'a> Refiner<'a> {
                 self.solution.insert(self.agents[index], &self.new[index]);
                 continue;
             }
-            self.agents[..index].iter().for_each(|&agent| self.solution.remove(agent));
-            for (&agent, path) in self.agents.iter().zip(&self.old) {
-                self.solution.insert(agent, path);
-            }
+            self.restore(index);
             return false;
         }
         true
+    }
+
+    /// Puts the old paths of the neighbourhood back, in place of the new paths of its first agents.
+    fn restore(&mut self, num_new: usize) {
+        self.agents[..num_new].iter().for_each(|&agent| self.solution.remove(agent));
+        for (&agent, path) in self.agents.iter().zip(&self.old) {
+            self.solution.insert(agent, path);
+        }
     }
 
     /// Exchanges the paths of the neighbourhood.
