@@ -14,7 +14,7 @@ use pogema_toolbox::short;
 use serde_json::json;
 
 use crate::output::{check_writable, say, write_trace};
-use crate::plan::Thinking;
+use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use policy::Policy;
 pub use settings::Settings;
@@ -30,7 +30,7 @@ pub struct Run {
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
     #[command(flatten)]
-    thinking: Thinking,
+    planner_args: PlannerArgs,
     /// Tell `--policy rhcr` also of the goals that are still to come
     #[arg(long)]
     future_goals: bool,
@@ -52,7 +52,7 @@ impl Run {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
-        let settings = self.thinking.settings(self.future_goals)?;
+        let settings = self.planner_args.policy_settings(self.future_goals)?;
         let generated = self.settings.generate(&config)?;
         for warning in &generated.warnings {
             eprintln!("warning: {warning}");

@@ -32,7 +32,7 @@ impl FromStr for Color {
         let [_, rgb @ ..] =
             number.filter(|_| !text.contains('+')).map(u32::to_be_bytes).ok_or_else(|| {
                 let found = shorten(text, Error::LONGEST_QUOTE);
-                Error::Request { reason: format!("colour is `{found}`, expected one such as `#c1433c`") }
+                Error::request(format!("colour is `{found}`, expected one such as `#c1433c`"))
             })?;
         Ok(Self(rgb))
     }

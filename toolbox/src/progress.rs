@@ -68,12 +68,9 @@ pub struct Episode {
     /// The machine, if it is not that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub machine: Option<String>,
-    /// The planner's lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lower_bound: Option<u64>,
-    /// The planner's proof that there is no plan, in words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unsolvable: Option<String>,
+    /// What its planner proved.
+    #[serde(flatten)]
+    pub proof: Proof,
 }
 
 /// An episode that could not be played.
@@ -118,13 +115,13 @@ impl Progress {
     /// # Errors
     /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
     pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
-        if store.path(&format!("{key}.{RESULTS}")).exists() {
+        if store.path(&format!("{key}{RESULTS}")).exists() {
             // A run may have broken off after it had written all.
-            remove(&store.path(&format!("{key}.{LINES}")))?;
+            remove(&store.path(&format!("{key}{LINES}")))?;
             return Ok(None);
         }
-        remove(&store.path(&format!("{key}.{FAILED}")))?;
-        let path = store.path(&format!("{key}.{LINES}"));
+        remove(&store.path(&format!("{key}{FAILED}")))?;
+        let path = store.path(&format!("{key}{LINES}"));
         let failed = |error: std::io::Error| Error::io(&path, error);
         let (lines, whole) = read(&path, num_episodes)?;
         let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
@@ -163,7 +160,7 @@ impl Progress {
     /// # Errors
     /// If it cannot be written.
     pub fn note(&mut self, failed: &Failed) -> Result<(), Error> {
-        let path = self.store.path(&format!("{}.{FAILED}", self.key));
+        let path = self.store.path(&format!("{}{FAILED}", self.key));
         let file = match &mut self.failed {
             Some(file) => file,
             none => none.insert(File::create(&path).map_err(|error| Error::io(&path, error))?),
@@ -192,12 +189,11 @@ impl Progress {
                 seconds: Some(line.runtime),
                 run: line.run,
                 machine: line.machine,
-                lower_bound: line.proof.lower_bound,
-                unsolvable: line.proof.unsolvable,
+                proof: line.proof,
             })?);
         }
-        self.store.write(&format!("{}.{EPISODES}", self.key), list(&episodes).as_bytes())?;
-        self.store.write(&format!("{}.{RESULTS}", self.key), list(&rows).as_bytes())?;
+        self.store.write(&format!("{}{EPISODES}", self.key), list(&episodes).as_bytes())?;
+        self.store.write(&format!("{}{RESULTS}", self.key), list(&rows).as_bytes())?;
         remove(&self.path)?;
         Ok(true)
     }

@@ -92,8 +92,9 @@ impl Export {
             let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
             let scenario = scenario.truncated(num_agents)?;
             if matches!(scenario.goals, Targets::Sequences(_)) && self.to != Format::Config {
-                let reason = "the scenario has sequences of goals, which only `--to config` can hold";
-                return Err(Error::Request { reason: reason.into() });
+                return Err(Error::request(
+                    "the scenario has sequences of goals, which only `--to config` can hold",
+                ));
             }
             if self.to == Format::Config {
                 return write_out(self.out.as_deref(), config(&map.text, Some(&scenario)).as_bytes());
@@ -126,7 +127,7 @@ impl Export {
     }
 
     fn one_map(&self, found: usize, what: &str) -> Error {
-        Error::Request { reason: format!("`{}` means {found} maps, {what} one", self.map) }
+        Error::request(format!("`{}` means {found} maps, {what} one", self.map))
     }
 }
 
@@ -196,7 +197,7 @@ impl Tiles {
         let cut = |map: NamedMap| -> Result<Vec<NamedMap>, Error> {
             if !map.text.starts.is_empty() || map.text.pools.is_some() {
                 let reason = format!("`{}` has starts and goals, which would be lost in tiles", map.name);
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
             tiles(&map.name, &map.text.map, self.side)
         };

@@ -101,7 +101,7 @@ impl Show {
         }
         let [NamedMap { text, .. }] = maps else {
             let reason = format!("`{}` means {} maps, a picture is of one", self.map, maps.len());
-            return Err(Error::Request { reason });
+            return Err(Error::request(reason));
         };
         let (trace, style) = (still(text)?, Style { static_frame: Some(0), ..Style::default() });
         if let Some(path) = &self.svg {

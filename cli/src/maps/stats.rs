@@ -43,7 +43,7 @@ impl Stats {
         let maps = self.sources.meant_by(&self.map)?;
         if self.scenario.is_some() && maps.len() != 1 {
             let reason = format!("`{}` means {} maps, a scenario is of one", self.map, maps.len());
-            return Err(Error::Request { reason });
+            return Err(Error::request(reason));
         }
         let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
         let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =

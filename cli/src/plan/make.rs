@@ -17,7 +17,7 @@ use crate::render::Pictures;
 use crate::run::Settings;
 use crate::words::word;
 
-use super::thinking::Thinking;
+use super::planner_args::PlannerArgs;
 
 #[derive(Args, Debug)]
 pub struct MakePlan {
@@ -27,7 +27,7 @@ pub struct MakePlan {
     #[arg(long, value_name = "NAME", default_value_t = PlannerName::Lacam, value_parser = word::<PlannerName>())]
     planner: PlannerName,
     #[command(flatten)]
-    thinking: Thinking,
+    planner_args: PlannerArgs,
     /// Write the plan to this file, a line of cells for each step
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -52,7 +52,7 @@ impl MakePlan {
             check_writable(path)?;
         }
         self.pictures.check(config.num_agents)?;
-        let budget = self.thinking.budget()?;
+        let budget = self.planner_args.budget()?;
         let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
         let problem = match self.settings.most_steps()?.map(usize::try_from) {
@@ -60,7 +60,7 @@ impl MakePlan {
             _ => problem,
         };
         let began = Instant::now();
-        let outcome = self.planner.make(self.thinking.choice()).plan(&problem, &budget);
+        let outcome = self.planner.make(self.planner_args.planner_settings()).plan(&problem, &budget);
         let seconds = began.elapsed().as_secs_f64();
         if let Outcome::Solved { plan, .. } = &outcome {
             let goals = instance.first_goals();

@@ -94,7 +94,7 @@ impl Pictures {
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
                 let reason = format!("`{other}` and `{flag}` name one file, `{}`", path.display());
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
             check_writable(path)?;
         }

@@ -13,9 +13,8 @@ pub use picks::{Pick, picks};
 
 use crate::environments::Environments;
 use crate::manifest::{Manifest, Run};
-use crate::pairs::Pairs;
 use crate::replay::differences;
-use crate::results::{Results, Row};
+use crate::results::{Pairs, Results, Row};
 use crate::suite::Suite;
 use crate::tree::Node;
 use crate::views::{ImageFormat, Shown, Table, View};

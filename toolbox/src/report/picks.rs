@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::pairs::Pairs;
-use crate::results::{Results, Row, short};
+use indexmap::IndexMap;
+
+use crate::results::{Pairs, Results, Row, short};
 
 /// Figures by which episodes are judged, of which the first counts that all rows have, and whether less is better.
 const JUDGED_BY: [(&str, bool); 4] =
@@ -38,14 +39,10 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         return Vec::new();
     };
     let best = best_of(results, figure, is_less_better);
-    let mut of_algorithms: Vec<(&str, Vec<Judged<'_>>)> = Vec::new();
+    let mut of_algorithms: IndexMap<&str, Vec<Judged<'_>>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
-        let place = of_algorithms.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
-            of_algorithms.push((name, Vec::new()));
-            of_algorithms.len() - 1
-        });
-        let episodes = &mut of_algorithms[place].1;
+        let episodes = of_algorithms.entry(name).or_default();
         let value = row.metric(figure).unwrap_or_default();
         let (least, whose) = best.get(&told(&row.settings)).copied().unwrap_or((value, name));
         let times = if is_less_better { value / least } else { least / value };
@@ -61,7 +58,7 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
             name,
         });
     }
-    of_algorithms.into_iter().flat_map(|(_, episodes)| ends(episodes, number)).collect()
+    of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
 struct Judged<'a> {
@@ -126,8 +123,8 @@ mod tests {
 
     fn results(rows: &[(&str, u64, f64, f64)]) -> Results {
         let row = |&(algorithm, seed, soc, share): &(&str, u64, f64, f64)| Row {
-            metrics: Pairs(vec![("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
-            settings: Pairs(vec![("seed".into(), seed.into())]),
+            metrics: Pairs::from([("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
+            settings: Pairs::from([("seed".into(), seed.into())]),
             algorithm: algorithm.to_owned(),
             ..Row::default()
         };
@@ -153,7 +150,7 @@ mod tests {
     #[test]
     fn rows_that_cannot_be_judged_are_not_picked() {
         let mut results = results(&[("A", 0, 20.0, 1.0)]);
-        results.rows[0].metrics = Pairs(vec![("fun".into(), 1.0.into())]);
+        results.rows[0].metrics = Pairs::from([("fun".into(), 1.0.into())]);
         assert_eq!(picks(&results, 3), []);
     }
 }

@@ -48,13 +48,8 @@ pub(super) enum Places {
 impl Places {
     /// Finds out whether all rows have numbers there.
     pub fn of<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Self {
-        let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
-        if found.iter().all(Value::is_number) {
-            return Self::Numbers;
-        }
-        found.sort_by(compare);
-        found.dedup();
-        Self::Names(found)
+        let found = distinct(rows, column);
+        if found.iter().all(Value::is_number) { Self::Numbers } else { Self::Names(found) }
     }
 
     fn place(&self, value: &Value) -> Option<f64> {
@@ -63,6 +58,14 @@ impl Places {
             Self::Names(names) => names.iter().position(|name| name == value).map(|place| place as f64),
         }
     }
+}
+
+/// What rows have in a column, sorted, each value once.
+pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Vec<Value> {
+    let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
+    found.sort_by(compare);
+    found.dedup();
+    found
 }
 
 /// What a row has in a column, be it a metric or not.

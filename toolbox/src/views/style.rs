@@ -124,7 +124,7 @@ impl Style {
             has_line_types: flag("line_types", true)?,
             ticks: options.numbers("ticks")?.filter(|ticks| !ticks.is_empty()),
             order: options.words("hue_order")?,
-            kind: kind(options)?,
+            kind: options.word("extension")?.unwrap_or_default(),
             dots_per_inch: size("figure_dpi", 300.0)?.clamp(10.0, 2400.0),
             palette: palette(options)?,
         })
@@ -145,14 +145,6 @@ impl Style {
         let Self { width, height, font_size, .. } = *self;
         Frame { width, height, font_size, title: self.title().map(str::to_owned), x, y }
     }
-}
-
-fn kind(options: &Options<'_>) -> Result<ImageFormat, Error> {
-    Ok(match options.choice("extension", &["pdf", "svg", "png"])? {
-        Some("svg") => ImageFormat::Svg,
-        Some("png") => ImageFormat::Png,
-        _ => ImageFormat::Pdf,
-    })
 }
 
 fn palette(options: &Options<'_>) -> Result<Vec<String>, Error> {
