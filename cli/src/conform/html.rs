@@ -3,14 +3,14 @@
 use pogema_conformance::panel::{Content, Grid, Limits, Moment, Panel, text_of_panels};
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
 use pogema_conformance::{Record, agents_grid, play};
-use pogema_core::{Error, Snapshot, shorten};
+use pogema_core::{Error, Snapshot, Words, shorten};
 use serde::Serialize;
 
 use super::grid_svg::drawing;
 use super::known::Leftover;
 use super::summary::{
-    self, OUTCOMES, Standing, Verdict, counts, is_rule, names, score, shortened, spec_url, standing, times,
-    title, verdict,
+    self, OUTCOMES, Standing, counts, is_rule, names, score, shortened, spec_url, standing, times, title,
+    verdict,
 };
 use super::template::fill;
 
@@ -40,8 +40,8 @@ struct Port {
     passed: usize,
     claimed: usize,
     num_not_run: u64,
-    new: Vec<Told>,
-    known: Vec<Told>,
+    new: Vec<ShownCause>,
+    known: Vec<ShownCause>,
 }
 
 #[derive(Serialize)]
@@ -69,9 +69,8 @@ struct Link {
     url: Option<String>,
 }
 
-/// A cause.
 #[derive(Serialize)]
-struct Told {
+struct ShownCause {
     rule: Option<Link>,
     what: String,
     times: String,
@@ -119,28 +118,17 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
 fn port(report: &PortReport, name: &str) -> Port {
     let score = score(report);
     let (known, new) = report.causes.iter().partition::<Vec<&Cause>, _>(|cause| cause.known.is_some());
-    let told = |causes: Vec<&Cause>| causes.into_iter().map(|cause| told(cause, name)).collect();
+    let shown_causes = |causes: Vec<&Cause>| causes.into_iter().map(|cause| shown(cause, name)).collect();
     Port {
         name: name.to_owned(),
         title: title(report),
         verdict: verdict(report),
-        class: class(score.verdict()),
+        class: score.verdict().word(),
         passed: score.passed,
         claimed: score.claimed,
         num_not_run: report.num_not_run,
-        new: told(new),
-        known: told(known),
-    }
-}
-
-/// A name for the style sheet.
-fn class(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Conforms => "conforms",
-        Verdict::Known => "known",
-        Verdict::Diverges => "diverges",
-        Verdict::Misbehaves => "misbehaves",
-        Verdict::Unchecked => "nothing",
+        new: shown_causes(new),
+        known: shown_causes(known),
     }
 }
 
@@ -163,8 +151,8 @@ fn link(rule: &str) -> Link {
     Link { text: rule.to_owned(), url: spec_url(rule).filter(|_| is_rule(rule)) }
 }
 
-fn told(cause: &Cause, port: &str) -> Told {
-    Told {
+fn shown(cause: &Cause, port: &str) -> ShownCause {
+    ShownCause {
         rule: cause.rule.as_deref().map(link),
         what: cause.what.clone(),
         times: times(cause),

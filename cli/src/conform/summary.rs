@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Verdicts, needed_by};
-use pogema_core::shorten;
+use pogema_core::{shorten, words};
 
 /// How a rule came out for a port, all its cases together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,19 +144,20 @@ pub fn score(report: &PortReport) -> Score {
     }
 }
 
-/// What a run says of a port, in short.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It does all that it claims.
-    Conforms,
-    /// It does, but for what is known.
-    Known,
-    /// It breaks a rule.
-    Diverges,
-    /// It breaks the protocol, and perhaps rules.
-    Misbehaves,
-    /// It claims nothing that was asked.
-    Unchecked,
+words! {
+    /// What a run says of a port, in short; the style sheet of the page knows the words.
+    pub enum Verdict {
+        /// It does all that it claims.
+        Conforms = "conforms",
+        /// It does, but for what is known.
+        Known = "known",
+        /// It breaks a rule.
+        Diverges = "diverges",
+        /// It breaks the protocol, and perhaps rules.
+        Misbehaves = "misbehaves",
+        /// It claims nothing that was asked.
+        Unchecked = "nothing",
+    }
 }
 
 impl Score {
