@@ -109,9 +109,8 @@ fn write_report(
 fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
     let Summary { num_played, num_failed, is_whole } = summary;
     if *num_failed > 0 {
-        let files: Vec<String> =
-            suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key)).collect();
-        let files: Vec<&String> = files.iter().filter(|name| folder.join(name).exists()).collect();
+        let files = suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key));
+        let files: Vec<String> = files.filter(|name| folder.join(name).exists()).collect();
         let reason =
             format!("{num_failed} episodes could not be played; {files:?} say why, `--resume` tries again");
         return Err(Error::io(folder, reason));

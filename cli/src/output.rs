@@ -6,6 +6,7 @@ use std::path::Path;
 use comfy_table::{CellAlignment, Table, TableStyle, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use pogema_core::{Error, Trace};
+use pogema_toolbox::short;
 use serde::Serialize;
 
 /// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
@@ -72,6 +73,12 @@ pub fn progress_bar(layout: &str, total: u64) -> ProgressBar {
     bar
 }
 
+/// Metrics in one line.
+pub fn in_a_line<'a>(metrics: impl IntoIterator<Item = (&'a str, f64)>) -> String {
+    let shown = metrics.into_iter().map(|(name, value)| format!("{name}={}", short(value)));
+    shown.collect::<Vec<_>>().join("  ")
+}
+
 /// Names the flag whose value an error is about.
 pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     move |error| match error {
@@ -80,9 +87,9 @@ pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     }
 }
 
-/// A table that is Markdown too, its numbers to the right of a first column of names.
-pub fn markdown_table(head: &[&str]) -> Table {
-    table(presets::ASCII_MARKDOWN, head)
+/// A table that is Markdown too, its numbers to the right of a first column of names; ` | ` separates the titles.
+pub fn markdown_table(head: &str) -> Table {
+    table(presets::ASCII_MARKDOWN, &head.split(" | ").collect::<Vec<_>>())
 }
 
 /// A table with lines between its columns, its numbers to the right of a first column of names.

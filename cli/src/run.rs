@@ -10,10 +10,9 @@ use pogema_core::{Episode, Error, Trace};
 use pogema_maps::GridConfig;
 use pogema_reference::Reference;
 use pogema_render::Ground;
-use pogema_toolbox::short;
 use serde_json::json;
 
-use crate::output::{check_writable, say, write_trace};
+use crate::output::{check_writable, in_a_line, say, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use policy::Policy;
@@ -113,12 +112,6 @@ impl Run {
             });
             return say(&summary.to_string());
         }
-        let figures: Vec<String> = episode
-            .metrics()
-            .named()
-            .iter()
-            .map(|(name, value)| format!("{name}={}", short(*value)))
-            .collect();
-        say(&format!("{} steps  {}", episode.num_steps(), figures.join("  ")))
+        say(&format!("{} steps  {}", episode.num_steps(), in_a_line(episode.metrics().named())))
     }
 }

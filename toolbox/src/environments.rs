@@ -9,6 +9,7 @@ use pogema_maps::{GridConfig, Library, MapText};
 use serde_json::{Map as Object, Value};
 
 use crate::Pairs;
+use crate::frame::plain_text;
 use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
 use crate::variants::{Variant, Variants};
 
@@ -81,12 +82,9 @@ impl Environments {
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let meant = fields
-            .get("map_name")
-            .and_then(Value::as_str)
-            .and_then(|name| self.library.choose(name, seed).ok());
-        if let Some(name) = meant.map(|(name, _)| Value::from(name)) {
-            fields.insert("map_name".into(), name);
+        let pattern = fields.get("map_name").and_then(Value::as_str);
+        if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.choose(pattern, seed)) {
+            fields.insert("map_name".into(), name.into());
         }
         Ok(fields)
     }
@@ -110,7 +108,7 @@ impl Environments {
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
         if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
-            let name = fields.get("name").map_or_else(String::new, told);
+            let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
         }
         for own in OWN_FIELDS {
@@ -118,7 +116,7 @@ impl Environments {
         }
         let seed = fields.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| {
-            let given = fields.get("seed").map_or_else(|| "missing".into(), told);
+            let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
             Error::config("seed", given, "a number, or results could not be repeated")
         })?;
         let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
@@ -212,9 +210,4 @@ impl Environments {
             }
         }
     }
-}
-
-/// A value as a file would have it.
-fn told(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

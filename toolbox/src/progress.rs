@@ -10,26 +10,9 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::results::{Episode, Proof, Row};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
 use crate::{Environments, Pairs};
-
-/// What a planner proved about an episode.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Proof {
-    /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lower_bound: Option<u64>,
-    /// Why there is no plan.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unsolvable: Option<String>,
-}
-
-impl Proof {
-    fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-}
 
 /// An episode that is done.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -49,27 +32,6 @@ pub struct Done {
     pub run: usize,
     /// What its planner proved.
     #[serde(default, skip_serializing_if = "Proof::is_empty")]
-    pub proof: Proof,
-}
-
-/// How an episode was played, which may differ where what came of it does not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Episode {
-    /// Its number.
-    pub episode: usize,
-    /// Its environment's seed.
-    pub seed: Value,
-    /// All fields of its environment.
-    pub config: Value,
-    /// What the policy took of it. Units: seconds.
-    pub seconds: Option<f64>,
-    /// The number of the run that played it.
-    pub run: usize,
-    /// The machine, if it is not that of the run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub machine: Option<String>,
-    /// What its planner proved.
-    #[serde(flatten)]
     pub proof: Proof,
 }
 
@@ -99,14 +61,6 @@ pub struct Progress {
     file: File,
     done: Vec<bool>,
     failed: Option<File>,
-}
-
-/// A row of pogema-toolbox's results.
-#[derive(Serialize)]
-struct Row<'a> {
-    metrics: &'a Pairs,
-    env_grid_search: Pairs,
-    algorithm: &'a str,
 }
 
 impl Progress {
@@ -179,8 +133,9 @@ impl Progress {
         let (lines, _) = read(&self.path, self.done.len())?;
         let (mut rows, mut episodes) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
         for line in sorted(lines) {
-            let env_grid_search = environments.changes(line.index)?;
-            rows.push(self.told(&Row { metrics: &line.metrics, env_grid_search, algorithm: &self.key })?);
+            let settings = environments.changes(line.index)?;
+            let algorithm = self.key.clone();
+            rows.push(self.told(&Row { metrics: line.metrics, settings, algorithm, ..Row::default() })?);
             let config = Value::Object(environments.named_fields(line.index)?);
             episodes.push(self.told(&Episode {
                 episode: line.index,

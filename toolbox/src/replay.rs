@@ -48,8 +48,7 @@ impl Suite {
         key: &str,
         index: usize,
     ) -> Result<(Pairs, Trace), Error> {
-        let algorithm = self.algorithms.iter().find(|algorithm| algorithm.key == key);
-        let algorithm = algorithm.ok_or_else(|| {
+        let algorithm = self.algorithm(key).ok_or_else(|| {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
             Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use indexmap::{IndexMap, IndexSet};
 use pogema_core::Error;
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::manifest;
-use crate::progress::{Episode, Proof};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, entries};
 
 /// The column of the algorithm's name.
@@ -32,10 +32,49 @@ pub type Pairs = IndexMap<String, Value>;
 /// What is larger is no figure.
 const LARGEST: f64 = 1e100;
 
+/// What a planner proved about an episode.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Proof {
+    /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_bound: Option<u64>,
+    /// Why there is no plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unsolvable: Option<String>,
+}
+
+impl Proof {
+    pub(crate) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// How an episode was played, which may differ where what came of it does not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Episode {
+    /// Its number.
+    pub episode: usize,
+    /// Its environment's seed.
+    pub seed: Value,
+    /// All fields of its environment.
+    pub config: Value,
+    /// What the policy took of it. Units: seconds.
+    pub seconds: Option<f64>,
+    /// The number of the run that played it.
+    pub run: usize,
+    /// The machine, if it is not that of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<String>,
+    /// What its planner proved.
+    #[serde(flatten)]
+    pub proof: Proof,
+}
+
 /// One episode of one algorithm.
 ///
 /// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
-#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Figures by name; what is neither number nor truth value is left to others.
     pub metrics: Pairs,
@@ -200,14 +239,14 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(paths)
 }
 
-fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
+fn read_list<T: DeserializeOwned>(path: &Path, what: &str) -> Result<Vec<T>, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let rows: Vec<Row> = serde_json::from_str(&without_nan(&text)).map_err(|error| {
-        Error::io(
-            path,
-            format!("expected a list of results with metrics, env_grid_search and algorithm: {error}"),
-        )
-    })?;
+    let list = serde_json::from_str(&without_nan(&text));
+    list.map_err(|error| Error::io(path, format!("expected a list of {what}: {error}")))
+}
+
+fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
+    let rows: Vec<Row> = read_list(path, "results with metrics, env_grid_search and algorithm")?;
     match rows.iter().position(|row| row.algorithm != algorithm) {
         None => Ok(rows),
         Some(index) => {
@@ -225,9 +264,7 @@ fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
     }
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let episodes: Vec<Episode> = serde_json::from_str(&without_nan(&text))
-        .map_err(|error| Error::io(path, format!("expected a list of episodes: {error}")))?;
+    let episodes: Vec<Episode> = read_list(path, "episodes")?;
     if episodes.len() != rows.len() {
         let reason = format!("`{}` episodes, expected {}, one for each row", episodes.len(), rows.len());
         return Err(Error::io(path, reason));

@@ -153,10 +153,16 @@ pub fn run_one(
     Ok(Summary { num_played: num_played.into_inner(), num_failed: num_failed.into_inner(), is_whole })
 }
 
-fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Failed> {
+fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Box<Failed>> {
     let failed = |error: Error, config| {
         let env_grid_search = environments.changes(index).unwrap_or_default();
-        Failed { index, env_grid_search, config, error: error.to_string(), traceback: String::new() }
+        Box::new(Failed {
+            index,
+            env_grid_search,
+            config,
+            error: error.to_string(),
+            traceback: String::new(),
+        })
     };
     let environment = environments.at(index).map_err(|error| failed(error, serde_json::Value::Null))?;
     play(&environment.config, built_in).map_err(|error| failed(error, environment.config.to_value()))

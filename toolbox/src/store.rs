@@ -148,8 +148,8 @@ fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
 
 /// Removes what runs were writing when they were killed; nobody else writes here now.
 fn remove_unfinished(folder: &Path) -> Result<(), Error> {
-    let unfinished = entries(folder)?.into_iter().filter(|path| name_of(path).starts_with(UNFINISHED));
-    unfinished.map(|path| remove(&path)).collect()
+    let mut unfinished = entries(folder)?.into_iter().filter(|path| name_of(path).starts_with(UNFINISHED));
+    unfinished.try_for_each(|path| remove(&path))
 }
 
 fn check_empty(folder: &Path) -> Result<(), Error> {

@@ -124,6 +124,11 @@ impl Suite {
         Ok(self)
     }
 
+    /// The algorithm of a name among the results.
+    pub fn algorithm(&self, key: &str) -> Option<&Algorithm> {
+        self.algorithms.iter().find(|algorithm| algorithm.key == key)
+    }
+
     /// Whether its environments are others than POGEMA's.
     pub fn is_foreign(&self) -> bool {
         self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))

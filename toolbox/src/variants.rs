@@ -80,12 +80,8 @@ impl Variants {
             let first_stride = stride;
             values.iter().enumerate().map(move |(at, (_, line))| (at * first_stride, *line))
         });
-        let is_plain = self.parameters.is_empty();
-        is_plain.then_some((0, self.line)).into_iter().chain(values).take(if self.is_empty() {
-            0
-        } else {
-            usize::MAX
-        })
+        let (is_plain, is_empty) = (self.parameters.is_empty(), self.is_empty());
+        is_plain.then_some((0, self.line)).into_iter().chain(values).filter(move |_| !is_empty)
     }
 
     /// The line of an outermost field that is not varied.

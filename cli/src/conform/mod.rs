@@ -9,7 +9,6 @@ mod outputs;
 mod port_table;
 mod ports;
 mod summary;
-mod template;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -83,15 +82,7 @@ impl Conform {
             let python = find_oracle_python(&self.oracle_folder)?;
             report.check_cases_with_oracle(&cases::folder(), &python)?;
             let bar = self.bar("POGEMA 1.4.0");
-            let tick = || bar.inc(1);
-            report.check_oracle(
-                &[Engine::REFERENCE, FAST],
-                &python,
-                self.cases,
-                self.seed,
-                &self.keep,
-                &tick,
-            )?;
+            report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
             bar.finish_and_clear();
         }
         if let Some(path) = &self.json {

@@ -11,7 +11,7 @@ use pogema_maps::formats::{
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
-use super::{Sources, write_out};
+use super::{Sources, not_one, write_out};
 use crate::output::check_writable;
 use crate::words::word;
 
@@ -87,7 +87,9 @@ impl Export {
     pub fn run(&self) -> Result<(), Error> {
         let mut maps = self.sources.meant_by(&self.map)?;
         if let Some(path) = &self.scenario {
-            let [map] = maps.as_mut_slice() else { return Err(self.one_map(maps.len(), "a scenario is of")) };
+            let [map] = maps.as_mut_slice() else {
+                return Err(not_one(&self.map, maps.len(), "a scenario is of"));
+            };
             let scenario = read_scenario(path, &map.text.map)?;
             let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
             let scenario = scenario.truncated(num_agents)?;
@@ -107,27 +109,18 @@ impl Export {
     }
 
     fn bytes(&self, maps: &[NamedMap]) -> Result<Vec<u8>, Error> {
-        match self.to {
-            Format::Set => return write_set(maps).map(String::into_bytes),
-            Format::Zip => {
+        let written = match (self.to, maps) {
+            (Format::Set, _) => write_set(maps)?,
+            (Format::Zip, _) => {
                 return write_archive(maps.iter().map(|map| (map.name.as_str(), &map.text.map)));
             }
-            Format::Text | Format::Map | Format::Scen | Format::Config => {}
-        }
-        let [NamedMap { name, text }] = maps else {
-            return Err(self.one_map(maps.len(), "this format holds"));
-        };
-        let written = match self.to {
-            Format::Text => text.to_text()? + "\n",
-            Format::Map => write_movingai(&text.map),
-            Format::Scen => write_scen(&tasks(name, text)?)?,
-            _ => config(text, None),
+            (Format::Text, [map]) => map.text.to_text()? + "\n",
+            (Format::Map, [map]) => write_movingai(&map.text.map),
+            (Format::Scen, [map]) => write_scen(&tasks(&map.name, &map.text)?)?,
+            (Format::Config, [map]) => config(&map.text, None),
+            _ => return Err(not_one(&self.map, maps.len(), "this format holds")),
         };
         Ok(written.into_bytes())
-    }
-
-    fn one_map(&self, found: usize, what: &str) -> Error {
-        Error::request(format!("`{}` means {found} maps, {what} one", self.map))
     }
 }
 

@@ -39,7 +39,7 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         return Vec::new();
     };
     let best = best_of(results, figure, is_less_better);
-    let mut of_algorithms: IndexMap<&str, Vec<Judged<'_>>> = IndexMap::new();
+    let mut of_algorithms: IndexMap<&str, Vec<Judged>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
         let episodes = of_algorithms.entry(name).or_default();
@@ -50,31 +50,17 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         let solved = row.metric(SOLVED);
         let why = why(figure, value, solved, value / least, (whose != name && times > 1.0).then_some(whose));
         let worth = if is_less_better { value } else { -value };
-        episodes.push(Judged {
-            at,
-            episode: episodes.len(),
-            bad: [-solved.unwrap_or(1.0), times, worth],
-            why,
-            name,
-        });
+        let bad = [-solved.unwrap_or(1.0), times, worth];
+        let pick = Pick { algorithm: name.into(), episode: episodes.len(), row: at, is_worst: true, why };
+        episodes.push(Judged { pick, bad });
     }
     of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
-struct Judged<'a> {
-    at: usize,
-    episode: usize,
+struct Judged {
+    pick: Pick,
     /// The larger the worse, the first first.
     bad: [f64; 3],
-    why: String,
-    name: &'a str,
-}
-
-impl Judged<'_> {
-    fn pick(&self, is_worst: bool) -> Pick {
-        let (algorithm, why) = (self.name.to_owned(), self.why.clone());
-        Pick { algorithm, episode: self.episode, row: self.at, is_worst, why }
-    }
 }
 
 /// The best figure in each environment, and whose it is.
@@ -105,15 +91,16 @@ fn told(settings: &Pairs) -> String {
     parts.join("\n")
 }
 
-fn ends(mut episodes: Vec<Judged<'_>>, number: usize) -> Vec<Pick> {
-    let by_worth = |one: &Judged<'_>, other: &Judged<'_>| {
+fn ends(mut episodes: Vec<Judged>, number: usize) -> Vec<Pick> {
+    let by_worth = |one: &Judged, other: &Judged| {
         let pairs = one.bad.iter().zip(&other.bad);
         let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
-        differs.unwrap_or_else(|| one.episode.cmp(&other.episode))
+        differs.unwrap_or_else(|| one.pick.episode.cmp(&other.pick.episode))
     };
     episodes.sort_by(by_worth);
-    let worst = episodes.iter().take(number).map(|episode| episode.pick(true));
-    let best = episodes.iter().rev().take(number).map(|episode| episode.pick(false));
+    let worst = episodes.iter().take(number).map(|judged| judged.pick.clone());
+    let best =
+        episodes.iter().rev().take(number).map(|judged| Pick { is_worst: false, ..judged.pick.clone() });
     worst.chain(best).collect()
 }
 

@@ -70,20 +70,17 @@ impl BoxView {
         let is_log = self.style.log_y && all.iter().all(|&value| value > 0.0);
         let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
         let colours = (0..groups.len()).rev().map(|number| self.style.colour(number));
-        let outliers: Vec<(f64, f64)> = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(number, (_, values))| {
-                outliers(values).into_iter().map(move |x| (x, number as f64 + 1.0))
-            })
-            .collect();
+        let mut dots: Vec<(f64, f64)> = Vec::new();
+        for (number, (_, values)) in groups.iter().enumerate() {
+            dots.extend(outliers(values).into_iter().map(|x| (x, number as f64 + 1.0)));
+        }
         let mut boxes = BoxPlot::new().with_horizontal(true).with_width(0.6).with_group_colors(colours);
         for (name, values) in groups {
             boxes = boxes.with_group(name, values);
         }
         let mut plots = vec![Plot::Box(boxes)];
-        if !outliers.is_empty() {
-            let dots = ScatterPlot::new().with_data(outliers).with_color("#555555").with_size(1.0);
+        if !dots.is_empty() {
+            let dots = ScatterPlot::new().with_data(dots).with_color("#555555").with_size(1.0);
             plots.push(Plot::Scatter(dots.with_marker_opacity(0.5)));
         }
         let x = Axis::of_numbers(&self.common.title(&self.y), &all, is_log, self.style.ticks.as_deref());

@@ -51,21 +51,14 @@ impl CactusView {
             times.sort_by(f64::total_cmp);
             times
         };
-        let lines: Vec<(String, Vec<f64>)> = results
-            .algorithms()
-            .into_iter()
-            .map(|algorithm| (algorithm.clone(), times(&algorithm)))
-            .collect();
+        let all = results.algorithms().into_iter();
+        let lines: Vec<_> = all.map(|algorithm| (algorithm.clone(), times(&algorithm))).collect();
         if lines.iter().all(|(_, times)| times.is_empty()) {
             return Err(Error::request(format!("view `{name}`: no row is solved and has a `{}`", self.x)));
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
-        notes.extend(
-            lines
-                .iter()
-                .filter(|(_, times)| times.is_empty())
-                .map(|(name, _)| format!("`{name}` solved nothing")),
-        );
+        let idle = lines.iter().filter(|(_, times)| times.is_empty());
+        notes.extend(idle.map(|(name, _)| format!("`{name}` solved nothing")));
         Ok(Shown { pictures: vec![self.draw(&lines)], notes, ..Shown::default() })
     }
 

@@ -80,20 +80,14 @@ impl PlotView {
         let places = Places::of(&results.rows, &self.x);
         let mut contents = self.contents(results);
         for content in &mut contents {
-            content.series = names
-                .iter()
-                .enumerate()
-                .filter_map(|(number, value)| {
-                    let rows: Vec<&Row> = content
-                        .rows
-                        .iter()
-                        .copied()
-                        .filter(|row| at(row, &self.by).as_ref() == Some(value))
-                        .collect();
-                    let points = means(&rows, &self.x, &places, &self.y, self.spread);
-                    (!points.is_empty()).then_some(Series { number, points })
-                })
-                .collect();
+            for (number, value) in names.iter().enumerate() {
+                let mut rows = content.rows.clone();
+                rows.retain(|row| at(row, &self.by).as_ref() == Some(value));
+                let points = means(&rows, &self.x, &places, &self.y, self.spread);
+                if !points.is_empty() {
+                    content.series.push(Series { number, points });
+                }
+            }
         }
         if contents.iter().all(|content| content.series.is_empty()) {
             let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);

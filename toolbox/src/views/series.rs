@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::legend::Entry;
 use super::style::Style;
 use crate::bootstrap::{Estimate, Spread};
-use crate::frame::{compare, group_by, values};
+use crate::frame::{compare, values};
 use crate::results::{Row, figure};
 
 /// Dashes of lines: a solid one first.
@@ -95,21 +95,12 @@ pub(super) fn means(
     y: &str,
     spread: Spread,
 ) -> Vec<(f64, Estimate)> {
-    let groups = group_by(rows.iter().copied(), &[x.to_owned()]);
-    // A column that is a metric is no key: its rows are all in one group.
-    let is_metric = rows.iter().all(|row| row.key(x).is_none());
     let mut points: Vec<(f64, Vec<&Row>)> = Vec::new();
-    if is_metric {
-        for row in rows {
-            let Some(place) = at(row, x).and_then(|value| places.place(&value)) else { continue };
-            match points.iter_mut().find(|(known, _)| *known == place) {
-                Some((_, rows)) => rows.push(row),
-                None => points.push((place, vec![row])),
-            }
-        }
-    } else {
-        for group in groups {
-            points.extend(places.place(&group.keys[0]).map(|place| (place, group.rows)));
+    for row in rows {
+        let Some(place) = at(row, x).and_then(|value| places.place(&value)) else { continue };
+        match points.iter_mut().find(|(known, _)| *known == place) {
+            Some((_, rows)) => rows.push(row),
+            None => points.push((place, vec![row])),
         }
     }
     points.sort_by(|(one, _), (other, _)| one.total_cmp(other));
