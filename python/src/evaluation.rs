@@ -213,7 +213,9 @@ impl Evaluation {
     }
 
     fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
-        let Some((algorithm, built_in)) = self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it)?))) else {
+        let Some((algorithm, built_in)) =
+            self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it)?)))
+        else {
             return Ok(None);
         };
         let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
