@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar};
 use pogema_core::Error;
 use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
@@ -15,7 +15,7 @@ use pogema_toolbox::{
 };
 
 use crate::maps::Sources;
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, progress_bar, say};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
@@ -46,11 +46,10 @@ pub struct Evaluate {
 
 impl Evaluate {
     pub fn run(&self) -> Result<(), Error> {
-        let suite = Suite::read(&self.suite)?;
-        let suite = match &self.algorithms {
-            Some(path) => suite.with_algorithms(path)?,
-            None => suite,
-        };
+        let mut suite = Suite::read(&self.suite)?;
+        if let Some(path) = &self.algorithms {
+            suite = suite.with_algorithms(path)?;
+        }
         built_in(&suite)?;
         let environments = environments(&suite, &self.sources)?;
         let named = self.html.as_ref().and_then(|named| named.first());
@@ -110,9 +109,8 @@ fn write_report(
 fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
     let Summary { num_played, num_failed, is_whole } = summary;
     if *num_failed > 0 {
-        let files: Vec<String> =
-            suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key)).collect();
-        let files: Vec<&String> = files.iter().filter(|name| folder.join(name).exists()).collect();
+        let files = suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key));
+        let files: Vec<String> = files.filter(|name| folder.join(name).exists()).collect();
         let reason =
             format!("{num_failed} episodes could not be played; {files:?} say why, `--resume` tries again");
         return Err(Error::io(folder, reason));
@@ -154,9 +152,8 @@ impl Bar {
 }
 
 fn begin(algorithm: &str, total: usize, done: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
-    let bar = ProgressBar::new(total as u64).with_message(algorithm.to_owned());
-    let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
+    let bar = progress_bar("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left", total as u64);
+    bar.set_message(algorithm.to_owned());
     bar.inc(done as u64);
     bar.reset_eta();
     bar

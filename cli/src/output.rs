@@ -3,8 +3,11 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table, TableStyle, presets};
+use indicatif::{ProgressBar, ProgressStyle};
 use pogema_core::{Error, Trace};
+use pogema_toolbox::short;
+use serde::Serialize;
 
 /// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
 pub fn say(text: &str) -> Result<(), Error> {
@@ -42,6 +45,15 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
 }
 
+/// Writes a value as JSON.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
+    let text = serde_json::to_vec_pretty(value).map_err(|error| Error::io(path, error))?;
+    pogema_conformance::files::write(path, &text)
+}
+
 /// Writes what happened in an episode, compressed if the file's name ends in `.zst`.
 ///
 /// # Errors
@@ -52,6 +64,21 @@ pub fn write_trace(path: &Path, trace: &Trace) -> Result<(), Error> {
     pogema_conformance::files::write(path, &text)
 }
 
+/// A progress bar in a layout of indicatif.
+pub fn progress_bar(layout: &str, total: u64) -> ProgressBar {
+    let bar = ProgressBar::new(total);
+    if let Ok(style) = ProgressStyle::with_template(layout) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Metrics in one line.
+pub fn in_a_line<'a>(metrics: impl IntoIterator<Item = (&'a str, f64)>) -> String {
+    let shown = metrics.into_iter().map(|(name, value)| format!("{name}={}", short(value)));
+    shown.collect::<Vec<_>>().join("  ")
+}
+
 /// Names the flag whose value an error is about.
 pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     move |error| match error {
@@ -60,10 +87,19 @@ pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     }
 }
 
-/// A table that is Markdown too, its numbers to the right of a first column of names.
-pub fn markdown_table(head: &[&str]) -> Table {
+/// A table that is Markdown too, its numbers to the right of a first column of names; ` | ` separates the titles.
+pub fn markdown_table(head: &str) -> Table {
+    table(presets::ASCII_MARKDOWN, &head.split(" | ").collect::<Vec<_>>())
+}
+
+/// A table with lines between its columns, its numbers to the right of a first column of names.
+pub fn lined_table(head: &[&str]) -> Table {
+    table(presets::UTF8_FULL_CONDENSED, head)
+}
+
+fn table(style: TableStyle, head: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_header(head.to_vec());
+    table.load_style(style).set_header(head.to_vec());
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }

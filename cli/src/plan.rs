@@ -1,9 +1,9 @@
 //! Plans for whole problems.
 
 mod make;
-mod thinking;
+mod planner_args;
 mod validate;
 
 pub use make::MakePlan;
-pub use thinking::Thinking;
+pub use planner_args::PlannerArgs;
 pub use validate::Validate;

@@ -1,33 +1,22 @@
 //! `pogema port`: an engine of ours as a port.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use pogema_conformance::Engine;
 use pogema_conformance::port::serve;
 use pogema_core::Error;
 
-use crate::conform::FAST;
+use crate::conform::ENGINES;
 
 #[derive(Args, Debug)]
 pub struct Port {
     /// Which engine answers
-    #[arg(long, value_enum, default_value_t = Which::Reference)]
-    engine: Which,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Which {
-    Reference,
-    Fast,
-    Literal,
+    #[arg(long, default_value = Engine::REFERENCE.name, value_parser = ENGINES.map(|engine| engine.name))]
+    engine: String,
 }
 
 impl Port {
     pub fn run(&self) -> Result<(), Error> {
-        let engine = match self.engine {
-            Which::Reference => Engine::REFERENCE,
-            Which::Fast => FAST,
-            Which::Literal => Engine::LITERAL,
-        };
-        serve(engine, std::io::stdin().lock(), std::io::stdout().lock())
+        let named = ENGINES.into_iter().find(|engine| engine.name == self.engine);
+        serve(named.unwrap_or(Engine::REFERENCE), std::io::stdin().lock(), std::io::stdout().lock())
     }
 }

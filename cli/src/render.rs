@@ -45,7 +45,7 @@ impl FromStr for Steps {
         let steps = ends.filter(|(first, last)| first <= last).map(|(first, last)| Self { first, last });
         steps.ok_or_else(|| {
             let found = shorten(text, Error::LONGEST_QUOTE);
-            Error::Request { reason: format!("found `{found}`, expected two steps such as `10..20`") }
+            Error::request(format!("found `{found}`, expected two steps such as `10..20`"))
         })
     }
 }

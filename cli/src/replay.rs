@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use pogema_core::Error;
-use pogema_toolbox::{Pairs, Results, Suite, differences, short};
+use pogema_toolbox::{Pairs, Results, Suite, differences};
 
 use crate::evaluate::environments;
 use crate::maps::Sources;
-use crate::output::{check_writable, say, write_trace};
+use crate::output::{check_writable, in_a_line, say, write_trace};
 use crate::render::Pictures;
 
 #[derive(Args, Debug)]
@@ -42,22 +42,17 @@ impl Replay {
             let title = format!("{}, episode {}", self.algorithm, self.episode);
             self.pictures.draw(&trace, &title)?;
         }
-        let figures = metrics.iter().filter_map(|(name, value)| Some((name, value.as_f64()?)));
-        let figures: Vec<String> = figures.map(|(name, value)| format!("{name}={}", short(value))).collect();
-        say(&format!("{} steps  {}", trace.steps.len(), figures.join("  ")))?;
+        let figures = metrics.iter().filter_map(|(name, value)| Some((name.as_str(), value.as_f64()?)));
+        say(&format!("{} steps  {}", trace.steps.len(), in_a_line(figures)))?;
         self.compare(&metrics);
         Ok(())
     }
 
     /// Says in what the episode differs from what is in the results.
     fn compare(&self, metrics: &Pairs) {
-        let results = match Results::read(std::slice::from_ref(&self.folder)) {
-            Ok(results) => results,
-            Err(error) => {
-                eprintln!("note: nothing to compare it with: {error}");
-                return;
-            }
-        };
+        let results = Results::read(std::slice::from_ref(&self.folder));
+        let note = |error| eprintln!("note: nothing to compare it with: {error}");
+        let Ok(results) = results.map_err(note) else { return };
         let row = results.rows.iter().filter(|row| row.algorithm == self.algorithm).nth(self.episode);
         let Some(row) = row else {
             eprintln!("note: `{}` is not finished, so there is nothing to compare it with", self.algorithm);

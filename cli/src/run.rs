@@ -10,11 +10,10 @@ use pogema_core::{Episode, Error, Trace};
 use pogema_maps::GridConfig;
 use pogema_reference::Reference;
 use pogema_render::Ground;
-use pogema_toolbox::short;
 use serde_json::json;
 
-use crate::output::{check_writable, say, write_trace};
-use crate::plan::Thinking;
+use crate::output::{check_writable, in_a_line, say, write_trace};
+use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use policy::Policy;
 pub use settings::Settings;
@@ -30,7 +29,7 @@ pub struct Run {
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
     #[command(flatten)]
-    thinking: Thinking,
+    planner_args: PlannerArgs,
     /// Tell `--policy rhcr` also of the goals that are still to come
     #[arg(long)]
     future_goals: bool,
@@ -52,7 +51,7 @@ impl Run {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
-        let settings = self.thinking.settings(self.future_goals)?;
+        let settings = self.planner_args.policy_settings(self.future_goals)?;
         let generated = self.settings.generate(&config)?;
         for warning in &generated.warnings {
             eprintln!("warning: {warning}");
@@ -113,12 +112,6 @@ impl Run {
             });
             return say(&summary.to_string());
         }
-        let figures: Vec<String> = episode
-            .metrics()
-            .named()
-            .iter()
-            .map(|(name, value)| format!("{name}={}", short(*value)))
-            .collect();
-        say(&format!("{} steps  {}", episode.num_steps(), figures.join("  ")))
+        say(&format!("{} steps  {}", episode.num_steps(), in_a_line(episode.metrics().named())))
     }
 }

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use pogema_core::Error;
 use pogema_toolbox::six::Definition;
-use pogema_toolbox::views::{Format, Gallery, ImageFormat, Told, View};
+use pogema_toolbox::views::{Format, Gallery, ImageFormat, ShownView, View};
 use pogema_toolbox::{Node, Results};
 
 use crate::output::say;
+use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Views {
@@ -23,38 +24,17 @@ pub struct Views {
     #[arg(long = "view", value_name = "NAME")]
     names: Vec<String>,
     /// How tables are written, whatever the views say
-    #[arg(long, value_enum)]
-    format: Option<TableFormat>,
+    #[arg(long, value_parser = word::<Format>())]
+    format: Option<Format>,
     /// The format of plots, whatever the views say
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    plots: Option<PlotFormat>,
+    #[arg(long, value_parser = word::<ImageFormat>(), value_name = "FORMAT")]
+    plots: Option<ImageFormat>,
     /// Where plots are written; by default `views` in the first folder
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// The six metrics by this definition, in place of views; beside `--config` or `--view`, the definition for theirs
-    #[arg(long, value_enum, value_name = "DEFINITION")]
-    six: Option<SixDefinition>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum TableFormat {
-    Terminal,
-    Markdown,
-    Latex,
-    Csv,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PlotFormat {
-    Svg,
-    Pdf,
-    Png,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SixDefinition {
-    Published,
-    Paper,
+    #[arg(long, value_parser = word::<Definition>(), value_name = "DEFINITION")]
+    six: Option<Definition>,
 }
 
 impl Views {
@@ -68,7 +48,7 @@ impl Views {
         let mut status = ExitCode::SUCCESS;
         for (number, (name, view)) in gallery.views.iter().enumerate() {
             match gallery.show(name, view, &results) {
-                Ok(told) => tell(&told, if number == 0 { "" } else { "\n" })?,
+                Ok(shown) => tell(&shown, if number == 0 { "" } else { "\n" })?,
                 Err(error) => {
                     eprintln!("error: {error}");
                     status = ExitCode::from(2);
@@ -87,9 +67,9 @@ impl Views {
             Gallery::of(&self.folders, self.config.as_deref(), &self.names)?
         };
         Ok(Gallery {
-            format: self.format.map(Into::into),
-            kind: self.plots.map(Into::into),
-            definition: self.six.map(Into::into),
+            format: self.format,
+            kind: self.plots,
+            definition: self.six,
             folder: Some(self.out.clone().unwrap_or_else(|| self.folders[0].join("views"))),
             ..gallery
         })
@@ -97,45 +77,15 @@ impl Views {
 }
 
 /// Prints the tables of a view, and says what was written and what left out.
-fn tell(told: &Told, gap: &str) -> Result<(), Error> {
-    for table in &told.tables {
+fn tell(shown: &ShownView, gap: &str) -> Result<(), Error> {
+    for table in &shown.tables {
         say(&format!("{gap}{table}"))?;
     }
-    for path in &told.files {
+    for path in &shown.files {
         eprintln!("wrote {}", path.display());
     }
-    for note in &told.notes {
+    for note in &shown.notes {
         eprintln!("note: {note}");
     }
     Ok(())
-}
-
-impl From<TableFormat> for Format {
-    fn from(format: TableFormat) -> Self {
-        match format {
-            TableFormat::Terminal => Self::Terminal,
-            TableFormat::Markdown => Self::Markdown,
-            TableFormat::Latex => Self::Latex,
-            TableFormat::Csv => Self::Csv,
-        }
-    }
-}
-
-impl From<PlotFormat> for ImageFormat {
-    fn from(format: PlotFormat) -> Self {
-        match format {
-            PlotFormat::Svg => Self::Svg,
-            PlotFormat::Pdf => Self::Pdf,
-            PlotFormat::Png => Self::Png,
-        }
-    }
-}
-
-impl From<SixDefinition> for Definition {
-    fn from(definition: SixDefinition) -> Self {
-        match definition {
-            SixDefinition::Published => Self::Published,
-            SixDefinition::Paper => Self::Paper,
-        }
-    }
 }

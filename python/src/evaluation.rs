@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use pogema_core::Error;
 use pogema_core::files::write_whole;
+use pogema_core::{Error, Words};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
@@ -52,7 +52,7 @@ impl Evaluation {
                 None => Suite::read(&path)?,
             };
             let environments = environments(&suite, maps, &files)?;
-            Ok((suite, environments, read_begin(begin)?))
+            Ok((suite, environments, Begin::read("begin", begin)?))
         };
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
@@ -85,10 +85,10 @@ impl Evaluation {
     fn algorithms(&self) -> Vec<Listed> {
         let all = self.suite.algorithms.iter().map(|algorithm| {
             let parameters = algorithm.parameters.iter().map(|(key, node)| (key.clone(), node.value()));
-            let parameters = Pairs(parameters.collect());
+            let parameters: Pairs = parameters.collect();
             let (key, name, backend) = (&algorithm.key, &algorithm.name, &algorithm.backend);
             let parameters = serde_json::to_string(&parameters).unwrap_or_default();
-            (key.clone(), name.clone(), parameters, algorithm.num_processes, backend.clone())
+            (key.clone(), name.clone(), parameters, algorithm.num_processes, backend.word().to_owned())
         });
         all.collect()
     }
@@ -213,8 +213,9 @@ impl Evaluation {
     }
 
     fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
-        let algorithm = self.suite.algorithms.iter().find(|algorithm| algorithm.key == key);
-        let Some((algorithm, built_in)) = algorithm.and_then(|it| Some((it, BuiltIn::of(it)?))) else {
+        let Some((algorithm, built_in)) =
+            self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it)?)))
+        else {
             return Ok(None);
         };
         let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
@@ -257,15 +258,6 @@ fn library(suite: &Suite, maps: Vec<(String, String)>, files: &[PathBuf]) -> Res
     };
     library.register(maps.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
     Ok(library)
-}
-
-fn read_begin(name: &str) -> Result<Begin, Error> {
-    match name {
-        "new" => Ok(Begin::New),
-        "resume" => Ok(Begin::Resume),
-        "anew" => Ok(Begin::Anew),
-        _ => Err(Error::argument("begin", name, "`new`, `resume` or `anew`")),
-    }
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {

@@ -70,9 +70,9 @@ def test_what_is_wrong_is_told(played, tmp_path):
     folder, _ = played
     for wrong, told in [
         ({"names": ["Mean"]}, "no view `Mean`; the nearest one is `Means`"),
-        ({"table_format": "word"}, "`table_format` is `word`, expected `terminal`"),
-        ({"plot_format": "gif"}, "`plot_format` is `gif`, expected `svg`"),
-        ({"six": "mine"}, "`six` is `mine`, expected `published`"),
+        ({"table_format": "word"}, "`table_format` is `word`, expected one of `terminal`"),
+        ({"plot_format": "gif"}, "`plot_format` is `gif`, expected one of `svg`"),
+        ({"six": "mine"}, "`six` is `mine`, expected one of `published`"),
         ({"config": tmp_path / "no.yaml"}, "no.yaml"),
     ]:
         with pytest.raises((ValueError, OSError), match=re.escape(told)):

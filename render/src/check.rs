@@ -15,7 +15,7 @@ pub fn check(trace: &Trace) -> Result<(), Error> {
         let is_off = |cell: &&Cell| !map.contains(**cell);
         if let Some(cell) = state.cells.iter().chain(&state.goals).find(is_off) {
             let expected = format!("a cell of the map of {} rows and {} columns", map.height(), map.width());
-            return Err(refused(&format!("a cell of frame {frame}"), cell, &expected));
+            return Err(Error::out_of_range(&format!("a cell of frame {frame}"), cell, expected));
         }
     }
     Ok(())
@@ -25,12 +25,7 @@ pub fn check(trace: &Trace) -> Result<(), Error> {
 pub(crate) fn check_agent(agent: usize, num_agents: usize) -> Result<(), Error> {
     match num_agents.checked_sub(1) {
         Some(last) if agent <= last => Ok(()),
-        Some(last) => Err(refused("agent", agent, &format!("0 to {last}"))),
-        None => Err(refused("agent", agent, "none, the episode has no agents")),
+        Some(last) => Err(Error::out_of_range("agent", agent, format!("0 to {last}"))),
+        None => Err(Error::out_of_range("agent", agent, "none, the episode has no agents")),
     }
-}
-
-/// An error about one requested value.
-pub(crate) fn refused(what: &str, value: impl std::fmt::Display, expected: &str) -> Error {
-    Error::out_of_range(what, value, expected)
 }

@@ -1,9 +1,8 @@
 //! Animated GIFs.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-use gif::{DisposalMethod, Encoder, Frame, Repeat};
+use gif::{Encoder, Frame, Repeat};
 use pogema_core::{Error, Trace};
 use tiny_skia::Pixmap;
 
@@ -46,7 +45,7 @@ pub fn encode(
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let delay = 100.0 / motion.rate(style.step_time);
     let mut last = palette.numbers(&first);
-    let mut waiting = whole(&last, width, height);
+    let mut waiting = Frame::from_indexed_pixels(width, height, last.clone(), None);
     for index in 1..=motion.num_frames() {
         waiting.delay = waiting.delay.saturating_add(delay_at(index, delay));
         progress(index, motion.num_frames());
@@ -66,16 +65,6 @@ pub fn encode(
 fn delay_at(index: usize, delay: f64) -> u16 {
     let until = |index: usize| (index as f64 * delay).round();
     ((until(index) - until(index - 1)) as u16).max(SHORTEST)
-}
-
-fn whole(numbers: &[u8], width: u16, height: u16) -> Frame<'static> {
-    Frame {
-        width,
-        height,
-        buffer: Cow::Owned(numbers.to_vec()),
-        dispose: DisposalMethod::Keep,
-        ..Frame::default()
-    }
 }
 
 /// The smallest part of a picture that holds all that changed; empty if nothing did.
@@ -99,16 +88,9 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
                 .map(|(from, to)| if from == to { UNCHANGED } else { *to }),
         );
     }
-    Frame {
-        top: top as u16,
-        left: left as u16,
-        width: (right - left + 1) as u16,
-        height: (bottom - top + 1) as u16,
-        buffer: Cow::Owned(buffer),
-        transparent: Some(UNCHANGED),
-        dispose: DisposalMethod::Keep,
-        ..Frame::default()
-    }
+    let (width, height) = ((right - left + 1) as u16, (bottom - top + 1) as u16);
+    let part = Frame::from_indexed_pixels(width, height, buffer, Some(UNCHANGED));
+    Frame { top: top as u16, left: left as u16, ..part }
 }
 
 /// The colours of a scene, each on its way from white in even steps.

@@ -3,7 +3,6 @@
 use pogema_core::Error;
 use tiny_skia::Pixmap;
 
-use crate::check::refused;
 use crate::raster::Painter;
 use crate::scene::Scene;
 
@@ -29,7 +28,7 @@ impl<'a> Motion<'a> {
         let num_frames = (scene.states.len() + 1).saturating_mul(per_step);
         if num_frames > MOST_FRAMES {
             let expected = format!("at most {MOST_FRAMES}: draw fewer steps or more steps a second");
-            return Err(refused("number of frames", num_frames, &expected));
+            return Err(Error::out_of_range("number of frames", num_frames, expected));
         }
         Ok(Self { painter: Painter::new(scene, width, MOST_PIXELS, multiple)?, per_step, num_frames })
     }

@@ -3,7 +3,6 @@
 use pogema_core::{Error, Trace};
 use tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
-use crate::check::refused;
 use crate::ground::Ground;
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
@@ -56,10 +55,10 @@ impl<'a> Painter<'a> {
         let (width, height) = (whole(width.into()), whole(f64::from(rows) * scale));
         if width == 0 || width.saturating_mul(height) > most {
             let value = format!("{width} x {height} pixels");
-            return Err(refused(
+            return Err(Error::out_of_range(
                 "size of the picture",
                 value,
-                &format!("1 to {most} pixels in all: choose another width"),
+                format!("1 to {most} pixels in all: choose another width"),
             ));
         }
         let failed = || Error::external("picture", format!("no memory for {width} x {height} pixels"));

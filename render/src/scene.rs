@@ -1,8 +1,10 @@
 //! What is to be seen of an episode at each frame, whatever it is drawn with.
 
+use std::ops::Range;
+
 use pogema_core::{Cell, Config, Error, OnGoal, Snapshot, Trace};
 
-use crate::check::{check, check_agent, refused};
+use crate::check::{check, check_agent};
 use crate::ground::Ground;
 use crate::style::{Color, Style};
 
@@ -61,10 +63,10 @@ impl<'a> Scene<'a> {
     pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {
         check(trace)?;
         if style.colors.agents.is_empty() {
-            return Err(refused("number of agents' colours", 0, "at least 1"));
+            return Err(Error::out_of_range("number of agents' colours", 0, "at least 1"));
         }
         if !(style.step_time > 0.0 && style.step_time.is_finite()) {
-            return Err(refused("time of a step", style.step_time, "more than 0 seconds"));
+            return Err(Error::out_of_range("time of a step", style.step_time, "more than 0 seconds"));
         }
         let mut states: Vec<&Snapshot> = trace.states().collect();
         if let Some(agent) = style.egocentric {
@@ -80,10 +82,15 @@ impl<'a> Scene<'a> {
         Ok(Self { trace, style, states: vec![state], before })
     }
 
+    /// The ground, and the rows and columns of it that are drawn.
+    fn ground(&self) -> (Ground<'a>, Range<i32>, Range<i32>) {
+        let ground = Ground::of(self.trace);
+        (ground, ground.rows(self.style.border), ground.cols(self.style.border))
+    }
+
     /// The left, upper edge of the picture and its width and height. Units: cells, from the centre of (0, 0).
     pub fn view_box(&self) -> [i32; 4] {
-        let ground = Ground::of(self.trace);
-        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let (_, rows, cols) = self.ground();
         let margin = size::MARGIN as i32;
         [
             cols.start - margin,
@@ -96,8 +103,7 @@ impl<'a> Scene<'a> {
     /// All obstacles, grouped by when they are first seen; those never seen come last. Without a view all are
     /// seen at once.
     pub fn obstacles(&self) -> Vec<Obstacles> {
-        let ground = Ground::of(self.trace);
-        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let (ground, rows, cols) = self.ground();
         let num_cols = cols.len();
         let first_seen = self.first_seen();
         let mut groups = vec![Vec::new(); self.states.len() + 1];
@@ -117,8 +123,7 @@ impl<'a> Scene<'a> {
     /// The frame at which each cell is first seen, row by row; `usize::MAX` for never.
     fn first_seen(&self) -> Option<Vec<usize>> {
         let agent = self.style.egocentric?;
-        let ground = Ground::of(self.trace);
-        let (rows, cols) = (ground.rows(self.style.border), ground.cols(self.style.border));
+        let (ground, rows, cols) = self.ground();
         let mut first = vec![usize::MAX; rows.len() * cols.len()];
         let past = self.before.iter().map(|state| (0, state));
         let mut last = None;
@@ -128,7 +133,7 @@ impl<'a> Scene<'a> {
                 continue;
             }
             let radius = ground.radius as i32;
-            let around = |at: u16, range: &std::ops::Range<i32>| {
+            let around = |at: u16, range: &Range<i32>| {
                 (i32::from(at) - radius).max(range.start)..(i32::from(at) + radius + 1).min(range.end)
             };
             for row in around(cell.row, &rows) {

@@ -14,6 +14,12 @@ pub struct Color(pub [u8; 3]);
 impl Color {
     /// What raster pictures are drawn on.
     pub const WHITE: Self = Self([255; 3]);
+
+    /// The colour of a number such as `0xc1433c`.
+    fn of_rgb(number: u32) -> Self {
+        let [_, rgb @ ..] = number.to_be_bytes();
+        Self(rgb)
+    }
 }
 
 impl fmt::Display for Color {
@@ -29,12 +35,10 @@ impl FromStr for Color {
     fn from_str(text: &str) -> Result<Self, Error> {
         let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii());
         let number = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok());
-        let [_, rgb @ ..] =
-            number.filter(|_| !text.contains('+')).map(u32::to_be_bytes).ok_or_else(|| {
-                let found = shorten(text, Error::LONGEST_QUOTE);
-                Error::Request { reason: format!("colour is `{found}`, expected one such as `#c1433c`") }
-            })?;
-        Ok(Self(rgb))
+        number.filter(|_| !text.contains('+')).map(Self::of_rgb).ok_or_else(|| {
+            let found = shorten(text, Error::LONGEST_QUOTE);
+            Error::request(format!("colour is `{found}`, expected one such as `#c1433c`"))
+        })
     }
 }
 
@@ -55,20 +59,15 @@ pub struct Colors {
 ///
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
 impl Default for Colors {
+    #[allow(clippy::unreadable_literal, reason = "a colour is read as three pairs of digits")]
     fn default() -> Self {
         Self {
-            obstacle: Color([0x84, 0xa1, 0xae]),
-            agents: vec![
-                Color([0xc1, 0x43, 0x3c]),
-                Color([0x2e, 0x6f, 0x9e]),
-                Color([0x6e, 0x81, 0xaf]),
-                Color([0x00, 0xb9, 0xc8]),
-                Color([0x72, 0xd5, 0xc8]),
-                Color([0x0e, 0xa0, 0x8c]),
-                Color([0x8f, 0x7b, 0x66]),
-            ],
-            own: Color([0xc1, 0x43, 0x3c]),
-            others: Color([0x6e, 0x81, 0xaf]),
+            obstacle: Color::of_rgb(0x84a1ae),
+            agents: [0xc1433c, 0x2e6f9e, 0x6e81af, 0x00b9c8, 0x72d5c8, 0x0ea08c, 0x8f7b66]
+                .map(Color::of_rgb)
+                .to_vec(),
+            own: Color::of_rgb(0xc1433c),
+            others: Color::of_rgb(0x6e81af),
         }
     }
 }

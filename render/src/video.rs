@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use pogema_core::files::temporary_beside;
-use pogema_core::{Error, Trace, shorten};
+use pogema_core::{Error, Trace, Words, shorten, words};
 
 use crate::motion::Motion;
 use crate::scene::Scene;
@@ -19,13 +19,14 @@ const LONGEST_REASON: usize = 200;
 const MISSING: &str = "videos need the program `ffmpeg`, which is not on the PATH: install it, for example by \
                        `apt install ffmpeg` or `brew install ffmpeg`, or draw a GIF";
 
-/// What a video is packed in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// H.264 in MP4.
-    Mp4,
-    /// VP9 in `WebM`.
-    Webm,
+words! {
+    /// What a video is packed in, by the ending of its file.
+    pub enum Format {
+        /// H.264 in MP4.
+        Mp4 = "mp4",
+        /// VP9 in `WebM`.
+        Webm = "webm",
+    }
 }
 
 impl Format {
@@ -35,37 +36,15 @@ impl Format {
     /// [`Error::Io`] for any other ending than `.mp4` and `.webm`.
     pub fn of(path: &Path) -> Result<Self, Error> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        match ending.as_deref() {
-            Some("mp4") => Ok(Self::Mp4),
-            Some("webm") => Ok(Self::Webm),
-            _ => Err(Error::io(path, "the name of a video ends in `.mp4` or `.webm`")),
-        }
+        let format = ending.and_then(|ending| Self::of_word(&ending));
+        format.ok_or_else(|| Error::io(path, "the name of a video ends in `.mp4` or `.webm`"))
     }
 
-    fn suffix(self) -> &'static str {
+    /// How ffmpeg encodes it.
+    fn arguments(self) -> &'static str {
         match self {
-            Self::Mp4 => ".mp4",
-            Self::Webm => ".webm",
-        }
-    }
-
-    fn arguments(self) -> &'static [&'static str] {
-        match self {
-            Self::Mp4 => &["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"],
-            Self::Webm => &[
-                "-c:v",
-                "libvpx-vp9",
-                "-crf",
-                "28",
-                "-b:v",
-                "0",
-                "-cpu-used",
-                "4",
-                "-row-mt",
-                "1",
-                "-pix_fmt",
-                "yuv420p",
-            ],
+            Self::Mp4 => "-c:v libx264 -crf 18 -pix_fmt yuv420p -movflags +faststart",
+            Self::Webm => "-c:v libvpx-vp9 -crf 28 -b:v 0 -cpu-used 4 -row-mt 1 -pix_fmt yuv420p",
         }
     }
 }
@@ -90,7 +69,7 @@ pub fn write(
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 2)?;
     let failed = |error: std::io::Error| Error::io(path, error);
-    let unfinished = temporary_beside(path, format.suffix())?.into_temp_path();
+    let unfinished = temporary_beside(path, &format!(".{format}"))?.into_temp_path();
     let mut said = tempfile::tempfile().map_err(failed)?;
     let mut ffmpeg = start(&motion, style.step_time, format, &unfinished, said.try_clone().map_err(failed)?)?;
     let fed = feed(&mut ffmpeg, &motion, progress);
@@ -135,7 +114,7 @@ fn start(
     command.args(["-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
     command.args(["-video_size", &format!("{width}x{height}")]);
     command.args(["-framerate", &format!("{:.4}", motion.rate(step_time)), "-i", "-", "-an"]);
-    command.args(format.arguments()).arg(file);
+    command.args(format.arguments().split(' ')).arg(file);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(said);
     command.spawn().map_err(not_started)
 }

@@ -9,8 +9,9 @@ use pogema_maps::{GridConfig, Library, MapText};
 use serde_json::{Map as Object, Value};
 
 use crate::Pairs;
+use crate::frame::plain_text;
 use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
-use crate::variants::Variants;
+use crate::variants::{Variant, Variants};
 
 /// The environments of a suite, each made when it is asked for.
 #[derive(Clone, Debug)]
@@ -54,7 +55,7 @@ impl Environments {
             let tell = |error: Error| {
                 let of_field = error.field().and_then(|field| self.variants.line_of(field));
                 let reason = format!("line {}: {error}", of_field.unwrap_or(line));
-                suite.in_file(Error::Request { reason })
+                suite.in_file(Error::request(reason))
             };
             self.at(index).map(|_| ()).map_err(tell)
         })
@@ -65,9 +66,12 @@ impl Environments {
     /// # Errors
     /// If it is out of range.
     pub fn fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
-        let variant = self.variants.at(index);
+        self.variant(index).map(|variant| variant.fields)
+    }
+
+    fn variant(&self, index: usize) -> Result<Variant, Error> {
         let out_of_range = || Error::argument("episode", index, format!("below {}", self.len()));
-        variant.map(|variant| variant.fields).ok_or_else(out_of_range)
+        self.variants.at(index).ok_or_else(out_of_range)
     }
 
     /// All fields of an environment of a number below their count, with the name of the map that its seed chooses
@@ -78,12 +82,9 @@ impl Environments {
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let meant = fields
-            .get("map_name")
-            .and_then(Value::as_str)
-            .and_then(|name| self.library.choose(name, seed).ok());
-        if let Some(name) = meant.map(|(name, _)| Value::from(name)) {
-            fields.insert("map_name".into(), name);
+        let pattern = fields.get("map_name").and_then(Value::as_str);
+        if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.choose(pattern, seed)) {
+            fields.insert("map_name".into(), name.into());
         }
         Ok(fields)
     }
@@ -103,14 +104,11 @@ impl Environments {
     /// # Errors
     /// If it is out of range, or cannot be.
     pub fn at(&self, index: usize) -> Result<Environment, Error> {
-        let variant = self.variants.at(index);
-        let out_of_range = || Error::argument("episode", index, format!("below {}", self.len()));
-        let variant = variant.ok_or_else(out_of_range)?;
-        let mut fields = variant.fields;
+        let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
         if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
-            let name = fields.get("name").map_or_else(String::new, told);
+            let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
         }
         for own in OWN_FIELDS {
@@ -118,7 +116,7 @@ impl Environments {
         }
         let seed = fields.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| {
-            let given = fields.get("seed").map_or_else(|| "missing".into(), told);
+            let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
             Error::config("seed", given, "a number, or results could not be repeated")
         })?;
         let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
@@ -134,7 +132,7 @@ impl Environments {
             None => config,
         };
         let map_name = map.map(|(name, _)| name);
-        Ok(Environment { changes: Pairs(variant.changes), map_name, config })
+        Ok(Environment { changes, map_name, config })
     }
 
     /// What was varied for the environment of a number below their count.
@@ -142,8 +140,7 @@ impl Environments {
     /// # Errors
     /// If it is out of range.
     pub fn changes(&self, index: usize) -> Result<Pairs, Error> {
-        let changes = self.variants.changes_at(index).map(Pairs);
-        changes.ok_or_else(|| Error::argument("episode", index, format!("below {}", self.len())))
+        self.variant(index).map(|variant| variant.changes)
     }
 
     /// Numbers of environments with those first that make the most work; of two that make as much, the earlier one.
@@ -209,13 +206,8 @@ impl Environments {
             _ => {
                 let told: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
                 let number = missing.len();
-                Err(Error::Request { reason: format!("{number} maps are not known: {}", told.join(", ")) })
+                Err(Error::request(format!("{number} maps are not known: {}", told.join(", "))))
             }
         }
     }
-}
-
-/// A value as a file would have it.
-fn told(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

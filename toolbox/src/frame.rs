@@ -53,11 +53,12 @@ pub fn compare(one: &Value, other: &Value) -> Ordering {
 
 /// A value as it is shown: a text without quotes, nothing for what is missing.
 pub fn shown(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Null => String::new(),
-        value => value.to_string(),
-    }
+    if value.is_null() { String::new() } else { plain_text(value) }
+}
+
+/// A value in JSON, but a text without quotes.
+pub(crate) fn plain_text(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// The figures of a metric, without those of rows that have none.
@@ -67,22 +68,19 @@ pub fn values(rows: &[&Row], metric: &str) -> Vec<f64> {
 
 /// One line for each algorithm and metric about how many rows have no number there.
 pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) -> Vec<String> {
-    let groups = group_by(rows, &[ALGORITHM.to_owned()]);
-    let count = |group: &Group<'_>, metric: &str| {
-        group.rows.iter().filter(|row| row.metric(metric).is_none()).count()
-    };
-    let notes = groups.iter().flat_map(|group| {
-        metrics
-            .iter()
-            .map(move |metric| (group, metric, count(group, metric)))
-            .filter(|&(.., lacking)| lacking > 0)
-    });
+    let mut notes = Vec::new();
+    for Group { keys, rows } in group_by(rows, &[ALGORITHM.to_owned()]) {
+        for metric in metrics {
+            let (lacking, all) = (rows.len() - values(&rows, metric).len(), rows.len());
+            if lacking > 0 {
+                let algorithm = shown(&keys[0]);
+                notes.push(format!(
+                    "`{algorithm}` has no `{metric}` in {lacking} of {all} rows; means are over the others"
+                ));
+            }
+        }
+    }
     notes
-        .map(|(group, metric, lacking)| {
-            let (algorithm, all) = (shown(&group.keys[0]), group.rows.len());
-            format!("`{algorithm}` has no `{metric}` in {lacking} of {all} rows; means are over the others")
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -40,10 +40,10 @@ pub struct Run {
 impl Manifest {
     /// What a suite's results are known by, before anything was played.
     pub fn of(suite: &Suite) -> Self {
-        let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.told()));
+        let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.fingerprint()));
         Self {
             suite: std::path::absolute(&suite.path).unwrap_or_else(|_| suite.path.clone()),
-            environment: digest(&suite.environments.told()),
+            environment: digest(&suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
             runs: Vec::new(),
         }

@@ -9,7 +9,7 @@ use pogema_numpy::Generator;
 use pogema_planners::{NamedPolicy, Outcome};
 
 use crate::built_in::BuiltIn;
-use crate::progress::Proof;
+use crate::results::Proof;
 
 /// The result of an episode.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,26 +10,9 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::results::{Episode, Proof, Row};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
 use crate::{Environments, Pairs};
-
-/// What a planner proved about an episode.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Proof {
-    /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lower_bound: Option<u64>,
-    /// Why there is no plan.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unsolvable: Option<String>,
-}
-
-impl Proof {
-    fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-}
 
 /// An episode that is done.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,30 +33,6 @@ pub struct Done {
     /// What its planner proved.
     #[serde(default, skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
-}
-
-/// How an episode was played, which may differ where what came of it does not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Episode {
-    /// Its number.
-    pub episode: usize,
-    /// Its environment's seed.
-    pub seed: Value,
-    /// All fields of its environment.
-    pub config: Value,
-    /// What the policy took of it. Units: seconds.
-    pub seconds: Option<f64>,
-    /// The number of the run that played it.
-    pub run: usize,
-    /// The machine, if it is not that of the run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub machine: Option<String>,
-    /// The planner's lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lower_bound: Option<u64>,
-    /// The planner's proof that there is no plan, in words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unsolvable: Option<String>,
 }
 
 /// An episode that could not be played.
@@ -104,27 +63,19 @@ pub struct Progress {
     failed: Option<File>,
 }
 
-/// A row of pogema-toolbox's results.
-#[derive(Serialize)]
-struct Row<'a> {
-    metrics: &'a Pairs,
-    env_grid_search: Pairs,
-    algorithm: &'a str,
-}
-
 impl Progress {
     /// Takes up what is done of so many episodes of an algorithm; none if all are.
     ///
     /// # Errors
     /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
     pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
-        if store.path(&format!("{key}.{RESULTS}")).exists() {
+        if store.path(&format!("{key}{RESULTS}")).exists() {
             // A run may have broken off after it had written all.
-            remove(&store.path(&format!("{key}.{LINES}")))?;
+            remove(&store.path(&format!("{key}{LINES}")))?;
             return Ok(None);
         }
-        remove(&store.path(&format!("{key}.{FAILED}")))?;
-        let path = store.path(&format!("{key}.{LINES}"));
+        remove(&store.path(&format!("{key}{FAILED}")))?;
+        let path = store.path(&format!("{key}{LINES}"));
         let failed = |error: std::io::Error| Error::io(&path, error);
         let (lines, whole) = read(&path, num_episodes)?;
         let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
@@ -163,7 +114,7 @@ impl Progress {
     /// # Errors
     /// If it cannot be written.
     pub fn note(&mut self, failed: &Failed) -> Result<(), Error> {
-        let path = self.store.path(&format!("{}.{FAILED}", self.key));
+        let path = self.store.path(&format!("{}{FAILED}", self.key));
         let file = match &mut self.failed {
             Some(file) => file,
             none => none.insert(File::create(&path).map_err(|error| Error::io(&path, error))?),
@@ -182,8 +133,9 @@ impl Progress {
         let (lines, _) = read(&self.path, self.done.len())?;
         let (mut rows, mut episodes) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
         for line in sorted(lines) {
-            let env_grid_search = environments.changes(line.index)?;
-            rows.push(self.told(&Row { metrics: &line.metrics, env_grid_search, algorithm: &self.key })?);
+            let settings = environments.changes(line.index)?;
+            let algorithm = self.key.clone();
+            rows.push(self.told(&Row { metrics: line.metrics, settings, algorithm, ..Row::default() })?);
             let config = Value::Object(environments.named_fields(line.index)?);
             episodes.push(self.told(&Episode {
                 episode: line.index,
@@ -192,12 +144,11 @@ impl Progress {
                 seconds: Some(line.runtime),
                 run: line.run,
                 machine: line.machine,
-                lower_bound: line.proof.lower_bound,
-                unsolvable: line.proof.unsolvable,
+                proof: line.proof,
             })?);
         }
-        self.store.write(&format!("{}.{EPISODES}", self.key), list(&episodes).as_bytes())?;
-        self.store.write(&format!("{}.{RESULTS}", self.key), list(&rows).as_bytes())?;
+        self.store.write(&format!("{}{EPISODES}", self.key), list(&episodes).as_bytes())?;
+        self.store.write(&format!("{}{RESULTS}", self.key), list(&rows).as_bytes())?;
         remove(&self.path)?;
         Ok(true)
     }

@@ -8,9 +8,8 @@ use pogema_core::{Error, Trace};
 use crate::built_in::BuiltIn;
 use crate::environments::Environments;
 use crate::manifest::Manifest;
-use crate::pairs::Pairs;
 use crate::play::{play, record};
-use crate::results::{Row, figure};
+use crate::results::{Pairs, Row, figure};
 use crate::run::measured;
 use crate::store::{ALGORITHMS, SUITE};
 use crate::suite::{Algorithm, Suite};
@@ -49,8 +48,7 @@ impl Suite {
         key: &str,
         index: usize,
     ) -> Result<(Pairs, Trace), Error> {
-        let algorithm = self.algorithms.iter().find(|algorithm| algorithm.key == key);
-        let algorithm = algorithm.ok_or_else(|| {
+        let algorithm = self.algorithm(key).ok_or_else(|| {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
             Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
@@ -64,8 +62,7 @@ impl Suite {
     /// If it cannot be played.
     pub fn play_one(&self, environments: &Environments) -> Result<(Pairs, Duration), Error> {
         let algorithm = self.algorithms.first();
-        let algorithm =
-            algorithm.ok_or_else(|| Error::Request { reason: "the suite has no algorithm".into() })?;
+        let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
         let played = play(&environments.at(0)?.config, &built_in(algorithm)?)?;
         Ok((measured(&played), played.runtime))
     }
@@ -74,14 +71,13 @@ impl Suite {
 fn built_in(algorithm: &Algorithm) -> Result<BuiltIn, Error> {
     BuiltIn::of(algorithm).unwrap_or_else(|| {
         let key = &algorithm.key;
-        let reason = format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it");
-        Err(Error::Request { reason })
+        Err(Error::request(format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it")))
     })
 }
 
 /// In what figures an episode that was played again differs from its row, each told in a few words.
 pub fn differences(row: &Row, metrics: &Pairs) -> Vec<String> {
-    let told = |(name, then): (&str, &serde_json::Value)| {
+    let told = |(name, then): (&String, &serde_json::Value)| {
         let (then, now) = (figure(then)?, figure(metrics.get(name)?)?);
         (then.to_bits() != now.to_bits()).then(|| format!("{name} {now}, in the results {then}"))
     };

@@ -1,38 +1,80 @@
 //! What came of an evaluation: the rows of all algorithms, read from its folder.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use indexmap::{IndexMap, IndexSet};
 use pogema_core::Error;
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::manifest;
-use crate::pairs::Pairs;
-use crate::progress::{Episode, Proof};
+use crate::store::{EPISODES, FAILED, LINES, RESULTS, entries};
 
 /// The column of the algorithm's name.
 pub const ALGORITHM: &str = "algorithm";
 
+/// The share of instances that were solved: 1 or 0 in one row.
+pub(crate) const SOLVED: &str = "CSR";
+
 /// The metric that a file of episodes adds.
-const RUNTIME: &str = "runtime";
-
-/// What is added to an algorithm's name for its file of how each episode was played.
-const EPISODES: &str = ".episodes.json";
-
-/// What is added to an algorithm's name for its file of episodes that could not be played.
-const FAILED: &str = ".failed.jsonl";
+pub(crate) const RUNTIME: &str = "runtime";
 
 /// The field of a config that names its map.
 const MAP_NAME: &str = "map_name";
 
+/// A JSON object that keeps the order of its names, which the columns of tables follow.
+///
+/// If a name occurs twice, the last value counts, as in Python's reader.
+pub type Pairs = IndexMap<String, Value>;
+
 /// What is larger is no figure.
 const LARGEST: f64 = 1e100;
+
+/// What a planner proved about an episode.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Proof {
+    /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_bound: Option<u64>,
+    /// Why there is no plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unsolvable: Option<String>,
+}
+
+impl Proof {
+    pub(crate) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// How an episode was played, which may differ where what came of it does not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Episode {
+    /// Its number.
+    pub episode: usize,
+    /// Its environment's seed.
+    pub seed: Value,
+    /// All fields of its environment.
+    pub config: Value,
+    /// What the policy took of it. Units: seconds.
+    pub seconds: Option<f64>,
+    /// The number of the run that played it.
+    pub run: usize,
+    /// The machine, if it is not that of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<String>,
+    /// What its planner proved.
+    #[serde(flatten)]
+    pub proof: Proof,
+}
 
 /// One episode of one algorithm.
 ///
 /// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
-#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Figures by name; what is neither number nor truth value is left to others.
     pub metrics: Pairs,
@@ -56,6 +98,11 @@ impl Row {
     /// A metric, if it is a number, and not one so large that only a mistake makes it.
     pub fn metric(&self, name: &str) -> Option<f64> {
         figure(self.metrics.get(name)?)
+    }
+
+    /// Whether the instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
+    pub(crate) fn is_solved(&self) -> bool {
+        self.metric(SOLVED).is_none_or(|share| share > 0.0)
     }
 
     /// Returns a field of the environment, varied or not.
@@ -112,7 +159,7 @@ impl Results {
             let names: Vec<String> = folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
             let reason =
                 format!("no results in {}, expected <algorithm>.json files with rows", names.join(", "));
-            return Err(Error::Request { reason });
+            return Err(Error::request(reason));
         }
         Ok(results)
     }
@@ -124,9 +171,9 @@ impl Results {
             if let Some(algorithm) = name.strip_suffix(FAILED) {
                 self.notes
                     .push(format!("{}: episodes of `{algorithm}` could not be played", folder.display()));
-            } else if let Some(algorithm) = name.strip_suffix(".jsonl") {
+            } else if let Some(algorithm) = name.strip_suffix(LINES) {
                 self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
-            } else if let Some(algorithm) = name.strip_suffix(".json").filter(|_| !is_apart(&name)) {
+            } else if let Some(algorithm) = name.strip_suffix(RESULTS).filter(|_| !is_apart(&name)) {
                 let mut rows = read_rows(&path, algorithm)?;
                 join_episodes(&mut rows, &folder.join(format!("{algorithm}{EPISODES}")))?;
                 if rows.is_empty() {
@@ -140,13 +187,22 @@ impl Results {
 
     /// The algorithms, sorted by name.
     pub fn algorithms(&self) -> Vec<String> {
-        let names: std::collections::BTreeSet<&String> = self.rows.iter().map(|row| &row.algorithm).collect();
+        let names: BTreeSet<&String> = self.rows.iter().map(|row| &row.algorithm).collect();
         names.into_iter().cloned().collect()
+    }
+
+    /// The rows of each folder, by its name.
+    pub(crate) fn by_folder(&self) -> BTreeMap<&str, Vec<&Row>> {
+        let mut folders: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+        for row in &self.rows {
+            folders.entry(&row.set).or_default().push(row);
+        }
+        folders
     }
 
     /// Columns that are no metrics: what was varied, in order of first appearance, then the algorithm.
     pub fn key_columns(&self) -> Vec<String> {
-        let settings = self.rows.iter().flat_map(|row| row.settings.iter().map(|(name, _)| name));
+        let settings = self.rows.iter().flat_map(|row| row.settings.keys());
         let mut columns = first_appearances(settings.filter(|&name| name != ALGORITHM));
         columns.push(ALGORITHM.to_owned());
         columns
@@ -165,9 +221,8 @@ fn is_apart(name: &str) -> bool {
     name == manifest::FILE || name.ends_with(EPISODES)
 }
 
-fn first_appearances<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut seen = HashSet::new();
-    names.filter(|name| seen.insert(*name)).map(str::to_owned).collect()
+fn first_appearances<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
+    names.collect::<IndexSet<_>>().into_iter().cloned().collect()
 }
 
 fn name_of(path: &Path) -> String {
@@ -178,26 +233,20 @@ fn name_of(path: &Path) -> String {
 
 /// The files of a folder, sorted by name.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let entries = std::fs::read_dir(folder).map_err(|error| Error::io(folder, error))?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|error| Error::io(folder, error))?.path();
-        if path.is_file() {
-            paths.push(path);
-        }
-    }
+    let mut paths = entries(folder)?;
+    paths.retain(|path| path.is_file());
     paths.sort();
     Ok(paths)
 }
 
-fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
+fn read_list<T: DeserializeOwned>(path: &Path, what: &str) -> Result<Vec<T>, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let rows: Vec<Row> = serde_json::from_str(&without_nan(&text)).map_err(|error| {
-        Error::io(
-            path,
-            format!("expected a list of results with metrics, env_grid_search and algorithm: {error}"),
-        )
-    })?;
+    let list = serde_json::from_str(&without_nan(&text));
+    list.map_err(|error| Error::io(path, format!("expected a list of {what}: {error}")))
+}
+
+fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
+    let rows: Vec<Row> = read_list(path, "results with metrics, env_grid_search and algorithm")?;
     match rows.iter().position(|row| row.algorithm != algorithm) {
         None => Ok(rows),
         Some(index) => {
@@ -215,19 +264,17 @@ fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
     }
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let episodes: Vec<Episode> = serde_json::from_str(&without_nan(&text))
-        .map_err(|error| Error::io(path, format!("expected a list of episodes: {error}")))?;
+    let episodes: Vec<Episode> = read_list(path, "episodes")?;
     if episodes.len() != rows.len() {
         let reason = format!("`{}` episodes, expected {}, one for each row", episodes.len(), rows.len());
         return Err(Error::io(path, reason));
     }
     for (row, episode) in rows.iter_mut().zip(episodes) {
-        if row.metrics.get(RUNTIME).is_none() {
-            row.metrics.set(RUNTIME, episode.seconds.into());
+        if !row.metrics.contains_key(RUNTIME) {
+            row.metrics.insert(RUNTIME.to_owned(), episode.seconds.into());
         }
         row.config = small_fields(episode.config);
-        row.proof = Proof { lower_bound: episode.lower_bound, unsolvable: episode.unsolvable };
+        row.proof = episode.proof;
     }
     Ok(())
 }
@@ -238,7 +285,7 @@ fn small_fields(config: Value) -> Pairs {
     let is_small = |(name, value): &(String, Value)| {
         value.is_number() || value.is_boolean() || name == MAP_NAME && value.is_string()
     };
-    Pairs(fields.into_iter().filter(is_small).collect())
+    fields.into_iter().filter(is_small).collect()
 }
 
 /// The text with null in place of the numbers that Python writes though JSON does not have them.
@@ -309,6 +356,15 @@ mod tests {
         assert!(episodes.contains("expected a list of episodes: invalid type"), "{episodes}");
         assert!(told(&[]).contains("no results in"));
         assert!(told(&[("A.json", "[]")]).contains("no results in"));
+    }
+
+    #[test]
+    fn pairs_keep_their_order_and_the_last_of_two_values() {
+        let text = r#"{"seed":3,"map_name":"wall","a":null,"list":[1,2.5]}"#;
+        let pairs: Pairs = serde_json::from_str(text).unwrap();
+        assert_eq!(serde_json::to_string(&pairs).unwrap(), text);
+        let pairs: Pairs = serde_json::from_str(r#"{"a":1,"b":2,"a":3}"#).unwrap();
+        assert_eq!(serde_json::to_string(&pairs).unwrap(), r#"{"a":3,"b":2}"#);
     }
 
     #[test]

@@ -9,9 +9,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::built_in::BuiltIn;
 use crate::environments::Environments;
-use crate::pairs::Pairs;
 use crate::play::{Played, play};
 use crate::progress::{Done, Failed, Progress};
+use crate::results::Pairs;
 use crate::store::Store;
 use crate::suite::{Algorithm, Suite};
 
@@ -153,26 +153,24 @@ pub fn run_one(
     Ok(Summary { num_played: num_played.into_inner(), num_failed: num_failed.into_inner(), is_whole })
 }
 
-fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Failed> {
-    let environment = environments.at(index).map_err(|error| Failed {
-        index,
-        env_grid_search: environments.changes(index).unwrap_or_default(),
-        config: serde_json::Value::Null,
-        error: error.to_string(),
-        traceback: String::new(),
-    })?;
-    play(&environment.config, built_in).map_err(|error| Failed {
-        index,
-        env_grid_search: environment.changes,
-        config: environment.config.to_value(),
-        error: error.to_string(),
-        traceback: String::new(),
-    })
+fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Box<Failed>> {
+    let failed = |error: Error, config| {
+        let env_grid_search = environments.changes(index).unwrap_or_default();
+        Box::new(Failed {
+            index,
+            env_grid_search,
+            config,
+            error: error.to_string(),
+            traceback: String::new(),
+        })
+    };
+    let environment = environments.at(index).map_err(|error| failed(error, serde_json::Value::Null))?;
+    play(&environment.config, built_in).map_err(|error| failed(error, environment.config.to_value()))
 }
 
 fn done(index: usize, played: Played) -> Done {
     let (metrics, runtime) = (measured(&played), played.runtime.as_secs_f64());
-    Done { index, metrics, runtime, machine: None, run: 0, proof: played.proof }
+    Done { index, metrics, runtime, proof: played.proof, ..Done::default() }
 }
 
 /// The figures of an episode as results have them: what POGEMA counts is whole, and a mean is not.
@@ -182,7 +180,7 @@ pub(crate) fn measured(played: &Played) -> Pairs {
         let is_count = COUNTS.contains(&name) || name == "ep_length" && has_one_goal_each;
         (name.to_owned(), if is_count { (value as u64).into() } else { value.into() })
     };
-    Pairs(played.metrics.named().into_iter().map(told).collect())
+    played.metrics.named().into_iter().map(told).collect()
 }
 
 const COUNTS: [&str; 4] = ["SoC", "makespan", "a_collisions", "o_collisions"];

@@ -2,77 +2,60 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use pogema_core::{Words, words};
 use serde_json::Value;
 
+use crate::bootstrap::{mean, mean_of};
 use crate::frame::{compare, shown};
 use crate::results::{Results, Row};
 
-/// How the metrics are computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Definition {
-    /// As the numbers were that have been published: all of them come out of the published files.
-    ///
-    /// - What nobody solved counts for nobody. The best is the best of the algorithms that take part.
-    /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
-    /// - Pathfinding counts a way that was not found as one of the length of the episode.
-    /// - Coordination counts the steps of an episode as its makespan less 1. That is what the published files have as
-    ///   `ep_length` wherever they count collisions. POGEMA 1.4.0, and so what we play, has one more in `ep_length`,
-    ///   while makespan is the same everywhere; so files of either kind can be compared.
-    ///
-    /// Source: `build_web_plot.py` of the public repository pogema-benchmark, commit 7b86d776
-    #[default]
-    Published,
-    /// As the paper's text says it.
-    ///
-    /// - What was not solved is 0, whoever else solved it.
-    /// - Scalability uses seconds, and has no upper bound; all pairs count, which the text leaves open.
-    /// - Pathfinding is 0 where no way was found.
-    /// - Coordination counts as many steps as `ep_length` says.
-    ///
-    /// Source: POGEMA (ICLR 2025), section 4.2, equations 1 to 9
-    Paper,
+words! {
+    /// How the metrics are computed.
+    #[derive(Default)]
+    pub enum Definition {
+        /// As the published numbers, all of which follow from the published files.
+        ///
+        /// - What nobody solved counts for nobody. The best is the best of the algorithms that take part.
+        /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
+        /// - Pathfinding counts a way that was not found as one of the length of the episode.
+        /// - Coordination counts the steps of an episode as its makespan less 1. That is what the published files have
+        ///   as `ep_length` wherever they count collisions. POGEMA 1.4.0, and so what we play, has one more in
+        ///   `ep_length`, while makespan is the same everywhere; so files of either kind can be compared.
+        ///
+        /// Source: `build_web_plot.py` of the public repository pogema-benchmark, commit 7b86d776
+        #[default]
+        Published = "published",
+        /// As the paper's text defines them.
+        ///
+        /// - What was not solved is 0, whoever else solved it.
+        /// - Scalability uses seconds, and has no upper bound; all pairs count, which the text leaves open.
+        /// - Pathfinding is 0 where no way was found.
+        /// - Coordination counts as many steps as `ep_length` says.
+        ///
+        /// Source: POGEMA (ICLR 2025), section 4.2, equations 1 to 9
+        Paper = "paper",
+    }
 }
 
-/// One of the six.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Metric {
-    /// Best sum of costs over own, on random maps and mazes.
-    Performance,
-    /// The same on tiles of cities.
-    OutOfDistribution,
-    /// The same on puzzles.
-    Cooperation,
-    /// How much time per agent few agents take, over what more take, in the warehouse.
-    Scalability,
-    /// How seldom agents are in each other's way, on random maps and mazes.
-    Coordination,
-    /// Shortest way over own, with one agent on whole cities.
-    Pathfinding,
+words! {
+    /// One of the six, in the order in which they are shown.
+    pub enum Metric {
+        /// Best sum of costs over own, on random maps and mazes.
+        Performance = "Performance",
+        /// The same on tiles of cities.
+        OutOfDistribution = "Out-of-Distribution",
+        /// The same on puzzles.
+        Cooperation = "Cooperation",
+        /// How much time per agent few agents take, over what more take, in the warehouse.
+        Scalability = "Scalability",
+        /// How seldom agents are in each other's way, on random maps and mazes.
+        Coordination = "Coordination",
+        /// Shortest way over own, with one agent on whole cities.
+        Pathfinding = "Pathfinding",
+    }
 }
-
-/// The six in the order in which they are shown.
-pub const METRICS: [Metric; 6] = [
-    Metric::Performance,
-    Metric::OutOfDistribution,
-    Metric::Cooperation,
-    Metric::Scalability,
-    Metric::Coordination,
-    Metric::Pathfinding,
-];
 
 impl Metric {
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Performance => "Performance",
-            Self::OutOfDistribution => "Out-of-Distribution",
-            Self::Cooperation => "Cooperation",
-            Self::Scalability => "Scalability",
-            Self::Coordination => "Coordination",
-            Self::Pathfinding => "Pathfinding",
-        }
-    }
-
     /// Parts of the names of the folders that it needs.
     fn sets(self) -> &'static [&'static str] {
         match self {
@@ -90,7 +73,7 @@ impl Metric {
 pub struct Six {
     /// Its name.
     pub algorithm: String,
-    /// In the order of [`METRICS`]; none where its folder is missing or rows lack what is needed.
+    /// In the order of [`Metric`]; none where its folder is missing or rows lack what is needed.
     pub values: [Option<f64>; 6],
     /// Scalability before it is bounded by 1.
     pub unbounded_scalability: Option<f64>,
@@ -107,17 +90,12 @@ const LIFELONG_STEPS: f64 = 256.0;
 pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>) {
     let mut notes = Vec::new();
     let joined: Vec<Joined<'_>> =
-        METRICS.iter().map(|metric| Joined::of(results, metric.sets(), *metric, &mut notes)).collect();
+        Metric::all().map(|metric| Joined::of(results, metric, &mut notes)).collect();
     let one = |algorithm: String| {
-        let found: Vec<Option<f64>> = METRICS
-            .iter()
-            .zip(&joined)
-            .map(|(metric, joined)| {
-                joined.metric(*metric, &algorithm, definition).filter(|value| value.is_finite())
-            })
-            .collect();
         let mut values = [None; 6];
-        values.copy_from_slice(&found);
+        for ((metric, joined), value) in Metric::all().zip(&joined).zip(&mut values) {
+            *value = joined.metric(metric, &algorithm, definition).filter(|value| value.is_finite());
+        }
         let unbounded_scalability = values[3];
         if definition == Definition::Published {
             values[3] = values[3].map(|value| value.min(1.0));
@@ -126,9 +104,9 @@ pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>)
     };
     let all: Vec<Six> = results.algorithms().into_iter().map(one).collect();
     for six in &all {
-        for ((metric, joined), value) in METRICS.iter().zip(&joined).zip(&six.values) {
+        for ((metric, joined), value) in Metric::all().zip(&joined).zip(&six.values) {
             if value.is_none() && !joined.instances.is_empty() {
-                let (algorithm, metric) = (&six.algorithm, metric.name());
+                let algorithm = &six.algorithm;
                 notes.push(format!(
                     "`{algorithm}` has no {metric}: its rows are missing or lack a metric for it"
                 ));
@@ -145,11 +123,12 @@ struct Joined<'a> {
 }
 
 impl<'a> Joined<'a> {
-    fn of(results: &'a Results, sets: &[&str], metric: Metric, notes: &mut Vec<String>) -> Self {
+    fn of(results: &'a Results, metric: Metric, notes: &mut Vec<String>) -> Self {
+        let sets = metric.sets();
         let is_of = |row: &&Row, set: &str| row.set.to_lowercase().contains(set);
         for set in sets {
             if !results.rows.iter().any(|row| is_of(&row, set)) {
-                notes.push(format!("{}: no folder with `{set}` in its name", metric.name()));
+                notes.push(format!("{metric}: no folder with `{set}` in its name"));
             }
         }
         let rows: Vec<&Row> =
@@ -162,8 +141,9 @@ impl<'a> Joined<'a> {
         let all = instances.len();
         instances.retain(|_, rows| rows.len() == algorithms.len());
         if instances.len() < all {
-            let (name, left) = (metric.name(), instances.len());
-            notes.push(format!("{name}: {left} of {all} instances count, which every algorithm has played"));
+            let left = instances.len();
+            notes
+                .push(format!("{metric}: {left} of {all} instances count, which every algorithm has played"));
         }
         let is_lifelong = rows.iter().any(|row| row.metric("avg_throughput").is_some());
         Self { instances: instances.into_values().collect(), is_lifelong }
@@ -183,8 +163,7 @@ impl<'a> Joined<'a> {
     /// The mean of a figure of each instance; instances without one are left out, and none may lack what it is of.
     fn mean(&self, figure: impl Fn(&HashMap<&str, &Row>) -> Option<Counted>) -> Option<f64> {
         let found: Option<Vec<Counted>> = self.instances.iter().map(figure).collect();
-        let counted: Vec<f64> = found?.into_iter().flatten().collect();
-        (!counted.is_empty()).then(|| crate::bootstrap::mean(&counted))
+        mean_of(&found?.into_iter().flatten().collect::<Vec<f64>>())
     }
 
     /// Best sum of costs over own, or own throughput over the best.
@@ -197,9 +176,7 @@ impl<'a> Joined<'a> {
                 let best = all?.into_iter().fold(0.0, f64::max);
                 return Some(if best > 0.0 { Some(own.metric("avg_throughput")? / best) } else { nobody });
             }
-            let costs: Option<Vec<Counted>> = rows.values().map(|row| solved(row, "SoC")).collect();
-            let best = costs?.into_iter().flatten().reduce(f64::min);
-            let Some(best) = best else { return Some(nobody) };
+            let Some(best) = least(rows, "SoC")? else { return Some(nobody) };
             Some(Some(solved(own, "SoC")?.map_or(0.0, |cost| best / cost)))
         })
     }
@@ -213,14 +190,10 @@ impl<'a> Joined<'a> {
             let num_agents = row.settings.get("num_agents")?.as_u64()?;
             times.entry(num_agents).or_default().push(row.metric("runtime")? / steps);
         }
-        let per_agent = times.iter().map(|(&number, times)| crate::bootstrap::mean(times) / number as f64);
-        let per_agent: Vec<f64> = per_agent.collect();
-        let pairs = per_agent
-            .iter()
-            .enumerate()
-            .flat_map(|(at, few)| per_agent[at + 1..].iter().map(move |many| few / many));
-        let pairs: Vec<f64> = pairs.collect();
-        (!pairs.is_empty()).then(|| crate::bootstrap::mean(&pairs))
+        let per_agent: Vec<f64> = times.iter().map(|(&number, times)| mean(times) / number as f64).collect();
+        let pairs =
+            (0..per_agent.len()).flat_map(|at| per_agent[at + 1..].iter().map(move |many| (at, many)));
+        mean_of(&pairs.map(|(few, many)| per_agent[few] / many).collect::<Vec<f64>>())
     }
 
     fn coordination(&self, algorithm: &str, definition: Definition) -> Option<f64> {
@@ -251,11 +224,8 @@ impl<'a> Joined<'a> {
         self.mean(|rows| {
             let own = rows.get(algorithm)?;
             if definition == Definition::Paper {
-                let costs: Option<Vec<Counted>> = rows.values().map(|row| solved(row, length)).collect();
-                let best = costs?.into_iter().flatten().reduce(f64::min);
-                return Some(Some(
-                    solved(own, length)?.map_or(0.0, |cost| best.map_or(0.0, |best| best / cost)),
-                ));
+                let best = least(rows, length)?;
+                return Some(Some(solved(own, length)?.zip(best).map_or(0.0, |(cost, best)| best / cost)));
             }
             let lengths: Option<Vec<f64>> = rows.values().map(|row| row.metric(length)).collect();
             let best = lengths?.into_iter().reduce(f64::min)?;
@@ -273,9 +243,15 @@ fn solved(row: &Row, metric: &str) -> Option<Counted> {
     Some(if row.metric("CSR")? > 0.0 { Some(row.metric(metric)?) } else { None })
 }
 
+/// The least of a metric over the rows that solved the instance; nothing at all if that is not known of every row.
+fn least(rows: &HashMap<&str, &Row>, metric: &str) -> Option<Counted> {
+    let all: Option<Vec<Counted>> = rows.values().map(|row| solved(row, metric)).collect();
+    Some(all?.into_iter().flatten().reduce(f64::min))
+}
+
 /// What tells an instance from others: its folder and all that was varied, whatever the order.
 pub(crate) fn instance(row: &Row) -> String {
-    let mut settings: Vec<(&str, &Value)> = row.settings.iter().collect();
+    let mut settings: Vec<(&String, &Value)> = row.settings.iter().collect();
     settings.sort_by(|one, other| one.0.cmp(other.0).then_with(|| compare(one.1, other.1)));
     let told = settings.into_iter().map(|(name, value)| format!("{name}={}", shown(value)));
     std::iter::once(row.set.clone()).chain(told).collect::<Vec<_>>().join(", ")

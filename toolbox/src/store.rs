@@ -4,25 +4,27 @@
 //! which they were; and when all are done, the results in pogema-toolbox's layout, in the order of the suite, and
 //! beside them how each episode was played and how long it took, which differs from run to run and results must not.
 
+use std::borrow::Cow;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use pogema_core::Error;
 use pogema_core::files::{UNFINISHED, write_whole};
+use pogema_core::{Error, words};
 
 use crate::manifest::{self, Manifest, Run};
 use crate::suite::Suite;
 
-/// What may be in the folder already.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Begin {
-    /// Nothing.
-    New,
-    /// An earlier run of the same suite, which is gone on with.
-    Resume,
-    /// Results of anything, which are deleted.
-    Anew,
+words! {
+    /// How a run treats the results that the folder holds already.
+    pub enum Begin {
+        /// Fails if there are any.
+        New = "new",
+        /// Continues an earlier run of the same suite.
+        Resume = "resume",
+        /// Deletes them.
+        Anew = "anew",
+    }
 }
 
 /// The folder, which one process at a time may write to.
@@ -138,7 +140,7 @@ fn refused(folder: &Path, what: &str) -> Error {
 fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
     for key in known.algorithms.keys() {
         for ending in [RESULTS, EPISODES, LINES, FAILED] {
-            remove(&folder.join(format!("{key}.{ending}")))?;
+            remove(&folder.join(format!("{key}{ending}")))?;
         }
     }
     remove(&folder.join(REPORT))
@@ -146,37 +148,38 @@ fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
 
 /// Removes what runs were writing when they were killed; nobody else writes here now.
 fn remove_unfinished(folder: &Path) -> Result<(), Error> {
-    let failed = |error: std::io::Error| Error::io(folder, error);
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        if entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
-            remove(&entry.path())?;
-        }
-    }
-    Ok(())
+    let mut unfinished = entries(folder)?.into_iter().filter(|path| name_of(path).starts_with(UNFINISHED));
+    unfinished.try_for_each(|path| remove(&path))
 }
 
 fn check_empty(folder: &Path) -> Result<(), Error> {
-    let failed = |error: std::io::Error| Error::io(folder, error);
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let name = entry.map_err(failed)?.file_name();
-        if name != LOCK {
-            let name = name.to_string_lossy();
+    match entries(folder)?.iter().map(|path| name_of(path)).find(|name| name != LOCK) {
+        None => Ok(()),
+        Some(name) => {
             let reason = format!("holds `{name}`, which no evaluation wrote; choose an empty folder");
-            return Err(Error::io(folder, reason));
+            Err(Error::io(folder, reason))
         }
     }
-    Ok(())
+}
+
+/// The files and folders in a folder.
+pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+    entries.map_err(|error| Error::io(folder, error))
+}
+
+fn name_of(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// The page of the results.
 pub const REPORT: &str = "report.html";
 
 /// Endings of the files of an algorithm: its results, how each was played, the episodes done so far, and those that failed.
-pub(crate) const RESULTS: &str = "json";
-pub(crate) const EPISODES: &str = "episodes.json";
-pub(crate) const LINES: &str = "jsonl";
-pub(crate) const FAILED: &str = "failed.jsonl";
+pub(crate) const RESULTS: &str = ".json";
+pub(crate) const EPISODES: &str = ".episodes.json";
+pub(crate) const LINES: &str = ".jsonl";
+pub(crate) const FAILED: &str = ".failed.jsonl";
 
 fn lock(folder: &Path) -> Result<File, Error> {
     let path = folder.join(LOCK);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pogema_core::Error;
+use pogema_core::{Error, Words, words};
 use pogema_maps::{FIELDS, nearest};
 
 use crate::tree::Node;
@@ -22,11 +22,25 @@ pub(crate) const ENVIRONMENT: &str = "Environment";
 /// Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
 pub(crate) const OWN_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
 
-/// How episodes of an algorithm are shared among processes; built-in algorithms use threads instead.
-///
-/// Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase.parallel_backend`
-pub const BACKENDS: [&str; 5] =
-    ["sequential", "multiprocessing", "balanced_multiprocessing", "dask", "balanced_dask"];
+words! {
+    /// How episodes of an algorithm are distributed to processes; built-in algorithms use threads instead.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase.parallel_backend`
+    #[derive(Default)]
+    pub enum Backend {
+        /// In one process.
+        Sequential = "sequential",
+        /// In several processes, the longest episodes first.
+        Multiprocessing = "multiprocessing",
+        /// The same as `multiprocessing`.
+        #[default]
+        BalancedMultiprocessing = "balanced_multiprocessing",
+        /// On a Dask cluster, the longest episodes first.
+        Dask = "dask",
+        /// The same as `dask`.
+        BalancedDask = "balanced_dask",
+    }
+}
 
 /// The keys of every algorithm; all others are parameters of its own.
 const ALGORITHM_KEYS: [&str; 3] = ["name", "num_process", "parallel_backend"];
@@ -72,8 +86,8 @@ pub struct Algorithm {
     pub name: String,
     /// Most processes or threads that play its episodes, if it says so.
     pub num_processes: Option<usize>,
-    /// One of [`BACKENDS`].
-    pub backend: String,
+    /// How its episodes are distributed.
+    pub backend: Backend,
     /// The fields that are its own, in the order of the file.
     pub parameters: Vec<(String, Node)>,
 }
@@ -108,6 +122,11 @@ impl Suite {
         self.algorithms = Node::parse(&text).and_then(read).map_err(|error| in_file(path, error))?;
         self.replacement = Some(Replacement { path: path.to_owned(), text });
         Ok(self)
+    }
+
+    /// The algorithm of a name among the results.
+    pub fn algorithm(&self, key: &str) -> Option<&Algorithm> {
+        self.algorithms.iter().find(|algorithm| algorithm.key == key)
     }
 
     /// Whether its environments are others than POGEMA's.
@@ -177,7 +196,11 @@ impl Algorithm {
         let name = node.field("name").ok_or_else(|| wrong(node, key, "a field `name`"))?;
         let name = text_of(name, &own("name"), "the name of an algorithm")?;
         let backend = node.field("parallel_backend");
-        let backend = backend.map(|node| one_of(node, &own("parallel_backend"), &BACKENDS)).transpose()?;
+        let backend = backend.map(|node| {
+            let expected = || format!("one of {}", Backend::NAMES.join(", "));
+            let word = node.text().and_then(Backend::of_word);
+            word.ok_or_else(|| wrong(node, &own("parallel_backend"), &expected()))
+        });
         let num_processes = node.field("num_process").map(|node| {
             let number = node.value().as_u64().filter(|&number| number > 0);
             number.ok_or_else(|| wrong(node, &own("num_process"), "a number of 1 or more"))
@@ -188,13 +211,13 @@ impl Algorithm {
             line: node.line,
             name: name.to_owned(),
             num_processes: num_processes.transpose()?.map(|number| number as usize),
-            backend: backend.unwrap_or("balanced_multiprocessing").to_owned(),
+            backend: backend.transpose()?.unwrap_or_default(),
             parameters: all.iter().filter(is_own).cloned().collect(),
         })
     }
 
-    /// All that decides what it does, as text, to know it by.
-    pub fn told(&self) -> String {
+    /// Text that differs between algorithms that play differently.
+    pub fn fingerprint(&self) -> String {
         let parameters = self.parameters.iter().map(|(key, node)| serde_json::json!([key, node.value()]));
         serde_json::json!([self.name, parameters.collect::<Vec<_>>()]).to_string()
     }
@@ -214,11 +237,6 @@ fn fields<'a>(node: &'a Node, key: &str) -> Result<&'a [(String, Node)], Error> 
 
 fn text_of<'a>(node: &'a Node, key: &str, expected: &str) -> Result<&'a str, Error> {
     node.text().ok_or_else(|| wrong(node, key, expected))
-}
-
-fn one_of<'a>(node: &'a Node, key: &str, known: &[&str]) -> Result<&'a str, Error> {
-    let text = node.text().filter(|text| known.contains(text));
-    text.ok_or_else(|| wrong(node, key, &format!("one of {}", known.join(", "))))
 }
 
 fn required<'a>(root: &'a Node, key: &str) -> Result<&'a Node, Error> {

@@ -3,6 +3,7 @@
 use pogema_core::Error;
 use serde_json::{Map as Object, Value};
 
+use crate::results::Pairs;
 use crate::tree::{Content, Node};
 
 /// The key whose list says what a field is varied over.
@@ -32,7 +33,7 @@ pub struct Variants {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     /// What was varied, by the last key of its path, in the order of the file.
-    pub changes: Vec<(String, Value)>,
+    pub changes: Pairs,
     /// All fields.
     pub fields: Object<String, Value>,
 }
@@ -51,7 +52,7 @@ impl Variants {
             if let Some(twin) = twin {
                 let (one, other) = (twin.path.join("."), parameter.path.join("."));
                 let reason = format!("`{one}` and `{other}` are both varied under the same last name");
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
         }
         let all = node.fields().unwrap_or_default().iter();
@@ -70,11 +71,6 @@ impl Variants {
         self.len() == 0
     }
 
-    /// What was varied in the combination of a number below their count, by the last name of its path.
-    pub fn changes_at(&self, index: usize) -> Option<Vec<(String, Value)>> {
-        Some(self.at(index)?.changes)
-    }
-
     /// Numbers of combinations that together have each value of each varied field, all others being the first, with
     /// the line of that value.
     pub fn probes(&self) -> impl Iterator<Item = (usize, u64)> {
@@ -84,12 +80,8 @@ impl Variants {
             let first_stride = stride;
             values.iter().enumerate().map(move |(at, (_, line))| (at * first_stride, *line))
         });
-        let is_plain = self.parameters.is_empty();
-        is_plain.then_some((0, self.line)).into_iter().chain(values).take(if self.is_empty() {
-            0
-        } else {
-            usize::MAX
-        })
+        let (is_plain, is_empty) = (self.parameters.is_empty(), self.is_empty());
+        is_plain.then_some((0, self.line)).into_iter().chain(values).filter(move |_| !is_empty)
     }
 
     /// The line of an outermost field that is not varied.
@@ -118,8 +110,8 @@ impl Variants {
         self.parameters.iter().find(|parameter| parameter.path == [field])
     }
 
-    /// All that makes the combinations, as text, to know them by.
-    pub fn told(&self) -> String {
+    /// Text that differs between different combinations.
+    pub fn fingerprint(&self) -> String {
         let parameters: Vec<_> = self
             .parameters
             .iter()
@@ -136,13 +128,13 @@ impl Variants {
         if index >= self.len() {
             return None;
         }
-        let (mut rest, mut fields, mut changes) = (index, self.fields.clone(), Vec::new());
+        let (mut rest, mut fields, mut changes) = (index, self.fields.clone(), Pairs::new());
         for Parameter { path, values } in self.parameters.iter().rev() {
             let (value, _) = &values[rest % values.len()];
             rest /= values.len();
             let place = path.iter().try_fold(&mut fields, |place, key| place.get_mut(key))?;
             place.clone_from(value);
-            changes.push((path.last()?.clone(), value.clone()));
+            changes.insert(path.last()?.clone(), value.clone());
         }
         changes.reverse();
         match fields {
@@ -194,10 +186,10 @@ mod tests {
         let told = |index: usize| {
             let variant = variants.at(index).unwrap();
             assert_eq!(variant.fields["size"], 8);
-            assert_eq!(variant.fields["seed"], variant.changes[0].1);
-            assert_eq!(variant.fields["deep"]["agents"], variant.changes[1].1);
-            assert_eq!((variant.changes[0].0.as_str(), variant.changes[1].0.as_str()), ("seed", "agents"));
-            format!("{}{}", variant.changes[0].1, variant.changes[1].1.as_str().unwrap())
+            assert_eq!(variant.fields["seed"], variant.changes[0]);
+            assert_eq!(variant.fields["deep"]["agents"], variant.changes[1]);
+            assert!(variant.changes.keys().eq(["seed", "agents"]));
+            format!("{}{}", variant.changes[0], variant.changes[1].as_str().unwrap())
         };
         assert_eq!(variants.len(), 6);
         assert_eq!((0..6).map(told).collect::<Vec<_>>(), ["1a", "1b", "1c", "2a", "2b", "2c"]);

@@ -150,7 +150,7 @@ fn instances_are_known_by_what_is_varied_in_the_published_rows() {
     let of = |settings: &str| row("03-warehouse", settings, Some(6));
     let named = of(r#"{"num_agents": 2, "seed": 5, "map_name": "wfi_warehouse"}"#);
     let fixed = Row {
-        config: Pairs(vec![("num_agents".into(), 2.into()), ("seed".into(), 9.into())]),
+        config: Pairs::from([("num_agents".into(), 2.into()), ("seed".into(), 9.into())]),
         ..of(r#"{"seed": 5}"#)
     };
     for row in [named.clone(), fixed] {

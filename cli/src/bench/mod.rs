@@ -11,13 +11,12 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use pogema_conformance::{files, find_oracle_python};
+use pogema_conformance::find_oracle_python;
 use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, progress_bar, say, write_json};
 
 use bars::{Bar, bars};
 use work::{Speed, Work};
@@ -100,9 +99,7 @@ impl Bench {
         if works.is_empty() {
             return Err(Error::argument("--rows", &self.rows, "a part of a row's name, such as `64 agents`"));
         }
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}");
-        let bar = ProgressBar::new(self.rounds * works.len() as u64);
-        let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
+        let bar = progress_bar("{bar:40} {pos}/{len} {msg}", self.rounds * works.len() as u64);
         let mut rows: Vec<Row> = Vec::new();
         for _ in 0..self.rounds {
             for (index, work) in works.iter().enumerate() {
@@ -119,11 +116,7 @@ impl Bench {
         let path = pogema_fast::Path::from_environment()?.to_string();
         let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
         say(&show::tell(&report.machine, &report.path, &report.rows, &report.bars))?;
-        if let Some(path) = &self.json {
-            let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
-            files::write(path, &text)?;
-        }
-        Ok(())
+        self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))
     }
 }
 

@@ -18,21 +18,9 @@ pub fn tell(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
 }
 
 fn speeds(rows: &[Row]) -> Table {
-    let mut table = markdown_table(&[
-        "work",
-        "step",
-        "f32",
-        "u8",
-        "bits",
-        "step + f32",
-        "step + u8",
-        "zeros f32",
-        "zeros u8",
-        "f32 of zeros",
-        "POGEMA",
-        "times",
-        "reset",
-    ]);
+    let mut table = markdown_table(
+        "work | step | f32 | u8 | bits | step + f32 | step + u8 | zeros f32 | zeros u8 | f32 of zeros | POGEMA | times | reset",
+    );
     for row in rows {
         let speed = &row.speed;
         let millions = [
@@ -58,7 +46,7 @@ fn speeds(rows: &[Row]) -> Table {
 }
 
 fn bar_table(bars: &[Bar]) -> Table {
-    let mut table = markdown_table(&["bar", "wanted", "measured", "met"]);
+    let mut table = markdown_table("bar | wanted | measured | met");
     for bar in bars {
         let sign = if bar.is_limit { "at most" } else { "at least" };
         let met = match bar.is_met() {

@@ -112,32 +112,22 @@ impl Work {
             failure = source.generate().and_then(|generated| engine.start(generated.instance));
         });
         failure?;
-        let mut speed = Speed { reset, bytes: engine.num_bytes(), ..Speed::default() };
+        let (bytes, actions) = (engine.num_bytes(), self.actions(1));
+        let (mut ends, mut index) = (Ends::new(self.num_agents), 0);
         let agents = || 0..self.num_agents;
-        let actions = self.actions(1);
-        let mut ends = Ends::new(self.num_agents);
-        let mut index = 0;
-        let mut step = |engine: &mut Engine| {
-            index += 1;
-            engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())
+        let act = |is_step: bool, observations: Observations<'_>| {
+            if is_step {
+                index += 1;
+                engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())?;
+            }
+            match observations {
+                Observations::None => Ok(()),
+                Observations::F32(floats) => engine.observe_agents(agents(), floats),
+                Observations::U8(bytes) => engine.observe_agents(agents(), bytes),
+                Observations::Bits(words) => engine.observe_bits(agents(), words),
+            }
         };
-        let mut rate = Rate { budget, num_agents: self.num_agents, failure: Ok(()) };
-        speed.step = rate.of(|| step(&mut engine));
-        let (mut floats, mut bytes, mut words) = self.buffers(1)?;
-        speed.fill_f32 = self.num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut floats);
-        speed.f32 = rate.of(|| engine.observe_agents(agents(), &mut floats));
-        speed.step_f32 = rate.of(|| {
-            step(&mut engine)?;
-            engine.observe_agents(agents(), &mut floats)
-        });
-        speed.fill_u8 = self.num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut bytes);
-        speed.u8 = rate.of(|| engine.observe_agents(agents(), &mut bytes));
-        speed.step_u8 = rate.of(|| {
-            step(&mut engine)?;
-            engine.observe_agents(agents(), &mut bytes)
-        });
-        speed.bits = rate.of(|| engine.observe_bits(agents(), &mut words));
-        rate.failure.map(|()| speed)
+        Ok(Speed { reset, bytes, ..self.rates(budget, 1, pool.as_deref(), act)? })
     }
 
     fn measure_batch(&self, budget: Duration, lanes: usize) -> Result<Speed, Error> {
@@ -155,25 +145,40 @@ impl Work {
         let reset = lanes as f64 * calls_per_second(budget, || failure = batch.reset());
         failure?;
         let bytes = (0..lanes).map(|lane| batch.lane(lane).map(Engine::num_bytes)).sum::<Result<_, _>>()?;
-        let mut speed = Speed { reset, bytes, ..Speed::default() };
-        let num_agents = lanes * self.num_agents;
         let actions = self.actions(lanes);
-        let mut ends = Ends::new(num_agents);
-        let mut index = 0;
-        let mut step = |batch: &mut Batch, observations: Observations<'_>| {
+        let (mut ends, mut index) = (Ends::new(lanes * self.num_agents), 0);
+        let act = |is_step: bool, observations: Observations<'_>| {
+            if !is_step {
+                return batch.observe(observations);
+            }
             index += 1;
             batch.step(&actions[index % NUM_ACTION_LISTS], ends.out(), observations)
         };
-        let mut rate = Rate { budget, num_agents, failure: Ok(()) };
-        speed.step = rate.of(|| step(&mut batch, Observations::None));
+        Ok(Speed { reset, bytes, ..self.rates(budget, lanes, pool.as_deref(), act)? })
+    }
+
+    /// Times steps and observations, which `act` makes; its flag says whether it steps before it observes.
+    fn rates(
+        &self,
+        budget: Duration,
+        lanes: usize,
+        pool: Option<&ThreadPool>,
+        mut act: impl FnMut(bool, Observations<'_>) -> Result<(), Error>,
+    ) -> Result<Speed, Error> {
+        let num_agents = lanes * self.num_agents;
         let (mut floats, mut bytes, mut words) = self.buffers(lanes)?;
-        speed.fill_f32 = num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut floats);
-        speed.f32 = rate.of(|| batch.observe(Observations::F32(&mut floats)));
-        speed.step_f32 = rate.of(|| step(&mut batch, Observations::F32(&mut floats)));
-        speed.fill_u8 = num_agents as f64 * fills_per_second(budget, pool.as_deref(), &mut bytes);
-        speed.u8 = rate.of(|| batch.observe(Observations::U8(&mut bytes)));
-        speed.step_u8 = rate.of(|| step(&mut batch, Observations::U8(&mut bytes)));
-        speed.bits = rate.of(|| batch.observe(Observations::Bits(&mut words)));
+        let mut rate = Rate { budget, num_agents, failure: Ok(()) };
+        let speed = Speed {
+            step: rate.of(|| act(true, Observations::None)),
+            fill_f32: num_agents as f64 * fills_per_second(budget, pool, &mut floats),
+            f32: rate.of(|| act(false, Observations::F32(&mut floats))),
+            step_f32: rate.of(|| act(true, Observations::F32(&mut floats))),
+            fill_u8: num_agents as f64 * fills_per_second(budget, pool, &mut bytes),
+            u8: rate.of(|| act(false, Observations::U8(&mut bytes))),
+            step_u8: rate.of(|| act(true, Observations::U8(&mut bytes))),
+            bits: rate.of(|| act(false, Observations::Bits(&mut words))),
+            ..Speed::default()
+        };
         rate.failure.map(|()| speed)
     }
 

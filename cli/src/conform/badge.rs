@@ -2,21 +2,9 @@
 
 use pogema_conformance::port::PortReport;
 use pogema_core::Error;
-use serde::Serialize;
+use serde_json::json;
 
-use super::summary::{Verdict, name_of, score};
-use super::template::fill;
-
-/// What the template asks for.
-#[derive(Serialize)]
-struct Holes<'a> {
-    label: &'a str,
-    message: String,
-    port: &'a str,
-    colour: &'a str,
-    left: usize,
-    right: usize,
-}
+use super::summary::{Verdict, fill, name_of, score};
 
 /// The badge of a port, as SVG.
 pub fn badge(report: &PortReport) -> Result<String, Error> {
@@ -30,7 +18,14 @@ pub fn badge(report: &PortReport) -> Result<String, Error> {
     };
     let (label, message) = ("POGEMA 1.4.0", format!("{word} {}/{} rules", score.passed, score.claimed));
     let (left, right) = (width(label), width(&message));
-    let holes = Holes { label, message, port: name_of(report), colour, left, right };
+    let holes = json!({
+        "label": label,
+        "message": message,
+        "port": name_of(report),
+        "colour": colour,
+        "left": left,
+        "right": right,
+    });
     fill(include_str!("badge.svg"), holes)
 }
 

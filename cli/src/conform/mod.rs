@@ -9,19 +9,17 @@ mod outputs;
 mod port_table;
 mod ports;
 mod summary;
-mod template;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
-use indicatif::{ProgressBar, ProgressStyle};
-use pogema_conformance::{Engine, Report, cases, files, find_oracle_python, golden};
+use indicatif::ProgressBar;
+use pogema_conformance::{Engine, Report, cases, find_oracle_python, golden};
 use pogema_core::Error;
 
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, lined_table, progress_bar, say, write_json};
 
 /// How many divergences are told in full.
 const MOST_TOLD: usize = 5;
@@ -51,8 +49,10 @@ pub struct Conform {
 }
 
 /// The fast engine.
-pub const FAST: Engine =
-    Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+
+/// Our own engines.
+pub const ENGINES: [Engine; 3] = [Engine::REFERENCE, FAST, Engine::LITERAL];
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
@@ -68,58 +68,46 @@ impl Conform {
             return self.ports.run(&shared);
         }
         self.json.as_deref().map_or(Ok(()), check_writable)?;
-        let engines = [Engine::REFERENCE, FAST, Engine::LITERAL];
         let mut report = Report::default();
-        for engine in engines {
+        for engine in ENGINES {
             let name = |part: &str| format!("{part}, {}", engine.name);
             report.check_recordings(&name("golden"), &golden::folder(), engine)?;
             report.check_recordings(&name("found"), &golden::found_folder(), engine)?;
             report.check_cases(&name("cases"), &cases::folder(), engine)?;
         }
         let bar = self.bar("fresh cases");
-        report.check_fresh(&engines, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
+        report.check_fresh(&ENGINES, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
         bar.finish_and_clear();
         if self.oracle {
             let python = find_oracle_python(&self.oracle_folder)?;
             report.check_cases_with_oracle(&cases::folder(), &python)?;
             let bar = self.bar("POGEMA 1.4.0");
-            let tick = || bar.inc(1);
-            report.check_oracle(
-                &[Engine::REFERENCE, FAST],
-                &python,
-                self.cases,
-                self.seed,
-                &self.keep,
-                &tick,
-            )?;
+            report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
             bar.finish_and_clear();
         }
         if let Some(path) = &self.json {
-            let text = serde_json::to_vec_pretty(&report).map_err(|error| Error::io(path, error))?;
-            files::write(path, &text)?;
+            write_json(path, &report)?;
         }
         say(&tell(&report))?;
         Ok(if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
     fn bar(&self, what: &'static str) -> ProgressBar {
-        let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}, {eta} left");
-        let bar = ProgressBar::new(self.cases).with_message(what);
-        style.map_or(bar.clone(), |style| bar.with_style(style))
+        progress_bar("{msg} {bar:40} {pos}/{len}, {eta} left", self.cases).with_message(what)
     }
 }
 
 /// The report as tables and words.
 fn tell(report: &Report) -> String {
-    let mut parts = table(&["part", "checked", "failed"]);
+    let mut parts = lined_table(&["part", "checked", "failed"]);
     for part in &report.parts {
         parts.add_row([part.name.clone(), part.checked.to_string(), part.failed.to_string()]);
     }
-    let mut rules = table(&["rule", "comparisons", "diverged"]);
+    let mut rules = lined_table(&["rule", "comparisons", "diverged"]);
     for (rule, count) in &report.tally.rules {
         rules.add_row([rule.clone(), count.checked.to_string(), count.diverged.to_string()]);
     }
-    let mut events = table(&["what happened", "times"]);
+    let mut events = lined_table(&["what happened", "times"]);
     for (name, count) in report.events.named() {
         events.add_row([name.to_owned(), count.to_string()]);
     }
@@ -137,13 +125,4 @@ fn tell(report: &Report) -> String {
     };
     text.push_str(&verdict);
     text
-}
-
-fn table(head: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(head.to_vec());
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }

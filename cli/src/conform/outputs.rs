@@ -43,7 +43,7 @@ impl Outputs {
     /// With the first file or combination that cannot be.
     pub fn check(&self, num_ports: usize, json: Option<&Path>) -> Result<Known, Error> {
         if self.badge.is_some() && num_ports != 1 {
-            return Err(Error::Request { reason: "`--badge` needs exactly one port".into() });
+            return Err(Error::request("`--badge` needs exactly one port"));
         }
         let mut taken = BTreeSet::new();
         for path in self.paths().chain(json) {

@@ -7,7 +7,7 @@ use pogema_conformance::port::{Cause, PortReport};
 
 use super::known::Leftover;
 use super::summary::{self, OUTCOMES, counts, names, printable, shortened, times, title, verdict};
-use super::table;
+use crate::output::lined_table;
 
 /// What to do about a known deviation that is gone.
 const STOPPED: &str = "it stopped occurring and can be removed from the list";
@@ -51,7 +51,7 @@ fn rules(reports: &[PortReport]) -> String {
         _ => format!("\n{}", OUTCOMES[at]),
     };
     let titles: Vec<String> = std::iter::once("rule".to_owned()).chain(columns.iter().map(title)).collect();
-    let mut table = table(&titles.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut table = lined_table(&titles.iter().map(String::as_str).collect::<Vec<_>>());
     for rule in rows {
         let counts: Vec<[String; 4]> = reports.iter().map(|report| counts(report, rule)).collect();
         let cells = columns.iter().map(|&(port, at)| counts[port][at].clone());
@@ -71,7 +71,7 @@ fn unclaimed(reports: &[PortReport]) -> String {
         1 => titles.push("cases left unchecked"),
         _ => titles.extend(names.iter().map(String::as_str)),
     }
-    let mut table = table(&titles);
+    let mut table = lined_table(&titles);
     for what in all {
         let counts =
             reports.iter().map(|report| report.not_claimed.get(what).map_or(String::new(), u64::to_string));

@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use pogema_conformance::files;
 use pogema_conformance::port::{
     Command, Link, Part, Plan, PortReport, Process, Profile, Subject, check_ports, check_traces,
     shrink_causes,
@@ -17,7 +16,7 @@ use super::known::Leftover;
 use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, score};
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, say, write_json};
 use crate::words::word;
 
 /// The exit status for a port that breaks the protocol.
@@ -82,7 +81,7 @@ impl Ports {
         shared.json.map_or(Ok(()), |path| check_writable(path))?;
         let reports = [check_traces(&self.traces)?];
         let leftover = Leftover::default();
-        write_json(shared, &reports)?;
+        shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
         say(&port_table::tell(&reports, &leftover))?;
         Ok(exit_code(&reports, &leftover))
     }
@@ -113,7 +112,7 @@ impl Ports {
         shared.bar.finish_and_clear();
         known.mark(&mut reports);
         let leftover = known.leftover(&reports, &plan);
-        write_json(shared, &reports)?;
+        shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
         self.outputs.write(&reports, &leftover)?;
         say(&port_table::tell(&reports, &leftover))?;
         Ok(exit_code(&reports, &leftover))
@@ -130,12 +129,6 @@ impl Ports {
             parts: self.parts.clone(),
         }
     }
-}
-
-fn write_json(shared: &Shared<'_>, reports: &[PortReport]) -> Result<(), Error> {
-    let Some(path) = shared.json else { return Ok(()) };
-    let text = serde_json::to_vec_pretty(reports).map_err(|error| Error::io(path, error))?;
-    files::write(path, &text)
 }
 
 fn subject(command: &Command) -> Subject<'_> {

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Verdicts, needed_by};
-use pogema_core::shorten;
+use pogema_core::{Error, shorten, words};
+use serde_json::Value;
 
 /// How a rule came out for a port, all its cases together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,19 +145,20 @@ pub fn score(report: &PortReport) -> Score {
     }
 }
 
-/// What a run says of a port, in short.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It does all that it claims.
-    Conforms,
-    /// It does, but for what is known.
-    Known,
-    /// It breaks a rule.
-    Diverges,
-    /// It breaks the protocol, and perhaps rules.
-    Misbehaves,
-    /// It claims nothing that was asked.
-    Unchecked,
+words! {
+    /// What a run says of a port, in short; the style sheet of the page knows the words.
+    pub enum Verdict {
+        /// It does all that it claims.
+        Conforms = "conforms",
+        /// It does, but for what is known.
+        Known = "known",
+        /// It breaks a rule.
+        Diverges = "diverges",
+        /// It breaks the protocol, and perhaps rules.
+        Misbehaves = "misbehaves",
+        /// It claims nothing that was asked.
+        Unchecked = "nothing",
+    }
 }
 
 impl Score {
@@ -216,6 +218,11 @@ pub fn shortened(text: &str) -> String {
 /// A text without what only terminals understand, since ports may say anything.
 pub fn printable(text: &str) -> String {
     text.chars().filter(|letter| !letter.is_control() || "\n\t".contains(*letter)).collect()
+}
+
+/// Fills in a template of HTML or SVG, in which everything is escaped.
+pub fn fill(template: &str, holes: Value) -> Result<String, Error> {
+    Ok(printable(&pogema_render::html::fill(template, holes)?))
 }
 
 #[cfg(test)]

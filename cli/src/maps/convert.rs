@@ -11,7 +11,7 @@ use pogema_maps::formats::{
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
-use super::{Sources, write_out};
+use super::{Sources, not_one, write_out};
 use crate::output::check_writable;
 use crate::words::word;
 
@@ -87,13 +87,16 @@ impl Export {
     pub fn run(&self) -> Result<(), Error> {
         let mut maps = self.sources.meant_by(&self.map)?;
         if let Some(path) = &self.scenario {
-            let [map] = maps.as_mut_slice() else { return Err(self.one_map(maps.len(), "a scenario is of")) };
+            let [map] = maps.as_mut_slice() else {
+                return Err(not_one(&self.map, maps.len(), "a scenario is of"));
+            };
             let scenario = read_scenario(path, &map.text.map)?;
             let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
             let scenario = scenario.truncated(num_agents)?;
             if matches!(scenario.goals, Targets::Sequences(_)) && self.to != Format::Config {
-                let reason = "the scenario has sequences of goals, which only `--to config` can hold";
-                return Err(Error::Request { reason: reason.into() });
+                return Err(Error::request(
+                    "the scenario has sequences of goals, which only `--to config` can hold",
+                ));
             }
             if self.to == Format::Config {
                 return write_out(self.out.as_deref(), config(&map.text, Some(&scenario)).as_bytes());
@@ -106,27 +109,18 @@ impl Export {
     }
 
     fn bytes(&self, maps: &[NamedMap]) -> Result<Vec<u8>, Error> {
-        match self.to {
-            Format::Set => return write_set(maps).map(String::into_bytes),
-            Format::Zip => {
+        let written = match (self.to, maps) {
+            (Format::Set, _) => write_set(maps)?,
+            (Format::Zip, _) => {
                 return write_archive(maps.iter().map(|map| (map.name.as_str(), &map.text.map)));
             }
-            Format::Text | Format::Map | Format::Scen | Format::Config => {}
-        }
-        let [NamedMap { name, text }] = maps else {
-            return Err(self.one_map(maps.len(), "this format holds"));
-        };
-        let written = match self.to {
-            Format::Text => text.to_text()? + "\n",
-            Format::Map => write_movingai(&text.map),
-            Format::Scen => write_scen(&tasks(name, text)?)?,
-            _ => config(text, None),
+            (Format::Text, [map]) => map.text.to_text()? + "\n",
+            (Format::Map, [map]) => write_movingai(&map.text.map),
+            (Format::Scen, [map]) => write_scen(&tasks(&map.name, &map.text)?)?,
+            (Format::Config, [map]) => config(&map.text, None),
+            _ => return Err(not_one(&self.map, maps.len(), "this format holds")),
         };
         Ok(written.into_bytes())
-    }
-
-    fn one_map(&self, found: usize, what: &str) -> Error {
-        Error::Request { reason: format!("`{}` means {found} maps, {what} one", self.map) }
     }
 }
 
@@ -196,7 +190,7 @@ impl Tiles {
         let cut = |map: NamedMap| -> Result<Vec<NamedMap>, Error> {
             if !map.text.starts.is_empty() || map.text.pools.is_some() {
                 let reason = format!("`{}` has starts and goals, which would be lost in tiles", map.name);
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
             tiles(&map.name, &map.text.map, self.side)
         };

@@ -92,70 +92,39 @@ fn seeds(text: &str) -> Result<Range<u64>, String> {
     if seeds.is_empty() { Err(wrong()) } else { Ok(seeds) }
 }
 
+/// The defaults of a type, with the settings whose flags are given.
+macro_rules! given {
+    ($flags:expr => $Settings:ident: $($name:ident)+) => {{
+        let mut settings = $Settings::default();
+        $(settings.$name = $flags.$name.unwrap_or(settings.$name);)+
+        settings
+    }};
+}
+
 impl Generate {
     pub fn run(&self) -> Result<(), Error> {
         let maps = match self.what.as_str() {
             "random" => {
-                let ranges = self.ranges.random();
+                let ranges = given!(self.ranges => RandomRanges: width_min width_max height_min height_max
+                    obstacle_density_min obstacle_density_max);
                 let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
                 of_seeds(self.name.as_deref().unwrap_or("random"), self.seeds.clone(), make)?
             }
             "mazes" => {
-                let ranges = self.ranges.mazes();
+                let ranges = given!(self.ranges => MazeRanges: width_min width_max height_min height_max
+                    obstacle_density_min obstacle_density_max wall_components_min wall_components_max
+                    go_straight_min go_straight_max);
                 let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
                 of_seeds(self.name.as_deref().unwrap_or("mazes"), self.seeds.clone(), make)?
             }
             "shelves" => {
+                let warehouse = given!(self.shelves => Warehouse: wall_width wall_height walls_in_row walls_rows
+                    bottom_gap horizontal_gap vertical_gap);
                 let name = self.name.clone().unwrap_or_else(|| "shelves".into());
-                vec![NamedMap { name, text: self.shelves.warehouse().generate(self.shelves.bays)? }]
+                vec![NamedMap { name, text: warehouse.generate(self.shelves.bays)? }]
             }
             preset => Preset::by_name(preset)?.maps()?,
         };
         write_out(self.out.as_deref(), write_set(&maps)?.as_bytes())
-    }
-}
-
-impl Ranges {
-    fn random(&self) -> RandomRanges {
-        let default = RandomRanges::default();
-        RandomRanges {
-            width_min: self.width_min.unwrap_or(default.width_min),
-            width_max: self.width_max.unwrap_or(default.width_max),
-            height_min: self.height_min.unwrap_or(default.height_min),
-            height_max: self.height_max.unwrap_or(default.height_max),
-            obstacle_density_min: self.obstacle_density_min.unwrap_or(default.obstacle_density_min),
-            obstacle_density_max: self.obstacle_density_max.unwrap_or(default.obstacle_density_max),
-        }
-    }
-
-    fn mazes(&self) -> MazeRanges {
-        let default = MazeRanges::default();
-        MazeRanges {
-            width_min: self.width_min.unwrap_or(default.width_min),
-            width_max: self.width_max.unwrap_or(default.width_max),
-            height_min: self.height_min.unwrap_or(default.height_min),
-            height_max: self.height_max.unwrap_or(default.height_max),
-            obstacle_density_min: self.obstacle_density_min.unwrap_or(default.obstacle_density_min),
-            obstacle_density_max: self.obstacle_density_max.unwrap_or(default.obstacle_density_max),
-            wall_components_min: self.wall_components_min.unwrap_or(default.wall_components_min),
-            wall_components_max: self.wall_components_max.unwrap_or(default.wall_components_max),
-            go_straight_min: self.go_straight_min.unwrap_or(default.go_straight_min),
-            go_straight_max: self.go_straight_max.unwrap_or(default.go_straight_max),
-        }
-    }
-}
-
-impl Shelves {
-    fn warehouse(&self) -> Warehouse {
-        let default = Warehouse::default();
-        Warehouse {
-            wall_width: self.wall_width.unwrap_or(default.wall_width),
-            wall_height: self.wall_height.unwrap_or(default.wall_height),
-            walls_in_row: self.walls_in_row.unwrap_or(default.walls_in_row),
-            walls_rows: self.walls_rows.unwrap_or(default.walls_rows),
-            bottom_gap: self.bottom_gap.unwrap_or(default.bottom_gap),
-            horizontal_gap: self.horizontal_gap.unwrap_or(default.horizontal_gap),
-            vertical_gap: self.vertical_gap.unwrap_or(default.vertical_gap),
-        }
     }
 }

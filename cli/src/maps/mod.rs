@@ -94,11 +94,14 @@ impl Sources {
             return read_maps(Path::new(word), Reading::default());
         }
         let names = library.matching(word)?;
-        names
-            .into_iter()
-            .map(|name| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() }))
-            .collect()
+        let map = |name: &str| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() });
+        names.into_iter().map(map).collect()
     }
+}
+
+/// An error about a word that means several maps where there has to be one.
+fn not_one(word: &str, found: usize, what: &str) -> Error {
+    Error::request(format!("`{word}` means {found} maps, {what} one"))
 }
 
 /// Writes what was asked for, to a file or to standard output.

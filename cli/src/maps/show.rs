@@ -9,7 +9,7 @@ use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
 use pogema_render::{Style, html, raster, svg};
 
-use super::{Sources, write_out};
+use super::{Sources, not_one, write_out};
 use crate::output::{markdown_table, say};
 
 #[derive(Args, Debug)]
@@ -27,15 +27,8 @@ impl List {
             Some(pattern) => library.matching(pattern)?,
             None => library.names().collect(),
         };
-        let mut table = markdown_table(&[
-            "map",
-            "rows",
-            "columns",
-            "free",
-            "agents",
-            "least cost",
-            "what has to be done",
-        ]);
+        let mut table =
+            markdown_table("map | rows | columns | free | agents | least cost | what has to be done");
         for name in names {
             let text = library.map(name)?;
             let puzzle = PUZZLES.iter().find(|puzzle| puzzle.name == name);
@@ -100,8 +93,7 @@ impl Show {
             return Ok(());
         }
         let [NamedMap { text, .. }] = maps else {
-            let reason = format!("`{}` means {} maps, a picture is of one", self.map, maps.len());
-            return Err(Error::Request { reason });
+            return Err(not_one(&self.map, maps.len(), "a picture is of"));
         };
         let (trace, style) = (still(text)?, Style { static_frame: Some(0), ..Style::default() });
         if let Some(path) = &self.svg {
@@ -149,12 +141,10 @@ fn picture(text: &MapText, room: usize) -> String {
     let goals = MapText { starts: Vec::new(), ..text.clone() };
     match (text.to_text(), starts.rows(), goals.rows()) {
         (Ok(rows), ..) => rows,
-        (_, Ok(starts), Ok(goals)) => starts
-            .iter()
-            .zip(&goals)
-            .map(|(one, other)| format!("{one}  {other}"))
-            .collect::<Vec<_>>()
-            .join("\n"),
+        (_, Ok(starts), Ok(goals)) => {
+            let rows = starts.iter().zip(&goals).map(|(start, goal)| format!("{start}  {goal}"));
+            rows.collect::<Vec<_>>().join("\n")
+        }
         _ => braille(&text.map, room),
     }
 }

@@ -11,7 +11,7 @@ use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioS
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
-use super::Sources;
+use super::{Sources, not_one};
 use crate::output::{markdown_table, say};
 use crate::words::word_of;
 
@@ -42,8 +42,7 @@ impl Stats {
     pub fn run(&self) -> Result<(), Error> {
         let maps = self.sources.meant_by(&self.map)?;
         if self.scenario.is_some() && maps.len() != 1 {
-            let reason = format!("`{}` means {} maps, a scenario is of one", self.map, maps.len());
-            return Err(Error::Request { reason });
+            return Err(not_one(&self.map, maps.len(), "a scenario is of"));
         }
         let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
         let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
@@ -101,18 +100,9 @@ fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> Scenar
 }
 
 fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
-    let mut table = markdown_table(&[
-        "map",
-        "rows",
-        "columns",
-        "free",
-        "density",
-        "components",
-        "largest",
-        "dead ends",
-        "corridor",
-        "unreachable pairs",
-    ]);
+    let mut table = markdown_table(
+        "map | rows | columns | free | density | components | largest | dead ends | corridor | unreachable pairs",
+    );
     for (map, stats, _) in judged {
         table.add_row([
             map.name.clone(),
@@ -154,16 +144,12 @@ fn infeasibility(infeasibility: &Infeasibility) -> String {
             format!("agents {} all want to stay on cell {cell}", listed(agents))
         }
         Infeasibility::Locked(agents) => {
-            format!(
-                "agents {} share a component in which nothing they can do brings them all home",
-                listed(agents)
-            )
+            let agents = listed(agents);
+            format!("agents {agents} share a component in which nothing they can do brings them all home")
         }
         Infeasibility::WrongOrder(agents) => {
-            format!(
-                "agents {} share a corridor along which their goals stand in another order",
-                listed(agents)
-            )
+            let agents = listed(agents);
+            format!("agents {agents} share a corridor along which their goals stand in another order")
         }
     }
 }

@@ -12,12 +12,12 @@ use pogema_planners::{Outcome, Plan, PlannerName, Problem, validate, write_plan,
 use pogema_reference::Reference;
 use serde_json::json;
 
-use crate::output::{check_writable, say};
+use crate::output::{check_writable, say, write_trace};
 use crate::render::Pictures;
 use crate::run::Settings;
 use crate::words::word;
 
-use super::thinking::Thinking;
+use super::planner_args::PlannerArgs;
 
 #[derive(Args, Debug)]
 pub struct MakePlan {
@@ -27,7 +27,7 @@ pub struct MakePlan {
     #[arg(long, value_name = "NAME", default_value_t = PlannerName::Lacam, value_parser = word::<PlannerName>())]
     planner: PlannerName,
     #[command(flatten)]
-    thinking: Thinking,
+    planner_args: PlannerArgs,
     /// Write the plan to this file, a line of cells for each step
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -52,7 +52,7 @@ impl MakePlan {
             check_writable(path)?;
         }
         self.pictures.check(config.num_agents)?;
-        let budget = self.thinking.budget()?;
+        let budget = self.planner_args.budget()?;
         let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
         let problem = match self.settings.most_steps()?.map(usize::try_from) {
@@ -60,7 +60,7 @@ impl MakePlan {
             _ => problem,
         };
         let began = Instant::now();
-        let outcome = self.planner.make(self.thinking.choice()).plan(&problem, &budget);
+        let outcome = self.planner.make(self.planner_args.planner_settings()).plan(&problem, &budget);
         let seconds = began.elapsed().as_secs_f64();
         if let Outcome::Solved { plan, .. } = &outcome {
             let goals = instance.first_goals();
@@ -86,9 +86,7 @@ impl MakePlan {
         }
         let trace = replay(config, instance, plan)?;
         if let Some(path) = &self.trace {
-            let mut text = Vec::new();
-            trace.write(&mut text)?;
-            files::write(path, &text)?;
+            write_trace(path, &trace)?;
         }
         if !self.pictures.are_wanted() {
             return Ok(());
@@ -115,23 +113,17 @@ fn replay(config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<Trace
 }
 
 fn as_json(outcome: &Outcome, seconds: f64) -> String {
-    let told = match outcome {
+    let mut json = match outcome {
         Outcome::Solved { plan, lower_bound } => json!({
             "outcome": "solved",
             "sum_of_costs": plan.sum_of_costs(),
             "lower_bound": lower_bound,
             "makespan": plan.makespan(),
-            "seconds": seconds,
         }),
-        Outcome::TimedOut { lower_bound, .. } => {
-            json!({"outcome": "timed_out", "lower_bound": lower_bound, "seconds": seconds})
-        }
-        Outcome::GaveUp { lower_bound, .. } => {
-            json!({"outcome": "gave_up", "lower_bound": lower_bound, "seconds": seconds})
-        }
-        Outcome::Impossible { reason } => {
-            json!({"outcome": "impossible", "reason": reason, "seconds": seconds})
-        }
+        Outcome::TimedOut { lower_bound, .. } => json!({"outcome": "timed_out", "lower_bound": lower_bound}),
+        Outcome::GaveUp { lower_bound, .. } => json!({"outcome": "gave_up", "lower_bound": lower_bound}),
+        Outcome::Impossible { reason } => json!({"outcome": "impossible", "reason": reason}),
     };
-    told.to_string()
+    json["seconds"] = seconds.into();
+    json.to_string()
 }

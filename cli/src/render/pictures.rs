@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use pogema_conformance::files;
 use pogema_core::{Error, Trace};
 use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, video};
 
 use super::screen::Screen;
-use crate::output::{check_writable, flagged};
+use crate::output::{check_writable, flagged, progress_bar};
 use crate::words::word;
 
 /// The longer side of pictures. Units: pixels.
@@ -94,7 +93,7 @@ impl Pictures {
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
                 let reason = format!("`{other}` and `{flag}` name one file, `{}`", path.display());
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
             check_writable(path)?;
         }
@@ -170,10 +169,7 @@ impl Pictures {
 
 /// A bar on the terminal, told how many frames are done, and how many there are.
 fn progress(what: &'static str) -> impl FnMut(usize, usize) {
-    let bar = ProgressBar::no_length().with_message(what);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} frames") {
-        bar.set_style(style);
-    }
+    let bar = progress_bar("{msg} {wide_bar} {pos}/{len} frames", 0).with_message(what);
     move |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);

@@ -36,8 +36,8 @@ impl Policy {
     ) -> Result<Self, Error> {
         match (name, file) {
             (FILE, Some(path)) => Ok(Self::File(read_actions(path, config.num_agents)?.into_iter())),
-            (FILE, None) => Err(Error::Request { reason: "`--policy file` needs `--actions FILE`".into() }),
-            (_, Some(_)) => Err(Error::Request { reason: "`--actions` needs `--policy file`".into() }),
+            (FILE, None) => Err(Error::request("`--policy file` needs `--actions FILE`")),
+            (_, Some(_)) => Err(Error::request("`--actions` needs `--policy file`")),
             (_, None) => {
                 let (rules, dice) = (config.rules(), generator(config)?);
                 let policy = NamedPolicy::new(name, settings, &rules, instance, dice)?;
@@ -84,9 +84,7 @@ fn read_actions(path: &Path, num_agents: usize) -> Result<Vec<Vec<Action>>, Erro
 fn read_step(text: &str, num_agents: usize) -> Result<Vec<Action>, Error> {
     let numbers: Vec<i64> = serde_json::from_str(text).map_err(|_| {
         let found = shorten(text.trim(), Error::LONGEST_QUOTE);
-        Error::Request {
-            reason: format!("found `{found}`, expected a list of action numbers such as [0, 4]"),
-        }
+        Error::request(format!("found `{found}`, expected a list of action numbers such as [0, 4]"))
     })?;
     Error::check_length("actions", num_agents, numbers.len())?;
     (0..).zip(numbers).map(|(agent, number)| Action::from_number(agent, number)).collect()

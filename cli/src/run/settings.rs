@@ -166,10 +166,7 @@ impl Settings {
             None => GridConfig::from_value(&Value::Object(fields.clone()))?,
         };
         let Some(path) = &self.scenario else { return Ok(config) };
-        let map = config
-            .map
-            .as_ref()
-            .ok_or_else(|| Error::Request { reason: "`--scenario` needs a map".into() })?;
+        let map = config.map.as_ref().ok_or_else(|| Error::request("`--scenario` needs a map"))?;
         let scenario = read_scenario(path, map)?;
         config.with_scenario(&scenario, &fields)
     }

@@ -6,7 +6,7 @@ use console::{Style as Paint, truncate_str};
 use pogema_core::picture::agent_letter;
 use pogema_core::{Cell, Error, Snapshot};
 
-use crate::check::{check_agent, refused};
+use crate::check::check_agent;
 use crate::ground::{Border, Ground};
 use part::Part;
 
@@ -48,7 +48,7 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
         check_agent(agent, num_agents)?;
     }
     if style.most.is_some_and(|(rows, cols)| rows == 0 || cols == 0) {
-        return Err(refused("size of the terminal", "0", "at least one row and one column"));
+        return Err(Error::out_of_range("size of the terminal", "0", "at least one row and one column"));
     }
     let cell_width = if num_agents > MOST_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
     let part = Part::of(ground, state, style, cell_width);

@@ -3,20 +3,22 @@
 
 mod picks;
 
+use std::collections::HashMap;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use pogema_core::Error;
 use pogema_render::html::{Album, fill, pack};
-use serde::Serialize;
+use serde_json::{Value, json};
 
 pub use picks::{Pick, picks};
 
 use crate::environments::Environments;
-use crate::manifest::{Manifest, Run};
-use crate::pairs::Pairs;
+use crate::frame::plain_text;
+use crate::manifest::Manifest;
 use crate::replay::differences;
-use crate::results::{Results, Row};
-use crate::suite::Suite;
+use crate::results::{Pairs, Results, Row};
+use crate::suite::{Algorithm, Suite};
 use crate::tree::Node;
 use crate::views::{ImageFormat, Shown, Table, View};
 
@@ -56,53 +58,6 @@ impl Replay {
     }
 }
 
-/// What the template is filled with.
-#[derive(Serialize)]
-struct Page {
-    facts: Vec<(&'static str, String)>,
-    notes: Vec<String>,
-    views: Vec<Section>,
-    algorithms: Vec<Algorithm>,
-    runs: Vec<Run>,
-    suite: String,
-}
-
-#[derive(Serialize)]
-struct Section {
-    name: String,
-    tables: Vec<Grid>,
-    /// Plots as addresses that hold them.
-    plots: Vec<String>,
-    notes: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Grid {
-    head: Vec<String>,
-    rows: Vec<Vec<String>>,
-    /// Whether each column holds figures.
-    figures: Vec<bool>,
-    remark: Option<String>,
-}
-
-#[derive(Serialize)]
-struct Algorithm {
-    name: String,
-    parameters: String,
-    episodes: Vec<Episode>,
-}
-
-#[derive(Serialize)]
-struct Episode {
-    number: usize,
-    is_worst: bool,
-    settings: String,
-    why: String,
-    /// Its place among the replays.
-    replay: Option<usize>,
-    remark: String,
-}
-
 /// The page, for the views of the suite, or for a table of all figures if it has none.
 ///
 /// # Errors
@@ -116,21 +71,25 @@ pub fn page(
     let stem = suite.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let title = stem.unwrap_or_else(|| "evaluation".into());
     let mut album = Album { title, style: include_str!("report.css").into(), ..Album::default() };
-    let mut algorithms: Vec<Algorithm> = suite.algorithms.iter().map(algorithm).collect();
-    for replay in replays {
-        let found = algorithms.iter_mut().find(|algorithm| algorithm.name == replay.pick.algorithm);
-        if let Some(algorithm) = found {
-            algorithm.episodes.push(episode(replay, &results.rows[replay.pick.row], &mut album));
-        }
+    let mut episodes: HashMap<&str, Vec<Value>> = HashMap::new();
+    for replay in replays.iter().filter(|replay| suite.algorithm(&replay.pick.algorithm).is_some()) {
+        let shown = episode(replay, &results.rows[replay.pick.row], &mut album);
+        episodes.entry(&replay.pick.algorithm).or_default().push(shown);
     }
-    let page = Page {
-        facts: facts(suite, results),
-        notes: results.notes.clone(),
-        views: sections(suite, results)?,
-        algorithms,
-        runs: manifest.runs.clone(),
-        suite: played(suite),
+    let algorithm = |algorithm: &Algorithm| {
+        let parameters = algorithm.parameters.iter().map(|(key, node)| format!("{key}: {}", node.value()));
+        let parameters: Vec<String> = std::iter::once(algorithm.name.clone()).chain(parameters).collect();
+        let episodes = episodes.get(algorithm.key.as_str());
+        json!({"name": algorithm.key, "parameters": parameters.join(", "), "episodes": episodes})
     };
+    let page = json!({
+        "facts": facts(suite, results),
+        "notes": results.notes,
+        "views": sections(suite, results)?,
+        "algorithms": suite.algorithms.iter().map(algorithm).collect::<Vec<_>>(),
+        "runs": manifest.runs,
+        "suite": played(suite),
+    });
     album.body = fill(include_str!("report.html"), page)?;
     album.text()
 }
@@ -144,14 +103,11 @@ fn played(suite: &Suite) -> String {
 fn facts(suite: &Suite, results: &Results) -> Vec<(&'static str, String)> {
     let names = results.algorithms();
     let expected = suite.environments.len();
-    let of = |name: &String| results.rows.iter().filter(|row| row.algorithm == *name).count();
-    let missing: Vec<String> = suite
-        .algorithms
-        .iter()
-        .map(|algorithm| (&algorithm.key, of(&algorithm.key)))
-        .filter(|(_, number)| *number < expected)
-        .map(|(name, number)| format!("{name} has {number} of {expected}"))
-        .collect();
+    let missing = suite.algorithms.iter().filter_map(|Algorithm { key, .. }| {
+        let number = results.rows.iter().filter(|row| row.algorithm == *key).count();
+        (number < expected).then(|| format!("{key} has {number} of {expected}"))
+    });
+    let missing: Vec<String> = missing.collect();
     let mut facts = vec![
         ("algorithms", names.join(", ")),
         ("episodes", format!("{} in {expected} environments", results.rows.len())),
@@ -162,7 +118,7 @@ fn facts(suite: &Suite, results: &Results) -> Vec<(&'static str, String)> {
     facts
 }
 
-fn sections(suite: &Suite, results: &Results) -> Result<Vec<Section>, Error> {
+fn sections(suite: &Suite, results: &Results) -> Result<Vec<Value>, Error> {
     let all = Node::parse("type: tabular\ndrop_keys: [seed, map_name]")?;
     let usual = [("means".to_owned(), all)];
     let views = if suite.views.is_empty() { &usual[..] } else { &suite.views };
@@ -177,38 +133,25 @@ fn sections(suite: &Suite, results: &Results) -> Result<Vec<Section>, Error> {
     views.iter().map(show).collect()
 }
 
-fn section(name: &str, shown: Shown) -> Result<Section, Error> {
+fn section(name: &str, shown: Shown) -> Result<Value, Error> {
     let plot = |svg: Vec<u8>| format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
     let plots = shown.pictures.iter().map(|picture| picture.bytes(ImageFormat::Svg).map(plot));
-    Ok(Section {
-        name: name.to_owned(),
-        plots: plots.collect::<Result<_, _>>()?,
-        tables: shown.tables.iter().map(grid).collect(),
-        notes: shown.notes,
-    })
+    Ok(json!({
+        "name": name,
+        "plots": plots.collect::<Result<Vec<_>, _>>()?,
+        "tables": shown.tables.iter().map(grid).collect::<Vec<_>>(),
+        "notes": shown.notes,
+    }))
 }
 
-fn grid(table: &Table) -> Grid {
-    Grid {
-        head: table.head.clone(),
-        rows: table.texts(),
-        figures: (0..table.head.len()).map(|column| table.is_figure(column)).collect(),
-        remark: table.remark.clone(),
-    }
+fn grid(table: &Table) -> Value {
+    let figures: Vec<bool> = (0..table.head.len()).map(|column| table.is_figure(column)).collect();
+    json!({"head": table.head, "rows": table.texts(), "figures": figures, "remark": table.remark})
 }
 
-fn algorithm(algorithm: &crate::suite::Algorithm) -> Algorithm {
-    let parameters = algorithm.parameters.iter().map(|(key, node)| format!("{key}: {}", node.value()));
-    let parameters: Vec<String> = std::iter::once(algorithm.name.clone()).chain(parameters).collect();
-    Algorithm { name: algorithm.key.clone(), parameters: parameters.join(", "), episodes: Vec::new() }
-}
-
-fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Episode {
+fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Value {
     let Pick { algorithm, episode, is_worst, why, .. } = &replay.pick;
-    let settings = row.settings.iter().map(|(name, value)| {
-        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        format!("{name} {value}")
-    });
+    let settings = row.settings.iter().map(|(name, value)| format!("{name} {}", plain_text(value)));
     let place = replay.film.as_ref().ok().map(|film| {
         album.replays.push((format!("{algorithm}, episode {episode}: {why}"), film.clone()));
         album.replays.len() - 1
@@ -218,12 +161,12 @@ fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Episode {
         Ok(_) if replay.differences.is_empty() => String::new(),
         Ok(_) => format!("played again it came out otherwise: {}", replay.differences.join("; ")),
     };
-    Episode {
-        number: *episode,
-        is_worst: *is_worst,
-        settings: settings.collect::<Vec<_>>().join(", "),
-        why: why.clone(),
-        replay: place,
-        remark,
-    }
+    json!({
+        "number": episode,
+        "is_worst": is_worst,
+        "settings": settings.collect::<Vec<_>>().join(", "),
+        "why": why,
+        "replay": place,
+        "remark": remark,
+    })
 }

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::pairs::Pairs;
-use crate::results::{Results, Row, short};
+use indexmap::IndexMap;
+
+use crate::results::{Pairs, Results, Row, short};
 
 /// Figures by which episodes are judged, of which the first counts that all rows have, and whether less is better.
 const JUDGED_BY: [(&str, bool); 4] =
@@ -38,14 +39,10 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         return Vec::new();
     };
     let best = best_of(results, figure, is_less_better);
-    let mut of_algorithms: Vec<(&str, Vec<Judged<'_>>)> = Vec::new();
+    let mut of_algorithms: IndexMap<&str, Vec<Judged>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
-        let place = of_algorithms.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
-            of_algorithms.push((name, Vec::new()));
-            of_algorithms.len() - 1
-        });
-        let episodes = &mut of_algorithms[place].1;
+        let episodes = of_algorithms.entry(name).or_default();
         let value = row.metric(figure).unwrap_or_default();
         let (least, whose) = best.get(&told(&row.settings)).copied().unwrap_or((value, name));
         let times = if is_less_better { value / least } else { least / value };
@@ -53,31 +50,17 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         let solved = row.metric(SOLVED);
         let why = why(figure, value, solved, value / least, (whose != name && times > 1.0).then_some(whose));
         let worth = if is_less_better { value } else { -value };
-        episodes.push(Judged {
-            at,
-            episode: episodes.len(),
-            bad: [-solved.unwrap_or(1.0), times, worth],
-            why,
-            name,
-        });
+        let bad = [-solved.unwrap_or(1.0), times, worth];
+        let pick = Pick { algorithm: name.into(), episode: episodes.len(), row: at, is_worst: true, why };
+        episodes.push(Judged { pick, bad });
     }
-    of_algorithms.into_iter().flat_map(|(_, episodes)| ends(episodes, number)).collect()
+    of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
-struct Judged<'a> {
-    at: usize,
-    episode: usize,
+struct Judged {
+    pick: Pick,
     /// The larger the worse, the first first.
     bad: [f64; 3],
-    why: String,
-    name: &'a str,
-}
-
-impl Judged<'_> {
-    fn pick(&self, is_worst: bool) -> Pick {
-        let (algorithm, why) = (self.name.to_owned(), self.why.clone());
-        Pick { algorithm, episode: self.episode, row: self.at, is_worst, why }
-    }
 }
 
 /// The best figure in each environment, and whose it is.
@@ -108,15 +91,16 @@ fn told(settings: &Pairs) -> String {
     parts.join("\n")
 }
 
-fn ends(mut episodes: Vec<Judged<'_>>, number: usize) -> Vec<Pick> {
-    let by_worth = |one: &Judged<'_>, other: &Judged<'_>| {
+fn ends(mut episodes: Vec<Judged>, number: usize) -> Vec<Pick> {
+    let by_worth = |one: &Judged, other: &Judged| {
         let pairs = one.bad.iter().zip(&other.bad);
         let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
-        differs.unwrap_or_else(|| one.episode.cmp(&other.episode))
+        differs.unwrap_or_else(|| one.pick.episode.cmp(&other.pick.episode))
     };
     episodes.sort_by(by_worth);
-    let worst = episodes.iter().take(number).map(|episode| episode.pick(true));
-    let best = episodes.iter().rev().take(number).map(|episode| episode.pick(false));
+    let worst = episodes.iter().take(number).map(|judged| judged.pick.clone());
+    let best =
+        episodes.iter().rev().take(number).map(|judged| Pick { is_worst: false, ..judged.pick.clone() });
     worst.chain(best).collect()
 }
 
@@ -126,8 +110,8 @@ mod tests {
 
     fn results(rows: &[(&str, u64, f64, f64)]) -> Results {
         let row = |&(algorithm, seed, soc, share): &(&str, u64, f64, f64)| Row {
-            metrics: Pairs(vec![("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
-            settings: Pairs(vec![("seed".into(), seed.into())]),
+            metrics: Pairs::from([("SoC".into(), soc.into()), ("ISR".into(), share.into())]),
+            settings: Pairs::from([("seed".into(), seed.into())]),
             algorithm: algorithm.to_owned(),
             ..Row::default()
         };
@@ -153,7 +137,7 @@ mod tests {
     #[test]
     fn rows_that_cannot_be_judged_are_not_picked() {
         let mut results = results(&[("A", 0, 20.0, 1.0)]);
-        results.rows[0].metrics = Pairs(vec![("fun".into(), 1.0.into())]);
+        results.rows[0].metrics = Pairs::from([("fun".into(), 1.0.into())]);
         assert_eq!(picks(&results, 3), []);
     }
 }

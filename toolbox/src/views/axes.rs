@@ -3,6 +3,8 @@
 use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 
+use super::compose::plain_layout;
+
 /// The colour of the lines behind a plot.
 const GRID: &str = "#DDDDDD";
 
@@ -126,18 +128,10 @@ impl Frame {
         let left = size * 2.0 + widest(&self.y) + TICK + 2.0;
         let right = 5.0 + self.x.ticks.last().map_or(0.0, |(_, text)| text_width(text, self.font_size) / 2.0);
         let top = self.title.as_ref().map_or(5.0, |_| size * 2.0);
-        let mut layout = Layout::new(self.x.range, self.y.range)
-            .with_width(self.width)
-            .with_height(self.height)
-            .with_show_grid(false)
+        let mut layout = plain_layout((self.width, self.height), self.x.range, self.y.range)
             .with_force_margins(left.min(self.width * 0.45), right.min(self.width * 0.25))
             .with_force_margins_y(top, TICK + size * 3.1)
-            .with_x_axis_min(self.x.range.0)
-            .with_x_axis_max(self.x.range.1)
-            .with_y_axis_min(self.y.range.0)
-            .with_y_axis_max(self.y.range.1)
             .with_axis_line_width(0.6);
-        (layout.suppress_x_ticks, layout.suppress_y_ticks, layout.show_legend) = (true, true, false);
         (layout.log_x, layout.log_y) = (self.x.is_log, self.y.is_log);
         layout
     }
@@ -156,34 +150,51 @@ impl Frame {
             scene.add(line((x, bottom), (x, bottom + TICK), "black"));
             if x - half > free_from {
                 free_from = x + half + size * 0.5;
-                scene.add(self.text(text, (x, bottom + TICK + size), TextAnchor::Middle, None));
+                scene.add(self::text(text, (x, bottom + TICK + size), self.font_size));
             }
         }
         for (tick, text) in within(&self.y) {
             let y = place.map_y(tick);
             behind.push(line((left, y), (right, y), GRID));
             scene.add(line((left - TICK, y), (left, y), "black"));
-            scene.add(self.text(text, (left - TICK - 2.0, y + size * 0.35), TextAnchor::End, None));
+            scene.add(anchored(
+                text,
+                (left - TICK - 2.0, y + size * 0.35),
+                self.font_size,
+                TextAnchor::End,
+                None,
+            ));
         }
         scene.elements.splice(0..0, behind);
         let (middle_x, middle_y) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
-        scene.add(self.text(&self.x.title, (middle_x, bottom + TICK + size * 2.5), TextAnchor::Middle, None));
-        scene.add(self.text(&self.y.title, (size * 1.2, middle_y), TextAnchor::Middle, Some(-90.0)));
+        scene.add(text(&self.x.title, (middle_x, bottom + TICK + size * 2.5), self.font_size));
+        scene.add(anchored(
+            &self.y.title,
+            (size * 1.2, middle_y),
+            self.font_size,
+            TextAnchor::Middle,
+            Some(-90.0),
+        ));
         if let Some(title) = &self.title {
-            scene.add(self.text(title, (middle_x, top - size * 0.6), TextAnchor::Middle, None));
+            scene.add(text(title, (middle_x, top - size * 0.6), self.font_size));
         }
-    }
-
-    fn text(&self, text: &str, (x, y): (f64, f64), anchor: TextAnchor, rotate: Option<f64>) -> Primitive {
-        let (content, size) = (text.to_owned(), self.font_size);
-        Primitive::Text { x, y, content, size, anchor, rotate, bold: false, color: None }
     }
 }
 
 /// A text in the middle of a place.
-pub(super) fn text(text: &str, (x, y): (f64, f64), size: u32) -> Primitive {
-    let (content, anchor) = (text.to_owned(), TextAnchor::Middle);
-    Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None }
+pub(super) fn text(text: &str, place: (f64, f64), size: u32) -> Primitive {
+    anchored(text, place, size, TextAnchor::Middle, None)
+}
+
+/// A text that begins, has its middle or ends at a place, turned by some degrees.
+pub(super) fn anchored(
+    text: &str,
+    (x, y): (f64, f64),
+    size: u32,
+    anchor: TextAnchor,
+    rotate: Option<f64>,
+) -> Primitive {
+    Primitive::Text { x, y, content: text.to_owned(), size, anchor, rotate, bold: false, color: None }
 }
 
 /// The ticks that are on the axis.

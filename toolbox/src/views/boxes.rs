@@ -10,11 +10,11 @@ use super::axes::Axis;
 use super::options::{Common, Options};
 use super::panel::framed;
 use super::picture::Picture;
-use super::series::{at, placeless};
+use super::series::{at, distinct, placeless};
 use super::style::Style;
 use super::{Shown, known_column};
 use crate::bootstrap::percentile;
-use crate::frame::{compare, lacking, values};
+use crate::frame::{lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
@@ -48,9 +48,7 @@ impl BoxView {
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "x", &self.x, results)?;
         known_column(name, "y", &self.y, results)?;
-        let mut keys: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &self.x)).collect();
-        keys.sort_by(compare);
-        keys.dedup();
+        let keys = distinct(&results.rows, &self.x);
         let group = |key: &Value| {
             let rows: Vec<&Row> =
                 results.rows.iter().filter(|row| at(row, &self.x).as_ref() == Some(key)).collect();
@@ -60,8 +58,7 @@ impl BoxView {
         let groups: Vec<(String, Vec<f64>)> =
             keys.iter().rev().map(group).filter(|(_, values)| !values.is_empty()).collect();
         if groups.is_empty() {
-            let reason = format!("view `{name}`: no row has a number in `{}`", self.y);
-            return Err(Error::Request { reason });
+            return Err(Error::request(format!("view `{name}`: no row has a number in `{}`", self.y)));
         }
         let mut notes = placeless(&results.rows, [&self.x]);
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
@@ -73,20 +70,17 @@ impl BoxView {
         let is_log = self.style.log_y && all.iter().all(|&value| value > 0.0);
         let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
         let colours = (0..groups.len()).rev().map(|number| self.style.colour(number));
-        let outliers: Vec<(f64, f64)> = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(number, (_, values))| {
-                outliers(values).into_iter().map(move |x| (x, number as f64 + 1.0))
-            })
-            .collect();
+        let mut dots: Vec<(f64, f64)> = Vec::new();
+        for (number, (_, values)) in groups.iter().enumerate() {
+            dots.extend(outliers(values).into_iter().map(|x| (x, number as f64 + 1.0)));
+        }
         let mut boxes = BoxPlot::new().with_horizontal(true).with_width(0.6).with_group_colors(colours);
         for (name, values) in groups {
             boxes = boxes.with_group(name, values);
         }
         let mut plots = vec![Plot::Box(boxes)];
-        if !outliers.is_empty() {
-            let dots = ScatterPlot::new().with_data(outliers).with_color("#555555").with_size(1.0);
+        if !dots.is_empty() {
+            let dots = ScatterPlot::new().with_data(dots).with_color("#555555").with_size(1.0);
             plots.push(Plot::Scatter(dots.with_marker_opacity(0.5)));
         }
         let x = Axis::of_numbers(&self.common.title(&self.y), &all, is_log, self.style.ticks.as_deref());

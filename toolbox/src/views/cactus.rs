@@ -13,11 +13,8 @@ use super::series::{Series, signs};
 use super::style::Style;
 use super::{Shown, known_column};
 use crate::frame::lacking;
-use crate::results::Results;
+use crate::results::{RUNTIME, Results, SOLVED};
 use crate::tree::Node;
-
-/// What tells whether an instance was solved.
-const SOLVED: &str = "CSR";
 
 /// `type: cactus`: a line for each algorithm, which rises by one at the `runtime` of each instance that it solved.
 ///
@@ -36,7 +33,7 @@ impl CactusView {
         Ok(Self {
             common: Common::read(&options)?,
             style: Style { log_x, has_markers: false, ..Style::read(&options, (3.6, 2.6))? },
-            x: options.text("x")?.unwrap_or_else(|| "runtime".to_owned()),
+            x: options.text("x")?.unwrap_or_else(|| RUNTIME.to_owned()),
         })
     }
 
@@ -54,22 +51,14 @@ impl CactusView {
             times.sort_by(f64::total_cmp);
             times
         };
-        let lines: Vec<(String, Vec<f64>)> = results
-            .algorithms()
-            .into_iter()
-            .map(|algorithm| (algorithm.clone(), times(&algorithm)))
-            .collect();
+        let all = results.algorithms().into_iter();
+        let lines: Vec<_> = all.map(|algorithm| (algorithm.clone(), times(&algorithm))).collect();
         if lines.iter().all(|(_, times)| times.is_empty()) {
-            let reason = format!("view `{name}`: no row is solved and has a `{}`", self.x);
-            return Err(Error::Request { reason });
+            return Err(Error::request(format!("view `{name}`: no row is solved and has a `{}`", self.x)));
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
-        notes.extend(
-            lines
-                .iter()
-                .filter(|(_, times)| times.is_empty())
-                .map(|(name, _)| format!("`{name}` solved nothing")),
-        );
+        let idle = lines.iter().filter(|(_, times)| times.is_empty());
+        notes.extend(idle.map(|(name, _)| format!("`{name}` solved nothing")));
         Ok(Shown { pictures: vec![self.draw(&lines)], notes, ..Shown::default() })
     }
 

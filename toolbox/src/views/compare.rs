@@ -8,7 +8,7 @@ use pogema_core::Error;
 use super::axes::Axis;
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
-use super::pairing::{Pairing, is_solved};
+use super::pairing::Pairing;
 use super::panel::framed;
 use super::picture::Picture;
 use super::style::Style;
@@ -95,7 +95,7 @@ impl CompareView {
             _ => {
                 let known = all.join(", ");
                 let reason = format!("view `{name}`: expected `first` and `second`, each one of {known}");
-                return Err(Error::Request { reason });
+                return Err(Error::request(reason));
             }
         };
         for (key, algorithm) in [("first", &first), ("second", &second)] {
@@ -126,7 +126,7 @@ impl CompareView {
 
     /// Whether a row's figure counts: that of the share of solved ones always does.
     fn counts(&self, row: &Row) -> bool {
-        MORE_IS_BETTER.contains(&self.metric.as_str()) || is_solved(row)
+        MORE_IS_BETTER.contains(&self.metric.as_str()) || row.is_solved()
     }
 
     fn table(&self, pair: &[String; 2], score: &Score) -> Table {

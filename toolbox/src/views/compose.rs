@@ -13,6 +13,22 @@ pub(super) fn bare(plots: Vec<Plot>, layout: Layout) -> Scene {
     scene
 }
 
+/// A layout of nothing but the plot, from end to end.
+pub(super) fn plain_layout((width, height): (f64, f64), x: (f64, f64), y: (f64, f64)) -> Layout {
+    let mut layout = Layout::new(x, y)
+        .with_width(width)
+        .with_height(height)
+        .with_show_grid(false)
+        .with_force_margins(0.0, 0.0)
+        .with_force_margins_y(0.0, 0.0)
+        .with_x_axis_min(x.0)
+        .with_x_axis_max(x.1)
+        .with_y_axis_min(y.0)
+        .with_y_axis_max(y.1);
+    (layout.suppress_x_ticks, layout.suppress_y_ticks, layout.show_legend) = (true, true, false);
+    layout
+}
+
 /// Puts one scene into another.
 pub(super) fn insert(scene: &mut Scene, part: Scene, (x, y): (f64, f64)) {
     scene.font_family = scene.font_family.take().or(part.font_family);

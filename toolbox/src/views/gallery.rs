@@ -26,9 +26,9 @@ pub struct Gallery {
     pub folder: Option<PathBuf>,
 }
 
-/// What came of a view.
+/// The tables of a view as text, and the files of its plots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Told {
+pub struct ShownView {
     /// Its tables with its name above them.
     pub tables: Vec<String>,
     /// The files of its plots.
@@ -59,19 +59,19 @@ impl Gallery {
     ///
     /// # Errors
     /// If it cannot be shown, or a file cannot be written.
-    pub fn show(&self, name: &str, view: &View, results: &Results) -> Result<Told, Error> {
+    pub fn show(&self, name: &str, view: &View, results: &Results) -> Result<ShownView, Error> {
         let shown = view.show(name, results, self.definition)?;
         let format = self.format.or(view.format()).unwrap_or(Format::Terminal);
         let tables =
             shown.tables.iter().map(|table| format!("{}{}", heading(name, format), table.text(format)));
-        let mut told = Told { tables: tables.collect(), files: Vec::new(), notes: shown.notes };
+        let mut all = ShownView { tables: tables.collect(), files: Vec::new(), notes: shown.notes };
         if let Some(folder) = &self.folder {
             for picture in &shown.pictures {
                 let kind = self.kind.unwrap_or(picture.kind);
-                told.files.push(write(folder, name, kind, &picture.bytes(kind)?)?);
+                all.files.push(write(folder, name, kind, &picture.bytes(kind)?)?);
             }
         }
-        Ok(told)
+        Ok(all)
     }
 }
 
@@ -95,13 +95,13 @@ fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
     let found = all.iter().find(|path| path.is_file()).cloned();
     found.ok_or_else(|| {
         let looked = all.iter().map(|path| format!("`{}`", path.display())).collect::<Vec<_>>().join(", ");
-        Error::Request { reason: format!("no views: expected {looked}, or another file as `config`") }
+        Error::request(format!("no views: expected {looked}, or another file as `config`"))
     })
 }
 
 fn write(folder: &Path, name: &str, kind: ImageFormat, bytes: &[u8]) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-    let path = folder.join(format!("{}.{}", file_name(name), kind.extension()));
+    let path = folder.join(format!("{}.{}", file_name(name), kind));
     write_whole(&path, bytes)?;
     Ok(path)
 }

@@ -1,20 +1,22 @@
 //! A table in one of its formats.
 
 use comfy_table::{CellAlignment, Table as Drawn, presets};
+use pogema_core::words;
 
 use crate::bootstrap::Estimate;
 
-/// How a table is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// With lines around its cells.
-    Terminal,
-    /// As GitHub reads it.
-    Markdown,
-    /// With the rules of the package booktabs.
-    Latex,
-    /// Commas, and a column each for mean, lower end, upper end and number of values.
-    Csv,
+words! {
+    /// How a table is written.
+    pub enum Format {
+        /// With lines around its cells.
+        Terminal = "terminal",
+        /// As GitHub reads it.
+        Markdown = "markdown",
+        /// With the rules of the package booktabs.
+        Latex = "latex",
+        /// Commas, and a column each for mean, lower end, upper end and number of values.
+        Csv = "csv",
+    }
 }
 
 /// What stands in a cell.

@@ -1,23 +1,17 @@
 //! The file formats of plots.
 
-/// The format of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ImageFormat {
-    /// Lines and letters, for the web.
-    Svg,
-    /// Lines and letters with their font, for papers.
-    Pdf,
-    /// Dots.
-    Png,
-}
+use pogema_core::words;
 
-impl ImageFormat {
-    /// What such files end with.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Pdf => "pdf",
-            Self::Png => "png",
-        }
+words! {
+    /// The format of a picture, whose word is the extension of its files.
+    #[derive(Default)]
+    pub enum ImageFormat {
+        /// Lines and letters, for the web.
+        Svg = "svg",
+        /// Lines and letters with their font, for papers.
+        #[default]
+        Pdf = "pdf",
+        /// Dots.
+        Png = "png",
     }
 }

@@ -1,11 +1,10 @@
 //! Which line is whose.
 
-use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 
-use super::axes::text_width;
-use super::compose::{bare, insert};
+use super::axes::{anchored, text, text_width};
+use super::compose::{bare, insert, plain_layout};
 
 /// Height of a line in heights of the font.
 const LINE: f64 = 1.5;
@@ -54,33 +53,21 @@ impl Legend {
     pub fn draw(self, scene: &mut Scene, (left, top): (f64, f64), has_box: bool) {
         let (width, height) = self.size();
         if has_box {
-            let (fill, stroke) = ("#FFFFFF".into(), Some("#CCCCCC".into()));
-            let (x, y, opacity) = (left, top, Some(0.85));
             scene.add(Primitive::Rect {
-                x,
-                y,
+                x: left,
+                y: top,
                 width,
                 height,
-                fill,
-                stroke,
+                fill: "#FFFFFF".into(),
+                stroke: Some("#CCCCCC".into()),
                 stroke_width: Some(0.5),
-                opacity,
+                opacity: Some(0.85),
             });
         }
         let mut first = top + 2.0;
-        if let Some(content) = self.title.clone() {
-            let (x, y) = (left + width / 2.0, first + f64::from(self.font_size));
-            let (size, anchor) = (self.font_size, TextAnchor::Middle);
-            scene.add(Primitive::Text {
-                x,
-                y,
-                content,
-                size,
-                anchor,
-                rotate: None,
-                bold: false,
-                color: None,
-            });
+        if let Some(title) = &self.title {
+            let place = (left + width / 2.0, first + f64::from(self.font_size));
+            scene.add(text(title, place, self.font_size));
             first += self.line_height();
         }
         let (columns, column_width, line_height) =
@@ -95,24 +82,8 @@ impl Legend {
 
 fn draw_entry(scene: &mut Scene, entry: Entry, (x, y): (f64, f64), size: u32) {
     let height = f64::from(size) * LINE;
-    insert(scene, bare(entry.sign, blank(SIGN - 6.0, height)), (x, y));
-    let (x, y) = (x + SIGN - 2.0, y + height / 2.0 + f64::from(size) * 0.36);
-    let (content, anchor) = (entry.label, TextAnchor::Start);
-    scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None });
-}
-
-/// A layout of nothing but the plot, from 0 to 1 in both directions.
-fn blank(width: f64, height: f64) -> Layout {
-    let mut layout = Layout::new((0.0, 1.0), (0.0, 1.0))
-        .with_width(width)
-        .with_height(height)
-        .with_show_grid(false)
-        .with_force_margins(0.0, 0.0)
-        .with_force_margins_y(0.0, 0.0)
-        .with_x_axis_min(0.0)
-        .with_x_axis_max(1.0)
-        .with_y_axis_min(0.0)
-        .with_y_axis_max(1.0);
-    (layout.suppress_x_ticks, layout.suppress_y_ticks, layout.show_legend) = (true, true, false);
-    layout
+    let blank = plain_layout((SIGN - 6.0, height), (0.0, 1.0), (0.0, 1.0));
+    insert(scene, bare(entry.sign, blank), (x, y));
+    let place = (x + SIGN - 2.0, y + height / 2.0 + f64::from(size) * 0.36);
+    scene.add(anchored(&entry.label, place, size, TextAnchor::Start, None));
 }

@@ -11,6 +11,7 @@ mod gallery;
 mod grid;
 mod image_format;
 mod legend;
+mod means;
 mod options;
 mod pairing;
 mod panel;
@@ -31,7 +32,7 @@ use pogema_maps::nearest;
 pub use boxes::BoxView;
 pub use cactus::CactusView;
 pub use compare::CompareView;
-pub use gallery::{Gallery, Told};
+pub use gallery::{Gallery, ShownView};
 pub use grid::{Cell, Format, Table};
 pub use image_format::ImageFormat;
 pub use picture::Picture;
@@ -189,7 +190,5 @@ fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Resul
 fn named<'a>(view: &str, key: &str, column: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
     let hint = nearest(column, known).map(|hint| format!("; the nearest column is `{hint}`"));
     let hint = hint.unwrap_or_default();
-    Error::Request {
-        reason: format!("view `{view}`: `{key}` is `{column}`, expected a column of the results{hint}"),
-    }
+    Error::request(format!("view `{view}`: `{key}` is `{column}`, expected a column of the results{hint}"))
 }

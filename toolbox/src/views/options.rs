@@ -1,6 +1,6 @@
 //! The options of a view, read with their places.
 
-use pogema_core::Error;
+use pogema_core::{Error, Words};
 use pogema_maps::nearest;
 use serde_json::Value;
 
@@ -79,6 +79,11 @@ impl<'a> Options<'a> {
             let hint = nearest(given, words.iter().copied()).unwrap_or_default();
             self.wrong(node, key, &format!("one of {} (such as `{hint}`)", words.join(", ")))
         })
+    }
+
+    /// A word of an enum.
+    pub fn word<T: Words>(&self, key: &str) -> Result<Option<T>, Error> {
+        Ok(self.choice(key, T::NAMES)?.and_then(T::of_word))
     }
 
     pub fn flag(&self, key: &str) -> Result<Option<bool>, Error> {

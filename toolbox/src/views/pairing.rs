@@ -4,9 +4,6 @@ use std::collections::BTreeMap;
 
 use crate::results::Row;
 
-/// The metric that tells whether an instance was solved.
-const SOLVED: &str = "CSR";
-
 /// The rows of the instances that two algorithms played.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing<'a> {
@@ -39,9 +36,4 @@ impl<'a> Pairing<'a> {
         }
         pairing
     }
-}
-
-/// Whether a row's instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
-pub(super) fn is_solved(row: &Row) -> bool {
-    row.metric(SOLVED).is_none_or(|share| share > 0.0)
 }

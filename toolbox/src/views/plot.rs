@@ -10,11 +10,11 @@ use super::legend::Legend;
 use super::options::{Common, Options};
 use super::panel::{framed, place_legend};
 use super::picture::Picture;
-use super::series::{Places, Series, at, means, placeless};
+use super::series::{Places, Series, at, distinct, means, placeless};
 use super::style::Style;
 use super::{Shown, known_column};
 use crate::bootstrap::{RESAMPLES, Spread};
-use crate::frame::{compare, lacking, shown};
+use crate::frame::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
@@ -80,24 +80,18 @@ impl PlotView {
         let places = Places::of(&results.rows, &self.x);
         let mut contents = self.contents(results);
         for content in &mut contents {
-            content.series = names
-                .iter()
-                .enumerate()
-                .filter_map(|(number, value)| {
-                    let rows: Vec<&Row> = content
-                        .rows
-                        .iter()
-                        .copied()
-                        .filter(|row| at(row, &self.by).as_ref() == Some(value))
-                        .collect();
-                    let points = means(&rows, &self.x, &places, &self.y, self.spread);
-                    (!points.is_empty()).then_some(Series { number, points })
-                })
-                .collect();
+            for (number, value) in names.iter().enumerate() {
+                let mut rows = content.rows.clone();
+                rows.retain(|row| at(row, &self.by).as_ref() == Some(value));
+                let points = means(&rows, &self.x, &places, &self.y, self.spread);
+                if !points.is_empty() {
+                    content.series.push(Series { number, points });
+                }
+            }
         }
         if contents.iter().all(|content| content.series.is_empty()) {
             let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);
-            return Err(Error::Request { reason });
+            return Err(Error::request(reason));
         }
         notes.extend(placeless(
             &results.rows,
@@ -112,9 +106,7 @@ impl PlotView {
 
     /// What tells lines apart, in the order of their colours, and a note on what has none.
     fn lines(&self, results: &Results) -> (Vec<Value>, Vec<String>) {
-        let mut found: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &self.by)).collect();
-        found.sort_by(compare);
-        found.dedup();
+        let found = distinct(&results.rows, &self.by);
         let Some(order) = &self.style.order else { return (found, Vec::new()) };
         let is_named = |value: &Value, name: &String| {
             shown(value) == *name || self.common.shown(&self.by, value) == *name
@@ -134,15 +126,12 @@ impl PlotView {
             let title = self.style.title().map(str::to_owned);
             return vec![Content { rows: results.rows.iter().collect(), title, series: Vec::new() }];
         };
-        let mut values: Vec<Value> = results.rows.iter().filter_map(|row| at(row, &panels.over)).collect();
-        values.sort_by(compare);
-        values.dedup();
         let content = |value: Value| {
             let rows = results.rows.iter().filter(|row| at(row, &panels.over).as_ref() == Some(&value));
             let title = panels.have_titles.then(|| self.common.shown(&panels.over, &value));
             Content { rows: rows.collect(), title, series: Vec::new() }
         };
-        values.into_iter().map(content).collect()
+        distinct(&results.rows, &panels.over).into_iter().map(content).collect()
     }
 
     fn frame(&self, content: &Content<'_>, all: &[Content<'_>], places: &Places) -> Frame {
@@ -301,7 +290,7 @@ mod tests {
     }
 
     fn json(pairs: &[(&str, Value)]) -> crate::Pairs {
-        crate::Pairs(pairs.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect())
+        pairs.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect()
     }
 
     fn show(fields: &str) -> Result<Shown, String> {

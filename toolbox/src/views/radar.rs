@@ -3,7 +3,7 @@
 use kuva::plot::radar::RadarPlot;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
-use pogema_core::Error;
+use pogema_core::{Error, Words};
 
 use super::compose::bare;
 use super::grid::{Cell, Table};
@@ -14,7 +14,7 @@ use super::series::Series;
 use super::style::Style;
 use super::{Shown, axes};
 use crate::results::{ALGORITHM, Results};
-use crate::six::{Definition, METRICS, Six, six};
+use crate::six::{Definition, Metric, Six, six};
 use crate::tree::Node;
 
 /// `type: radar`: the six metrics, which need the folders of a whole evaluation.
@@ -30,11 +30,11 @@ pub struct RadarView {
 impl RadarView {
     pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
         let options = Options::new(name, node, &Style::keys(&["definition"]))?;
-        let definition = match options.choice("definition", &["published", "paper"])? {
-            Some("paper") => Definition::Paper,
-            _ => Definition::Published,
-        };
-        Ok(Self { common: Common::read(&options)?, style: Style::read(&options, (4.2, 3.2))?, definition })
+        Ok(Self {
+            common: Common::read(&options)?,
+            style: Style::read(&options, (4.2, 3.2))?,
+            definition: options.word("definition")?.unwrap_or_default(),
+        })
     }
 
     /// Computes and draws them; a definition that is given has precedence over the view's own.
@@ -52,15 +52,14 @@ impl RadarView {
         if all.iter().all(|six| six.values.iter().all(Option::is_none)) {
             let reason =
                 format!("view `{name}`: none of the six metrics can be computed: {}", notes.join("; "));
-            return Err(Error::Request { reason });
+            return Err(Error::request(reason));
         }
         let is_beyond = |six: &Six| six.values.iter().flatten().any(|&value| value > 1.0);
         if all.iter().any(is_beyond) {
             notes.push("values above 1 are drawn as 1".to_owned());
         }
-        let known =
-            METRICS.iter().enumerate().filter(|(at, _)| all.iter().any(|six| six.values[*at].is_some()));
-        let known: Vec<usize> = known.map(|(at, _)| at).collect();
+        let is_known = |at: &usize| all.iter().any(|six| six.values[*at].is_some());
+        let known: Vec<usize> = (0..Metric::NAMES.len()).filter(is_known).collect();
         let pictures = if known.len() < 3 {
             notes.push(format!("view `{name}`: a star needs 3 metrics, there are {}", known.len()));
             Vec::new()
@@ -71,7 +70,7 @@ impl RadarView {
     }
 
     fn table(&self, all: &[Six], definition: Definition) -> Table {
-        let title = METRICS.iter().map(|metric| self.common.title(metric.name()));
+        let title = Metric::NAMES.iter().map(|metric| self.common.title(metric));
         let row = |six: &Six| {
             let name = Cell::Text(self.common.algorithm(&six.algorithm));
             std::iter::once(name).chain(six.values.map(Cell::Number)).collect()
@@ -90,7 +89,7 @@ impl RadarView {
     }
 
     fn draw(&self, all: &[Six], known: &[usize]) -> Picture {
-        let names = known.iter().map(|&at| self.common.title(METRICS[at].name()));
+        let names = known.iter().map(|&at| self.common.title(Metric::NAMES[at]));
         let mut radar = RadarPlot::new(names)
             .with_range(0.0, 1.0)
             .with_grid_lines(4)

@@ -1,7 +1,5 @@
 //! Whether all algorithms have played the same instances.
 
-use std::collections::BTreeMap;
-
 use pogema_core::Error;
 
 use super::Shown;
@@ -34,13 +32,10 @@ impl SeedsView {
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         let keys: Vec<String> = results.key_columns().into_iter().filter(|key| key != ALGORITHM).collect();
         let algorithms = results.algorithms();
-        let mut sets: BTreeMap<&str, Vec<_>> = BTreeMap::new();
-        for row in &results.rows {
-            sets.entry(&row.set).or_default().push(row);
-        }
-        let has_folders = sets.len() > 1;
+        let folders = results.by_folder();
+        let has_folders = folders.len() > 1;
         let (mut rows, mut problems, mut instances) = (Vec::new(), 0, 0);
-        for (set, of_set) in sets {
+        for (set, of_set) in folders {
             for group in group_by(of_set, &keys) {
                 instances += 1;
                 let counts: Vec<usize> = algorithms

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::legend::Entry;
 use super::style::Style;
 use crate::bootstrap::{Estimate, Spread};
-use crate::frame::{compare, group_by, values};
+use crate::frame::{compare, values};
 use crate::results::{Row, figure};
 
 /// Dashes of lines: a solid one first.
@@ -48,13 +48,8 @@ pub(super) enum Places {
 impl Places {
     /// Finds out whether all rows have numbers there.
     pub fn of<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Self {
-        let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
-        if found.iter().all(Value::is_number) {
-            return Self::Numbers;
-        }
-        found.sort_by(compare);
-        found.dedup();
-        Self::Names(found)
+        let found = distinct(rows, column);
+        if found.iter().all(Value::is_number) { Self::Numbers } else { Self::Names(found) }
     }
 
     fn place(&self, value: &Value) -> Option<f64> {
@@ -63,6 +58,14 @@ impl Places {
             Self::Names(names) => names.iter().position(|name| name == value).map(|place| place as f64),
         }
     }
+}
+
+/// What rows have in a column, sorted, each value once.
+pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Vec<Value> {
+    let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
+    found.sort_by(compare);
+    found.dedup();
+    found
 }
 
 /// What a row has in a column, be it a metric or not.
@@ -92,21 +95,12 @@ pub(super) fn means(
     y: &str,
     spread: Spread,
 ) -> Vec<(f64, Estimate)> {
-    let groups = group_by(rows.iter().copied(), &[x.to_owned()]);
-    // A column that is a metric is no key: its rows are all in one group.
-    let is_metric = rows.iter().all(|row| row.key(x).is_none());
     let mut points: Vec<(f64, Vec<&Row>)> = Vec::new();
-    if is_metric {
-        for row in rows {
-            let Some(place) = at(row, x).and_then(|value| places.place(&value)) else { continue };
-            match points.iter_mut().find(|(known, _)| *known == place) {
-                Some((_, rows)) => rows.push(row),
-                None => points.push((place, vec![row])),
-            }
-        }
-    } else {
-        for group in groups {
-            points.extend(places.place(&group.keys[0]).map(|place| (place, group.rows)));
+    for row in rows {
+        let Some(place) = at(row, x).and_then(|value| places.place(&value)) else { continue };
+        match points.iter_mut().find(|(known, _)| *known == place) {
+            Some((_, rows)) => rows.push(row),
+            None => points.push((place, vec![row])),
         }
     }
     points.sort_by(|(one, _), (other, _)| one.total_cmp(other));

@@ -19,52 +19,15 @@ const COLOURS: [&str; 8] =
 /// The options of every plot.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_plot.py`, `PlotView`
-const KEYS: [&str; 27] = [
-    "name",
-    "width",
-    "height",
-    "remove_title",
-    "line_width",
-    "error_bar",
-    "plt_style",
-    "figure_dpi",
-    "font_size",
-    "legend_font_size",
-    "legend_loc",
-    "legend_columns",
-    "legend_bbox_to_anchor",
-    "figure_face_color",
-    "use_log_scale_x",
-    "use_log_scale_y",
-    "markers",
-    "line_types",
-    "extension",
-    "palette",
-    "hue_order",
-    "tight_layout",
-    "ticks",
-    "remove_legend_title",
-    "x",
-    "y",
-    "by",
-];
+const KEYS: &str = "name width height remove_title line_width error_bar plt_style figure_dpi font_size \
+    legend_font_size legend_loc legend_columns legend_bbox_to_anchor figure_face_color use_log_scale_x \
+    use_log_scale_y markers line_types extension palette hue_order tight_layout ticks remove_legend_title x y by";
 
 /// Where a legend may be.
 ///
 /// Source: Matplotlib, `legend`, parameter `loc`
-const PLACES: [&str; 11] = [
-    "best",
-    "upper right",
-    "upper left",
-    "lower left",
-    "lower right",
-    "right",
-    "center left",
-    "center right",
-    "lower center",
-    "upper center",
-    "center",
-];
+const PLACES: &str = "best, upper right, upper left, lower left, lower right, right, center left, center right, \
+    lower center, upper center, center";
 
 /// How one plot looks; sizes are in points.
 #[derive(Clone, Debug)]
@@ -95,7 +58,7 @@ pub(super) struct Style {
 impl Style {
     /// All keys that a plot may have, with some more of its own.
     pub fn keys(more: &[&'static str]) -> Vec<&'static str> {
-        KEYS.iter().chain(more).copied().collect()
+        KEYS.split(' ').chain(more.iter().copied()).collect()
     }
 
     /// Reads the options of a plot whose size in inches is given if the view does not say.
@@ -114,7 +77,7 @@ impl Style {
             line_width: size("line_width", 2.0)? * 0.75,
             font_size: size("font_size", 8.0)?.round().clamp(1.0, 100.0) as u32,
             legend_font_size: size("legend_font_size", 7.0)?.round().clamp(1.0, 100.0) as u32,
-            legend_place: options.choice("legend_loc", &PLACES)?,
+            legend_place: options.choice("legend_loc", &PLACES.split(", ").collect::<Vec<_>>())?,
             legend_columns: options.whole("legend_columns", 100)?.unwrap_or(5).max(1),
             has_legend_title: !flag("remove_legend_title", true)?,
             background: colour_option(options, "figure_face_color")?.unwrap_or_else(|| "#FFFFFF".to_owned()),
@@ -124,7 +87,7 @@ impl Style {
             has_line_types: flag("line_types", true)?,
             ticks: options.numbers("ticks")?.filter(|ticks| !ticks.is_empty()),
             order: options.words("hue_order")?,
-            kind: kind(options)?,
+            kind: options.word("extension")?.unwrap_or_default(),
             dots_per_inch: size("figure_dpi", 300.0)?.clamp(10.0, 2400.0),
             palette: palette(options)?,
         })
@@ -145,14 +108,6 @@ impl Style {
         let Self { width, height, font_size, .. } = *self;
         Frame { width, height, font_size, title: self.title().map(str::to_owned), x, y }
     }
-}
-
-fn kind(options: &Options<'_>) -> Result<ImageFormat, Error> {
-    Ok(match options.choice("extension", &["pdf", "svg", "png"])? {
-        Some("svg") => ImageFormat::Svg,
-        Some("png") => ImageFormat::Png,
-        _ => ImageFormat::Pdf,
-    })
 }
 
 fn palette(options: &Options<'_>) -> Result<Vec<String>, Error> {

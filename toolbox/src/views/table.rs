@@ -10,40 +10,19 @@ use crate::frame::{Group, compare, group_by, lacking, values};
 use crate::results::Results;
 use crate::tree::Node;
 
-/// Names of pogema-toolbox's table formats, in each of our formats.
+/// Names of pogema-toolbox's table formats for each of our formats.
 ///
 /// Source: tabulate 0.9, `tabulate_formats`
-const FORMATS: [(Format, &[&str]); 4] = [
+const FORMATS: [(Format, &str); 4] = [
     (
         Format::Terminal,
-        &[
-            "psql",
-            "plain",
-            "simple",
-            "grid",
-            "simple_grid",
-            "rounded_grid",
-            "heavy_grid",
-            "mixed_grid",
-            "double_grid",
-            "fancy_grid",
-            "outline",
-            "simple_outline",
-            "rounded_outline",
-            "heavy_outline",
-            "mixed_outline",
-            "double_outline",
-            "fancy_outline",
-            "presto",
-            "pretty",
-            "orgtbl",
-            "rst",
-            "terminal",
-        ],
+        "psql plain simple grid simple_grid rounded_grid heavy_grid mixed_grid double_grid fancy_grid outline \
+         simple_outline rounded_outline heavy_outline mixed_outline double_outline fancy_outline presto pretty \
+         orgtbl rst terminal",
     ),
-    (Format::Markdown, &["github", "pipe", "markdown"]),
-    (Format::Latex, &["latex", "latex_raw", "latex_booktabs", "latex_longtable"]),
-    (Format::Csv, &["csv", "tsv"]),
+    (Format::Markdown, "github pipe markdown"),
+    (Format::Latex, "latex latex_raw latex_booktabs latex_longtable"),
+    (Format::Csv, "csv tsv"),
 ];
 
 /// `type: tabular`: the mean of each metric in each group of rows.
@@ -68,9 +47,9 @@ impl TableView {
         let options = Options::new(name, node, &known)?;
         // Whoever runs views wants to see them.
         options.flag("print_results")?;
-        let words: Vec<&'static str> = FORMATS.iter().flat_map(|(_, words)| *words).copied().collect();
+        let words: Vec<&'static str> = FORMATS.iter().flat_map(|(_, words)| words.split(' ')).collect();
         let word = options.choice("table_format", &words)?.unwrap_or("psql");
-        let format = FORMATS.iter().find(|(_, words)| words.contains(&word));
+        let format = FORMATS.iter().find(|(_, words)| words.split(' ').any(|known| known == word));
         let method = options.choice("error_method", &["ci", "sd"])?.unwrap_or("ci");
         let level = options.size("error_level")?;
         let spread = match method {

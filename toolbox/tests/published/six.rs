@@ -1,6 +1,7 @@
 //! The six metrics, as published and as the paper words them.
 
-use pogema_toolbox::six::{Definition, METRICS, six};
+use pogema_core::Words;
+use pogema_toolbox::six::{Definition, Metric, six};
 
 use crate::archive::published;
 
@@ -17,7 +18,7 @@ fn all_published_metrics_come_out() {
     let mut cells = 0;
     for row in &rows[1..] {
         let six = all.iter().find(|six| six.algorithm == row[1]).unwrap();
-        let named = METRICS.iter().map(|metric| metric.name()).zip(six.values);
+        let named = Metric::all().map(Words::word).zip(six.values);
         for (name, value) in named.chain([("Scalability_unclipped", six.unbounded_scalability)]) {
             let column = rows[0].iter().position(|title| title == name).unwrap();
             let expected: f64 = row[column].parse().unwrap();
@@ -42,7 +43,7 @@ fn the_paper_s_wording_gives_other_values() {
     ];
     for (algorithm, values) in expected {
         let six = all.iter().find(|six| six.algorithm == algorithm).unwrap();
-        for ((metric, value), expected) in METRICS.iter().zip(six.values).zip(values) {
+        for ((metric, value), expected) in Metric::all().zip(six.values).zip(values) {
             assert!((value.unwrap() - expected).abs() < 1e-6, "{algorithm} {metric:?}: {value:?} {expected}");
         }
     }

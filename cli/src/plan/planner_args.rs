@@ -1,4 +1,4 @@
-//! The budget and threads of a planner.
+//! The budget, threads and seed of a planner.
 
 use std::time::Duration;
 
@@ -8,9 +8,9 @@ use pogema_planners::{Budget, PlannerSettings, PolicySettings};
 
 use crate::threads::{note_threads, number_of_threads};
 
-/// How long a planner may think, and on how many threads.
+/// Time, nodes and threads of a planner, and its seed.
 #[derive(Args, Clone, Debug)]
-pub struct Thinking {
+pub struct PlannerArgs {
     /// Most time for a plan, in seconds; 1 if `--nodes` is not given either
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -25,15 +25,13 @@ pub struct Thinking {
     planner_seed: u64,
 }
 
-impl Thinking {
-    /// What a planner is made with.
-    pub fn choice(&self) -> PlannerSettings {
+impl PlannerArgs {
+    pub fn planner_settings(&self) -> PlannerSettings {
         PlannerSettings { seed: self.planner_seed, threads: self.threads }
     }
 
-    /// What a policy is made with.
-    pub fn settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
-        let (budget, planner) = (self.budget()?, self.choice());
+    pub fn policy_settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
+        let (budget, planner) = (self.budget()?, self.planner_settings());
         Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
     }
 

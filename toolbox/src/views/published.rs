@@ -1,0 +1,304 @@
+//! Results beside published ones.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use pogema_core::Error;
+use pogema_maps::nearest;
+use serde_json::Value;
+
+use super::grid::{Cell, Table};
+use super::means::Means;
+use super::options::{Common, Options};
+use super::pairing::Pairing;
+use super::{Shown, known_column};
+use crate::bootstrap::mean_of;
+use crate::frame::{shown, values};
+use crate::results::{RUNTIME, Results, Row, SOLVED};
+use crate::six::instance;
+use crate::tree::Node;
+
+/// The metric that is compared on solved instances alone.
+const COST: &str = "SoC";
+
+/// The column of the number of agents.
+const NUM_AGENTS: &str = "num_agents";
+
+/// `type: published`: means beside published means, a row for each folder and number of agents.
+///
+/// `file` has the published means of a `setting`, a `dataset` (by default the name of the folder of results) and an
+/// `algorithm`, beside which stands `ours`. `episodes` is a folder with a folder of published results for each dataset.
+/// With it, sums of costs are compared on the instances that both solve; without it, only where both solve all.
+#[derive(Clone, Debug)]
+pub struct PublishedView {
+    common: Common,
+    file: PathBuf,
+    episodes: Option<PathBuf>,
+    setting: String,
+    dataset: Option<String>,
+    algorithm: String,
+    ours: Option<String>,
+    metrics: Vec<String>,
+}
+
+/// A row of the table before it is text.
+struct Line<'a> {
+    folder: &'a str,
+    num_agents: u64,
+    rows: Vec<&'a Row>,
+    /// In the order of the metrics.
+    figures: Vec<Figure>,
+}
+
+/// The mean of one metric beside the published one.
+struct Figure {
+    ours: Option<f64>,
+    published: Option<f64>,
+    /// A lower bound on the ratio of any planner.
+    at_least: Option<f64>,
+}
+
+impl PublishedView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let known = ["file", "episodes", "setting", "dataset", "algorithm", "ours", "metrics"];
+        let options = Options::new(name, node, &known)?;
+        let setting = options.required("setting")?;
+        let usual: &[&str] = match options.choice("setting", &["MAPF", "LMAPF"])? {
+            Some("LMAPF") => &["avg_throughput", RUNTIME],
+            _ => &[SOLVED, COST, "makespan", RUNTIME],
+        };
+        let usual = || usual.iter().map(|&metric| metric.to_owned()).collect();
+        Ok(Self {
+            common: Common::read(&options)?,
+            file: options.required("file")?.into(),
+            episodes: options.text("episodes")?.map(PathBuf::from),
+            setting,
+            dataset: options.text("dataset")?,
+            algorithm: options.required("algorithm")?,
+            ours: options.text("ours")?,
+            metrics: options.words("metrics")?.unwrap_or_else(usual),
+        })
+    }
+
+    /// Takes the paths of its files as relative to a folder.
+    pub(super) fn beside(&mut self, folder: &Path) {
+        self.file = folder.join(&self.file);
+        self.episodes = self.episodes.as_ref().map(|path| folder.join(path));
+    }
+
+    /// Reads what is published, and compares.
+    ///
+    /// # Errors
+    /// If a file cannot be read or lacks what the view names, or if the results do.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        for metric in &self.metrics {
+            known_column(name, "metrics", metric, results)?;
+        }
+        let ours = self.ours(name, results)?;
+        let means = Means::read(&self.file, &self.metrics)?;
+        let (mut lines, mut notes) = (Vec::new(), Vec::new());
+        for (folder, mut rows) in results.by_folder() {
+            rows.retain(|row| row.algorithm == ours);
+            if rows.is_empty() {
+                continue;
+            }
+            let dataset = self.dataset.as_deref().unwrap_or(folder);
+            let keys = [&self.setting, dataset, &self.algorithm];
+            means.check(name, keys)?;
+            let published = self.published(name, dataset)?;
+            published.as_deref().map_or(Ok(()), |published| check_columns(name, &rows, published))?;
+            let mut groups: BTreeMap<u64, Vec<&Row>> = BTreeMap::new();
+            for row in rows {
+                // POGEMA's default stands for what is not given.
+                let num_agents = row.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1);
+                groups.entry(num_agents).or_default().push(row);
+            }
+            for (num_agents, rows) in groups {
+                let pairing = published.as_deref().map(|published| pair(&rows, published));
+                let mean = |metric: &str| means.mean(keys, num_agents, metric);
+                let figures = self.metrics.iter().map(|metric| figure(metric, &rows, pairing.as_ref(), mean));
+                let line = Line { folder, num_agents, figures: figures.collect(), rows };
+                notes.extend(self.notes(&line, pairing.as_ref(), mean));
+                lines.push(line);
+            }
+        }
+        let remark = format!("`{ours}` beside the published `{}`, {}", self.algorithm, self.setting);
+        Ok(Shown { tables: vec![self.table(&lines, remark)], notes, ..Shown::default() })
+    }
+
+    /// The algorithm of the results that is compared.
+    fn ours(&self, name: &str, results: &Results) -> Result<String, Error> {
+        let all = results.algorithms();
+        let own = self.ours.as_ref().unwrap_or(&self.algorithm);
+        match all.as_slice() {
+            _ if all.contains(own) => Ok(own.clone()),
+            [only] if self.ours.is_none() => Ok(only.clone()),
+            _ => {
+                let found = self.ours.as_ref().map(|ours| format!(", found `{ours}`")).unwrap_or_default();
+                let known = all.join(", ");
+                Err(Error::request(format!("view `{name}`: expected `ours`, one of {known}{found}")))
+            }
+        }
+    }
+
+    /// The published rows of a dataset, if there is a folder of episodes.
+    fn published(&self, name: &str, dataset: &str) -> Result<Option<Vec<Row>>, Error> {
+        let Some(folder) = self.episodes.as_ref().map(|folder| folder.join(dataset)) else { return Ok(None) };
+        let results = Results::read(std::slice::from_ref(&folder))?;
+        let (all, algorithm) = (results.algorithms(), &self.algorithm);
+        if !all.contains(algorithm) {
+            let hint = nearest(algorithm, all.iter().map(String::as_str)).unwrap_or_default();
+            let folder = folder.display();
+            let reason = format!(
+                "view `{name}`: no `{algorithm}.json` in `{folder}`; the nearest one is `{hint}.json`"
+            );
+            return Err(Error::request(reason));
+        }
+        Ok(Some(results.rows.into_iter().filter(|row| row.algorithm == *algorithm).collect()))
+    }
+
+    /// What is not compared in a line, and what is proved.
+    fn notes(
+        &self,
+        line: &Line<'_>,
+        pairing: Option<&Pairing<'_>>,
+        mean: impl Fn(&str) -> Option<f64>,
+    ) -> Vec<String> {
+        let what = format!("`{}` with {} agents", line.folder, line.num_agents);
+        let mut notes = Vec::new();
+        if !self.metrics.iter().any(|metric| mean(metric).is_some()) {
+            notes.push(format!("{what}: there are no published means"));
+        }
+        let mut figures = self.metrics.iter().zip(&line.figures);
+        let lacks_cost = figures.any(|(metric, figure)| metric == COST && figure.published.is_none());
+        if pairing.is_some_and(|pairing| pairing.pairs.is_empty()) {
+            notes.push(format!("{what}: none of the instances is among the published episodes"));
+        } else if pairing.is_none() && lacks_cost {
+            let why = "some instances are unsolved; `episodes` compares those that both solve";
+            notes.push(format!("{what}: `{COST}` is not compared: {why}"));
+        }
+        let unsolvable = line.rows.iter().filter_map(|row| Some((row, row.proof.unsolvable.as_ref()?)));
+        notes.extend(unsolvable.map(|(row, why)| format!("{}: proved unsolvable: {why}", instance(row))));
+        notes
+    }
+
+    /// Makes the table; columns that would be empty are left out.
+    fn table(&self, lines: &[Line<'_>], remark: String) -> Table {
+        let mut columns: Vec<(String, Vec<Cell>)> = Vec::new();
+        let mut add = |title: &str, cell: &dyn Fn(&Line<'_>) -> Cell| {
+            columns.push((title.to_owned(), lines.iter().map(cell).collect()));
+        };
+        if lines.iter().any(|line| line.folder != lines[0].folder) {
+            add("Folder", &|line| Cell::Text(line.folder.to_owned()));
+        }
+        add(&self.common.title(NUM_AGENTS), &|line| Cell::Count(line.num_agents as usize));
+        add("Episodes", &|line| Cell::Count(line.rows.len()));
+        for (at, metric) in self.metrics.iter().enumerate() {
+            let title = self.common.title(metric);
+            let number = if [SOLVED, "ISR"].contains(&metric.as_str()) { Cell::Ratio } else { Cell::Number };
+            add(&title, &|line| number(line.figures[at].ours));
+            if lines.iter().any(|line| line.figures[at].published.is_some()) {
+                add(&format!("{title} published"), &|line| number(line.figures[at].published));
+                add(&format!("{title} ratio"), &|line| {
+                    Cell::Ratio(ratio(line.figures[at].ours, line.figures[at].published))
+                });
+            }
+            if lines.iter().any(|line| line.figures[at].at_least.is_some()) {
+                add(&format!("{title} at least"), &|line| Cell::Ratio(line.figures[at].at_least));
+            }
+            if metric == RUNTIME {
+                add("longest", &|line| {
+                    Cell::Number(values(&line.rows, RUNTIME).into_iter().reduce(f64::max))
+                });
+            }
+        }
+        let row = |at: usize| columns.iter().map(|(_, cells)| cells[at].clone()).collect();
+        let rows = (0..lines.len()).map(row).collect();
+        let head = columns.iter().map(|(title, _)| title.clone()).collect();
+        Table { head, rows, digits: self.common.digits, remark: Some(remark), ..Table::default() }
+    }
+}
+
+/// The fields that vary in rows.
+fn varied<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeSet<&'a String> {
+    rows.into_iter().flat_map(|row| row.settings.keys()).collect()
+}
+
+/// Passes if no field varies in the rows of a folder that does not vary in the published ones.
+///
+/// # Errors
+/// Names the field: different instances here would be taken for the same published one.
+fn check_columns(view: &str, rows: &[&Row], published: &[Row]) -> Result<(), Error> {
+    for name in varied(rows.iter().copied()).difference(&varied(published)) {
+        let values = rows.iter().filter_map(|row| row.settings.get(*name)).map(shown);
+        let (number, folder) = (values.collect::<BTreeSet<_>>().len(), &rows[0].set);
+        if number > 1 {
+            return Err(Error::request(format!(
+                "view `{view}`: `{name}` has {number} values in `{folder}` and is not varied in the published episodes"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Pairs rows with the published rows of the same instances, which are known by all fields that vary there.
+fn pair<'a>(rows: &[&'a Row], published: &'a [Row]) -> Pairing<'a> {
+    let columns = varied(published);
+    let key = |row: &Row| {
+        let fields = columns.iter().map(|&column| shown(row.field(column).unwrap_or(&Value::Null)));
+        fields.collect::<Vec<_>>().join(", ")
+    };
+    Pairing::of(rows.iter().copied(), published, key)
+}
+
+/// Compares a metric, sums of costs on solved instances only.
+fn figure(
+    metric: &str,
+    rows: &[&Row],
+    pairing: Option<&Pairing<'_>>,
+    mean: impl Fn(&str) -> Option<f64>,
+) -> Figure {
+    match pairing {
+        _ if metric != COST => {
+            Figure { ours: mean_of(&values(rows, metric)), published: mean(metric), at_least: None }
+        }
+        Some(pairing) => figure_of_both_solved(pairing),
+        None => figure_of_all_solved(rows, mean(COST).filter(|_| mean(SOLVED) == Some(1.0))),
+    }
+}
+
+/// The mean costs of the instances that both solve. The bound counts all instances that the published one solves.
+fn figure_of_both_solved(pairing: &Pairing<'_>) -> Figure {
+    let means = |cost: fn(&Row) -> Option<f64>| {
+        let solved = pairing.pairs.iter().filter(|(_, published)| published.is_solved());
+        let (ours, published): (Vec<f64>, Vec<f64>) =
+            solved.filter_map(|(row, published)| Some((cost(row)?, published.metric(COST)?))).unzip();
+        (mean_of(&ours), mean_of(&published))
+    };
+    let ((ours, published), (bound, bounded)) = (means(solved_cost), means(lower_bound));
+    Figure { ours, published, at_least: ratio(bound, bounded) }
+}
+
+/// The mean cost of the solved instances, beside a published mean over all of them.
+fn figure_of_all_solved(rows: &[&Row], published: Option<f64>) -> Figure {
+    let costs: Vec<f64> = rows.iter().filter_map(|row| solved_cost(row)).collect();
+    let bounds: Vec<f64> = rows.iter().filter_map(|row| lower_bound(row)).collect();
+    let is_whole = |figures: &[f64]| figures.len() == rows.len();
+    Figure {
+        ours: mean_of(&costs),
+        published: published.filter(|_| is_whole(&costs)),
+        at_least: ratio(mean_of(&bounds).filter(|_| is_whole(&bounds)), published),
+    }
+}
+
+fn solved_cost(row: &Row) -> Option<f64> {
+    row.metric(COST).filter(|_| row.is_solved())
+}
+
+fn lower_bound(row: &Row) -> Option<f64> {
+    row.proof.lower_bound.map(|bound| bound as f64)
+}
+
+fn ratio(ours: Option<f64>, published: Option<f64>) -> Option<f64> {
+    Some(ours? / published.filter(|&published| published != 0.0)?)
+}
