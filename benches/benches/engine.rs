@@ -8,7 +8,7 @@ use std::time::Duration;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use pogema_benches::episode;
 use pogema_core::{Action, Environment, StepOut};
-use pogema_fast::{Batch, Engine, Observations, Path, words_per_agent};
+use pogema_fast::{Batch, Engine, Observations, SimdPath, words_per_agent};
 use pogema_numpy::Generator;
 use pogema_planners::sample;
 
@@ -55,7 +55,7 @@ fn observe(criterion: &mut Criterion) {
     for (size, num_agents) in SIZES {
         let (config, instance) = episode(size, num_agents, 0).unwrap();
         group.throughput(Throughput::Elements(num_agents as u64));
-        for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+        for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
             let mut engine = Engine::with_path(config, path).unwrap();
             engine.reset(&instance).unwrap();
             let name = |dtype: &str| format!("{size}x{size}, {num_agents} agents, {dtype}, {path}");

@@ -13,7 +13,7 @@ use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
 use pogema_planners::sample;
-use pogema_toolbox::{Begin, Environments, Running, Store, Suite, run};
+use pogema_toolbox::{Begin, EpisodeConfigs, Running, Store, Suite, run};
 
 const NUM_AGENTS: usize = 64;
 const NUM_STEPS: usize = 256;
@@ -33,7 +33,7 @@ fn suite(num_episodes: usize) -> Suite {
     Suite::parse(Path::new("suite.yaml"), &text).unwrap()
 }
 
-fn environments(suite: &Suite) -> Environments {
+fn environments(suite: &Suite) -> EpisodeConfigs {
     suite.environments(&[]).unwrap().0
 }
 

@@ -11,7 +11,7 @@ use pogema_core::Error;
 use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::{
-    Begin, Environments, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
+    Begin, EpisodeConfigs, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
 };
 
 use crate::maps::Sources;
@@ -77,7 +77,7 @@ impl Evaluate {
 }
 
 /// The environments of a suite with maps of files, after all warnings.
-pub fn environments(suite: &Suite, sources: &Sources) -> Result<Environments, Error> {
+pub fn environments(suite: &Suite, sources: &Sources) -> Result<EpisodeConfigs, Error> {
     let (environments, warnings) = suite.environments(sources.paths())?;
     for warning in warnings {
         eprintln!("warning: {warning}");
@@ -89,7 +89,7 @@ fn write_report(
     path: &Path,
     folder: &Path,
     suite: &Suite,
-    environments: &Environments,
+    environments: &EpisodeConfigs,
     store: &Store,
 ) -> Result<(), Error> {
     let results = Results::read(&[folder.to_owned()])?;

@@ -1,7 +1,7 @@
 //! `pogema port`: an engine of ours as a port.
 
 use clap::Args;
-use pogema_conformance::Engine;
+use pogema_conformance::NamedEngine;
 use pogema_conformance::port::serve;
 use pogema_core::Error;
 
@@ -10,13 +10,13 @@ use crate::conform::ENGINES;
 #[derive(Args, Debug)]
 pub struct Port {
     /// Which engine answers
-    #[arg(long, default_value = Engine::REFERENCE.name, value_parser = ENGINES.map(|engine| engine.name))]
+    #[arg(long, default_value = NamedEngine::REFERENCE.name, value_parser = ENGINES.map(|engine| engine.name))]
     engine: String,
 }
 
 impl Port {
     pub fn run(&self) -> Result<(), Error> {
         let named = ENGINES.into_iter().find(|engine| engine.name == self.engine);
-        serve(named.unwrap_or(Engine::REFERENCE), std::io::stdin().lock(), std::io::stdout().lock())
+        serve(named.unwrap_or(NamedEngine::REFERENCE), std::io::stdin().lock(), std::io::stdout().lock())
     }
 }

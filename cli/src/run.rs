@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::output::{check_writable, in_a_line, say, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
-use policy::Policy;
+use policy::ActionSource;
 pub use settings::Settings;
 
 #[derive(Args, Debug)]
@@ -62,7 +62,8 @@ impl Run {
         episode.record(is_recorded);
         episode.start(generated.instance)?;
         let instance = episode.instance()?;
-        let mut policy = Policy::new(&self.policy, self.actions.as_deref(), &settings, &config, instance)?;
+        let mut policy =
+            ActionSource::new(&self.policy, self.actions.as_deref(), &settings, &config, instance)?;
         let mut screen = self.render.then(|| self.pictures.screen());
         loop {
             if let Some(screen) = &mut screen {

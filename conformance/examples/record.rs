@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
 
-use pogema_conformance::golden::{self, Recording};
-use pogema_conformance::{Engine, Op, Oracle, Request, draw_request, find_oracle_python, play_script};
+use pogema_conformance::golden::{self, GoldenRecording};
+use pogema_conformance::{NamedEngine, Op, Oracle, Request, draw_request, find_oracle_python, play_script};
 use pogema_core::Error;
 use serde_json::json;
 
@@ -43,7 +43,8 @@ fn main() -> ExitCode {
 fn random(number: &str) -> Result<usize, Error> {
     let number: u64 =
         number.parse().map_err(|error| Error::Request { reason: format!("`{number}`: {error}") })?;
-    let requests = (0..number).map(|case| play_script(Engine::REFERENCE, draw_request(SEED, case), SEED).0);
+    let requests =
+        (0..number).map(|case| play_script(NamedEngine::REFERENCE, draw_request(SEED, case), SEED).0);
     record("random.jsonl.zst", requests)
 }
 
@@ -84,7 +85,7 @@ fn record(name: &str, requests: impl Iterator<Item = Request>) -> Result<usize, 
     let mut recordings = Vec::new();
     for request in requests {
         let response = oracle.ask(&request)?;
-        recordings.push(Recording { request, response });
+        recordings.push(GoldenRecording { request, response });
     }
     golden::write(&golden::folder().join(name), &recordings)?;
     Ok(recordings.len())

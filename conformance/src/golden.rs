@@ -10,7 +10,7 @@ use crate::request::{Request, Response};
 
 /// A request and POGEMA's answer to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recording {
+pub struct GoldenRecording {
     /// What was asked.
     pub request: Request,
     /// What POGEMA 1.4.0 answered.
@@ -62,7 +62,7 @@ pub fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 ///
 /// # Errors
 /// [`Error::Io`] with the line that cannot be read.
-pub fn read(path: &Path) -> Result<Vec<Recording>, Error> {
+pub fn read(path: &Path) -> Result<Vec<GoldenRecording>, Error> {
     let mut recordings = Vec::new();
     for (index, line) in crate::files::open(path)?.lines().enumerate() {
         let line = line.map_err(|error| Error::io(path, error))?;
@@ -77,7 +77,7 @@ pub fn read(path: &Path) -> Result<Vec<Recording>, Error> {
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.
-pub fn write(path: &Path, recordings: &[Recording]) -> Result<(), Error> {
+pub fn write(path: &Path, recordings: &[GoldenRecording]) -> Result<(), Error> {
     let mut text = Vec::new();
     for recording in recordings {
         serde_json::to_writer(&mut text, recording).map_err(|error| Error::io(path, error))?;

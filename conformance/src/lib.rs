@@ -7,7 +7,7 @@
 //! | module | what it holds |
 //! | --- | --- |
 //! | [`Request`], [`Response`], [`Record`] | what is asked and what is answered, as JSON |
-//! | [`play`], [`Engine`] | our engines' answers |
+//! | [`play`], [`NamedEngine`] | our engines' answers |
 //! | [`Oracle`] | POGEMA's own answers |
 //! | [`compare`], [`Divergence`] | the first difference, and its rule |
 //! | [`draw_request`], [`Script`] | random configs and crowded episodes |
@@ -42,10 +42,10 @@ pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};
 pub use literal::Literal;
 pub use oracle::{Oracle, find_oracle_python};
-pub use play::{Engine, play, play_on};
+pub use play::{NamedEngine, play, play_on};
 pub use request::{
     Back, Derived, Failure, History, Op, Record, Registered, Request, ResetRecord, Response, StepRecord, When,
 };
-pub use runner::{Fault, Part, Progress, Report};
+pub use runner::{Fault, Progress, Report, RunPart};
 pub use script::{Script, play_script};
 pub use tally::{Tally, families_of};

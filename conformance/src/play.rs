@@ -20,14 +20,14 @@ const MOST_FORETOLD_STEPS: i64 = 4096;
 
 /// An engine to play with.
 #[derive(Clone, Copy, Debug)]
-pub struct Engine {
+pub struct NamedEngine {
     /// Its name in reports.
     pub name: &'static str,
     /// Makes an environment of it.
     pub make: fn(Config) -> Result<Box<dyn Environment>, Error>,
 }
 
-impl Engine {
+impl NamedEngine {
     /// The reference.
     pub const REFERENCE: Self =
         Self { name: "reference", make: |config| Ok(Box::new(pogema_reference::Reference::new(config)?)) };
@@ -41,11 +41,11 @@ pub type Make<'a> = dyn Fn(Config) -> Result<Box<dyn Environment>, Error> + Send
 
 /// Plays a request on the reference.
 pub fn play(request: &Request) -> Response {
-    play_on(Engine::REFERENCE, request)
+    play_on(NamedEngine::REFERENCE, request)
 }
 
 /// Plays a request on an engine.
-pub fn play_on(engine: Engine, request: &Request) -> Response {
+pub fn play_on(engine: NamedEngine, request: &Request) -> Response {
     let mut response = Response::to(request);
     match Player::new(&engine.make, request) {
         Ok(mut player) => {

@@ -11,10 +11,10 @@ use serde::Serialize;
 use crate::compare::{Divergence, compare};
 use crate::draw::draw_request;
 use crate::events::Events;
-use crate::golden::Recording;
+use crate::golden::GoldenRecording;
 use crate::laws::broken_law;
 use crate::oracle::Oracle;
-use crate::play::{Engine, play_on};
+use crate::play::{NamedEngine, play_on};
 use crate::request::{Request, Response};
 use crate::script::play_script;
 use crate::tally::Tally;
@@ -24,7 +24,7 @@ use crate::{cases, golden};
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// The parts of the run, in order.
-    pub parts: Vec<Part>,
+    pub parts: Vec<RunPart>,
     /// Comparisons by rule.
     pub tally: Tally,
     /// What happened in the episodes.
@@ -35,7 +35,7 @@ pub struct Report {
 
 /// One part of a run: the golden recordings, the cases, and so on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Part {
+pub struct RunPart {
     /// Its name.
     pub name: String,
     /// Files or cases checked.
@@ -87,7 +87,7 @@ impl Checked {
         &mut self,
         part: &str,
         name: &str,
-        engine: Engine,
+        engine: NamedEngine,
         (request, expected): (&Request, &Response),
         got: &Response,
     ) {
@@ -108,7 +108,7 @@ impl Report {
 
     fn take(&mut self, name: &str, results: Vec<Checked>) {
         let checked = results.len() as u64;
-        let mut part = Part { name: name.into(), checked, failed: 0, events: Events::default() };
+        let mut part = RunPart { name: name.into(), checked, failed: 0, events: Events::default() };
         for checked in results {
             self.tally.add(&checked.tally);
             part.events.add(&checked.events);
@@ -125,7 +125,7 @@ impl Report {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn check_recordings(&mut self, part: &str, folder: &Path, engine: Engine) -> Result<(), Error> {
+    pub fn check_recordings(&mut self, part: &str, folder: &Path, engine: NamedEngine) -> Result<(), Error> {
         let mut results = Vec::new();
         for path in golden::recording_files(folder)? {
             for (index, recording) in golden::read(&path)?.iter().enumerate() {
@@ -142,7 +142,7 @@ impl Report {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn check_cases(&mut self, part: &str, folder: &Path, engine: Engine) -> Result<(), Error> {
+    pub fn check_cases(&mut self, part: &str, folder: &Path, engine: NamedEngine) -> Result<(), Error> {
         let mut results = Vec::new();
         for path in golden::files(folder, ".yaml")? {
             let case = cases::read(&path)?;
@@ -163,7 +163,7 @@ impl Report {
     /// If a worker fails.
     pub fn check_fresh(
         &mut self,
-        engines: &[Engine],
+        engines: &[NamedEngine],
         num_cases: u64,
         seed: u64,
         keep: &Path,
@@ -197,7 +197,7 @@ impl Report {
     /// If POGEMA cannot be started or ends.
     pub fn check_oracle(
         &mut self,
-        engines: &[Engine],
+        engines: &[NamedEngine],
         python: &Path,
         num_cases: u64,
         seed: u64,
@@ -205,7 +205,7 @@ impl Report {
         progress: Progress<'_>,
     ) -> Result<(), Error> {
         let check = |oracle: &mut Oracle, case| {
-            let request = play_script(Engine::REFERENCE, draw_request(seed, case), seed).0;
+            let request = play_script(NamedEngine::REFERENCE, draw_request(seed, case), seed).0;
             // POGEMA works on its answer while we work on ours.
             oracle.send(&request)?;
             let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
@@ -275,7 +275,7 @@ fn diverged(part: &str, name: &str, found: Divergence) -> Fault {
 fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected: &Response) {
     let Some(fault) = &mut checked.fault else { return };
     let path = folder.join(format!("{}-{}.jsonl", fault.part, fault.name.replace(' ', "-")));
-    let recording = Recording { request: request.clone(), response: expected.clone() };
+    let recording = GoldenRecording { request: request.clone(), response: expected.clone() };
     let kept = std::fs::create_dir_all(folder)
         .map_err(|error| Error::io(folder, error))
         .and_then(|()| golden::write(&path, &[recording]));

@@ -3,7 +3,7 @@
 use pogema_core::{Action, Cell, Map, Snapshot};
 
 use crate::dice::Dice;
-use crate::play::{Engine, Player};
+use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, Response};
 
 /// How the agents of an episode choose their actions.
@@ -30,7 +30,7 @@ const MOST_STEPS: usize = 26;
 /// Adds operations to a request while playing it, so that the actions can answer to what happens.
 ///
 /// The result is the whole request and our answer to it, on the given engine.
-pub fn play_script(engine: Engine, mut request: Request, seed: u64) -> (Request, Response) {
+pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Request, Response) {
     let mut dice = Dice::new(seed ^ 0x5ca1_ab1e, request.id);
     let mut response = Response { id: Some(request.id), ..Response::default() };
     let Ok(mut player) = Player::new(&engine.make, &request) else {

@@ -3,14 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_conformance::{Engine, Report, golden};
+use pogema_conformance::{NamedEngine, Report, golden};
 use pogema_core::{Action, Collision, Config, Environment, Error, OnGoal, Reward};
 use pogema_core::{Instance, Occupancy, Snapshot, State, StepOut};
 use pogema_reference::Reference;
 
 #[test]
 fn engines_give_what_was_recorded() {
-    for engine in [Engine::REFERENCE, Engine::LITERAL] {
+    for engine in [NamedEngine::REFERENCE, NamedEngine::LITERAL] {
         let mut report = Report::default();
         report.check_recordings("golden", &golden::folder(), engine).unwrap();
         report.check_recordings("found", &golden::found_folder(), engine).unwrap();
@@ -28,7 +28,7 @@ fn fresh(engines: &[Engine], num_cases: u64) -> Report {
 
 #[test]
 fn engines_agree_on_crowded_episodes_of_every_kind() {
-    let report = fresh(&[Engine::REFERENCE, Engine::LITERAL], 1500);
+    let report = fresh(&[NamedEngine::REFERENCE, NamedEngine::LITERAL], 1500);
     assert!(report.agrees(), "{}", report.failures[0].text);
     for (name, count) in report.events.named() {
         let least = if name == "cycles" { 50 } else { 500 };
@@ -166,7 +166,7 @@ const WRONG: [(&str, Engine); 8] = [
 #[test]
 fn wrong_engines_are_caught_under_the_rule_they_break() {
     for (rule, engine) in WRONG {
-        let report = fresh(&[Engine::REFERENCE, engine], 200);
+        let report = fresh(&[NamedEngine::REFERENCE, engine], 200);
         let blamed = report.tally.rules.get(rule).map_or(0, |count| count.diverged);
         assert!(blamed > 0, "an engine that {} was not caught under {rule}", engine.name);
         let kept = report.failures.iter().all(|fault| fault.kept.is_some());

@@ -6,7 +6,7 @@
 use pogema_core::{
     Action, Cell, Collision, Config, Environment, EpisodeMeter, Error, Instance, OnGoal, Snapshot, StepOut,
 };
-use pogema_fast::{Autoreset, Batch, Observations, View};
+use pogema_fast::{Autoreset, Batch, ObservationBuffers, Observations};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
@@ -115,7 +115,7 @@ fn step_masked(batch: &mut Batch, step: u64) -> (Vec<Shown>, Vec<i8>) {
     let mut truncated = terminated.clone();
     let mut observed = vec![0.5; NUM_LANES * config().num_observed()];
     let mut masks = vec![7; num_agents * 5];
-    let view = View { observations: Observations::F32(&mut observed), masks: Some(&mut masks) };
+    let view = ObservationBuffers { observations: Observations::F32(&mut observed), masks: Some(&mut masks) };
     let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
     batch.step(&actions(step), out, view).unwrap();
     let shown = |lane: usize| {
@@ -278,8 +278,8 @@ fn ends_are_observed_in_the_order_asked_for() {
 
 #[test]
 fn masks_allow_what_no_obstacle_forbids() {
-    fn view(masks: &mut [i8]) -> View<'_> {
-        View { observations: Observations::None, masks: Some(masks) }
+    fn view(masks: &mut [i8]) -> ObservationBuffers<'_> {
+        ObservationBuffers { observations: Observations::None, masks: Some(masks) }
     }
     let mut batch = new_batch(Autoreset::SameStep, 2);
     let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];

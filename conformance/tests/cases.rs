@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_conformance::{Engine, cases, golden, play_on};
+use pogema_conformance::{NamedEngine, cases, golden, play_on};
 
 #[test]
 fn every_case_holds_on_every_engine() {
@@ -12,7 +12,7 @@ fn every_case_holds_on_every_engine() {
     for path in files {
         let case = cases::read(&path).unwrap();
         assert!(case.checks_something(), "{} expects nothing", path.display());
-        for engine in [Engine::REFERENCE, Engine::LITERAL] {
+        for engine in [NamedEngine::REFERENCE, NamedEngine::LITERAL] {
             if let Some(mismatch) = case.mismatch(&play_on(engine, &case.request().unwrap())) {
                 wrong.push(format!("{} on {}: {mismatch}", path.display(), engine.name));
             }

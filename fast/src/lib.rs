@@ -48,7 +48,7 @@ mod observe;
 mod simd;
 mod step;
 
-pub use batch::{Autoreset, Batch, Instances, Observations, View};
+pub use batch::{Autoreset, Batch, Instances, ObservationBuffers, Observations};
 pub use observe::words_per_agent;
-pub use simd::{Path, Value};
+pub use simd::{SimdPath, Value};
 pub use step::Engine;

@@ -7,7 +7,7 @@ use pogema_core::{Error, Seen};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::simd::{Channels, MOST_WORDS, Path, Scene, Value, lead_of, pack, per_line};
+use crate::simd::{Channels, MOST_WORDS, SimdPath, Value, WindowSource, lead_of, pack, per_line};
 
 /// Words for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;
@@ -87,8 +87,8 @@ impl Engine {
         Ok(())
     }
 
-    fn scene(&self) -> Scene<'_> {
-        Scene {
+    fn scene(&self) -> WindowSource<'_> {
+        WindowSource {
             obstacles: &self.obstacles,
             occupied: &self.occupied,
             cells: &self.cells,
@@ -194,8 +194,8 @@ thread_local! {
 
 /// Writes the values of the agents from `first` on, by way of `words`, as many agents at a time as have room there.
 fn write_blocks<V: Value>(
-    path: Path,
-    scene: &Scene<'_>,
+    path: SimdPath,
+    scene: &WindowSource<'_>,
     first: usize,
     channels: Channels,
     out: &mut [V],

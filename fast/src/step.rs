@@ -7,7 +7,7 @@ use pogema_core::{Seen, Snapshot, State, StepOut};
 use rayon::ThreadPool;
 
 use crate::grid::{Board, FREE, Strips, num_bytes};
-use crate::simd::Path;
+use crate::simd::SimdPath;
 
 /// One environment that plays by POGEMA 1.4.0's rules, on bits.
 ///
@@ -15,7 +15,7 @@ use crate::simd::Path;
 #[derive(Debug)]
 pub struct Engine {
     pub(crate) config: Config,
-    pub(crate) path: Path,
+    pub(crate) path: SimdPath,
     pub(crate) pool: Option<Arc<ThreadPool>>,
     /// Of the map without its border; 0 before the first reset.
     pub(crate) height: usize,
@@ -45,14 +45,14 @@ impl Engine {
     /// # Errors
     /// If the config is out of range, or `POGEMA_SIMD` names no path that this machine has.
     pub fn new(config: Config) -> Result<Self, Error> {
-        Self::with_path(config, Path::from_environment()?)
+        Self::with_path(config, SimdPath::from_environment()?)
     }
 
     /// An environment that observes by a given path.
     ///
     /// # Errors
     /// If the config is out of range or this machine does not have the path.
-    pub fn with_path(config: Config, path: Path) -> Result<Self, Error> {
+    pub fn with_path(config: Config, path: SimdPath) -> Result<Self, Error> {
         config.check()?;
         path.check()?;
         if config.num_agents > Self::MOST_AGENTS {

@@ -7,7 +7,7 @@ use pogema_core::{
     Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, Occupancy, OnGoal, Outside,
     Reward, Seen, StepOut,
 };
-use pogema_fast::{Engine, Path, words_per_agent};
+use pogema_fast::{Engine, SimdPath, words_per_agent};
 
 const NUM_AGENTS: usize = 24;
 const SIDE: usize = 9;
@@ -92,7 +92,7 @@ fn observe(engine: &Engine, buffers: &mut Buffers) {
     engine.count_seen(&mut buffers.seen).unwrap();
 }
 
-fn check(config: Config, path: Path) {
+fn check(config: Config, path: SimdPath) {
     for num_goals in [1, 3] {
         let mut engine = Engine::with_path(config, path).unwrap();
         engine.reset(&instance(num_goals)).unwrap();
@@ -108,7 +108,7 @@ fn check(config: Config, path: Path) {
 #[test]
 fn nothing_is_allocated_after_a_reset() {
     assert_ne!(measure(|| drop(std::hint::black_box(vec![0u8; 100]))).count_total, 0, "nothing is counted");
-    for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+    for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
         for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
             for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
                 for (radius, occupancy, reward) in [
@@ -147,7 +147,7 @@ fn the_bytes_told_are_the_bytes_held() {
         let mut told = 0;
         let mut engine = None;
         let info = measure(|| {
-            let engine = engine.insert(Engine::with_path(config, Path::Scalar).unwrap());
+            let engine = engine.insert(Engine::with_path(config, SimdPath::Scalar).unwrap());
             engine.reset(&instance).unwrap();
             told = engine.num_bytes();
         });

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Cell, Config, Environment, GoalStream, Instance, Map, Outside};
-use pogema_fast::{Engine, Path, words_per_agent};
+use pogema_fast::{Engine, SimdPath, words_per_agent};
 use quickcheck::{Arbitrary, Gen, QuickCheck};
 
 /// Miri, which looks at every access to memory, has time for a few small scenes.
@@ -14,7 +14,7 @@ const MOST_AGENTS: usize = if cfg!(miri) { 4 } else { 20 };
 
 /// A map, often wide, with some agents on it.
 #[derive(Clone, Debug)]
-struct Scene {
+struct WindowSource {
     height: usize,
     width: usize,
     radius: usize,
@@ -32,7 +32,7 @@ fn any_cell(g: &mut Gen, height: usize, width: usize) -> Cell {
     Cell::new(below(g, height) as u16, below(g, width) as u16)
 }
 
-impl Arbitrary for Scene {
+impl Arbitrary for WindowSource {
     fn arbitrary(g: &mut Gen) -> Self {
         let (height, width) = (1 + below(g, MOST_ROWS), 1 + below(g, MOST_COLS));
         let radius = match below(g, 8) {
@@ -69,7 +69,7 @@ impl Arbitrary for Scene {
     }
 }
 
-impl Scene {
+impl WindowSource {
     fn config(&self) -> Config {
         Config { num_agents: self.starts.len(), radius: self.radius, ..Config::default() }
     }
@@ -124,10 +124,10 @@ fn pack(bits: &[bool]) -> Vec<u64> {
     bits.chunks(64).map(word).collect()
 }
 
-fn bits_are_what_indexing_finds(scene: Scene) -> bool {
+fn bits_are_what_indexing_finds(scene: WindowSource) -> bool {
     let num_agents = scene.starts.len();
     let want: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&scene.window(agent))).collect();
-    Path::ALL.into_iter().filter(|path| path.is_available()).all(|path| {
+    SimdPath::ALL.into_iter().filter(|path| path.is_available()).all(|path| {
         let mut engine = Engine::with_path(scene.config(), path).unwrap();
         engine.reset(&scene.instance()).unwrap();
         let mut got = vec![u64::MAX; num_agents * words_per_agent(scene.radius)];
@@ -138,7 +138,7 @@ fn bits_are_what_indexing_finds(scene: Scene) -> bool {
 
 #[test]
 fn windows_hold_what_indexing_finds() {
-    QuickCheck::new().tests(NUM_SCENES).quickcheck(bits_are_what_indexing_finds as fn(Scene) -> bool);
+    QuickCheck::new().tests(NUM_SCENES).quickcheck(bits_are_what_indexing_finds as fn(WindowSource) -> bool);
 }
 
 /// Every column of a map in turn, so that windows of every width meet every border between strips.
@@ -152,7 +152,7 @@ fn windows_hold_what_indexing_finds_at_every_column() {
             let cols = (first..WIDTH).step_by(if radius > 33 { 37 } else { 20 });
             let starts: Vec<Cell> = cols.map(|col| Cell::new((col % 2) as u16, col as u16)).collect();
             let goals = starts.iter().map(|start| Cell::new(0, 199 - start.col)).collect();
-            let scene = Scene {
+            let scene = WindowSource {
                 height: 2,
                 width: WIDTH,
                 radius,

@@ -6,7 +6,7 @@ use pogema_core::{
     Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, Map, Outside, Snapshot,
     StepOut,
 };
-use pogema_fast::{Engine, Path, words_per_agent};
+use pogema_fast::{Engine, SimdPath, words_per_agent};
 
 const CONFIG: Config = Config {
     num_agents: 3,
@@ -192,13 +192,15 @@ fn wrong_configs_are_refused() {
             "config: `num_agents` is `4294967294`, expected at most 4294967293",
         ),
     ] {
-        let error = Engine::with_path(config, Path::Scalar).map(|_| ()).unwrap_err();
+        let error = Engine::with_path(config, SimdPath::Scalar).map(|_| ()).unwrap_err();
         assert_eq!(error.to_string(), want);
     }
-    for path in Path::ALL.into_iter().filter(|path| !path.is_available()) {
+    for path in SimdPath::ALL.into_iter().filter(|path| !path.is_available()) {
         let error = Engine::with_path(CONFIG, path).map(|_| ()).unwrap_err();
-        let want =
-            format!("config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", Path::best());
+        let want = format!(
+            "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
+            SimdPath::best()
+        );
         assert_eq!(error.to_string(), want);
     }
 }

@@ -6,7 +6,7 @@ use std::ffi::{OsStr, OsString};
 use std::process::Command;
 
 use pogema_core::{Cell, Collision, Config, Environment, GoalStream, Instance, Map, Outside};
-use pogema_fast::{Engine, Path, Value, words_per_agent};
+use pogema_fast::{Engine, SimdPath, Value, words_per_agent};
 
 const MOST_AGENTS: usize = 70;
 const MOST_OFFSET: usize = 70;
@@ -23,15 +23,15 @@ fn instance(num_agents: usize) -> Instance {
     Instance::new(map, Outside::Free, starts, goals).unwrap()
 }
 
-fn engine(num_agents: usize, radius: usize, path: Path) -> Engine {
+fn engine(num_agents: usize, radius: usize, path: SimdPath) -> Engine {
     let config = Config { num_agents, radius, collision: Collision::Soft, ..Config::default() };
     let mut engine = Engine::with_path(config, path).unwrap();
     engine.start(instance(num_agents)).unwrap();
     engine
 }
 
-fn available() -> impl Iterator<Item = Path> {
-    Path::ALL.into_iter().filter(|path| path.is_available())
+fn available() -> impl Iterator<Item = SimdPath> {
+    SimdPath::ALL.into_iter().filter(|path| path.is_available())
 }
 
 /// Writes into a part of a buffer that begins `offset` values after its beginning; checks all of the buffer.
@@ -49,7 +49,7 @@ fn check_part<V: Value + From<u8>>(engine: &Engine, want: &[u8], offset: usize, 
 
 fn check_parts(num_agents: usize, radius: usize, offset: usize) {
     let mut want = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
-    engine(num_agents, radius, Path::Scalar).observe_agents(0..num_agents, &mut want).unwrap();
+    engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut want).unwrap();
     for path in available() {
         let engine = engine(num_agents, radius, path);
         let about = format!("{path}, {num_agents} agents, radius {radius}, offset {offset}");
@@ -90,7 +90,7 @@ fn paths_give_the_same_bits_of_any_agents() {
     for radius in (1..=20).chain([33, 64, 128]) {
         let per_agent = words_per_agent(radius);
         let mut want = vec![u64::MAX; MOST_AGENTS * per_agent];
-        engine(MOST_AGENTS, radius, Path::Scalar).observe_bits(0..MOST_AGENTS, &mut want).unwrap();
+        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut want).unwrap();
         for path in available() {
             let engine = engine(MOST_AGENTS, radius, path);
             for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
@@ -112,15 +112,17 @@ const IS_CHILD: &str = "POGEMA_FAST_TEST_CHILD";
 fn the_variable_names_a_path_or_is_an_error() {
     if std::env::var_os(IS_CHILD).is_some() {
         let made = Engine::new(Config::default()).map(|_| ());
-        let path = Path::from_environment();
+        let path = SimdPath::from_environment();
         assert_eq!(path.as_ref().err(), made.as_ref().err());
         println!("<{}>", path.map_or_else(|error| error.to_string(), |path| path.to_string()));
         return;
     }
-    assert_eq!(child(None), Path::best().to_string());
-    for path in Path::ALL {
-        let too_much =
-            format!("config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", Path::best());
+    assert_eq!(child(None), SimdPath::best().to_string());
+    for path in SimdPath::ALL {
+        let too_much = format!(
+            "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
+            SimdPath::best()
+        );
         let want = if path.is_available() { path.to_string() } else { too_much };
         assert_eq!(child(Some(path.to_string().as_ref())), want);
     }
@@ -143,9 +145,9 @@ fn a_variable_that_is_no_text_is_an_error() {
 fn child(variable: Option<&OsStr>) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--exact", "the_variable_names_a_path_or_is_an_error", "--nocapture"]);
-    command.env(IS_CHILD, "1").env_remove(Path::VARIABLE);
+    command.env(IS_CHILD, "1").env_remove(SimdPath::VARIABLE);
     if let Some(value) = variable {
-        command.env(Path::VARIABLE, value);
+        command.env(SimdPath::VARIABLE, value);
     }
     let output = command.output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();

@@ -5,7 +5,7 @@
 use pogema_core::{
     Action, Cell, Config, Environment, GoalStream, Instance, Map, Occupancy, OnGoal, Outside, StepOut,
 };
-use pogema_fast::{Engine, Path};
+use pogema_fast::{Engine, SimdPath};
 
 fn cell(row: u16, col: u16) -> Cell {
     Cell { row, col }
@@ -73,7 +73,7 @@ fn an_agent_that_is_done_takes_no_part() {
 
 #[test]
 fn there_may_be_so_many_agents_and_not_one_more() {
-    let of = |num_agents| Engine::with_path(Config { num_agents, ..Config::default() }, Path::Scalar);
+    let of = |num_agents| Engine::with_path(Config { num_agents, ..Config::default() }, SimdPath::Scalar);
     assert!(of(Engine::MOST_AGENTS).is_ok());
     assert!(of(Engine::MOST_AGENTS + 1).is_err());
 }

@@ -2,7 +2,7 @@
 
 use pogema::reference::Reference;
 use pogema::{Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut};
-use pogema_conformance::{Engine, Report};
+use pogema_conformance::{NamedEngine, Report};
 
 /// Your engine. This one borrows everything from the reference, but for the bug that `is_wrong` switches on: the first
 /// agent never moves up.
@@ -51,10 +51,10 @@ impl Environment for Mine {
 }
 
 /// Plays 200 drawn episodes; counterexamples are kept in a folder.
-fn check(engine: Engine) -> Result<Report, Error> {
+fn check(engine: NamedEngine) -> Result<Report, Error> {
     let mut report = Report::default();
     let folder = std::env::temp_dir().join(format!("pogema-found-{}", std::process::id()));
-    report.check_fresh(&[Engine::REFERENCE, engine], 200, 1, &folder, &|| ())?;
+    report.check_fresh(&[NamedEngine::REFERENCE, engine], 200, 1, &folder, &|| ())?;
     Ok(report)
 }
 
@@ -62,14 +62,14 @@ pub(crate) fn main() -> Result<(), Error> {
     let make = |config| {
         Ok(Box::new(Mine { inner: Reference::new(config)?, is_wrong: false }) as Box<dyn Environment>)
     };
-    let report = check(Engine { name: "mine", make })?;
+    let report = check(NamedEngine { name: "mine", make })?;
     println!("right: {} of 200 episodes differ", report.failures.len());
     assert!(report.agrees());
 
     let make = |config| {
         Ok(Box::new(Mine { inner: Reference::new(config)?, is_wrong: true }) as Box<dyn Environment>)
     };
-    let report = check(Engine { name: "mine", make })?;
+    let report = check(NamedEngine { name: "mine", make })?;
     println!(
         "wrong: {} of 200 episodes differ; the first:\n{}",
         report.failures.len(),

@@ -10,7 +10,7 @@ use pogema_maps::formats::NamedMap;
 use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::{
-    Algorithm, Begin, BuiltIn, Done, Environments, Event, Failed, Pairs, Progress, Results, Running, Store,
+    Algorithm, Begin, BuiltIn, Done, EpisodeConfigs, Event, Failed, Pairs, Progress, Results, Running, Store,
     Suite, run_one,
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -26,7 +26,7 @@ type Again = (String, String, String);
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Evaluation {
     suite: Suite,
-    environments: Environments,
+    environments: EpisodeConfigs,
     store: Arc<Store>,
     folder: PathBuf,
     progress: Mutex<Option<Progress>>,
@@ -241,12 +241,12 @@ fn environments(
     suite: &Suite,
     maps: Vec<(String, String)>,
     files: &[PathBuf],
-) -> Result<Environments, Error> {
+) -> Result<EpisodeConfigs, Error> {
     let library = library(suite, maps, files)?;
     if suite.is_foreign() {
-        return Ok(Environments::unchecked(suite, library));
+        return Ok(EpisodeConfigs::unchecked(suite, library));
     }
-    Environments::new(suite, library)
+    EpisodeConfigs::new(suite, library)
 }
 
 /// The maps that a suite may name, those by name among them.
@@ -288,7 +288,7 @@ pub fn machine() -> &'static str {
 pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
     let play = || {
         let suite = Suite::parse(std::path::Path::new("suite.yaml"), suite)?;
-        let environments = Environments::unchecked(&suite, library(&suite, maps, &[])?);
+        let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?);
         let (played, runtime) = suite.play_one(&environments)?;
         let played = serde_json::to_string(&played)
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;

@@ -8,7 +8,7 @@ use numpy::{
 };
 use pogema::{EnvSource, Seed};
 use pogema_core::{Action, Config, Error, Occupancy, StepOut};
-use pogema_fast::{Autoreset, Observations, View};
+use pogema_fast::{Autoreset, ObservationBuffers, Observations};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -77,7 +77,7 @@ impl Batch {
         py.detach(|| game.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
-        let view = View { observations: buffer.lent()?, masks: lent(&mut masks)? };
+        let view = ObservationBuffers { observations: buffer.lent()?, masks: lent(&mut masks)? };
         let batch = &mut game.batch;
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
         write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
@@ -105,7 +105,7 @@ impl Batch {
         let (mut rewards, mut terminated, mut truncated) = ends;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
-        let view = View { observations: buffer.lent()?, masks: lent(&mut masks)? };
+        let view = ObservationBuffers { observations: buffer.lent()?, masks: lent(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
         let (batch, actions) = (&mut game.batch, &game.actions);
@@ -151,7 +151,7 @@ impl Batch {
         let mut guard = self.lock()?;
         let batch = &mut Self::open(&mut guard)?.batch;
         let mut masks = Some(masks);
-        let view = View { observations: Observations::None, masks: lent(&mut masks)? };
+        let view = ObservationBuffers { observations: Observations::None, masks: lent(&mut masks)? };
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))
     }
 

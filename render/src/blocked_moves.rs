@@ -12,12 +12,12 @@ pub struct BlockedMove {
     /// The id of the rule that reverted it.
     pub rule: &'static str,
     /// What stood in the way.
-    pub cause: Cause,
+    pub blocker: Blocker,
 }
 
 /// What a reverted move ran into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub enum Blocker {
     /// The wall around the map.
     Wall,
     /// The obstacle on a cell.
@@ -44,13 +44,13 @@ pub fn blocked_moves(
 ) -> Vec<BlockedMove> {
     let step = Step::new(map, before, actions, after);
     let reason = |agent| {
-        let (rule, cause) = step.reason(config.collision, agent);
-        BlockedMove { agent, rule, cause }
+        let (rule, blocker) = step.reason(config.collision, agent);
+        BlockedMove { agent, rule, blocker }
     };
     (0..step.num_agents).filter(|&agent| step.is_reverted(agent)).map(reason).collect()
 }
 
-type Reason = (&'static str, Cause);
+type Reason = (&'static str, Blocker);
 
 /// One step, with the agents that took part sorted by cell.
 struct Step<'a> {
@@ -106,9 +106,9 @@ impl<'a> Step<'a> {
 
     fn reason(&self, collision: Collision, agent: usize) -> Reason {
         let blocked = if collision == Collision::Soft { "collide/soft/stay" } else { "move/actions" };
-        let Some(target) = self.target(agent) else { return (blocked, Cause::Wall) };
+        let Some(target) = self.target(agent) else { return (blocked, Blocker::Wall) };
         if self.map.obstacles()[self.map.index(target)] {
-            return (blocked, Cause::Obstacle(target));
+            return (blocked, Blocker::Obstacle(target));
         }
         match collision {
             Collision::Priority => self.reason_by_priority(agent, target),
@@ -122,25 +122,25 @@ impl<'a> Step<'a> {
     /// Rule: collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn reason_by_priority(&self, agent: usize, target: Cell) -> Reason {
         if let Some(&winner) = self.arrivals.get(&target).filter(|&&other| other < agent) {
-            return ("collide/priority/contest", Cause::Agent(winner));
+            return ("collide/priority/contest", Blocker::Agent(winner));
         }
         match self.occupants.get(&target) {
-            Some(&other) if self.is_in_ring(agent) => ("collide/priority/swap", Cause::Agent(other)),
-            Some(&other) if !self.has_moved(other) => ("collide/priority", Cause::Agent(other)),
-            Some(&other) if other > agent => ("collide/priority/follow", Cause::Agent(other)),
-            _ => ("collide/priority", Cause::Unknown),
+            Some(&other) if self.is_in_ring(agent) => ("collide/priority/swap", Blocker::Agent(other)),
+            Some(&other) if !self.has_moved(other) => ("collide/priority", Blocker::Agent(other)),
+            Some(&other) if other > agent => ("collide/priority/follow", Blocker::Agent(other)),
+            _ => ("collide/priority", Blocker::Unknown),
         }
     }
 
     /// Rule: collide/block-both/occupied, collide/block-both/contest
     fn reason_blocking_both(&self, agent: usize, target: Cell) -> Reason {
         if let Some(&other) = self.occupants.get(&target) {
-            return ("collide/block-both/occupied", Cause::Agent(other));
+            return ("collide/block-both/occupied", Blocker::Agent(other));
         }
         match self.aiming.get(&target) {
-            Some(&(other, _)) if other != agent => ("collide/block-both/contest", Cause::Agent(other)),
-            Some(&(_, Some(other))) => ("collide/block-both/contest", Cause::Agent(other)),
-            _ => ("collide/block-both", Cause::Unknown),
+            Some(&(other, _)) if other != agent => ("collide/block-both/contest", Blocker::Agent(other)),
+            Some(&(_, Some(other))) => ("collide/block-both/contest", Blocker::Agent(other)),
+            _ => ("collide/block-both", Blocker::Unknown),
         }
     }
 
@@ -148,11 +148,11 @@ impl<'a> Step<'a> {
     fn reason_softly(&self, agent: usize, target: Cell) -> Reason {
         match (self.occupants.get(&target), self.arrivals.get(&target)) {
             (Some(&other), _) if self.target(other) == Some(self.before.cells[agent]) => {
-                ("collide/soft/swap", Cause::Agent(other))
+                ("collide/soft/swap", Blocker::Agent(other))
             }
-            (Some(&other), _) if !self.has_moved(other) => ("collide/soft/chain", Cause::Agent(other)),
-            (_, Some(&winner)) => ("collide/soft/contest", Cause::Agent(winner)),
-            _ => ("collide/soft", Cause::Unknown),
+            (Some(&other), _) if !self.has_moved(other) => ("collide/soft/chain", Blocker::Agent(other)),
+            (_, Some(&winner)) => ("collide/soft/contest", Blocker::Agent(winner)),
+            _ => ("collide/soft", Blocker::Unknown),
         }
     }
 

@@ -21,7 +21,7 @@ const MISSING: &str = "videos need the program `ffmpeg`, which is not on the PAT
 
 words! {
     /// What a video is packed in, by the ending of its file.
-    pub enum Format {
+    pub enum VideoFormat {
         /// H.264 in MP4.
         Mp4 = "mp4",
         /// VP9 in `WebM`.
@@ -29,7 +29,7 @@ words! {
     }
 }
 
-impl Format {
+impl VideoFormat {
     /// The format that a file's name ends in.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ pub fn write(
     path: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), Error> {
-    let format = Format::of(path)?;
+    let format = VideoFormat::of(path)?;
     let style = Style { static_frame: None, ..style.clone() };
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 2)?;
@@ -105,7 +105,7 @@ fn not_started(error: std::io::Error) -> Error {
 fn start(
     motion: &Motion<'_>,
     step_time: f64,
-    format: Format,
+    format: VideoFormat,
     file: &Path,
     said: std::fs::File,
 ) -> Result<Child, Error> {

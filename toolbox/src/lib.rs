@@ -6,7 +6,7 @@
 
 pub mod bootstrap;
 mod built_in;
-mod environments;
+mod episode_configs;
 pub mod frame;
 mod library;
 mod manifest;
@@ -26,8 +26,8 @@ mod variants;
 pub mod views;
 
 pub use built_in::BuiltIn;
-pub use environments::{Environment, Environments};
-pub use manifest::{Manifest, Run, machine};
+pub use episode_configs::{EpisodeConfig, EpisodeConfigs};
+pub use manifest::{Manifest, RunRecord, machine};
 pub use play::{Played, play, record};
 pub use progress::{Done, Failed, Progress};
 pub use replay::differences;

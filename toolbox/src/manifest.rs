@@ -23,12 +23,12 @@ pub struct Manifest {
     /// By what each algorithm is known.
     pub algorithms: BTreeMap<String, String>,
     /// Whoever played some of the episodes, each of which has the number of its run.
-    pub runs: Vec<Run>,
+    pub runs: Vec<RunRecord>,
 }
 
 /// One process that played episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Run {
+pub struct RunRecord {
     /// When it began to play, in the form of RFC 3339.
     pub began: String,
     /// The processor and how many threads it has.
@@ -81,7 +81,7 @@ impl Manifest {
     }
 }
 
-impl Run {
+impl RunRecord {
     /// This process, with the releases of what else it plays with.
     pub(crate) fn now(versions: &[(String, String)]) -> Self {
         let own = [("pogema-rs", env!("CARGO_PKG_VERSION")), ("POGEMA", "1.4.0")];

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::results::{Episode, Proof, Row};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
-use crate::{Environments, Pairs};
+use crate::{EpisodeConfigs, Pairs};
 
 /// An episode that is done.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -126,7 +126,7 @@ impl Progress {
     ///
     /// # Errors
     /// If they cannot be written; what is done stays kept then.
-    pub fn finish(self, environments: &Environments) -> Result<bool, Error> {
+    pub fn finish(self, environments: &EpisodeConfigs) -> Result<bool, Error> {
         if self.done.contains(&false) {
             return Ok(false);
         }

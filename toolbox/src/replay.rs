@@ -6,7 +6,7 @@ use std::time::Duration;
 use pogema_core::{Error, Trace};
 
 use crate::built_in::BuiltIn;
-use crate::environments::Environments;
+use crate::episode_configs::EpisodeConfigs;
 use crate::manifest::Manifest;
 use crate::play::{play, record};
 use crate::results::{Pairs, Row, figure};
@@ -32,10 +32,10 @@ impl Suite {
     /// Its environments, with the maps of further files.
     ///
     /// # Errors
-    /// As for [`Environments::new`], or if a file cannot be read.
-    pub fn environments(&self, further: &[PathBuf]) -> Result<(Environments, Vec<String>), Error> {
+    /// As for [`EpisodeConfigs::new`], or if a file cannot be read.
+    pub fn environments(&self, further: &[PathBuf]) -> Result<(EpisodeConfigs, Vec<String>), Error> {
         let (library, warnings) = self.library(further)?;
-        Ok((Environments::new(self, library)?, warnings))
+        Ok((EpisodeConfigs::new(self, library)?, warnings))
     }
 
     /// Plays an episode of one of its algorithms, and keeps all of it.
@@ -44,7 +44,7 @@ impl Suite {
     /// If there is no such algorithm or episode, or the algorithm is played in Python.
     pub fn play_again(
         &self,
-        environments: &Environments,
+        environments: &EpisodeConfigs,
         key: &str,
         index: usize,
     ) -> Result<(Pairs, Trace), Error> {
@@ -60,7 +60,7 @@ impl Suite {
     ///
     /// # Errors
     /// If it cannot be played.
-    pub fn play_one(&self, environments: &Environments) -> Result<(Pairs, Duration), Error> {
+    pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<(Pairs, Duration), Error> {
         let algorithm = self.algorithms.first();
         let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
         let played = play(&environments.at(0)?.config, &built_in(algorithm)?)?;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::built_in::BuiltIn;
-use crate::environments::Environments;
+use crate::episode_configs::EpisodeConfigs;
 use crate::play::{Played, play};
 use crate::progress::{Done, Failed, Progress};
 use crate::results::Pairs;
@@ -63,7 +63,7 @@ pub struct Summary {
 /// For an algorithm that is not built in, before anything is played; if results cannot be written.
 pub fn run(
     suite: &Suite,
-    environments: &Environments,
+    environments: &EpisodeConfigs,
     store: &Arc<Store>,
     running: Running<'_>,
 ) -> Result<Summary, Error> {
@@ -112,7 +112,7 @@ fn unknown(algorithm: &Algorithm) -> Error {
 pub fn run_one(
     algorithm: &Algorithm,
     built_in: &BuiltIn,
-    environments: &Environments,
+    environments: &EpisodeConfigs,
     store: &Arc<Store>,
     running: Running<'_>,
 ) -> Result<Summary, Error> {
@@ -153,7 +153,7 @@ pub fn run_one(
     Ok(Summary { num_played: num_played.into_inner(), num_failed: num_failed.into_inner(), is_whole })
 }
 
-fn played(index: usize, environments: &Environments, built_in: &BuiltIn) -> Result<Played, Box<Failed>> {
+fn played(index: usize, environments: &EpisodeConfigs, built_in: &BuiltIn) -> Result<Played, Box<Failed>> {
     let failed = |error: Error, config| {
         let env_grid_search = environments.changes(index).unwrap_or_default();
         Box::new(Failed {

@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use pogema_core::files::{UNFINISHED, write_whole};
 use pogema_core::{Error, words};
 
-use crate::manifest::{self, Manifest, Run};
+use crate::manifest::{self, Manifest, RunRecord};
 use crate::suite::Suite;
 
 words! {
@@ -105,7 +105,7 @@ impl Store {
     pub fn run(&self) -> Result<usize, Error> {
         let mut noted = self.noted();
         if !noted.has_begun {
-            noted.manifest.runs.push(Run::now(&self.versions));
+            noted.manifest.runs.push(RunRecord::now(&self.versions));
             self.tell(&noted.manifest)?;
             noted.has_begun = true;
         }

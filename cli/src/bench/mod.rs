@@ -113,7 +113,7 @@ impl Bench {
             }
         }
         bar.finish_and_clear();
-        let path = pogema_fast::Path::from_environment()?.to_string();
+        let path = pogema_fast::SimdPath::from_environment()?.to_string();
         let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
         say(&show::tell(&report.machine, &report.path, &report.rows, &report.bars))?;
         self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))

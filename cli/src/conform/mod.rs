@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use pogema_conformance::{Engine, Report, cases, find_oracle_python, golden};
+use pogema_conformance::{NamedEngine, Report, cases, find_oracle_python, golden};
 use pogema_core::Error;
 
 use crate::output::{check_writable, lined_table, progress_bar, say, write_json};
@@ -49,10 +49,11 @@ pub struct Conform {
 }
 
 /// The fast engine.
-const FAST: Engine = Engine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
+const FAST: NamedEngine =
+    NamedEngine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
 
 /// Our own engines.
-pub const ENGINES: [Engine; 3] = [Engine::REFERENCE, FAST, Engine::LITERAL];
+pub const ENGINES: [NamedEngine; 3] = [NamedEngine::REFERENCE, FAST, NamedEngine::LITERAL];
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {

@@ -98,7 +98,7 @@ impl Pictures {
             check_writable(path)?;
         }
         if let Some(path) = &self.video {
-            video::Format::of(path)?;
+            video::VideoFormat::of(path)?;
             video::check_ffmpeg()?;
         }
         if let Some(agent) = self.egocentric.filter(|&agent| agent >= num_agents) {

@@ -20,12 +20,12 @@ pub fn names() -> PossibleValuesParser {
 }
 
 /// A policy at work.
-pub enum Policy {
+pub enum ActionSource {
     Named(Box<NamedPolicy>),
     File(std::vec::IntoIter<Vec<Action>>),
 }
 
-impl Policy {
+impl ActionSource {
     /// The policy of a name for the episode of an instance.
     pub fn new(
         name: &str,

@@ -7,15 +7,15 @@ use pogema_core::Error;
 use super::plan::{Part, Plan};
 use crate::cases::{self, Case};
 use crate::draw::draw_request;
-use crate::golden::{self, Recording};
-use crate::play::{Engine, play};
+use crate::golden::{self, GoldenRecording};
+use crate::play::{NamedEngine, play};
 use crate::request::{Request, Response};
 use crate::script::play_script;
 
 /// One thing to check.
 pub enum Item {
     Case(String, Box<Case>),
-    Recorded(String, Box<Recording>),
+    Recorded(String, Box<GoldenRecording>),
     Drawn(u64),
 }
 
@@ -42,7 +42,7 @@ impl Item {
                 Ok((request, expected))
             }
             Self::Recorded(_, recording) => Ok((recording.request.clone(), recording.response.clone())),
-            Self::Drawn(number) => Ok(play_script(Engine::REFERENCE, draw_request(seed, *number), seed)),
+            Self::Drawn(number) => Ok(play_script(NamedEngine::REFERENCE, draw_request(seed, *number), seed)),
         }
     }
 }

@@ -21,11 +21,11 @@ mod process;
 mod protocol;
 mod report;
 mod run;
-mod scene;
 mod server;
 mod session;
 mod shrink;
 mod shrink_config;
+mod test_episode;
 mod trace;
 
 pub use claims::{Mode, Scope, Unclaimed, adapt, needed_by, profile_of};

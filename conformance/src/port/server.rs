@@ -7,7 +7,7 @@ use pogema_core::{Config, Environment, Error, Instance, Words};
 use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, ToldCell};
-use crate::play::{Engine, Make, Measured, Player};
+use crate::play::{Make, Measured, NamedEngine, Player};
 use crate::request::{Op, Record, Request, numbers};
 
 /// An engine as a port. It claims everything.
@@ -19,7 +19,7 @@ pub struct Server {
 
 impl Server {
     /// A port that plays on an engine.
-    pub fn new(engine: Engine) -> Self {
+    pub fn new(engine: NamedEngine) -> Self {
         Self::with(engine.name, engine.make)
     }
 
@@ -115,7 +115,7 @@ fn all<T: Words>() -> Vec<T> {
 ///
 /// # Errors
 /// [`Error::Io`] if a pipe breaks.
-pub fn serve(engine: Engine, input: impl BufRead, mut output: impl Write) -> Result<(), Error> {
+pub fn serve(engine: NamedEngine, input: impl BufRead, mut output: impl Write) -> Result<(), Error> {
     let failed = |error: std::io::Error| Error::io("pipe", error);
     let mut server = Server::new(engine);
     for line in input.lines() {

@@ -8,7 +8,7 @@ use super::group::Example;
 use super::judge::judge;
 use super::link::Link;
 use super::protocol::Hello;
-use super::scene::Scene;
+use super::test_episode::TestEpisode;
 use crate::play::play;
 use crate::request::{Op, Request, Response};
 
@@ -46,7 +46,7 @@ impl Shrinker<'_> {
         let mut cut = request.clone();
         cut.ops.truncate(until + 1);
         self.accept(&cut);
-        if let Some(scene) = Scene::of(&request, &expected, until) {
+        if let Some(scene) = TestEpisode::of(&request, &expected, until) {
             for mode in [Mode::Instance, Mode::Config] {
                 let before = self.best.mode;
                 self.best.mode = mode;
@@ -88,7 +88,7 @@ impl Shrinker<'_> {
         is_like
     }
 
-    fn shrink_scene(&mut self, mut scene: Scene) {
+    fn shrink_scene(&mut self, mut scene: TestEpisode) {
         loop {
             let before = scene.clone();
             self.start_later(&mut scene);
@@ -105,7 +105,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn try_scene(&mut self, scene: &mut Scene, candidate: Scene) -> bool {
+    fn try_scene(&mut self, scene: &mut TestEpisode, candidate: TestEpisode) -> bool {
         let is_accepted = candidate != *scene && self.accept(&candidate.request());
         if is_accepted {
             *scene = candidate;
@@ -114,7 +114,7 @@ impl Shrinker<'_> {
     }
 
     /// Begins with the state just before the difference, or as late as may be.
-    fn start_later(&mut self, scene: &mut Scene) {
+    fn start_later(&mut self, scene: &mut TestEpisode) {
         let played: Response = play(&scene.request());
         for num_ops in (1..scene.ops.len()).rev() {
             let Some(later) = scene.begun_after(num_ops, &played) else { continue };
@@ -124,7 +124,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn drop_agents(&mut self, scene: &mut Scene) {
+    fn drop_agents(&mut self, scene: &mut TestEpisode) {
         let mut size = scene.num_agents() / 2;
         while size > 0 {
             let mut first = 0;
@@ -139,7 +139,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn drop_lines(&mut self, scene: &mut Scene) {
+    fn drop_lines(&mut self, scene: &mut TestEpisode) {
         for row in (0..scene.rows.len()).rev() {
             if scene.rows.len() > 1 {
                 let smaller = scene.without_row(row);
@@ -155,7 +155,7 @@ impl Shrinker<'_> {
     }
 
     /// Leaves out steps, and as many of the steps that the episode may last if it has to be so.
-    fn drop_steps(&mut self, scene: &mut Scene) {
+    fn drop_steps(&mut self, scene: &mut TestEpisode) {
         for at in (0..scene.ops.len()).rev() {
             let mut shorter = scene.clone();
             shorter.ops.remove(at);
@@ -168,7 +168,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn simplify_fields(&mut self, scene: &mut Scene) {
+    fn simplify_fields(&mut self, scene: &mut TestEpisode) {
         for name in ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps"] {
             let mut simpler = scene.clone();
             simpler.fields.remove(name);
@@ -194,11 +194,11 @@ impl Shrinker<'_> {
                 break;
             }
         }
-        let plain = Scene { density: false, collisions: false, ..scene.clone() };
+        let plain = TestEpisode { density: false, collisions: false, ..scene.clone() };
         self.try_scene(scene, plain);
     }
 
-    fn clear_obstacles(&mut self, scene: &mut Scene) {
+    fn clear_obstacles(&mut self, scene: &mut TestEpisode) {
         let mut clear = scene.clone();
         clear.rows.iter_mut().for_each(|row| row.fill(false));
         if self.try_scene(scene, clear) {
@@ -215,7 +215,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn simplify_actions(&mut self, scene: &mut Scene) {
+    fn simplify_actions(&mut self, scene: &mut TestEpisode) {
         for at in 0..scene.ops.len() {
             for agent in 0..scene.num_agents() {
                 let mut simpler = scene.clone();
@@ -229,7 +229,7 @@ impl Shrinker<'_> {
         }
     }
 
-    fn shorten_sequences(&mut self, scene: &mut Scene) {
+    fn shorten_sequences(&mut self, scene: &mut TestEpisode) {
         for agent in 0..scene.num_agents() {
             while scene.goals[agent].len() > 2 {
                 let mut simpler = scene.clone();

@@ -12,7 +12,7 @@ use super::protocol::Told;
 use super::report::{PortReport, Shown, take};
 use crate::compare::compare_in;
 use crate::files;
-use crate::play::{Engine, Player};
+use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
 
 /// Plays the actions of each trace on the reference and compares what it gives with what stands there.
@@ -42,7 +42,7 @@ pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
 
 fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     let (config, instance) = (&trace.header.config, trace.header.instance()?);
-    let mut player = Player::of_instance(&Engine::REFERENCE.make, config, instance, &figures(trace))?;
+    let mut player = Player::of_instance(&NamedEngine::REFERENCE.make, config, instance, &figures(trace))?;
     let mut request = Request { config: player.config.to_value(), ..Request::default() };
     let (mut expected, mut got) = (Response::default(), Response::default());
     request.ops.push(Op::Reset(None));

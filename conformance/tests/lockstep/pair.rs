@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use pogema_core::{Action, Config, Environment, Error, Instance, Seen, Snapshot, StepOut};
-use pogema_fast::{Engine, Path, words_per_agent};
+use pogema_fast::{Engine, SimdPath, words_per_agent};
 use pogema_reference::Reference;
 
 /// What a value is before an engine writes it.
@@ -16,7 +16,7 @@ pub type Outcome<T> = Result<T, String>;
 /// One environment, played by all.
 pub struct Pair {
     pub reference: Reference,
-    pub engines: Vec<(Path, Engine)>,
+    pub engines: Vec<(SimdPath, Engine)>,
     /// Rows and columns of the map; 0 before the first reset.
     size: (usize, usize),
     /// The states since the reset.
@@ -33,7 +33,7 @@ pub struct Results {
 
 impl Pair {
     pub fn new(config: Config) -> Self {
-        let available = Path::ALL.into_iter().filter(|path| path.is_available());
+        let available = SimdPath::ALL.into_iter().filter(|path| path.is_available());
         let engines = available.map(|path| (path, Engine::with_path(config, path).unwrap())).collect();
         Self { reference: Reference::new(config).unwrap(), engines, size: (0, 0), past: Vec::new() }
     }
@@ -143,7 +143,7 @@ impl Pair {
 }
 
 /// Passes if the fast engine gives what the reference gives.
-fn same<T: PartialEq + Debug>(path: Path, what: &str, want: &T, got: &T) -> Outcome<()> {
+fn same<T: PartialEq + Debug>(path: SimdPath, what: &str, want: &T, got: &T) -> Outcome<()> {
     if want == got {
         return Ok(());
     }
@@ -177,7 +177,7 @@ fn seen_by(environment: &impl Environment) -> Result<Vec<Seen>, Error> {
 }
 
 /// Passes if the windows that `POMAPF` has apart are those of the `default` observation.
-fn check_windows(path: Path, engine: &Engine, config: Config, default: &[f32]) -> Outcome<()> {
+fn check_windows(path: SimdPath, engine: &Engine, config: Config, default: &[f32]) -> Outcome<()> {
     let area = config.side() * config.side();
     let channel =
         |index: usize| default.chunks(area).skip(index).step_by(3).flatten().copied().collect::<Vec<f32>>();

@@ -1,6 +1,6 @@
 //! Ports that say the same things in other ways.
 
-use pogema_conformance::Engine;
+use pogema_conformance::NamedEngine;
 use pogema_conformance::port::{Ask, Hello, Key, Link, Misbehaviour, Reply, Server};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -15,7 +15,7 @@ pub struct Told {
 
 impl Told {
     pub fn boxed(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> Box<dyn Link> {
-        Box::new(Self { server: Server::new(Engine::REFERENCE), hello, reply, last: Reply::default() })
+        Box::new(Self { server: Server::new(NamedEngine::REFERENCE), hello, reply, last: Reply::default() })
     }
 }
 

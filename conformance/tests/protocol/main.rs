@@ -10,7 +10,7 @@ use pogema_conformance::port::{
     Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
     check_ports, play_on_port,
 };
-use pogema_conformance::{Engine, Op, Request};
+use pogema_conformance::{NamedEngine, Op, Request};
 use pogema_core::{Collision, Observation, OnGoal};
 use serde_json::json;
 
@@ -130,7 +130,7 @@ fn a_port_steps_in_lockstep_with_the_reference() {
         let ops = std::iter::once(Op::Reset(None)).chain(steps).collect();
         let request = Request { config, ops, ..Request::default() };
         let expected = pogema_conformance::play(&request);
-        let mut server = Server::new(Engine::LITERAL);
+        let mut server = Server::new(NamedEngine::LITERAL);
         let hello = server.hello().unwrap();
         let answered = play_on_port(&mut server, &hello, Mode::Instance, &request, &expected);
         assert_eq!(answered.fault, None);

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use jsonschema::Validator;
-use pogema_conformance::Engine;
+use pogema_conformance::NamedEngine;
 use pogema_conformance::port::{
     Ask, Hello, Link, Misbehaviour, PROTOCOL, Part, Plan, Reply, Server, Subject, check_ports,
 };
@@ -49,7 +49,7 @@ fn schema() -> Validator {
 fn all_that_is_said_fits_the_schema() {
     let said = Arc::new(Mutex::new(Vec::new()));
     let start = || {
-        let link = Listening { server: Server::new(Engine::REFERENCE), said: Arc::clone(&said) };
+        let link = Listening { server: Server::new(NamedEngine::REFERENCE), said: Arc::clone(&said) };
         Ok(Box::new(link) as Box<dyn Link>)
     };
     let subject = Subject { command: "listening".into(), start: Box::new(start) };

@@ -11,7 +11,7 @@ mod tables;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use pogema_conformance::{Engine, Op, Oracle, Registered, Request};
+use pogema_conformance::{NamedEngine, Op, Oracle, Registered, Request};
 use pogema_core::{Error, Map};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::Value;
@@ -38,7 +38,7 @@ fn our_refusal(request: &Request) -> Option<String> {
         let registered = named.map(|map| Map::from_rows(&map.rows)).transpose()?;
         let rules = config.rules();
         let instance = InstanceSource::new(config, registered)?.generate()?.instance;
-        (Engine::REFERENCE.make)(rules)?.reset(&instance)
+        (NamedEngine::REFERENCE.make)(rules)?.reset(&instance)
     };
     reset().err().map(|error| error.to_string())
 }

@@ -86,7 +86,7 @@ impl Observations<'_> {
 
 /// What a step or a look at a batch shows of its lanes; observations alone are a view, too.
 #[derive(Debug)]
-pub struct View<'a> {
+pub struct ObservationBuffers<'a> {
     /// What agents see.
     pub observations: Observations<'a>,
     /// Which actions make sense, as [`crate::Engine::mask_actions`] writes them, if that is wanted.
@@ -95,13 +95,13 @@ pub struct View<'a> {
     pub masks: Option<&'a mut [i8]>,
 }
 
-impl<'a> From<Observations<'a>> for View<'a> {
+impl<'a> From<Observations<'a>> for ObservationBuffers<'a> {
     fn from(observations: Observations<'a>) -> Self {
         Self { observations, masks: None }
     }
 }
 
-impl View<'_> {
+impl ObservationBuffers<'_> {
     pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
         self.observations.check(num_lanes, config)?;
         let want = num_lanes * config.num_agents * Action::ALL.len();
@@ -126,7 +126,7 @@ impl View<'_> {
 pub(super) struct Jobs<'a> {
     pub lanes: &'a mut [Lane],
     pub steps: Option<(&'a [Action], StepOut<'a>)>,
-    pub view: View<'a>,
+    pub view: ObservationBuffers<'a>,
     /// Whether the observations of all lanes together are better written around the cache.
     pub beyond_cache: bool,
 }

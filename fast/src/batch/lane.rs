@@ -2,7 +2,7 @@
 
 use pogema_core::{Action, Config, EpisodeMeter, Error, Instance, Metrics, StepOut};
 
-use crate::{Engine, Path};
+use crate::{Engine, SimdPath};
 
 use super::Autoreset;
 use super::prepare::Preparer;
@@ -32,7 +32,7 @@ pub struct Lane {
 }
 
 impl Lane {
-    pub fn new(index: usize, config: Config, path: Path) -> Result<Self, Error> {
+    pub fn new(index: usize, config: Config, path: SimdPath) -> Result<Self, Error> {
         Ok(Self {
             index,
             engine: Engine::with_path(config, path)?,

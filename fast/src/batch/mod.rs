@@ -7,14 +7,14 @@ mod team;
 
 use pogema_core::{Action, Config, Error, Metrics, StepOut, check_threads};
 
-use crate::{Engine, Path};
+use crate::{Engine, SimdPath};
 
 use jobs::Jobs;
 use lane::Lane;
 use prepare::Preparer;
 use team::Team;
 
-pub use jobs::{Observations, View};
+pub use jobs::{ObservationBuffers, Observations};
 pub use prepare::Instances;
 
 /// What follows the end of a lane's episode by itself.
@@ -64,7 +64,7 @@ impl Batch {
         }
         // A lane is played by one thread at a time.
         let num_threads = check_threads("num_threads", num_threads)?.min(num_lanes);
-        let path = Path::from_environment()?;
+        let path = SimdPath::from_environment()?;
         let lane = |index| Lane::new(index, config, path);
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;
         let team = Team::new(num_threads)?;
@@ -161,7 +161,7 @@ impl Batch {
         &mut self,
         actions: &[Action],
         out: StepOut<'_>,
-        view: impl Into<View<'a>>,
+        view: impl Into<ObservationBuffers<'a>>,
     ) -> Result<(), Error> {
         let view = view.into();
         self.check_started()?;
@@ -185,7 +185,7 @@ impl Batch {
     /// Before the first reset, or for a buffer of the wrong length.
     ///
     /// Rule: observe/default
-    pub fn observe<'a>(&mut self, view: impl Into<View<'a>>) -> Result<(), Error> {
+    pub fn observe<'a>(&mut self, view: impl Into<ObservationBuffers<'a>>) -> Result<(), Error> {
         let view = view.into();
         self.check_started()?;
         view.check(self.lanes.len(), &self.config)?;

@@ -18,7 +18,7 @@ pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32]) {
     let first = (lead + head.len()) / F32_PER_VECTOR;
     let num_vectors = body.len() / F32_PER_VECTOR;
     let (body, tail) = body.split_at_mut(num_vectors * F32_PER_VECTOR);
-    // SAFETY: the path is only taken where AVX2 is there (`Path::check`); `body` holds `num_vectors` vectors, and
+    // SAFETY: the path is only taken where AVX2 is there (`SimdPath::check`); `body` holds `num_vectors` vectors, and
     // `check_enough` has seen that `words` hold a bit for each value.
     unsafe { spread_f32_vectors(words.as_ptr().cast::<u8>().add(first), num_vectors, body.as_mut_ptr()) };
     let (words, lead) = words_from(words, lead, head.len() + body.len());

@@ -9,7 +9,7 @@ use std::arch::x86_64::{
 use std::ops::Range;
 use std::sync::atomic::AtomicU64;
 
-use super::Scene;
+use super::WindowSource;
 use super::sights::{GROUP, Sights};
 use crate::bits::BitWriter;
 use crate::grid::MOST_ROWS;
@@ -18,8 +18,14 @@ use crate::grid::MOST_ROWS;
 const LANES: usize = 4;
 
 /// Writes all three channels of some agents, or says that the windows are too large for this.
-pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, words: &mut [u64]) -> bool {
-    // SAFETY: the path is only taken where its features are there (`Path::check`).
+pub fn pack(
+    scene: &WindowSource<'_>,
+    agents: Range<usize>,
+    lead: usize,
+    apart: bool,
+    words: &mut [u64],
+) -> bool {
+    // SAFETY: the path is only taken where its features are there (`SimdPath::check`).
     unsafe {
         match scene.radius {
             1 => pack_side::<3>(scene, agents, lead, apart, words),
@@ -35,7 +41,7 @@ pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, w
 
 #[target_feature(enable = "avx2")]
 fn pack_side<const SIDE: usize>(
-    scene: &Scene<'_>,
+    scene: &WindowSource<'_>,
     agents: Range<usize>,
     lead: usize,
     apart: bool,

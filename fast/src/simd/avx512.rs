@@ -13,7 +13,7 @@ const F32_PER_LINE: usize = per_line::<f32>();
 const U8_PER_LINE: usize = per_line::<u8>();
 
 pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: bool) {
-    // SAFETY: the path is only taken where AVX-512 is there (`Path::check`), and `check_enough` has seen that
+    // SAFETY: the path is only taken where AVX-512 is there (`SimdPath::check`), and `check_enough` has seen that
     // `words` hold a bit for each value.
     unsafe {
         if beyond_cache {

@@ -17,12 +17,18 @@ use std::sync::atomic::AtomicU64;
 
 use super::avx512_layout::{LANES, Layout};
 use super::sights::{GROUP, Sights};
-use super::{MOST_WORDS, Scene};
+use super::{MOST_WORDS, WindowSource};
 use crate::grid::MOST_ROWS;
 
 /// Writes all three channels of some agents, or says that the windows are too large for this.
-pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, words: &mut [u64]) -> bool {
-    // SAFETY: the path is only taken where its features are there (`Path::check`).
+pub fn pack(
+    scene: &WindowSource<'_>,
+    agents: Range<usize>,
+    lead: usize,
+    apart: bool,
+    words: &mut [u64],
+) -> bool {
+    // SAFETY: the path is only taken where its features are there (`SimdPath::check`).
     unsafe {
         match (scene.radius, apart) {
             (1, false) => pack_on::<3>(scene, agents, lead, words),
@@ -43,7 +49,12 @@ pub fn pack(scene: &Scene<'_>, agents: Range<usize>, lead: usize, apart: bool, w
 
 /// Each agent's bits right after those of the agent before.
 #[target_feature(enable = "avx512f,avx512bw")]
-fn pack_on<const SIDE: usize>(scene: &Scene<'_>, agents: Range<usize>, lead: usize, words: &mut [u64]) {
+fn pack_on<const SIDE: usize>(
+    scene: &WindowSource<'_>,
+    agents: Range<usize>,
+    lead: usize,
+    words: &mut [u64],
+) {
     let mut bit = lead;
     words[bit / 64] = 0;
     for begin in agents.clone().step_by(GROUP) {
@@ -77,7 +88,7 @@ fn pack_on<const SIDE: usize>(scene: &Scene<'_>, agents: Range<usize>, lead: usi
 /// Each agent's bits in words of its own.
 #[target_feature(enable = "avx512f,avx512bw")]
 fn pack_apart<const SIDE: usize, const WORDS: usize>(
-    scene: &Scene<'_>,
+    scene: &WindowSource<'_>,
     agents: Range<usize>,
     words: &mut [u64],
 ) {
@@ -106,7 +117,11 @@ const CHOOSE: i32 = 0xca;
 /// All bits of an agent. `APART` only makes each caller's copy its own, so that it is put in place there.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
-fn record<const SIDE: usize, const APART: bool>(scene: &Scene<'_>, sights: &Sights, index: usize) -> __m512i {
+fn record<const SIDE: usize, const APART: bool>(
+    scene: &WindowSource<'_>,
+    sights: &Sights,
+    index: usize,
+) -> __m512i {
     let first = sights.first[index] as usize;
     let obstacles = &scene.obstacles.words()[first..first + MOST_ROWS];
     let occupied = &scene.occupied.words()[first..first + MOST_ROWS];

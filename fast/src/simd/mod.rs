@@ -29,7 +29,7 @@ use crate::grid::Strips;
 
 /// How observations are computed. What comes out is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Path {
+pub enum SimdPath {
     /// No intrinsics; on every machine.
     Scalar,
     /// AVX2.
@@ -38,7 +38,7 @@ pub enum Path {
     Avx512,
 }
 
-impl Path {
+impl SimdPath {
     /// All paths, the plainest first.
     pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
 
@@ -84,7 +84,7 @@ impl Path {
     }
 }
 
-impl fmt::Display for Path {
+impl fmt::Display for SimdPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Scalar => "scalar",
@@ -113,7 +113,7 @@ impl Channels {
 
 /// What agents look at.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Scene<'a> {
+pub(crate) struct WindowSource<'a> {
     pub obstacles: &'a Strips,
     pub occupied: &'a Strips,
     pub cells: &'a [Cell],
@@ -121,7 +121,7 @@ pub(crate) struct Scene<'a> {
     pub radius: usize,
 }
 
-impl Scene<'_> {
+impl WindowSource<'_> {
     pub fn side(&self) -> usize {
         2 * self.radius + 1
     }
@@ -148,41 +148,41 @@ impl Value for f32 {}
 impl Value for u8 {}
 
 pub(crate) mod sealed {
-    use super::Path;
+    use super::SimdPath;
 
     pub trait Spread: Sized {
         /// Makes a value of each bit, but not of the first `lead`, fewer than 64, of which the caller says that
         /// they bring `out` to a line of memory. `beyond_cache` if the values will not be read soon.
-        fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool);
+        fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool);
     }
 }
 
 impl sealed::Spread for f32 {
-    fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
         check_enough(words, lead + out.len());
         match path {
-            Path::Scalar => scalar::spread(words, lead, out, &scalar::FLOATS),
+            SimdPath::Scalar => scalar::spread(words, lead, out, &scalar::FLOATS),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2 => avx2::spread_f32(words, lead, out),
+            SimdPath::Avx2 => avx2::spread_f32(words, lead, out),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 => avx512::spread_f32(words, lead, out, beyond_cache),
+            SimdPath::Avx512 => avx512::spread_f32(words, lead, out, beyond_cache),
             #[cfg(not(target_arch = "x86_64"))]
-            Path::Avx2 | Path::Avx512 => unreachable!("a path is checked when an engine is made"),
+            SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("a path is checked when an engine is made"),
         }
     }
 }
 
 impl sealed::Spread for u8 {
-    fn spread(path: Path, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
         check_enough(words, lead + out.len());
         match path {
-            Path::Scalar => scalar::spread(words, lead, out, &scalar::BYTES),
+            SimdPath::Scalar => scalar::spread(words, lead, out, &scalar::BYTES),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2 => avx2::spread_u8(words, lead, out),
+            SimdPath::Avx2 => avx2::spread_u8(words, lead, out),
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 => avx512::spread_u8(words, lead, out, beyond_cache),
+            SimdPath::Avx512 => avx512::spread_u8(words, lead, out, beyond_cache),
             #[cfg(not(target_arch = "x86_64"))]
-            Path::Avx2 | Path::Avx512 => unreachable!("a path is checked when an engine is made"),
+            SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("a path is checked when an engine is made"),
         }
     }
 }
@@ -228,8 +228,8 @@ pub(crate) const MOST_WORDS: usize = 8;
 ///
 /// Rule: observe/default, observe/default/window, observe/default/agents, observe/default/inactive
 pub(crate) fn pack(
-    path: Path,
-    scene: &Scene<'_>,
+    path: SimdPath,
+    scene: &WindowSource<'_>,
     agents: Range<usize>,
     channels: Channels,
     (lead, apart): (usize, bool),
@@ -238,9 +238,9 @@ pub(crate) fn pack(
     #[cfg(target_arch = "x86_64")]
     if channels == Channels::All {
         let is_done = match path {
-            Path::Scalar => false,
-            Path::Avx2 => avx2_windows::pack(scene, agents.clone(), lead, apart, words),
-            Path::Avx512 => avx512_windows::pack(scene, agents.clone(), lead, apart, words),
+            SimdPath::Scalar => false,
+            SimdPath::Avx2 => avx2_windows::pack(scene, agents.clone(), lead, apart, words),
+            SimdPath::Avx512 => avx512_windows::pack(scene, agents.clone(), lead, apart, words),
         };
         if is_done {
             return;

@@ -6,13 +6,13 @@ use std::sync::atomic::Ordering::Relaxed;
 use crate::bits::BitWriter;
 use crate::grid::{STRIDE, Strips};
 
-use super::{Channels, Scene};
+use super::{Channels, WindowSource};
 
 /// Widest window that lies in one strip.
 const NARROW: usize = 64 - STRIDE + 1;
 
 pub fn pack(
-    scene: &Scene<'_>,
+    scene: &WindowSource<'_>,
     agents: Range<usize>,
     channels: Channels,
     (lead, apart): (usize, bool),
@@ -30,7 +30,7 @@ pub fn pack(
             write_window(scene.occupied, row, col, side, &mut writer);
         }
         if channels == Channels::All {
-            writer.push_one_of(Scene::goal_index(cell, scene.goals[agent], side), side * side);
+            writer.push_one_of(WindowSource::goal_index(cell, scene.goals[agent], side), side * side);
         }
         if apart {
             writer.end_word();

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pogema_core::Cell;
 
-use super::Scene;
+use super::WindowSource;
 
 /// Agents whose sights are found at a time.
 pub const GROUP: usize = 16;
@@ -22,13 +22,13 @@ pub struct Sights {
 impl Sights {
     #[allow(clippy::inline_always, reason = "so that each path compiles it with its own features")]
     #[inline(always)]
-    pub fn of<const SIDE: usize>(scene: &Scene<'_>, agents: Range<usize>) -> Self {
+    pub fn of<const SIDE: usize>(scene: &WindowSource<'_>, agents: Range<usize>) -> Self {
         let (cells, goals) = (group(&scene.cells[agents.clone()]), group(&scene.goals[agents]));
         let mut sights = Self { first: [0; GROUP], shift: [0; GROUP], goal: [0; GROUP] };
         for (index, (&cell, &goal)) in cells.iter().zip(&goals).enumerate() {
             let (first, shift) = scene.obstacles.locate(usize::from(cell.row), usize::from(cell.col));
             (sights.first[index], sights.shift[index]) = (first as u32, shift);
-            sights.goal[index] = (2 * SIDE * SIDE + Scene::goal_index(cell, goal, SIDE)) as u32;
+            sights.goal[index] = (2 * SIDE * SIDE + WindowSource::goal_index(cell, goal, SIDE)) as u32;
         }
         sights
     }

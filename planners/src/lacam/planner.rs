@@ -2,7 +2,7 @@
 
 use crate::budget::Budget;
 use crate::lacam::params::LacamParams;
-use crate::lacam::run::Run;
+use crate::lacam::run::PlanCall;
 use crate::outcome::Outcome;
 use crate::planner::Planner;
 use crate::problem::Problem;
@@ -22,6 +22,6 @@ impl Lacam {
 
 impl Planner for Lacam {
     fn plan(&mut self, problem: &Problem, budget: &Budget) -> Outcome {
-        problem.solve(budget, |costs, clock| Run::new(&self.params, problem, costs, budget, clock).run())
+        problem.solve(budget, |costs, clock| PlanCall::new(&self.params, problem, costs, budget, clock).run())
     }
 }

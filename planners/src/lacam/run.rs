@@ -17,7 +17,7 @@ use crate::problem::Problem;
 type Steps = Vec<Vec<Vertex>>;
 
 /// One call of the planner.
-pub(super) struct Run<'a> {
+pub(super) struct PlanCall<'a> {
     params: &'a LacamParams,
     problem: &'a Problem,
     costs: &'a [CostToGo],
@@ -36,7 +36,7 @@ enum Found {
     Spent,
 }
 
-impl<'a> Run<'a> {
+impl<'a> PlanCall<'a> {
     /// Prepares a call with the costs to go of all agents.
     pub fn new(
         params: &'a LacamParams,

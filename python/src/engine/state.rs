@@ -29,7 +29,7 @@ struct Saved {
     elapsed: u64,
     meter: EpisodeMeter,
     drawn: Drawn,
-    episode: Option<Episode>,
+    episode: Option<SavedEpisode>,
     is_filmed: bool,
     film: Option<Recording>,
     #[serde(default)]
@@ -43,7 +43,7 @@ struct Saved {
 /// An episode that has begun.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Episode {
+struct SavedEpisode {
     instance: MadeInstance,
     step: u64,
     now: Snapshot,
@@ -76,7 +76,7 @@ impl Engine {
         }
         let Self { episode, .. } = self;
         let begun = episode.instance().ok().map(|instance| {
-            Ok::<_, Error>(Episode {
+            Ok::<_, Error>(SavedEpisode {
                 instance: MadeInstance::of(instance)?,
                 step: episode.num_steps(),
                 now: episode.snapshot(),
@@ -136,11 +136,11 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
 
 fn resume(
     engine: &mut Engine,
-    episode: Episode,
+    episode: SavedEpisode,
     elapsed: u64,
     recording: Option<Recording>,
 ) -> Result<(), Error> {
-    let Episode { instance, step, now, past, streams: states } = episode;
+    let SavedEpisode { instance, step, now, past, streams: states } = episode;
     let instance = engine.source.remake(instance)?;
     let mut streams = instance.goals().to_vec();
     Error::check_length("streams", streams.len(), states.len())?;

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use pogema_core::{Error, Trace};
 use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
-use pogema_render::blocked_moves::{BlockedMove, Cause, blocked_moves};
+use pogema_render::blocked_moves::{BlockedMove, Blocker, blocked_moves};
 use pogema_render::html;
 use serde_json::{Value, json};
 
@@ -97,13 +97,13 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
 }
 
 fn told(blocked: BlockedMove) -> Value {
-    let (cause, other) = match blocked.cause {
-        Cause::Wall => ("wall", None),
-        Cause::Obstacle(_) => ("obstacle", None),
-        Cause::Agent(other) => ("agent", Some(other)),
-        Cause::Unknown => ("unknown", None),
+    let (blocker, other) = match blocked.blocker {
+        Blocker::Wall => ("wall", None),
+        Blocker::Obstacle(_) => ("obstacle", None),
+        Blocker::Agent(other) => ("agent", Some(other)),
+        Blocker::Unknown => ("unknown", None),
     };
-    json!({"agent": blocked.agent, "rule": blocked.rule, "cause": cause, "other": other})
+    json!({"agent": blocked.agent, "rule": blocked.rule, "blocker": blocker, "other": other})
 }
 
 /// Prints what a saved map says, or what is wrong with it.

@@ -26,14 +26,14 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMov
     let own = before.cells[agent];
     let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
     let at = |cell: Cell| (i32::from(cell.row), i32::from(cell.col));
-    let other = match blocked.cause {
-        Cause::Wall => {
+    let other = match blocked.blocker {
+        Blocker::Wall => {
             let (row, col) = aim(agent);
             return row < 0 || col < 0 || row as usize >= map.height() || col as usize >= map.width();
         }
-        Cause::Obstacle(cell) => return map.obstacles()[map.index(cell)] && at(cell) == aim(agent),
-        Cause::Unknown => return false,
-        Cause::Agent(other) => other,
+        Blocker::Obstacle(cell) => return map.obstacles()[map.index(cell)] && at(cell) == aim(agent),
+        Blocker::Unknown => return false,
+        Blocker::Agent(other) => other,
     };
     let was_there = at(before.cells[other]) == aim(agent);
     let stayed = before.cells[other] == after.cells[other];
@@ -124,8 +124,8 @@ fn a_ring_under_priority_is_a_swap() {
     let actions = [Action::Right, Action::Down, Action::Left, Action::Up];
     let state = &trace.start.state;
     let got = blocked_moves(&trace.header.config, &trace.header.map, state, &actions, state);
-    let reasons: Vec<_> = got.iter().map(|blocked| (blocked.rule, blocked.cause)).collect();
-    let swap = |other| ("collide/priority/swap", Cause::Agent(other));
+    let reasons: Vec<_> = got.iter().map(|blocked| (blocked.rule, blocked.blocker)).collect();
+    let swap = |other| ("collide/priority/swap", Blocker::Agent(other));
     assert_eq!(reasons, [swap(1), swap(2), swap(3), swap(0)]);
 }
 
@@ -134,5 +134,5 @@ fn steps_of_other_rules_have_no_known_reason() {
     let trace = play("{map: \"a.A\"}", 0.0).unwrap();
     let state = &trace.start.state;
     let got = blocked_moves(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
-    assert_eq!(got, [BlockedMove { agent: 0, rule: "collide/priority", cause: Cause::Unknown }]);
+    assert_eq!(got, [BlockedMove { agent: 0, rule: "collide/priority", blocker: Blocker::Unknown }]);
 }

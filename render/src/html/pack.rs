@@ -9,7 +9,7 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace, TraceStep};
 use serde::Serialize;
 
-use crate::blocked_moves::{BlockedMove, Cause, blocked_moves};
+use crate::blocked_moves::{BlockedMove, Blocker, blocked_moves};
 use crate::check::check;
 
 /// Levels above this take longer and save nearly nothing.
@@ -145,11 +145,11 @@ impl Parts {
     }
 
     fn add_blocked(&mut self, blocked: BlockedMove) {
-        let cause = match blocked.cause {
-            Cause::Wall => "wall",
-            Cause::Obstacle(_) => "obstacle",
-            Cause::Agent(_) => "agent",
-            Cause::Unknown => "unknown",
+        let cause = match blocked.blocker {
+            Blocker::Wall => "wall",
+            Blocker::Obstacle(_) => "obstacle",
+            Blocker::Agent(_) => "agent",
+            Blocker::Unknown => "unknown",
         };
         let reason = Reason { rule: blocked.rule, cause };
         let place = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
@@ -157,7 +157,7 @@ impl Parts {
             self.reasons.len() - 1
         });
         self.reverted.push(place as u8);
-        if let Cause::Agent(other) = blocked.cause {
+        if let Blocker::Agent(other) = blocked.blocker {
             self.others.extend((other as u32).to_le_bytes());
         }
     }

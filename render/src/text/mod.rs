@@ -1,6 +1,6 @@
 //! Frames of text for the terminal.
 
-mod part;
+mod viewport;
 
 use console::{Style as Paint, truncate_str};
 use pogema_core::picture::agent_letter;
@@ -8,7 +8,7 @@ use pogema_core::{Cell, Error, Snapshot};
 
 use crate::check::check_agent;
 use crate::ground::{Border, Ground};
-use part::Part;
+use viewport::Viewport;
 
 /// Up to so many agents are letters; more are numbers, since digits have no capitals for goals.
 const MOST_LETTERS: usize = 26;
@@ -51,8 +51,8 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
         return Err(Error::out_of_range("size of the terminal", "0", "at least one row and one column"));
     }
     let cell_width = if num_agents > MOST_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
-    let part = Part::of(ground, state, style, cell_width);
-    let drawing = Drawing { ground, step, state, style, cell_width, part };
+    let viewport = Viewport::of(ground, state, style, cell_width);
+    let drawing = Drawing { ground, step, state, style, cell_width, viewport };
     let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));
     let lines = drawing.lines();
     Ok(lines
@@ -79,20 +79,20 @@ struct Drawing<'a> {
     state: &'a Snapshot,
     style: &'a Style,
     cell_width: usize,
-    part: Part,
+    viewport: Viewport,
 }
 
 impl Drawing<'_> {
     fn lines(&self) -> Vec<String> {
-        let part = &self.part;
-        let edge = "─".repeat(part.cols.len() * (self.cell_width + 1) + 1);
+        let viewport = &self.viewport;
+        let edge = "─".repeat(viewport.cols.len() * (self.cell_width + 1) + 1);
         let is_framed = self.style.border == Border::Thin;
-        let mut lines = vec![format!("step {}{}", self.step, part.cut())];
+        let mut lines = vec![format!("step {}{}", self.step, viewport.cut())];
         if is_framed {
             lines.push(format!("┌{edge}┐"));
         }
         let marks = self.marks();
-        for row in marks.chunks(part.cols.len()) {
+        for row in marks.chunks(viewport.cols.len()) {
             let cells = row.iter().map(|&mark| self.paint(mark)).collect::<Vec<_>>().join(" ");
             lines.push(if is_framed { format!("│ {cells} │") } else { cells });
         }
@@ -102,9 +102,9 @@ impl Drawing<'_> {
         lines
     }
 
-    /// What each cell of the part shows, row by row; an agent hides a goal, a lower index a higher one.
+    /// What each cell of the viewport shows, row by row; an agent hides a goal, a lower index a higher one.
     fn marks(&self) -> Vec<Mark> {
-        let Part { rows, cols, .. } = &self.part;
+        let Viewport { rows, cols, .. } = &self.viewport;
         let ground = |row, col| match (self.is_seen(row, col), self.ground.is_obstacle(row, col)) {
             (false, _) => Mark::Unseen,
             (true, true) => Mark::Obstacle,

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 pub use picks::{Pick, picks};
 
-use crate::environments::Environments;
+use crate::episode_configs::EpisodeConfigs;
 use crate::frame::plain_text;
 use crate::manifest::Manifest;
 use crate::replay::differences;
@@ -38,7 +38,7 @@ pub struct Replay {
 
 impl Replay {
     /// Plays an episode again, if its algorithm is built in.
-    pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &Environments) -> Self {
+    pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &EpisodeConfigs) -> Self {
         let again = suite.play_again(environments, &pick.algorithm, pick.episode);
         match again.and_then(|(metrics, trace)| Ok((metrics, pack(&trace)?))) {
             Ok((metrics, film)) => Self::played(pick, results, &metrics, film),

@@ -8,7 +8,7 @@ use crate::problem::Agent;
 
 /// New paths of some agents.
 #[derive(Debug)]
-pub(crate) struct Change {
+pub(crate) struct PathChange {
     pub agents: Vec<Agent>,
     pub paths: Vec<Path>,
 }
@@ -18,7 +18,7 @@ pub(crate) struct Change {
 pub(crate) struct ChangeLog {
     is_alone: bool,
     num_changes: AtomicUsize,
-    changes: Mutex<Vec<Arc<Change>>>,
+    changes: Mutex<Vec<Arc<PathChange>>>,
 }
 
 impl ChangeLog {
@@ -37,13 +37,13 @@ impl ChangeLog {
         if changes.len() != seen {
             return None;
         }
-        changes.push(Arc::new(Change { agents: agents.to_vec(), paths: paths.to_vec() }));
+        changes.push(Arc::new(PathChange { agents: agents.to_vec(), paths: paths.to_vec() }));
         self.num_changes.store(changes.len(), Ordering::Release);
         Some(changes.len())
     }
 
     /// Returns the changes after the first `seen`.
-    pub fn since(&self, seen: usize) -> Vec<Arc<Change>> {
+    pub fn since(&self, seen: usize) -> Vec<Arc<PathChange>> {
         if self.is_alone || self.num_changes.load(Ordering::Acquire) == seen {
             return Vec::new();
         }

@@ -15,7 +15,7 @@ use crate::variants::{Variant, Variants};
 
 /// The environments of a suite, each made when it is asked for.
 #[derive(Clone, Debug)]
-pub struct Environments {
+pub struct EpisodeConfigs {
     variants: Variants,
     library: Library,
     folder: std::path::PathBuf,
@@ -23,7 +23,7 @@ pub struct Environments {
 
 /// One environment.
 #[derive(Clone, Debug)]
-pub struct Environment {
+pub struct EpisodeConfig {
     /// What was varied, by its last name, in the order of the file.
     pub changes: Pairs,
     /// The map that `map_name` stands for.
@@ -32,7 +32,7 @@ pub struct Environment {
     pub config: GridConfig,
 }
 
-impl Environments {
+impl EpisodeConfigs {
     /// The environments of a suite, whose maps are in a library.
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Environments {
     ///
     /// # Errors
     /// If it is out of range, or cannot be.
-    pub fn at(&self, index: usize) -> Result<Environment, Error> {
+    pub fn at(&self, index: usize) -> Result<EpisodeConfig, Error> {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
@@ -132,7 +132,7 @@ impl Environments {
             None => config,
         };
         let map_name = map.map(|(name, _)| name);
-        Ok(Environment { changes, map_name, config })
+        Ok(EpisodeConfig { changes, map_name, config })
     }
 
     /// What was varied for the environment of a number below their count.

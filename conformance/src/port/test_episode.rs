@@ -9,7 +9,7 @@ use crate::request::{Op, Record, Request, Response, numbers};
 
 /// An episode: a map, agents, what they do, and the fields of the config that have nothing to do with those.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
+pub struct TestEpisode {
     /// Row by row, whether there is an obstacle.
     pub rows: Vec<Vec<bool>>,
     /// Where each agent starts.
@@ -28,7 +28,7 @@ pub struct Scene {
     pub collisions: bool,
 }
 
-impl Scene {
+impl TestEpisode {
     /// The last episode of a request, as far as the operation at `until`.
     ///
     /// None if its instance cannot be written into a config.

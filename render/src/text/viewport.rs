@@ -9,14 +9,14 @@ use super::Style;
 use crate::ground::{Border, Ground};
 
 /// The cells that are drawn.
-pub struct Part {
+pub struct Viewport {
     pub rows: Range<i32>,
     pub cols: Range<i32>,
     /// All rows and columns there are.
     whole: [Range<i32>; 2],
 }
 
-impl Part {
+impl Viewport {
     pub fn of(ground: Ground<'_>, state: &Snapshot, style: &Style, cell_width: usize) -> Self {
         // The thin border is a frame around the cells.
         let border = if style.border == Border::Thin { Border::None } else { style.border };
@@ -38,11 +38,11 @@ impl Part {
     /// Which rows and columns are drawn, if not all are.
     pub fn cut(&self) -> String {
         let mut text = String::new();
-        for (name, part, whole) in
+        for (name, shown, whole) in
             [("rows", &self.rows, &self.whole[0]), ("columns", &self.cols, &self.whole[1])]
         {
-            if part != whole {
-                let (start, last, all) = (part.start, part.end - 1, whole.len());
+            if shown != whole {
+                let (start, last, all) = (shown.start, shown.end - 1, whole.len());
                 let _ = write!(text, "  {name} {start}..{last} of {all}");
             }
         }
