@@ -19,7 +19,7 @@ fn engines_give_what_was_recorded() {
     }
 }
 
-fn fresh(engines: &[Engine], num_cases: u64) -> Report {
+fn fresh(engines: &[NamedEngine], num_cases: u64) -> Report {
     let keep = tempfile::tempdir().unwrap();
     let mut report = Report::default();
     report.check_fresh(engines, num_cases, 77, keep.path(), &|| ()).unwrap();
@@ -92,17 +92,17 @@ impl Environment for Wrong {
 }
 
 /// Wrong engines, and the rule under which each must be caught.
-const WRONG: [(&str, Engine); 8] = [
+const WRONG: [(&str, NamedEngine); 8] = [
     (
         "occupancy/as-released",
-        Engine {
+        NamedEngine {
             name: "shows every agent",
             make: |config| Wrong::rules(config, |config| Config { occupancy: Occupancy::Exact, ..config }),
         },
     ),
     (
         "collide/priority",
-        Engine {
+        NamedEngine {
             name: "blocks both",
             make: |config| {
                 Wrong::rules(config, |config| match config.collision {
@@ -114,14 +114,14 @@ const WRONG: [(&str, Engine); 8] = [
     ),
     (
         "collide/soft",
-        Engine {
+        NamedEngine {
             name: "goes by priority",
             make: |config| Wrong::rules(config, |config| Config { collision: Collision::Priority, ..config }),
         },
     ),
     (
         "goal/finish",
-        Engine {
+        NamedEngine {
             name: "keeps finished agents",
             make: |config| {
                 Wrong::rules(config, |config| match config.on_goal {
@@ -133,14 +133,14 @@ const WRONG: [(&str, Engine); 8] = [
     ),
     (
         "reward/own",
-        Engine {
+        NamedEngine {
             name: "shares rewards",
             make: |config| Wrong::rules(config, |config| Config { reward: Reward::Shared, ..config }),
         },
     ),
     (
         "end/truncated",
-        Engine {
+        NamedEngine {
             name: "cuts off late",
             make: |config| {
                 Wrong::rules(config, |config| Config { max_steps: config.max_steps.max(1) + 1, ..config })
@@ -149,14 +149,14 @@ const WRONG: [(&str, Engine); 8] = [
     ),
     (
         "end/terminated",
-        Engine {
+        NamedEngine {
             name: "terminates the first agent",
             make: |config| Wrong::make(config, |config| config, |out, _| out.terminated[0] = true, |_| ()),
         },
     ),
     (
         "observe/default",
-        Engine {
+        NamedEngine {
             name: "sees one thing more",
             make: |config| Wrong::make(config, |config| config, |_, _| (), |seen| seen[0] = 1.0 - seen[0]),
         },
