@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Error, Instance, Map, Observation};
+use pogema_core::{Error, Instance, MAX_THREADS, Map, Observation};
 use pogema_fast::{Batch, Instances};
 use pogema_maps::{GridConfig, InstanceSource};
 
@@ -19,7 +19,7 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
     let source = EnvSource::new(vec![(config.clone(), None)], vec![0; num_envs])?;
     let source = source.with_seeds(vec![Seed::Shared(seed); num_envs])?;
     let num_cores = std::thread::available_parallelism().map_or(1, usize::from);
-    Batch::new(config.rules(), num_envs, num_cores.clamp(1, num_envs.max(1)), source)
+    Batch::new(config.rules(), num_envs, num_cores.min(MAX_THREADS), source)
 }
 
 /// A config with the map that it names.
@@ -39,13 +39,16 @@ impl EnvSource {
     /// for each environment.
     ///
     /// # Errors
-    /// [`Error::Config`] for a config that does not fit a batch, or differs from another in what they have to share.
+    /// [`Error::Argument`] for no environments; [`Error::Config`] for a config that does not fit a batch, or differs from another in what they have to share.
     pub fn new(configs: Vec<(GridConfig, Option<Map>)>, of_env: Vec<usize>) -> Result<Self, Error> {
+        if of_env.is_empty() {
+            return Err(Error::argument("num_envs", 0, "at least 1"));
+        }
         let shared = Seed::from_os()?;
         let mut seeds = Vec::with_capacity(of_env.len());
         for (env, &index) in of_env.iter().enumerate() {
             let config = configs.get(index).map(|(config, _)| config);
-            let config = config.ok_or_else(|| Error::config("config", index, "the number of a config"))?;
+            let config = config.ok_or_else(|| Error::argument("of_env", index, "the number of a config"))?;
             check_playable(config)?;
             check_alike(env, config, &configs[of_env[0]].0)?;
             seeds.push(config.seed.map_or(shared, Seed::Shared));
@@ -93,12 +96,8 @@ impl Instances for EnvSource {
 
 fn check_playable(config: &GridConfig) -> Result<(), Error> {
     if config.observation_type != Observation::Default {
-        let value = config.to_value()["observation_type"].to_string();
-        return Err(Error::config(
-            "observation_type",
-            value,
-            "`default`, the only one that a batch observes",
-        ));
+        let expected = "`default`, the only one that a batch observes";
+        return Err(Error::config("observation_type", config.observation_type, expected));
     }
     if config.persistent {
         return Err(Error::config("persistent", true, "false, since a batch keeps no steps"));

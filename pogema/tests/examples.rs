@@ -57,7 +57,7 @@ fn what_is_no_batch_is_refused_by_name() {
         let config = pogema::GridConfig::from_yaml(text).unwrap();
         pogema::batch(&config, num_envs, 0).err().unwrap().to_string()
     };
-    assert_eq!(refusal("{}", 0), "config: `num_lanes` is `0`, expected at least 1");
+    assert_eq!(refusal("{}", 0), "`num_envs` is `0`, expected at least 1");
     let expected = "config: `persistent` is `true`, expected false, since a batch keeps no steps";
     assert_eq!(refusal("{persistent: true}", 2), expected);
 }

@@ -287,7 +287,7 @@ def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Conf
 
 def _read_threads(num_threads: Optional[int], num_envs: int) -> int:
     if num_threads is None:
-        return min(num_envs, _engine.num_cores())
+        return min(num_envs, _engine.num_cores(), _engine.MAX_THREADS)
     _check_whole("num_threads", num_threads)
     if num_threads > _engine.MAX_THREADS:
         raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")

@@ -230,9 +230,6 @@ impl Game {
         num_threads: usize,
     ) -> Result<Self, Error> {
         let num_envs = of_env.len();
-        if num_envs == 0 {
-            return Err(Error::argument("num_envs", num_envs, "at least 1"));
-        }
         let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
         let source = EnvSource::new(configs.iter().map(read).collect::<Result<_, _>>()?, of_env)?;
         let rules = source.config(0).rules();

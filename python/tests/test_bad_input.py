@@ -230,8 +230,8 @@ def test_an_assigned_field_may_hold_what_numpy_makes():
     env.grid_config.agents_xy = np.array([[0, 0], [1, 1]])
     env.grid_config.targets_xy = ((np.int32(2), 2), (3, 3))
     env.reset()
-    assert env.get_agents_xy(ignore_borders=True) == [(0, 0), (1, 1)]
-    assert env.get_targets_xy(ignore_borders=True) == [(2, 2), (3, 3)]
+    assert env.get_agents_xy(ignore_borders=True) == [[0, 0], [1, 1]]
+    assert env.get_targets_xy(ignore_borders=True) == [[2, 2], [3, 3]]
 
 
 @pytest.mark.parametrize(

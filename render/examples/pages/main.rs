@@ -96,14 +96,14 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     Ok(all.to_string())
 }
 
-fn told(blocked: BlockedMove) -> Value {
-    let (blocker, other) = match blocked.blocker {
+fn told(reverted: BlockedMove) -> Value {
+    let (blocker, other) = match reverted.blocker {
         Blocker::Wall => ("wall", None),
         Blocker::Obstacle(_) => ("obstacle", None),
         Blocker::Agent(other) => ("agent", Some(other)),
         Blocker::Unknown => ("unknown", None),
     };
-    json!({"agent": blocked.agent, "rule": blocked.rule, "blocker": blocker, "other": other})
+    json!({"agent": reverted.agent, "rule": reverted.rule, "cause": blocker, "other": other})
 }
 
 /// Prints what a saved map says, or what is wrong with it.
