@@ -78,16 +78,21 @@ impl Library {
         Ok(names)
     }
 
-    /// Returns the map of a name, or the map that a seed chooses among those that a pattern matches.
+    /// Returns the map of a name; without such a map, the name is a pattern from which a seed chooses.
+    ///
+    /// # Errors
+    /// As [`Library::matching`].
+    pub fn named_or_chosen(&self, name: &str, seed: u64) -> Result<(&str, &MapText), Error> {
+        self.maps.get_key_value(name).map_or_else(|| self.choose(name, seed), |(name, text)| Ok((name, text)))
+    }
+
+    /// The map that a seed chooses among those that a pattern matches.
     ///
     /// # Errors
     /// As [`Library::matching`].
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     pub fn choose(&self, pattern: &str, seed: u64) -> Result<(&str, &MapText), Error> {
-        if let Some((name, text)) = self.maps.get_key_value(pattern) {
-            return Ok((name, text));
-        }
         let names = self.matching(pattern)?;
         let index = Generator::seeded(seed).integers(0, names.len() as i64).unwrap_or_default();
         let name = names[index as usize];

@@ -83,7 +83,7 @@ impl EpisodeConfigs {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
         let pattern = fields.get("map_name").and_then(Value::as_str);
-        if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.choose(pattern, seed)) {
+        if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.named_or_chosen(pattern, seed)) {
             fields.insert("map_name".into(), name.into());
         }
         Ok(fields)
@@ -163,7 +163,7 @@ impl EpisodeConfigs {
     /// # Errors
     /// If there is none.
     pub fn map(&self, pattern: &str, seed: u64) -> Result<(String, String), Error> {
-        let (name, text) = self.library.choose(pattern, seed)?;
+        let (name, text) = self.library.named_or_chosen(pattern, seed)?;
         Ok((name.to_owned(), text.to_text()?))
     }
 
@@ -180,7 +180,7 @@ impl EpisodeConfigs {
         }
         let pattern = fields.remove("map_name");
         let pattern = pattern.as_ref().and_then(Value::as_str).unwrap_or_default();
-        let (name, text) = self.library.choose(pattern, seed)?;
+        let (name, text) = self.library.named_or_chosen(pattern, seed)?;
         Ok(Some((name.to_owned(), text)))
     }
 
