@@ -1,6 +1,6 @@
 //! From buffers to the lists, tuples and dictionaries that POGEMA returns.
 
-use pogema_core::Action;
+use pogema_core::{Action, Cell};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -41,6 +41,11 @@ fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
 
 /// One place of every agent, (row, col).
 pub type Pairs = Vec<(i64, i64)>;
+
+/// The cells of agents, shifted by the border.
+pub fn pairs(cells: &[Cell], shift: i64) -> Pairs {
+    cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
+}
 
 /// A list of tuples.
 pub fn tuples<'py>(py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {

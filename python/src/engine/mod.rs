@@ -6,7 +6,7 @@ pub mod state;
 
 use numpy::PyArray2;
 use pogema_core::{
-    Action, Cell, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
+    Action, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
     Observation, Occupancy, OnGoal, Outside, Trace,
 };
 use pogema_maps::{GridConfig, InstanceSource, foretold_from};
@@ -15,7 +15,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use self::drawn::Drawn;
 use crate::fields::Fields;
-use crate::lists::{Pairs, infos, read_actions};
+use crate::lists::{Pairs, infos, pairs, read_actions};
 use crate::{config, errors};
 
 /// Row, column, goal's row and column, step, whether the agent takes part, whether the goal was drawn.
@@ -393,13 +393,6 @@ impl Engine {
 
 fn rules(source: &InstanceSource, exact: bool, time_limit: i64) -> Config {
     let rules = source.config().rules();
-    Config {
-        max_steps: time_limit,
-        occupancy: if exact { Occupancy::Exact } else { rules.occupancy },
-        ..rules
-    }
-}
-
-fn pairs(cells: &[Cell], shift: i64) -> Pairs {
-    cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
+    let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
+    Config { max_steps: time_limit, occupancy, ..rules }
 }
