@@ -32,7 +32,7 @@ const FILES: [(&str, &str); 17] = [
 ];
 
 /// Arguments and the line they are answered with.
-const REFUSED: [(&str, &str); 51] = [
+const REFUSED: [(&str, &str); 53] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     ("run --sped 3", "unexpected argument '--sped' found"),
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
@@ -54,6 +54,12 @@ const REFUSED: [(&str, &str); 51] = [
     ("run --density nan", "`--density` is `\"NaN\"`, expected a number from 0 to 1"),
     ("run nan.yaml", "nan.yaml: config: line 1, column 10: `density` is `NaN`, expected a finite number"),
     ("run list.yaml", "list.yaml: expected fields and values such as `size: 8`"),
+    ("run two.json --set sise=4", "`--set` is `sise`, expected a field of a config; the nearest is `size`"),
+    // The file is not at fault.
+    (
+        "run two.json --set map=.?",
+        "map: line 1, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
+    ),
     ("run --set size", "`--set` is `size`, expected FIELD=VALUE, such as `empty_outside=false`"),
     (
         "run ragged.yaml",
@@ -201,7 +207,7 @@ fn a_trace_of_another_version_is_refused() {
 fn input_cannot_break_the_line() {
     let folder = folder();
     let field = "a\nb\u{1b}[2J=1";
-    let expected = "config: unknown field `a\\nb\\u{1b}[2J`, the nearest known one is `map`";
+    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a field of a config; the nearest is `map`";
     assert_refused(folder.path(), &["run", "--set", field], expected);
     assert_refused(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
 }

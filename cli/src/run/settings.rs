@@ -6,7 +6,7 @@ use clap::Args;
 use pogema_core::{Collision, Error, Map, OnGoal, Words};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{Generated, GridConfig, InstanceSource, Library, MapText};
+use pogema_maps::{FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, nearest};
 use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
@@ -108,7 +108,11 @@ impl Settings {
     /// An error with the flag or the file that it comes from.
     fn located(&self, error: Error) -> Error {
         let flags = self.flags().unwrap_or_default();
-        let flag = flags.into_iter().find(|(field, ..)| error.field() == Some(field));
+        let field = match &error {
+            Error::Map { .. } | Error::UnknownLetter { .. } => Some("map"),
+            error => error.field(),
+        };
+        let flag = flags.into_iter().find(|(name, ..)| field == Some(name));
         match (error, flag, &self.config) {
             (Error::Config { value, expected, .. }, Some((_, flag, _)), _) => {
                 Error::argument(&flag, value, expected)
@@ -142,6 +146,11 @@ impl Settings {
             let (field, value) = other.split_once('=').ok_or_else(|| {
                 Error::argument("--set", other, "FIELD=VALUE, such as `empty_outside=false`")
             })?;
+            if !FIELDS.contains(&field) {
+                let hint = nearest(field, FIELDS).unwrap_or_default();
+                let expected = format!("a field of a config; the nearest is `{hint}`");
+                return Err(Error::argument("--set", field, expected));
+            }
             Ok((field.to_owned(), format!("--set {field}"), value_of(value)))
         });
         plain.chain(others).collect()
