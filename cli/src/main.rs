@@ -5,6 +5,7 @@
 mod bench;
 mod conform;
 mod evaluate;
+mod help;
 mod maps;
 mod output;
 mod plan;
@@ -56,7 +57,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let arguments = match help::parse() {
         Ok(arguments) => arguments,
         Err(error) if is_mistake(&error) => {
             eprintln!("{}", error.to_string().lines().next().unwrap_or_default());
