@@ -28,14 +28,15 @@ pub fn draw_request(seed: u64, case: u64) -> Request {
     loop {
         let mut request = draw_once(&mut dice);
         request.id = case;
-        if fits(&mut dice, &mut request) {
+        if try_fit(&mut dice, &mut request) {
             return request;
         }
     }
 }
 
-/// Returns whether to keep the case, halving the number of agents until they fit. Keeps a few cases that do not fit.
-fn fits(dice: &mut Dice, request: &mut Request) -> bool {
+/// Halves the number of agents until the case can be played, and returns whether to keep the case. Keeps a few
+/// unplayable cases.
+fn try_fit(dice: &mut Dice, request: &mut Request) -> bool {
     const KEPT_UNPLAYABLE: f64 = 0.005;
     let registered = request.register.as_ref().and_then(|map| pogema_core::Map::from_rows(&map.rows).ok());
     loop {

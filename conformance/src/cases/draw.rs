@@ -119,7 +119,7 @@ fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
     add("global_xy", list(expect.global_xy.as_ref()));
     add("global_target_xy", list(expect.global_target_xy.as_ref()));
     add("derived", expect.derived.as_ref().map(Value::to_string));
-    add("goals foretold", list(expect.foretold.as_ref()));
+    add("foretold goals", list(expect.foretold.as_ref()));
     add("padded dtype", expect.padded_dtype.clone());
     add("taken back", expect.moved.map(|moved| moved.to_string()));
     add("changes", list(expect.changes.as_ref()));

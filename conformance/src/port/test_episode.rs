@@ -46,8 +46,10 @@ impl TestEpisode {
         let num_goals = if restarts { until - begin + 2 } else { 1 };
         let map = instance.map();
         let rows = map.obstacles().chunks(map.width()).map(<[bool]>::to_vec).collect();
-        let ops =
-            request.ops[begin + 1..=until].iter().zip(begin + 1..).map(|(op, at)| plain(op, at, expected));
+        let ops = request.ops[begin + 1..=until]
+            .iter()
+            .zip(begin + 1..)
+            .map(|(op, at)| without_policy(op, at, expected));
         Some(Self {
             rows,
             starts: instance.starts().to_vec(),
@@ -161,7 +163,7 @@ fn without_line(index: u16, removed: usize, num_left: usize) -> u16 {
 }
 
 /// Returns an operation, with the chosen actions instead of a policy.
-fn plain(op: &Op, at: usize, expected: &Response) -> Op {
+fn without_policy(op: &Op, at: usize, expected: &Response) -> Op {
     let chosen = expected.records.get(at).and_then(Record::step);
     match (op, chosen) {
         (Op::Astar | Op::Sample, Some(step)) => Op::Step(numbers(&step.step.actions)),
