@@ -80,8 +80,8 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    pub fn of(figures: &[String]) -> Self {
-        let has = |name: &str| figures.iter().any(|figure| figure == name);
+    pub fn of(metric_names: &[String]) -> Self {
+        let has = |name: &str| metric_names.iter().any(|metric| metric == name);
         Self { density: has("avg_agents_density"), collisions: has("a_collisions") || has("o_collisions") }
     }
 }
@@ -112,7 +112,7 @@ impl Player {
         make: &Make<'_>,
         rules: &Config,
         instance: Instance,
-        figures: &[String],
+        metric_names: &[String],
     ) -> Result<Self, Error> {
         let config = GridConfig {
             num_agents: rules.num_agents,
@@ -127,7 +127,7 @@ impl Player {
             empty_outside: matches!(instance.outside(), Outside::Free),
             ..GridConfig::default()
         };
-        Self::with_source(make, config, Source::Given(Box::new(instance)), Measured::of(figures))
+        Self::with_source(make, config, Source::Given(Box::new(instance)), Measured::of(metric_names))
     }
 
     fn with_source(

@@ -13,8 +13,8 @@ pub fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
 }
 
 fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
-    let ground = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
-    let mut signs: Vec<Sign> = map.obstacles().iter().map(ground).collect();
+    let sign_of = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
+    let mut signs: Vec<Sign> = map.obstacles().iter().map(sign_of).collect();
     for &cell in &state.occupied {
         signs[map.index(cell)] = Sign::Occupied;
     }

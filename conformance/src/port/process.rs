@@ -248,9 +248,8 @@ fn write_all(mut stdin: impl Write, lines: &Receiver<Vec<u8>>) {
 fn read_lines(mut stdout: BufReader<impl Read>, sender: &Sender<Output>) {
     loop {
         let mut line = Vec::new();
-        let longest = MAX_LINE_LENGTH as u64 + 1;
-        let end =
-            stdout.by_ref().take(longest).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
+        let limit = MAX_LINE_LENGTH as u64 + 1;
+        let end = stdout.by_ref().take(limit).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
         let next = match end {
             true if line.len() > MAX_LINE_LENGTH => Output::TooLong,
             true => Output::End(line),
