@@ -79,7 +79,7 @@ fn what_lacks_its_form_is_named() {
     assert_error("wrong-length", "`rewards` has length");
     assert_error("left-out", "left `truncated` out of an answer that needs it");
     assert_error("short-window", "`observations` of agent 0 has 2 values, expected ");
-    assert_error("twice", "wrote a line that nobody asked for");
+    assert_error("twice", "wrote an unrequested line");
 }
 
 #[test]
