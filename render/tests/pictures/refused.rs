@@ -78,7 +78,10 @@ fn videos_of_unknown_kinds() {
     for name in ["a.avi", "a", "mp4"] {
         let error =
             video::write(&trace, &Style::default(), 100, Path::new(name), &mut |_, _| ()).unwrap_err();
-        assert_eq!(error, Error::io(name, "the name of a video ends in `.mp4` or `.webm`"));
+        assert_eq!(
+            error,
+            Error::io(name, "unknown video format, expected a name ending in `.mp4` or `.webm`")
+        );
     }
 }
 
@@ -86,7 +89,7 @@ fn videos_of_unknown_kinds() {
 fn texts_that_are_no_colors() {
     for text in ["", "red", "#12345", "#1234567", "#+12345", "#gggggg", "#€€"] {
         let error = text.parse::<Color>().unwrap_err().to_string();
-        assert_eq!(error, format!("colour is `{text}`, expected one such as `#c1433c`"));
+        assert_eq!(error, format!("colour is `{text}`, expected a colour such as `#c1433c`"));
     }
     let color: Color = "#c1433C".parse().unwrap();
     assert_eq!((color, color.to_string().as_str()), (Color([0xc1, 0x43, 0x3c]), "#c1433c"));
