@@ -130,10 +130,10 @@ def test_errors_are_reported_with_line_and_column(world):
     ]
     with world.open("editor") as page:
         load(world, page, "good.txt", "a.A\n")
-        for name, content, want in cases:
+        for name, content, expected in cases:
             load(world, page, name, content)
             got = text(page, "message")
-            assert got == want or (want.endswith("column 3") and got.startswith(want)), (content, got, want)
+            assert got == expected or (expected.endswith("column 3") and got.startswith(expected)), (content, got, expected)
             equal(page.get_attribute("#message", "class"), "bad")
             equal(rows(page), ["..."], "the map stays unchanged")
         page.click("#edit-source")

@@ -30,16 +30,16 @@ def test_play_and_pause(world):
 
 def test_steps_by_button_and_key(world):
     with world.open("restart") as page:
-        for how, want in [("#next", 1), ("#next", 2), ("#back", 1), ("#last", 64), ("#first", 0)]:
+        for how, expected in [("#next", 1), ("#next", 2), ("#back", 1), ("#last", 64), ("#first", 0)]:
             page.click(how)
             settle(page)
-            equal(step(page), want, how)
+            equal(step(page), expected, how)
         keys = [("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10), ("End", 64), ("ArrowRight", 64), ("Home", 0), ("ArrowLeft", 0)]
-        for key, want in keys:
+        for key, expected in keys:
             page.keyboard.press(key)
             settle(page)
-            equal(step(page), want, key)
-            equal(page.input_value("#scrub"), str(want), "slider")
+            equal(step(page), expected, key)
+            equal(page.input_value("#scrub"), str(expected), "slider")
 
 
 def test_scrub(world):

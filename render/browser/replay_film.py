@@ -78,8 +78,8 @@ def test_marks_are_the_occupancy_grid(world):
         width = len(film["map"][0])
         with world.open(name) as page:
             shown = page.evaluate("Array.from({ length: replay.numSteps + 1 }, (_, at) => replay.marks(at))")
-            want = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
-            equal(shown, want, name)
+            expected = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
+            equal(shown, expected, name)
     soft = world.film("soft")["states"]
     assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), "no agent vanished, so this tested nothing"
 
@@ -110,9 +110,9 @@ def test_select_an_agent(world):
         equal(text(page, "agent-cell"), place(film["states"][5]["cells"][3]))
         equal(text(page, "agent-goal"), place(film["states"][5]["goals"][3]))
         equal(text(page, "agent-action"), NAMES[film["states"][5]["actions"][3]])
-        for key, want in [("]", "Agent 4"), ("[", "Agent 3"), ("[", "Agent 2")]:
+        for key, expected in [("]", "Agent 4"), ("[", "Agent 3"), ("[", "Agent 2")]:
             page.keyboard.press(key)
-            equal(text(page, "agent-name"), want)
+            equal(text(page, "agent-name"), expected)
         page.keyboard.press("Escape")
         assert page.locator("#agent").is_hidden()
         page.fill("#search", "6")
@@ -141,14 +141,14 @@ def test_reverted_moves_are_listed_and_lead_to_their_steps(world):
             equal(text(page, "moves-title"), f"{len(steps)} reverted moves")
             for index in (0, 2):
                 row = page.locator(f"#moves-{index}")
-                want = reason(film, steps[index], agent)
+                expected = reason(film, steps[index], agent)
                 shown = row.inner_text()
-                assert want["rule"] in shown and str(steps[index]) in shown and want["action"] in shown, (shown, want)
+                assert expected["rule"] in shown and str(steps[index]) in shown and expected["action"] in shown, (shown, expected)
                 row.click()
                 settle(page)
                 equal(step(page), steps[index])
-                equal(text(page, "why-rule"), want["rule"])
-                named = {"agent": f"agent {want['other']}", "wall": "the wall", "obstacle": "obstacle"}[want["cause"]]
+                equal(text(page, "why-rule"), expected["rule"])
+                named = {"agent": f"agent {expected['other']}", "wall": "the wall", "obstacle": "obstacle"}[expected["cause"]]
                 assert named in text(page, "why-text"), text(page, "why-text")
             page.keyboard.press("Home")
             settle(page)

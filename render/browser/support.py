@@ -109,8 +109,8 @@ def pixel(page, canvas, x, y):
     )
 
 
-def equal(got, want, what=""):
-    assert got == want, f"{what}: got {got!r}, expected {want!r}"
+def equal(got, expected, what=""):
+    assert got == expected, f"{what}: got {got!r}, expected {expected!r}"
 
 
 def step(page):
