@@ -115,7 +115,7 @@ def test_the_report_fits_a_phone(world):
 def test_no_foreign_scripts_run(world):
     path, _ = report(world)
     with world.open("report", path=path) as page:
-        equal(page.evaluate("document.scripts.length"), 2, "the data and the page's own")
+        equal(page.evaluate("document.scripts.length"), 2, "the data and the page's script")
         refused = page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'sent', (error) => error.name)")
         equal(refused, "TypeError")
         assert page.errors and all("Content Security Policy" in one for one in page.errors), page.errors

@@ -11,7 +11,7 @@ pub struct BlockedMove {
     pub agent: usize,
     /// The id of the rule that reverted it.
     pub rule: &'static str,
-    /// The cause in this step.
+    /// The wall, obstacle or agent that blocked the move.
     pub blocker: Blocker,
 }
 
@@ -24,7 +24,7 @@ pub enum Blocker {
     Obstacle(Cell),
     /// Another agent, by index: the one that occupies the cell or moves to it instead.
     Agent(usize),
-    /// No cause that the rules know: the step was recorded under other rules.
+    /// No cause under the rules of the config: the step was recorded under other rules.
     Unknown,
 }
 
@@ -33,7 +33,7 @@ pub enum Blocker {
 /// A move is reverted if an active agent's action is not stay, but its cell does not change. Each reverted move has one
 /// reason. If several apply, the first of these counts: obstacle or wall, swap, occupied cell, lost contest.
 ///
-/// Shape: the agents of `before` and `after` and `actions` have the same length; agents beyond the shortest list are
+/// Shape: `actions` and the lists of `before` and `after` have one entry per agent; entries beyond the shortest list are
 /// ignored.
 ///
 /// Rule: move/actions, collide/priority, collide/block-both, collide/soft

@@ -26,6 +26,6 @@ pub(crate) fn check_agent(agent: usize, num_agents: usize) -> Result<(), Error> 
     match num_agents.checked_sub(1) {
         Some(last) if agent <= last => Ok(()),
         Some(last) => Err(Error::out_of_range("agent", agent, format!("0 to {last}"))),
-        None => Err(Error::out_of_range("agent", agent, "none, the episode has no agents")),
+        None => Err(Error::out_of_range("agent", agent, "none, because the episode has no agents")),
     }
 }

@@ -10,7 +10,7 @@ use crate::style::{Color, Style};
 /// Maximum number of pixels of a picture. A pixel takes four bytes.
 pub const MOST_PIXELS: usize = 1 << 26;
 
-/// Draws one frame as PNG on a white background [default: frame 0].
+/// Draws the style's static frame as PNG on a white background [default: frame 0].
 ///
 /// Units: `width` in pixels.
 ///

@@ -20,7 +20,7 @@ fn titles_are_escaped() {
     let title = "&lt;&#x2f;title&gt;&lt;script&gt;alert(1)&lt;&#x2f;script&gt;&amp;&quot;";
     assert!(page.contains(&format!("<title>{title}</title>")), "{}", &page[..600]);
     assert!(page.contains(&format!("<h1 id=\"title\">{title}</h1>")));
-    assert_eq!(page.matches("<script").count(), 2, "the data and the page's own");
+    assert_eq!(page.matches("<script").count(), 2, "the data and the page's script");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::common::{Policy, config, trace};
 use crate::drawn::{Circle, attribute, elements, ids, squares};
 use crate::{played, still};
 
-/// Precision of the digits of a drawing. Units: cells.
+/// Tolerance for rounded coordinates in a drawing. Units: cells.
 const NEAR: f64 = 0.02;
 
 fn episodes() -> Vec<Trace> {

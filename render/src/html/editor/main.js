@@ -125,7 +125,7 @@ class Page {
   }
 
   // Updates the page. `what` is "size", "cells", "done" (cells changed and the stroke ended) or undefined (only the
-// display changed).
+  // display changed).
   changed(what) {
     if (!this.canvas) return;
     const { grid, view, canvas } = this;

@@ -8,7 +8,7 @@ class ParseError extends Error {
   }
 }
 
-// The characters of the kinds of cells.
+// One character for each kind of cell.
 const MATERIALS = ".#@$!";
 const FREE = 0;
 const OBSTACLE = 1;

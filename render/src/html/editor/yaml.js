@@ -173,7 +173,7 @@ function formatConfig(map, blocks) {
     if (!EDITED.includes(block.name)) return block.lines;
     written.add(block.name);
     // Keep num_agents if the page has not changed the number of agents: without listed agents, POGEMA places that many;
-// otherwise it takes that many from a longer list.
+    // otherwise it takes that many from a longer list.
     const isUntouched = map.agents.length === 0 || map.agents.length === map.numListed;
     if (block.name === "num_agents" && isUntouched) return block.lines;
     return linesOf(block.name, map, true);

@@ -19,7 +19,7 @@ class Film {
     this.reasons = header.reasons;
     const [agents, all] = [this.numAgents, this.numAgents * this.numSteps];
     let at = 0;
-    // Copy each part, because typed arrays of multi-byte numbers need aligned offsets and the parts have none.
+    // Copy each part, because typed arrays of multi-byte numbers need aligned offsets, and the parts are not aligned.
     const take = (length, Kind = Uint8Array) => {
       const begin = at;
       at += length * Kind.BYTES_PER_ELEMENT;
