@@ -133,7 +133,10 @@ const REFUSED: [(&str, &str); 53] = [
         "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",
     ),
     ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name one file, `a`"),
-    ("render trace.jsonl --video a.avi", "a.avi: the name of a video ends in `.mp4` or `.webm`"),
+    (
+        "render trace.jsonl --video a.avi",
+        "a.avi: unknown video format, expected a name ending in `.mp4` or `.webm`",
+    ),
     (
         "render trace.jsonl --steps 3..1",
         "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected two steps such as `10..20`",
@@ -141,7 +144,7 @@ const REFUSED: [(&str, &str); 53] = [
     ("render trace.jsonl --steps 0..1", "`--steps` is `1`, expected 0 to 0"),
     (
         "render trace.jsonl --colors red",
-        "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected one such as `#c1433c`",
+        "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected a colour such as `#c1433c`",
     ),
     ("run --gif a.gif --view 5", "`--egocentric` is `5`, expected 0 to 0"),
 ];
