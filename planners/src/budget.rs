@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spent_budget_stops_the_clock() {
+    fn clocks_report_spent_budgets() {
         let mut clock = Budget::of_nodes(2).start();
         assert_eq!([clock.count_node(), clock.count_node(), clock.count_node()], [false, false, true]);
         assert!(Budget::of_nodes(0).start().count_node());
