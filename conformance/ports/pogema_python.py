@@ -225,7 +225,7 @@ class Port:
 
 
 def five_results(result: Any) -> Any:
-    """Converts the results of a step to five; 1.1 returns `done`, and marks truncation in the infos."""
+    """Converts results of 1.1 to the five values of later releases; 1.1 marks truncation in the infos."""
     if len(result) == 5:
         return result
     observations, rewards, done, infos = result

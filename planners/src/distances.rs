@@ -63,7 +63,7 @@ impl Distances {
         self.tables.len()
     }
 
-    /// Evicts the least recently used eighth of the tables, so that not every new table scans the whole cache.
+    /// Evicts the least recently used eighth of the tables, because each eviction scans the whole cache.
     fn evict(&mut self) {
         let idle = |entry: &(&Vertex, &(CostToGo, u64))| Arc::strong_count(&entry.1.0) == 1;
         let mut ages: Vec<(u64, Vertex)> =

@@ -14,7 +14,7 @@
 //! | [`sipp`]: safe interval path planning for one agent | `sipp` |
 //! | [`solvability`]: A* through joint states | `joint` |
 //!
-//! [`PlannerName`] and [`LifelongName`] make a planner by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner
+//! [`PlannerName`] and [`LifelongName`] create planners by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner
 //! control an environment.
 //!
 //! [`AStarTeam`] reproduces POGEMA's A* policy, action for action. [`pogema_team`] and [`sample`] draw the same random

@@ -10,8 +10,8 @@
 //! | OPEN, FOCAL | [`FocalQueue`] |
 //! | fmin(i) | [`crate::cbs::node::Node::least`] |
 //!
-//! The low level searches for the least cost first, and then for few conflicts within the weight, with the soft
-//! constraints of [`crate::sipp`].
+//! The low level searches for the least cost first, and then for few conflicts within the suboptimality bound, with
+//! the soft constraints of [`crate::sipp`].
 
 use crate::budget::{Budget, Clock};
 use crate::cbs::focal::FocalQueue;

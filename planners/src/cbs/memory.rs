@@ -24,7 +24,7 @@ impl MemoryUse {
         self.num_bytes > self.max_bytes
     }
 
-    /// Counts bytes besides nodes.
+    /// Counts bytes in addition to the nodes.
     pub(crate) fn add(&mut self, num_bytes: usize) {
         self.num_bytes += num_bytes;
     }

@@ -20,7 +20,7 @@ pub(super) struct Swap<'a, C> {
 }
 
 impl<C: Costs> Swap<'_, C> {
-    /// Returns the agent that must be pulled along so that the two can swap.
+    /// Returns the agent that must be pulled along so that the two can swap, or [`NONE`].
     pub fn partner(&self, agent: Agent, best: Vertex) -> Agent {
         let here = self.input.place(agent);
         if best == here {
@@ -37,7 +37,7 @@ impl<C: Costs> Swap<'_, C> {
         self.pusher_behind(agent, best)
     }
 
-    /// Returns a neighbour that can pass the agent only after the agent makes room.
+    /// Returns a neighbouring agent that can pass only after this agent makes room, or [`NONE`].
     fn pusher_behind(&self, agent: Agent, best: Vertex) -> Agent {
         let here = self.input.place(agent);
         let is_pusher = |&place: &Vertex| {

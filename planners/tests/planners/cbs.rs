@@ -102,8 +102,8 @@ fn agents_pass_each_other_optimally_in_a_long_corridor() {
     // One agent has to back out of the corridor or into the only bay.
     for bay in [1, 5, 11] {
         let length = 24;
-        let beside: String = (0..length).map(|col| if col == bay { '.' } else { '#' }).collect();
-        let rows = [".".repeat(length), beside];
+        let bay_row: String = (0..length).map(|col| if col == bay { '.' } else { '#' }).collect();
+        let rows = [".".repeat(length), bay_row];
         let last = length as u16 - 1;
         let rows = rows.each_ref().map(String::as_str);
         let case = Case::new(&rows, &[[(0, 0), (0, last)], [(0, last), (0, 0)]]);

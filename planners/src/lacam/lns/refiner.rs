@@ -217,7 +217,7 @@ impl<'a> Refiner<'a> {
         true
     }
 
-    /// Puts the old paths of the neighbourhood back, in place of the new paths of its first agents.
+    /// Restores the old paths of the neighbourhood, whose first `num_new` agents have new paths.
     fn restore(&mut self, num_new: usize) {
         self.agents[..num_new].iter().for_each(|&agent| self.solution.remove(agent));
         for (&agent, path) in self.agents.iter().zip(&self.old) {
