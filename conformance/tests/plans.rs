@@ -163,7 +163,7 @@ fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     policy.provide_future_goals(&instance).unwrap();
     policy.act(instance.map(), episode.state()).unwrap();
     let again = policy.act(instance.map(), episode.state()).unwrap_err().to_string();
-    assert_eq!(again, "the state is of step 0, expected step 1 of the same episode");
+    assert_eq!(again, "found the state of step 0, expected step 1 of the same episode");
 }
 
 #[test]

@@ -38,8 +38,10 @@ impl GoalForecast {
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let error = |reason: String| Error::OutOfStep { reason };
         if now.step != self.step || now.goals.len() != self.ahead.len() {
-            let reason =
-                format!("the state is of step {}, expected step {} of the same episode", now.step, self.step);
+            let reason = format!(
+                "found the state of step {}, expected step {} of the same episode",
+                now.step, self.step
+            );
             return Err(error(reason));
         }
         self.step += 1;
