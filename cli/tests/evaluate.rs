@@ -348,7 +348,10 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
 fn a_single_attempt_is_for_planners_of_one_goal() {
     let folder = folder_with(&SUITE.replace("{name: random}", "{name: random, single_attempt: true}"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
-    assert!(error.contains("`random` does not use a single attempt; only one-shot planners do"), "{error}");
+    assert!(
+        error.contains("`random` does not support a single attempt; only one-shot planners do"),
+        "{error}"
+    );
     assert_eq!(status, 2);
     let cbs = "{name: cbs, nodes: 1, single_attempt: true}";
     let folder = folder_with(&SUITE.replace("{name: random}", cbs).replace("[3, 1, 2]", "[3]"));

@@ -104,7 +104,7 @@ fn wrong_calls_are_one_line() {
         (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
         (
             vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],
-            "expected `rhcr`, to make use of goals still to come",
+            "expected a planner that uses future goals, such as `rhcr`",
         ),
     ] {
         let (_, error, status) = run(folder.path(), &arguments);

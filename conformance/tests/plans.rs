@@ -151,13 +151,19 @@ fn goals_to_come_are_those_of_one_episode_and_for_planners_that_use_them() {
     let mut policy = new(LifelongName::Rhcr);
     policy.provide_future_goals(&instance).unwrap();
     let other = started(&config.rules(), &drawn(2, 12, 16, "restart").1);
-    assert!(policy.act(instance.map(), other.state()).unwrap_err().to_string().contains("was not to come"));
+    assert!(
+        policy
+            .act(instance.map(), other.state())
+            .unwrap_err()
+            .to_string()
+            .contains("does not match its future goals")
+    );
     policy.reset();
     let episode = started(&config.rules(), &instance);
     policy.provide_future_goals(&instance).unwrap();
     policy.act(instance.map(), episode.state()).unwrap();
     let again = policy.act(instance.map(), episode.state()).unwrap_err().to_string();
-    assert_eq!(again, "the goals to come are known for step 1, not for 0");
+    assert_eq!(again, "found the state of step 0, expected step 1 of the same episode");
 }
 
 #[test]

@@ -53,7 +53,7 @@ def test_what_cannot_be_is_an_outcome():
     found = plan(corridor, [[0, 0], [0, 2]], [[0, 2], [0, 0]])
     assert found.outcome == "impossible" and found.reason
     assert found.cells is None
-    assert "both want to stay" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
+    assert "have the same goal" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
     assert plan(corridor, [[0, 0]], [[0, 2]], most_steps=1).outcome == "impossible"
     late = plan(OBSTACLES, STARTS, GOALS, nodes=0)
     assert (late.outcome, late.lower_bound) == ("timed_out", 4)
@@ -64,7 +64,7 @@ def test_what_cannot_be_is_an_outcome():
     ("asked", "text"),
     [
         ({"planner": "none"}, "`planner` is `none`, expected one of `lacam`, `pibt`, `pbs`, `ecbs`, `cbs`"),
-        ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is no free cell"),
+        ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is not a free cell"),
         ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "of 3 columns"),
         ({"goals": [[0, -1], [0, 0]]}, "agent 0: .* is not on the map"),
