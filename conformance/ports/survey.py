@@ -123,10 +123,10 @@ def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: 
         "",
         "Each release runs in its own virtual environment, with the pins that `conformance/ports/survey_venvs.py` "
         "lists, behind `conformance/ports/pogema_python.py`. Each release plays every hand-written case, every "
-        f"recording of 1.4.0 and {cases} drawn cases, once from instances and once from configs. ✓: all results follow the rule. "
-        "✗: number of cases or episodes that differ. –: the release does not claim the rule, mostly because the rule is "
-        "newer. If agents start in other places, the comparison of the episode ends, so ✓ means that a rule held "
-        "wherever it could be compared.",
+        f"recording of 1.4.0 and {cases} drawn cases, once from instances and once from configs. ✓: all results "
+        "follow the rule. ✗: number of cases or episodes that differ. –: the release does not claim the rule, mostly "
+        "because the rule is newer. If agents start in other places, the comparison of the episode ends, so ✓ means "
+        "that a rule held wherever it could be compared.",
         "",
         *(["Could not be installed:", "", *missing, ""] if missing else []),
         *[
