@@ -20,7 +20,7 @@ Report = dict[str, Any]
 
 # What a cause comes down to, in words; a cause that is not told here is told by its rule and field alone.
 WORDS = {
-    ("config/fields", "error"): "configs that 1.4.0 accepts are rejected, or the reverse",
+    ("config/fields", "error"): "configs that 1.4.0 takes are refused, or others taken",
     ("metrics/nothing", "metrics"): "`ep_length` under `nothing` is one too small",
     ("goal/restart/draw", "goal"): "a next goal may be the cell just reached",
     ("place/obstacles", "map"): "`width` and `height` are ignored, maps are squares",
@@ -114,19 +114,18 @@ def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: 
     lines = [
         "# Which release follows which rule",
         "",
-        "A program writes this page; its output is checked in unchanged:",
+        "This page is written by a program and was checked in as it came:",
         "",
         "```text",
         "cargo build --release",
         f"python3.11 conformance/ports/survey.py --cases {cases} --seed {seed}",
         "```",
         "",
-        "Each release runs in its own virtual environment, with the pins that `conformance/ports/survey_venvs.py` "
-        "lists, behind `conformance/ports/pogema_python.py`. Each release plays every hand-written case, every "
-        f"recording of 1.4.0 and {cases} drawn cases, once from instances and once from configs. ✓: all results "
-        "follow the rule. ✗: number of cases or episodes that differ. –: the release does not claim the rule, mostly "
-        "because the rule is newer. If agents start in other places, the comparison of the episode ends, so ✓ means "
-        "that a rule held wherever it could be compared.",
+        "Each release runs in a virtual environment of its own, with the pins that `conformance/ports/survey_venvs.py` "
+        "lists, behind `conformance/ports/pogema_python.py`. It is given every hand-written case, every recording of "
+        f"1.4.0 and {cases} drawn cases, once as instances and once as configs. ✓: all as the rule says. ✗: so many "
+        "cases or episodes otherwise. –: the release does not claim it, mostly since it came later. A difference in "
+        "where agents start ends the comparison of an episode, so a rule marked ✓ held wherever it could be seen.",
         "",
         *(["Could not be installed:", "", *missing, ""] if missing else []),
         *[
