@@ -54,7 +54,7 @@ const REFUSED: [(&str, &str); 53] = [
     ("run --density nan", "`--density` is `\"NaN\"`, expected a number from 0 to 1"),
     ("run nan.yaml", "nan.yaml: config: line 1, column 10: `density` is `NaN`, expected a finite number"),
     ("run list.yaml", "list.yaml: expected fields and values such as `size: 8`"),
-    ("run two.json --set sise=4", "`--set` is `sise`, expected a field of a config; the nearest is `size`"),
+    ("run two.json --set sise=4", "`--set` is `sise`, expected a config field; did you mean `size`?"),
     // The file is not at fault.
     (
         "run two.json --set map=.?",
@@ -71,7 +71,7 @@ const REFUSED: [(&str, &str); 53] = [
     ),
     (
         "run --map five-rooms",
-        "five-rooms: there is no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
+        "five-rooms: no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
          known map; the nearest is `four-rooms`",
     ),
     ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
@@ -106,8 +106,11 @@ const REFUSED: [(&str, &str); 53] = [
         "run --steps 9000000000 --policy stay --trace no/where.jsonl",
         "no/where.jsonl: `no`: No such file or directory (os error 2)",
     ),
-    ("run --steps 9000000000 --policy stay --trace blank.yaml/x", "blank.yaml/x: `blank.yaml` is no folder"),
-    ("conform --cases 9000000000 --json ./", "./: is no file"),
+    (
+        "run --steps 9000000000 --policy stay --trace blank.yaml/x",
+        "blank.yaml/x: `blank.yaml` is not a folder",
+    ),
+    ("conform --cases 9000000000 --json ./", "./: is not a regular file"),
     ("bench --rows nothing", "`--rows` is `nothing`, expected a part of a row's name, such as `64 agents`"),
     ("bench --seconds 0", "`--seconds` is `0`, expected a time above 0"),
     ("bench --rounds 0", "invalid value '0' for '--rounds <N>': 0 is not in 1..18446744073709551615"),
@@ -132,7 +135,7 @@ const REFUSED: [(&str, &str); 53] = [
         "render trace.jsonl --gif a.gif --fps 0.001",
         "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",
     ),
-    ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name one file, `a`"),
+    ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name the same file, `a`"),
     ("render trace.jsonl --video a.avi", "a.avi: the name of a video ends in `.mp4` or `.webm`"),
     (
         "render trace.jsonl --steps 3..1",
@@ -207,7 +210,7 @@ fn a_trace_of_another_version_is_refused() {
 fn input_cannot_break_the_line() {
     let folder = folder();
     let field = "a\nb\u{1b}[2J=1";
-    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a field of a config; the nearest is `map`";
+    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a config field; did you mean `map`?";
     assert_refused(folder.path(), &["run", "--set", field], expected);
     assert_refused(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
 }
@@ -218,7 +221,7 @@ fn a_device_is_no_file_to_write() {
     use std::os::unix::fs::FileTypeExt;
 
     let folder = folder();
-    assert_refused(folder.path(), &["run", "--trace", "/dev/null"], "/dev/null: is no file");
+    assert_refused(folder.path(), &["run", "--trace", "/dev/null"], "/dev/null: is not a regular file");
     assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
 }
 

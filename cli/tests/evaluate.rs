@@ -52,7 +52,7 @@ fn read(folder: &Path, name: &str) -> Value {
 fn results_are_those_of_the_suite_in_its_order() {
     let folder = folder_with(SUITE);
     let (text, error, status) = run(folder.path(), &EVALUATE);
-    assert_eq!((text.as_str(), status), ("18 episodes played; all results are there: out", 0), "{error}");
+    assert_eq!((text.as_str(), status), ("18 episodes played; all results are complete: out", 0), "{error}");
     for algorithm in ["Dice", "LaCAM", "A star"] {
         let rows = read(folder.path(), &format!("{algorithm}.json"));
         let rows = rows.as_array().unwrap();
@@ -177,7 +177,7 @@ fn what_broke_off_within_a_line_is_played_again_and_other_damage_is_told() {
     let line = r#"{"index":2,"metrics":{"ISR":0.5},"runtime":0.25}"#;
     fs::write(path("Dice.jsonl"), format!("{line}\n{}", &line[..20])).unwrap();
     let (text, ..) = run(folder.path(), &RESUME);
-    assert!(text.starts_with("5 episodes played; all results are there"), "{text}");
+    assert!(text.starts_with("5 episodes played; all results are complete"), "{text}");
     let rows = read(folder.path(), "Dice.json");
     assert_eq!(rows[2]["metrics"], serde_json::json!({"ISR": 0.5}), "what is kept is not played again");
     for (text, told) in [
@@ -312,7 +312,7 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
     let replaced =
         |more: &[&str]| run(folder.path(), &[&EVALUATE[..], &["--algorithms", "quick.yaml"], more].concat());
     let (text, error, _) = replaced(&[]);
-    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert!(text.starts_with("12 episodes played; all results are complete"), "{text}{error}");
     assert_eq!(fs::read_to_string(path("out/suite.yaml")).unwrap(), SUITE);
     assert_eq!(fs::read_to_string(path("out/algorithms.yaml")).unwrap(), quick);
     assert!(!path("out/LaCAM.json").exists());
@@ -340,7 +340,7 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
     }
     // The suite's own join the results that are there.
     let (text, error, _) = run(folder.path(), &RESUME);
-    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert!(text.starts_with("12 episodes played; all results are complete"), "{text}{error}");
     assert!(path("out/Quick.json").exists() && !path("out/algorithms.yaml").exists());
 }
 

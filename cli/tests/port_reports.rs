@@ -224,7 +224,7 @@ fn what_is_known_is_told_apart_and_borne() {
     for part in [
         "KNOWN end/truncated: truncated, ",
         "  since 2026-11-22: one step late\n",
-        "conforms to all it claims, but for 1 known: ",
+        "conforms to all it claims, except for 1 known: ",
         "not played: metrics/finish: metrics, known since 2026-01-31: not claimed any more",
         "not played: collide/priority: cell of other, known since 2026-01-31: it was so",
     ] {
@@ -270,8 +270,8 @@ fn what_stopped_occurring_fails_the_run() {
 #[test]
 fn faults_that_are_known_are_borne_unless_they_end_the_run() {
     for (wrong, expected, told, not_asked) in [
-        (MUTE, 3, "misbehaves as is known, too often to be asked everything: ", vec!["(not asked)"]),
-        (AT_TIMES_MUTE, 0, "but for 1 known: ", vec![]),
+        (MUTE, 3, "misbehaves only in known ways, but too often to finish the run: ", vec!["(not run)"]),
+        (AT_TIMES_MUTE, 0, "except for 1 known: ", vec![]),
     ] {
         let folder = folder(&[wrong]);
         let known = "- {rule: protocol, what: left `active` out of an answer that needs it, since: 2026-11-22, reason: r}";

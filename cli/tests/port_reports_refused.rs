@@ -32,13 +32,13 @@ fn bad_lists_of_what_is_known_are_refused_with_one_line() {
         ("- {rule: end/after, what: cell, since: 2026-11-22}".into(), "entry 1: missing field `reason`".into()),
         (
             entry("rule: colide/soft"),
-            "entry 1: unknown rule `colide/soft`, the nearest known one is `collide/soft`".into(),
+            "entry 1: unknown rule `colide/soft`; did you mean `collide/soft`?".into(),
         ),
         (entry("since: 2026-02-30"), date("2026-02-30")),
         (entry("since: 20261122"), date("20261122")),
         (entry("since: 2026-11-22T10:00"), date("2026-11-22T10:00")),
         (entry("reason: '  '"), "entry 1: `reason` is empty".into()),
-        (good.clone() + &good, "entry 2: says the same as entry 1".into()),
+        (good.clone() + &good, "entry 2: duplicates entry 1".into()),
         ("rule: end/after".into(), "expected a list of entries".into()),
         (
             "- end/after".into(),
@@ -62,9 +62,12 @@ fn reports_that_cannot_be_written_are_refused_before_the_run() {
     for (arguments, expected) in [
         ("--port a --port b --badge badge.svg", "`--badge` needs exactly one port".into()),
         ("--port a --html no/report.html", format!("no/report.html: `no`: {missing}")),
-        ("--port a --junit known.yaml/x", "known.yaml/x: `known.yaml` is no folder".into()),
-        ("--port a --badge ./", "./: is no file".into()),
-        ("--port a --html report.html --junit ./report.html", "report.html: is to hold two reports".into()),
+        ("--port a --junit known.yaml/x", "known.yaml/x: `known.yaml` is not a folder".into()),
+        ("--port a --badge ./", "./: is not a regular file".into()),
+        (
+            "--port a --html report.html --junit ./report.html",
+            "report.html: two reports would be written to this file".into(),
+        ),
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
         ("--html report.html", "the following required arguments were not provided:".into()),
     ] {

@@ -72,13 +72,16 @@ fn what_comes_out_otherwise_is_told() {
     fs::write(&path, format!("{}\"a_collisions\":9{}", &text[..at], &text[at + 15..])).unwrap();
     let (_, error, status) = run(folder.path(), &["replay", "out", "Dice", "0"]);
     assert_eq!(status, 0);
-    assert!(error.starts_with("note: it came out otherwise: a_collisions "), "{error}");
+    assert!(error.starts_with("note: the replay differs from the results: a_collisions "), "{error}");
     fs::write(&path, &text[..40]).unwrap();
     let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
-    assert!(error.starts_with("note: nothing to compare it with: out/Dice.json: expected a list"), "{error}");
+    assert!(
+        error.starts_with("note: cannot compare the replay with the results: out/Dice.json: expected a list"),
+        "{error}"
+    );
     fs::remove_file(&path).unwrap();
     let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
-    assert_eq!(error, "note: `Dice` is not finished, so there is nothing to compare it with");
+    assert_eq!(error, "note: cannot compare the replay with the results: `Dice` is not finished");
 }
 
 #[test]

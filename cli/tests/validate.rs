@@ -67,7 +67,7 @@ fn a_result_names_its_own_map_and_agents() {
     assert_eq!((text.as_str(), status), ("valid: 2 agents, 1 steps; sum of costs 2, makespan 1", 0));
     let (_, error, status) = run(folder.path(), &["lost.txt"]);
     let expected =
-        "error: lost.txt: its map `maps/four.map` is not there, expected it beside the plan, or `--map FILE`";
+        "error: lost.txt: map `maps/four.map` not found, expected it next to the plan, or `--map FILE`";
     assert_eq!((error.as_str(), status), (expected, 2));
     assert_eq!(run(folder.path(), &["lost.txt", "--map", "three.map"]).2, 0);
 }
