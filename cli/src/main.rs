@@ -58,7 +58,7 @@ enum Command {
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) if is_mistake(&error) => {
+        Err(error) if is_usage_error(&error) => {
             eprintln!("{}", error.to_string().lines().next().unwrap_or_default());
             return ExitCode::from(2);
         }
@@ -84,6 +84,6 @@ fn main() -> ExitCode {
 }
 
 /// Returns whether the arguments are wrong; requests for help or the version are not.
-fn is_mistake(error: &clap::Error) -> bool {
+fn is_usage_error(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }

@@ -30,7 +30,7 @@ pub struct Run {
     actions: Option<PathBuf>,
     #[command(flatten)]
     planner_args: PlannerArgs,
-    /// Let `--policy rhcr` know the future goals
+    /// Provide future goals to `--policy rhcr`
     #[arg(long)]
     future_goals: bool,
     /// Draw every step in the terminal

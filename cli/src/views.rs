@@ -23,10 +23,10 @@ pub struct Views {
     /// Show only the view of this name; may be given several times [default: all views]
     #[arg(long = "view", value_name = "NAME")]
     names: Vec<String>,
-    /// Format of tables; overrides that of the views
+    /// Format of tables [default: as each view sets it]
     #[arg(long, value_parser = word::<Format>())]
     format: Option<Format>,
-    /// Format of plots; overrides that of the views
+    /// Format of plots [default: as each view sets it]
     #[arg(long, value_parser = word::<ImageFormat>(), value_name = "FORMAT")]
     plots: Option<ImageFormat>,
     /// Folder for plots [default: `views` in the first folder]

@@ -227,11 +227,11 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
         assert_eq!((status, bytes(folder.path())), (2, before.clone()));
     }
     // Algorithms may be added; the results of removed ones stay.
-    let changed = SUITE.replace("  A star: {name: \"A*\"}\n", "  Nobody: {name: stay}\n");
+    let changed = SUITE.replace("  A star: {name: \"A*\"}\n", "  Idle: {name: stay}\n");
     fs::write(folder.path().join("suite.yaml"), changed).unwrap();
     let (text, error, _) = run(folder.path(), &RESUME);
     assert!(text.starts_with("6 episodes played"), "{text}{error}");
-    assert!(out.join("A star.json").exists() && out.join("Nobody.json").exists());
+    assert!(out.join("A star.json").exists() && out.join("Idle.json").exists());
 }
 
 #[test]

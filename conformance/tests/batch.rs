@@ -157,7 +157,7 @@ fn error_of<T>(result: Result<T, Error>) -> String {
 }
 
 #[test]
-fn wrong_calls_name_both_numbers_and_change_nothing() {
+fn wrong_calls_report_both_numbers_and_change_nothing() {
     let source = |lane, episode| instance(OnGoal::Finish, lane, episode);
     let new = |lanes, threads| error_of(Batch::new(config(OnGoal::Finish), lanes, threads, source));
     assert_eq!(new(0, 1), "`num_lanes` is `0`, expected at least 1");

@@ -1,4 +1,4 @@
-//! Accepted deviations: reads them from a file, marks the causes that they explain, and finds those that no longer occur.
+//! Known deviations: reads them from a file, marks the causes they explain, and finds those that no longer occur.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -28,10 +28,10 @@ pub struct Outputs {
     /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`; add
     /// `port: name` to limit an entry to one port. Copy `rule` and `what` from the line `FAIL collide/soft: cell
     /// differs` of the report; for a line `ERROR what` the rule is `protocol`. Listed causes are reported separately
-    /// and do not change the exit status. If an entry no longer occurs, the exit status is 1, so that the list stays
-    /// up to date. This applies only if the run compared the rule of the entry: never with `--case` or `--part`, nor
-    /// if `--rules`, `--profile` or the port's claims leave the rule out, nor if a port broke the protocol so often
-    /// that the run was cut short. For the rule `protocol`, it applies only without `--rules` and `--profile`.
+    /// and do not change the exit status. If no port shows an entry any longer, the exit status is 1, so that the list
+    /// stays up to date. This applies only if the run compared the rule of the entry: never with `--case` or `--part`,
+    /// nor if `--rules`, `--profile` or the port's claims leave the rule out, nor if a port broke the protocol so
+    /// often that the run was cut short. For the rule `protocol`, it applies only without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }

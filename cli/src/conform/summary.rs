@@ -181,13 +181,13 @@ pub fn verdict(report: &PortReport) -> String {
     let Score { known, diverging, misbehaving, .. } = score;
     let played = format!("{} cases, {} steps", report.num_played, report.num_steps);
     let causes = |number: usize| format!("{number} cause{}", if number == 1 { "" } else { "s" });
-    let but = if known == 0 { String::new() } else { format!(", except for {known} known") };
+    let exception = if known == 0 { String::new() } else { format!(", except for {known} known") };
     match (diverging, misbehaving) {
         (0, 0) if score.is_cut_short => {
             format!("misbehaves only in known ways, but too often to finish the run: {played}")
         }
         (0, 0) if score.verdict() == Verdict::Unchecked => format!("nothing was checked: {played}"),
-        (0, 0) => format!("conforms to all it claims{but}: {played}"),
+        (0, 0) => format!("conforms to all it claims{exception}: {played}"),
         (1.., 0) => format!("diverges: {} in {played}", causes(diverging)),
         (0, _) => format!("misbehaves: {} in {played}", causes(misbehaving)),
         (..) => format!("diverges and misbehaves: {} in {played}", causes(diverging + misbehaving)),

@@ -17,7 +17,7 @@ use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Import {
-    /// MovingAI maps (.map), archives of them (.zip), map texts (.txt), map sets and configs (.yaml), or folders of those
+    /// MovingAI maps (.map), zip archives (.zip), map texts (.txt), map sets and configs (.yaml), or folders of those
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Whether agents may enter MovingAI's water

@@ -72,18 +72,25 @@ struct Ranges {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Shelves")]
 struct Shelves {
+    /// Columns of a shelf [default: 5]
     #[arg(long, value_name = "N")]
     wall_width: Option<usize>,
+    /// Rows of a shelf [default: 2]
     #[arg(long, value_name = "N")]
     wall_height: Option<usize>,
+    /// Shelves side by side [default: 5]
     #[arg(long, value_name = "N")]
     walls_in_row: Option<usize>,
+    /// Shelves one below the other [default: 5]
     #[arg(long, value_name = "N")]
     walls_rows: Option<usize>,
+    /// Columns to the left and right of all shelves [default: 5]
     #[arg(long, value_name = "N")]
     bottom_gap: Option<usize>,
+    /// Columns between shelves [default: 1]
     #[arg(long, value_name = "N")]
     horizontal_gap: Option<usize>,
+    /// Rows between, above and below shelves [default: 3]
     #[arg(long, value_name = "N")]
     vertical_gap: Option<usize>,
     /// Cells in which agents may start and have their goals

@@ -68,7 +68,7 @@ pub struct Show {
 
 impl Show {
     pub fn run(&self) -> Result<(), Error> {
-        let room = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
+        let max_width = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
         let maps = self.sources.resolve(&self.map)?;
         self.draw(&maps)?;
         for NamedMap { name, text } in maps {
@@ -82,7 +82,7 @@ impl Show {
                 figures.components.len(),
                 if figures.components.len() == 1 { "" } else { "s" },
             ))?;
-            print_line(&picture(&text, room))?;
+            print_line(&picture(&text, max_width))?;
         }
         Ok(())
     }
@@ -132,9 +132,9 @@ impl Editor {
 
 /// Draws a map as text. If starts and goals share cells, draws two maps side by side. If the map is too wide or cannot
 /// be written as text, draws dots instead, see [`braille`].
-fn picture(text: &MapText, room: usize) -> String {
-    if text.map.width() > room {
-        return braille(&text.map, room);
+fn picture(text: &MapText, max_width: usize) -> String {
+    if text.map.width() > max_width {
+        return braille(&text.map, max_width);
     }
     let starts = MapText { goals: Vec::new(), ..text.clone() };
     let goals = MapText { starts: Vec::new(), ..text.clone() };
@@ -144,15 +144,15 @@ fn picture(text: &MapText, room: usize) -> String {
             let rows = starts.iter().zip(&goals).map(|(start, goal)| format!("{start}  {goal}"));
             rows.collect::<Vec<_>>().join("\n")
         }
-        _ => braille(&text.map, room),
+        _ => braille(&text.map, max_width),
     }
 }
 
 /// Draws a map in braille characters. Each has two columns and four rows of dots, each dot covers a square of cells
 /// and is set if at least half of them are obstacles.
-fn braille(map: &Map, room: usize) -> String {
+fn braille(map: &Map, max_width: usize) -> String {
     const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
-    let scale = map.width().div_ceil(2 * room).max(1);
+    let scale = map.width().div_ceil(2 * max_width).max(1);
     let is_dark = |top: usize, left: usize| {
         let (bottom, right) = ((top + scale).min(map.height()), (left + scale).min(map.width()));
         if top >= bottom || left >= right {

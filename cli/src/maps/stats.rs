@@ -44,18 +44,20 @@ impl Stats {
         if self.scenario.is_some() && maps.len() != 1 {
             return Err(ambiguous_map(&self.map, maps.len(), "for a scenario"));
         }
-        let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
-        let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
-            judged.collect::<Result<_, Error>>()?;
+        let analysed = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
+        let analysed: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
+            analysed.collect::<Result<_, Error>>()?;
         if self.json {
-            let all: Vec<Value> =
-                judged.iter().map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref())).collect();
+            let all: Vec<Value> = analysed
+                .iter()
+                .map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref()))
+                .collect();
             return print_line(&json!(all).to_string());
         }
-        print_line(&table(&judged).to_string())?;
-        for (map, _, scenario) in &judged {
+        print_line(&table(&analysed).to_string())?;
+        for (map, _, scenario) in &analysed {
             if let Some(scenario) = scenario {
-                print_line(&format!("{}: {}", map.name, in_words(scenario)))?;
+                print_line(&format!("{}: {}", map.name, scenario_text(scenario)))?;
             }
         }
         Ok(())
@@ -64,16 +66,16 @@ impl Stats {
     /// Analyses the requested scenario, or the starts and goals of the map.
     fn scenario_of(&self, map: &NamedMap) -> Result<Option<ScenarioStats>, Error> {
         let on_goal = self.on_target;
-        let ground = &map.text.map;
+        let plain_map = &map.text.map;
         if let Some(path) = &self.scenario {
-            let scenario = read_scenario(path, ground)?;
+            let scenario = read_scenario(path, plain_map)?;
             let scenario = scenario.truncated(self.num_agents.unwrap_or(scenario.starts.len()))?;
-            return Ok(Some(judged(ground, &scenario.starts, &scenario.goals.first(), on_goal)));
+            return Ok(Some(analyse(plain_map, &scenario.starts, &scenario.goals.first(), on_goal)));
         }
         if let (Some(seed), Some(num_agents)) = (self.seed, self.num_agents) {
             let pools = map.text.pools.clone().unzip();
             let config = GridConfig {
-                map: Some(ground.clone()),
+                map: Some(plain_map.clone()),
                 seed: Some(seed),
                 num_agents,
                 possible_agents_xy: pools.0,
@@ -82,16 +84,16 @@ impl Stats {
             };
             let instance = InstanceSource::new(config, None)?.generate()?.instance;
             let goals = instance.first_goals();
-            return Ok(Some(judged(ground, instance.starts(), &goals, on_goal)));
+            return Ok(Some(analyse(plain_map, instance.starts(), &goals, on_goal)));
         }
-        let own =
-            (!map.text.starts.is_empty()).then(|| judged(ground, &map.text.starts, &map.text.goals, on_goal));
+        let own = (!map.text.starts.is_empty())
+            .then(|| analyse(plain_map, &map.text.starts, &map.text.goals, on_goal));
         Ok(own)
     }
 }
 
 /// Analyses a scenario; joint A* decides its small components.
-fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
+fn analyse(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
     ScenarioStats::of(map, starts, goals, on_goal, |part| {
         let max_states = ScenarioStats::MAX_STATES;
         let found = solvability(&part.map, &part.starts, &part.goals, on_goal, max_states);
@@ -99,11 +101,11 @@ fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> Scenar
     })
 }
 
-fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
+fn table(analysed: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
     let mut table = markdown_table(
         "map | rows | columns | free | density | components | largest | dead ends | corridor | unreachable pairs",
     );
-    for (map, stats, _) in judged {
+    for (map, stats, _) in analysed {
         table.add_row([
             map.name.clone(),
             stats.height.to_string(),
@@ -120,7 +122,7 @@ fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
     table
 }
 
-fn in_words(scenario: &ScenarioStats) -> String {
+fn scenario_text(scenario: &ScenarioStats) -> String {
     let ScenarioStats { num_agents, sum_of_distances, longest_distance, .. } = scenario;
     let bounds = format!(
         "{num_agents} agents, sum of costs at least {sum_of_distances}, makespan at least {longest_distance}"

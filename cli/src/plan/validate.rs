@@ -91,7 +91,7 @@ fn as_text(task: &Task, verdict: &Result<(), Conflict>) -> String {
             let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
             format!("valid: {agents} agents, {steps} steps; sum of costs {cost}, makespan {makespan}")
         }
-        Err(conflict) => format!("not valid: {conflict}\n\n{}", drawn(task, conflict)),
+        Err(conflict) => format!("not valid: {conflict}\n\n{}", drawing(task, conflict)),
     }
 }
 
@@ -113,7 +113,7 @@ fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> String {
 }
 
 /// Draws the neighbourhood of a conflict before and after its step.
-fn drawn(task: &Task, conflict: &Conflict) -> String {
+fn drawing(task: &Task, conflict: &Conflict) -> String {
     let before = conflict.step.saturating_sub(1);
     let corner = |at: u16, shown: usize, all: usize| {
         usize::from(at).saturating_sub(shown / 2).min(all.saturating_sub(shown))

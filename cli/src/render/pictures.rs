@@ -39,7 +39,7 @@ pub struct Pictures {
     /// Frame of still pictures: 0 after the reset, 1 after the first step [default: 0 in PNG; SVG is animated]
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     frame: Option<usize>,
-    /// Draw the observation window of this agent
+    /// Draw the episode as this agent observes it
     #[arg(long, value_name = "AGENT", visible_alias = "view", help_heading = "Pictures")]
     egocentric: Option<usize>,
     /// Leave out the lines between cells

@@ -26,10 +26,10 @@ pub struct Settings {
     /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy`
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Seed of all random choices [default: from the config, else a new one in each run]
+    /// Seed of the map, starts, goals and random actions [default: from the config, else a new one in each run]
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
-    /// Number of agents [default: from the config, the map or the plan, else 1]
+    /// Number of agents [default: from the config, map, scenario or plan, else 1]
     #[arg(long, value_name = "N")]
     num_agents: Option<u64>,
     /// Side length of a random map [default: from the config, else 8]
@@ -41,7 +41,7 @@ pub struct Settings {
     /// Observation radius: how many cells agents see in each direction [default: from the config, else 5]
     #[arg(long, value_name = "R")]
     obs_radius: Option<u64>,
-    /// Maximum number of steps of the episode [default: from the config, else 64]
+    /// Maximum number of steps of the episode [default: from the config, else 64; for `pogema plan`, no limit]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<i64>,
     /// Effect of reaching a goal [default: from the config, else finish]

@@ -31,8 +31,8 @@ impl Scope {
         Map::new(self.height, self.width, obstacles).unwrap()
     }
 
-    /// Returns the number of placements of the agents on different free cells, over all maps: each cell of a placement is
-    /// free, each other cell is free or an obstacle.
+    /// Returns the number of placements of the agents on different free cells, over all maps. The cells of a placement
+    /// are free; each other cell is free or an obstacle.
     pub fn num_placements(self) -> u64 {
         let (cells, agents) = (self.num_cells() as u64, self.num_agents as u64);
         if agents > cells {

@@ -83,12 +83,12 @@ fn soak(num_steps: u64) {
 }
 
 #[test]
-fn a_crowd_stays_in_step() {
+fn a_crowd_stays_in_lockstep() {
     soak(2_000);
 }
 
 #[test]
 #[ignore = "minutes: cargo test --release -p pogema-conformance --test lockstep -- --ignored"]
-fn a_crowd_stays_in_step_for_100_000_steps() {
+fn a_crowd_stays_in_lockstep_for_100_000_steps() {
     soak(100_000);
 }

@@ -1,5 +1,5 @@
-//! The literal engine with one planted bug. The engine itself is correct: the bug changes its config, instance, actions,
-//! states and results on their way in or out.
+//! The literal engine with one planted bug. The engine itself is correct: the bug changes its config, instance,
+//! actions, states and results on their way in or out.
 
 use pogema_conformance::Literal;
 use pogema_core::{

@@ -136,8 +136,8 @@ fn a_port_steps_in_lockstep_with_the_reference() {
         let answered = play_on_port(&mut server, &hello, Mode::Instance, &request, &expected);
         assert_eq!(answered.fault, None);
         assert_eq!(answered.response.records.len(), 31);
-        for (want, got) in expected.records.iter().zip(&answered.response.records).skip(1) {
-            assert_eq!(want, got, "{observation}");
+        for (expected, actual) in expected.records.iter().zip(&answered.response.records).skip(1) {
+            assert_eq!(expected, actual, "{observation}");
         }
     }
 }
