@@ -58,7 +58,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ),
     (
         "evaluate",
-        &["pogema evaluate suite.yaml --out results --html", "pogema evaluate suite.yaml --out results --resume"],
+        &[
+            "pogema evaluate suite.yaml --out results --html",
+            "pogema evaluate suite.yaml --out results --resume",
+        ],
     ),
     ("views", &["pogema views results", "pogema views results --format latex --plots pdf --out figures"]),
     ("replay", &["pogema replay results LaCAM 3 --html episode.html"]),
@@ -165,6 +168,9 @@ mod tests {
         if env::var_os("BLESS").is_some() {
             fs::write(&path, &page).unwrap();
         }
-        assert!(fs::read_to_string(&path).unwrap() == page, "docs/reference/cli.md is out of date: set BLESS=1");
+        assert!(
+            fs::read_to_string(&path).unwrap() == page,
+            "docs/reference/cli.md is out of date: set BLESS=1"
+        );
     }
 }
