@@ -31,7 +31,7 @@ pub struct Episode<E> {
     results: StepResults,
     meters: Meters,
     /// The metrics of the episode if the last step ended it.
-    figures: Option<Metrics>,
+    final_metrics: Option<Metrics>,
     /// All states since the reset if the config keeps them.
     past: Vec<Snapshot>,
     is_recorded: bool,
@@ -89,7 +89,7 @@ impl<E: Environment> Episode<E> {
             num_steps: 0,
             results: StepResults::new(config.num_agents),
             meters: Meters { episode: EpisodeMeter::new(&config), density: None, collisions: None },
-            figures: None,
+            final_metrics: None,
             past: Vec::new(),
             is_recorded: false,
             recording: None,
@@ -135,7 +135,7 @@ impl<E: Environment> Episode<E> {
         self.engine.reset(&instance)?;
         self.instance = Some(instance);
         self.num_steps = 0;
-        self.figures = None;
+        self.final_metrics = None;
         self.meters.reset();
         self.feed_density()?;
         let is_kept = self.config().persistent;
@@ -198,7 +198,7 @@ impl<E: Environment> Episode<E> {
             let Scratch { cells, active, .. } = &self.scratch;
             collisions.feed(instance.map(), cells, active, actions, state.cells);
         }
-        self.figures =
+        self.final_metrics =
             self.meters.episode.feed(state.on_goal, &self.results.terminated, &self.results.truncated);
         self.feed_density()
     }
@@ -251,7 +251,7 @@ impl<E: Environment> Episode<E> {
         Ok(true)
     }
 
-    /// The engine.
+    /// Returns the engine.
     pub fn engine(&self) -> &E {
         &self.engine
     }
@@ -261,12 +261,12 @@ impl<E: Environment> Episode<E> {
         &mut self.engine
     }
 
-    /// The rules and sizes.
+    /// Returns the rules and sizes.
     pub fn config(&self) -> &Config {
         self.engine.config()
     }
 
-    /// The instance being played.
+    /// Returns the instance that is played.
     ///
     /// # Errors
     /// [`Error::NotReset`] before the start.
@@ -279,34 +279,34 @@ impl<E: Environment> Episode<E> {
         self.num_steps
     }
 
-    /// The state of all agents.
+    /// Returns the state of all agents.
     pub fn state(&self) -> State<'_> {
         self.engine.state()
     }
 
-    /// A copy of the visible state.
+    /// Returns a copy of the visible state.
     pub fn snapshot(&self) -> Snapshot {
         self.engine.snapshot()
     }
 
-    /// The rewards of the last step.
+    /// Returns the rewards of the last step.
     pub fn rewards(&self) -> &[f32] {
         &self.results.rewards
     }
 
-    /// Which agents the last step terminated.
+    /// Returns which agents the last step terminated.
     pub fn terminated(&self) -> &[bool] {
         &self.results.terminated
     }
 
-    /// Which agents the last step truncated.
+    /// Returns which agents the last step truncated.
     pub fn truncated(&self) -> &[bool] {
         &self.results.truncated
     }
 
     /// Returns whether the last step ended the episode: all agents are terminated, or all are truncated.
     pub fn is_over(&self) -> bool {
-        self.figures.is_some()
+        self.final_metrics.is_some()
     }
 
     /// Returns the metrics so far.
@@ -317,10 +317,10 @@ impl<E: Environment> Episode<E> {
         let counted = collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
         let (a_collisions, o_collisions) = counted.unzip();
         let avg_agents_density = density.as_ref().map(DensityMeter::mean);
-        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.figures.unwrap_or_default() }
+        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.final_metrics.unwrap_or_default() }
     }
 
-    /// The meters.
+    /// Returns the meters.
     pub fn meters(&self) -> &Meters {
         &self.meters
     }

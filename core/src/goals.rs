@@ -22,7 +22,7 @@ pub trait GoalSource: Debug + Send + Sync {
         None
     }
 
-    /// Restores the state that a source for the same map and goals saved. Returns whether the text is such a state.
+    /// Restores the state saved by a source for the same map and goals. Returns false if the text is no such state.
     fn restore(&mut self, _saved: &str) -> bool {
         false
     }
@@ -82,7 +82,7 @@ impl GoalStream {
         Self { first, rest: Rest::Drawn(source) }
     }
 
-    /// The first goal.
+    /// Returns the first goal.
     pub fn first(&self) -> Cell {
         self.first
     }

@@ -23,7 +23,7 @@ pub enum Outside {
 
 /// A map, its surroundings, and the start and goals of each agent.
 ///
-/// Engines rely on the checks of [`Instance::new`], so an instance cannot be changed.
+/// Engines rely on the checks of [`Instance::new`], so the parts of an instance are read-only.
 #[derive(Clone, Debug)]
 pub struct Instance {
     map: Map,

@@ -13,7 +13,7 @@ pub use collisions::CollisionMeter;
 pub use density::{DensityMeter, Seen, pairwise_mean};
 
 /// Defines the metrics, each with POGEMA's name for it.
-macro_rules! figures {
+macro_rules! define_metrics {
     ($(#[doc = $doc:literal] $field:ident = $name:literal,)+) => {
         /// The metrics of one episode, under POGEMA's names. A metric that does not apply to the mode is absent.
         ///
@@ -38,7 +38,7 @@ macro_rules! figures {
     };
 }
 
-figures! {
+define_metrics! {
     /// Share of agents that reached their goals.
     isr = "ISR",
     /// 1 if all agents reached their goals, else 0.
@@ -118,7 +118,7 @@ impl EpisodeMeter {
             let now = if reached || finished { self.step } else { NEVER };
             *arrived = if forgets && !reached { NEVER } else { now.min(*arrived) };
         }
-        let metrics = finished.then(|| self.figures(on_goal));
+        let metrics = finished.then(|| self.compute_metrics(on_goal));
         self.step += 1;
         if finished {
             self.reset();
@@ -126,7 +126,7 @@ impl EpisodeMeter {
         metrics
     }
 
-    fn figures(&self, on_goal: &[bool]) -> Metrics {
+    fn compute_metrics(&self, on_goal: &[bool]) -> Metrics {
         let num_agents = self.arrived.len() as f64;
         let num_steps = self.step as f64 + 1.0;
         let arrived = || self.arrived.iter().copied();

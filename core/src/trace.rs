@@ -187,10 +187,10 @@ struct Versions {
 
 impl Versions {
     fn check(&self) -> Result<(), Error> {
-        for (what, got, want) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
-            if got != want {
+        for (what, got, expected) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
+            if got != expected {
                 let reason =
-                    format!("the {what} is `{}`, expected `{want}`", shorten(got, Error::LONGEST_QUOTE));
+                    format!("the {what} is `{}`, expected `{expected}`", shorten(got, Error::LONGEST_QUOTE));
                 return Err(Error::Trace { line: 1, reason });
             }
         }

@@ -1,5 +1,6 @@
-//! A fast engine for the rules of POGEMA 1.4.0: the same episodes as the reference, hundreds of times faster than
-//! POGEMA.
+//! A fast engine for the rules of POGEMA 1.4.0.
+//!
+//! It plays the same episodes as the reference, hundreds of times faster than POGEMA.
 //!
 //! [`Engine`] plays one environment, from a handful of agents to millions. It has the same phases and file names as the
 //! reference, so that you can compare them side by side. Tests play both in lockstep, and check the fast engine against

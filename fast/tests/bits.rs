@@ -126,13 +126,13 @@ fn pack(bits: &[bool]) -> Vec<u64> {
 
 fn bits_match_indexing(sample: RandomInstance) -> bool {
     let num_agents = sample.starts.len();
-    let want: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&sample.window(agent))).collect();
+    let expected: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&sample.window(agent))).collect();
     SimdPath::ALL.into_iter().filter(|path| path.is_available()).all(|path| {
         let mut engine = Engine::with_path(sample.config(), path).unwrap();
         engine.reset(&sample.instance()).unwrap();
         let mut got = vec![u64::MAX; num_agents * words_per_agent(sample.radius)];
         engine.observe_bits(0..num_agents, &mut got).unwrap();
-        want == got
+        expected == got
     })
 }
 

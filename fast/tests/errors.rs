@@ -1,4 +1,4 @@
-//! Wrong calls are rejected with the wrong numbers in the message, and change nothing.
+//! Wrong calls are rejected with messages that name the wrong numbers, and change nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -49,23 +49,23 @@ fn step(engine: &mut Engine, lengths: [usize; 4]) -> Result<(), Error> {
 }
 
 /// Checks that the call failed with this message, and that the engine continues as if the call had not been made.
-fn check_rejected(engine: &mut Engine, outcome: Result<(), Error>, want: &str) {
-    assert_eq!(outcome.unwrap_err().to_string(), want);
+fn check_rejected(engine: &mut Engine, outcome: Result<(), Error>, expected: &str) {
+    assert_eq!(outcome.unwrap_err().to_string(), expected);
     let mut fresh = started();
-    assert_eq!(engine.snapshot(), fresh.snapshot(), "{want}");
+    assert_eq!(engine.snapshot(), fresh.snapshot(), "{expected}");
     let (mut seen, mut seen_fresh) = (vec![7.0; 3 * PER_AGENT], vec![7.0; 3 * PER_AGENT]);
     step(engine, [3; 4]).unwrap();
     step(&mut fresh, [3; 4]).unwrap();
     engine.observe(&mut seen).unwrap();
     fresh.observe(&mut seen_fresh).unwrap();
-    assert_eq!((engine.snapshot(), seen), (fresh.snapshot(), seen_fresh), "{want}");
+    assert_eq!((engine.snapshot(), seen), (fresh.snapshot(), seen_fresh), "{expected}");
     engine.reset(&instance(3, Outside::Free)).unwrap();
 }
 
 #[test]
 fn wrong_steps_are_rejected() {
     let mut engine = started();
-    for (lengths, want) in [
+    for (lengths, expected) in [
         ([2, 3, 3, 3], "actions has length 2, expected 3"),
         ([4, 3, 3, 3], "actions has length 4, expected 3"),
         ([3, 5, 3, 3], "rewards has length 5, expected 3"),
@@ -73,7 +73,7 @@ fn wrong_steps_are_rejected() {
         ([3, 3, 3, 1], "truncated has length 1, expected 3"),
     ] {
         let outcome = step(&mut engine, lengths);
-        check_rejected(&mut engine, outcome, want);
+        check_rejected(&mut engine, outcome, expected);
     }
     let outcome = engine.restore(0, &Snapshot::default());
     check_rejected(&mut engine, outcome, "the state does not fit the map and its agents");
@@ -83,7 +83,7 @@ fn wrong_steps_are_rejected() {
 fn wrong_agents_are_rejected() {
     let mut engine = started();
     let backwards = std::ops::Range { start: 2, end: 1 };
-    for (agents, want) in [
+    for (agents, expected) in [
         (0..4, "config: `agents` is `0..4`, expected within 0..3"),
         (4..4, "config: `agents` is `4..4`, expected within 0..3"),
         (backwards, "config: `agents` is `2..1`, expected within 0..3"),
@@ -101,7 +101,7 @@ fn wrong_agents_are_rejected() {
             "a failed call wrote values"
         );
         for outcome in outcomes {
-            check_rejected(&mut engine, outcome, want);
+            check_rejected(&mut engine, outcome, expected);
         }
     }
 }
@@ -111,10 +111,10 @@ fn wrong_buffers_are_rejected() {
     let mut engine = started();
     let all = 3 * PER_AGENT;
     assert_eq!(words_per_agent(CONFIG.radius), 2);
-    for (got, want) in
+    for (got, expected) in
         [(all - 1, "224, expected 225"), (all + 1, "226, expected 225"), (0, "0, expected 225")]
     {
-        let want = format!("observations has length {want}");
+        let expected = format!("observations has length {expected}");
         let (mut values, mut bytes) = (vec![7.0; got], vec![7u8; got]);
         let outcomes = [
             engine.observe(&mut values),
@@ -123,7 +123,7 @@ fn wrong_buffers_are_rejected() {
         ];
         assert!(values.iter().all(|&value| value == 7.0) && bytes.iter().all(|&byte| byte == 7));
         for outcome in outcomes {
-            check_rejected(&mut engine, outcome, &want);
+            check_rejected(&mut engine, outcome, &expected);
         }
     }
     let outcome = engine.observe_agents(1..2, &mut [7u8; 74]);
@@ -137,13 +137,13 @@ fn wrong_buffers_are_rejected() {
 #[test]
 fn wrong_arrays_are_rejected() {
     let mut engine = started();
-    for (lengths, want) in
+    for (lengths, expected) in
         [([74, 75], "obstacles has length 74, expected 75"), ([75, 74], "agents has length 74, expected 75")]
     {
         let [mut obstacles, mut agents] = lengths.map(|length| vec![7.0; length]);
         let outcome = engine.observe_windows(&mut obstacles, &mut agents);
         assert!(obstacles.iter().chain(&agents).all(|&value| value == 7.0), "a failed call wrote values");
-        check_rejected(&mut engine, outcome, want);
+        check_rejected(&mut engine, outcome, expected);
     }
     let outcome = engine.observe_map(&mut [7; 57]);
     check_rejected(&mut engine, outcome, "global obstacles has length 57, expected 56");
@@ -167,7 +167,7 @@ fn wrong_instances_are_rejected() {
 #[test]
 fn every_call_fails_before_a_reset() {
     let mut engine = Engine::new(CONFIG).unwrap();
-    let want = "the environment was not reset yet";
+    let expected = "the environment was not reset yet";
     let mut values = [7.0; 3 * PER_AGENT];
     let outcomes = [
         step(&mut engine, [3; 4]),
@@ -180,14 +180,14 @@ fn every_call_fails_before_a_reset() {
         engine.observe_bits(0..0, &mut []),
     ];
     for outcome in outcomes {
-        assert_eq!(outcome.unwrap_err().to_string(), want);
+        assert_eq!(outcome.unwrap_err().to_string(), expected);
     }
     assert_eq!((engine.snapshot(), engine.size()), (pogema_core::Snapshot::default(), (0, 0)));
 }
 
 #[test]
 fn wrong_configs_are_rejected() {
-    for (config, want) in [
+    for (config, expected) in [
         (Config { num_agents: 0, ..CONFIG }, "config: `num_agents` is `0`, expected at least 1"),
         (Config { radius: 0, ..CONFIG }, "config: `radius` is `0`, expected 1 to 128"),
         (Config { radius: 129, ..CONFIG }, "config: `radius` is `129`, expected 1 to 128"),
@@ -197,14 +197,14 @@ fn wrong_configs_are_rejected() {
         ),
     ] {
         let error = Engine::with_path(config, SimdPath::Scalar).map(|_| ()).unwrap_err();
-        assert_eq!(error.to_string(), want);
+        assert_eq!(error.to_string(), expected);
     }
     for path in SimdPath::ALL.into_iter().filter(|path| !path.is_available()) {
         let error = Engine::with_path(CONFIG, path).map(|_| ()).unwrap_err();
-        let want = format!(
+        let expected = format!(
             "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
             SimdPath::best()
         );
-        assert_eq!(error.to_string(), want);
+        assert_eq!(error.to_string(), expected);
     }
 }

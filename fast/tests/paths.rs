@@ -36,26 +36,26 @@ fn available() -> impl Iterator<Item = SimdPath> {
 }
 
 /// Writes into the part of a buffer that begins at index `offset`, and checks the whole buffer.
-fn check_part<V: Value + From<u8>>(engine: &Engine, want: &[u8], offset: usize, about: &str) {
+fn check_part<V: Value + From<u8>>(engine: &Engine, expected: &[u8], offset: usize, about: &str) {
     let num_agents = engine.config().num_agents;
     let untouched = V::from(9);
-    let mut buffer = vec![untouched; offset + want.len() + MOST_OFFSET];
-    engine.observe_agents(0..num_agents, &mut buffer[offset..offset + want.len()]).unwrap();
+    let mut buffer = vec![untouched; offset + expected.len() + MOST_OFFSET];
+    engine.observe_agents(0..num_agents, &mut buffer[offset..offset + expected.len()]).unwrap();
     let (before, rest) = buffer.split_at(offset);
-    let (values, after) = rest.split_at(want.len());
+    let (values, after) = rest.split_at(expected.len());
     assert!(before.iter().chain(after).all(|&value| value == untouched), "{about}: wrote outside the buffer");
-    let wrong = values.iter().zip(want).position(|(&value, &byte)| value != V::from(byte));
+    let wrong = values.iter().zip(expected).position(|(&value, &byte)| value != V::from(byte));
     assert_eq!(wrong, None, "{about}: index of the first wrong value");
 }
 
 fn check_parts(num_agents: usize, radius: usize, offset: usize) {
-    let mut want = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
-    engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut want).unwrap();
+    let mut expected = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
+    engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut expected).unwrap();
     for path in available() {
         let engine = engine(num_agents, radius, path);
         let about = format!("{path}, {num_agents} agents, radius {radius}, offset {offset}");
-        check_part::<u8>(&engine, &want, offset, &about);
-        check_part::<f32>(&engine, &want, offset, &about);
+        check_part::<u8>(&engine, &expected, offset, &about);
+        check_part::<f32>(&engine, &expected, offset, &about);
     }
 }
 
@@ -90,8 +90,8 @@ fn paths_write_the_same_into_buffers_beyond_the_cache() {
 fn paths_write_the_same_bits_of_any_agents() {
     for radius in (1..=20).chain([33, 64, 128]) {
         let per_agent = words_per_agent(radius);
-        let mut want = vec![u64::MAX; MOST_AGENTS * per_agent];
-        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut want).unwrap();
+        let mut expected = vec![u64::MAX; MOST_AGENTS * per_agent];
+        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut expected).unwrap();
         for path in available() {
             let engine = engine(MOST_AGENTS, radius, path);
             for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
@@ -99,7 +99,7 @@ fn paths_write_the_same_bits_of_any_agents() {
                 engine.observe_bits(first..last, &mut got[1..=(last - first) * per_agent]).unwrap();
                 let (got, after) = got.split_at((last - first) * per_agent + 1);
                 let about = format!("{path}, agents {first}..{last}, radius {radius}");
-                assert_eq!(got[1..], want[first * per_agent..last * per_agent], "{about}");
+                assert_eq!(got[1..], expected[first * per_agent..last * per_agent], "{about}");
                 assert_eq!((got[0], after), (u64::MAX, [u64::MAX].as_slice()), "{about}");
             }
         }
@@ -124,12 +124,12 @@ fn the_variable_is_a_path_or_an_error() {
             "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
             SimdPath::best()
         );
-        let want = if path.is_available() { path.to_string() } else { unavailable };
-        assert_eq!(child(Some(path.to_string().as_ref())), want);
+        let expected = if path.is_available() { path.to_string() } else { unavailable };
+        assert_eq!(child(Some(path.to_string().as_ref())), expected);
     }
     for name in ["", "AVX2", "sse", "scalar ", "avx512,avx2"] {
-        let want = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
-        assert_eq!(child(Some(name.as_ref())), want);
+        let expected = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
+        assert_eq!(child(Some(name.as_ref())), expected);
     }
 }
 
@@ -138,8 +138,8 @@ fn the_variable_is_a_path_or_an_error() {
 fn a_variable_that_is_not_text_is_an_error() {
     use std::os::unix::ffi::OsStringExt;
     let name = OsString::from_vec(vec![b'a', 0xff]);
-    let want = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
-    assert_eq!(child(Some(&name)), want);
+    let expected = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
+    assert_eq!(child(Some(&name)), expected);
 }
 
 /// Returns the path or error that a child process prints with this value of the variable.

@@ -98,12 +98,13 @@ fn check(config: Config, seed: u64) {
         let along = Action::ALL[1 + number / 3 % 4];
         let any = |numbers: &mut Numbers| Action::ALL.get(numbers.below(12)).copied().unwrap_or(along);
         let actions: Vec<Action> = (0..NUM_AGENTS).map(|_| any(&mut numbers)).collect();
-        let (want, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
-        assert!(want.state == got.state, "state, step {number}, {config:?}");
-        assert!(want == got, "results or observations, step {number}, {config:?}");
-        num_moved += cells.iter().zip(&want.state.cells).filter(|(before, after)| before != after).count();
-        num_reached += want.rewards.iter().sum::<f32>();
-        cells = want.state.cells;
+        let (expected, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
+        assert!(expected.state == got.state, "state, step {number}, {config:?}");
+        assert!(expected == got, "results or observations, step {number}, {config:?}");
+        num_moved +=
+            cells.iter().zip(&expected.state.cells).filter(|(before, after)| before != after).count();
+        num_reached += expected.rewards.iter().sum::<f32>();
+        cells = expected.state.cells;
     }
     assert!(num_moved > NUM_AGENTS, "only {num_moved} moves, {config:?}");
     assert!(num_reached > 500.0, "only {num_reached} goals, {config:?}");

@@ -13,7 +13,7 @@ pub enum NumpyError {
         hi: i64,
     },
     /// The ends of a range of doubles are in the wrong order, not numbers, or too far apart.
-    #[error("range is `{lo}` to `{hi}`, expected ends in ascending order and a finite width")]
+    #[error("range is `{lo}` to `{hi}`, expected the lower end first and a finite width")]
     BadRange {
         /// The lower end.
         lo: f64,

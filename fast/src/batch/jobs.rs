@@ -104,8 +104,8 @@ impl<'a> From<Observations<'a>> for ObservationBuffers<'a> {
 impl ObservationBuffers<'_> {
     pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
         self.observations.check(num_lanes, config)?;
-        let want = num_lanes * config.num_agents * Action::ALL.len();
-        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", want, masks.len()))
+        let expected = num_lanes * config.num_agents * Action::ALL.len();
+        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", expected, masks.len()))
     }
 
     fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
@@ -187,7 +187,7 @@ impl Jobs<'_> {
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {
-        let Some(lane) = self.lanes.first() else { unreachable!("split only while there are lanes") };
+        let Some(lane) = self.lanes.first() else { unreachable!("a split needs at least one lane") };
         let config = pogema_core::Environment::config(&lane.engine);
         let num_agents = num_lanes * config.num_agents;
         let beyond_cache = self.beyond_cache;

@@ -138,7 +138,7 @@ impl Lane {
         self.pending.as_ref().map_or(Ok(()), |instance| instance.check_fits(&self.engine.config))
     }
 
-    /// Begins the next episode, which the lane already has.
+    /// Begins the next episode. Call [`Lane::fetch_next`] first.
     pub fn begin(&mut self) -> Result<(), Error> {
         if self.is_next_ready {
             self.switch_to_next();

@@ -44,14 +44,16 @@ fn split<V>(lead: usize, out: &mut [V], per_vector: usize) -> (&mut [V], &mut [V
     out.split_at_mut(num_before.min(out.len()))
 }
 
-/// Returns the words from the one with the bit of value `index` on, and the position of that bit in it.
+/// Returns the words starting at the one with the bit of value `index`, and the position of that bit in it.
 fn words_from(words: &[u64], lead: usize, index: usize) -> (&[u64], usize) {
     let bit = lead + index;
     (&words[(bit / 64).min(words.len())..], bit % 64)
 }
 
+/// Converts `num_vectors` bytes of bits to vectors of `f32`.
+///
 /// # Safety
-/// AVX2; `bytes` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `bytes` and `out` hold `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32) {
     // Four bytes at a time, since loading them takes most of the time.
@@ -81,7 +83,7 @@ unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32
 /// Stores 1 for each set bit, and 0 for each unset bit.
 ///
 /// # Safety
-/// AVX2; `out` holds a vector.
+/// The machine has AVX2; `out` holds a vector.
 #[target_feature(enable = "avx2")]
 #[inline]
 unsafe fn store_f32_vector(word: __m256i, bits: __m256i, out: *mut f32) {
@@ -91,8 +93,10 @@ unsafe fn store_f32_vector(word: __m256i, bits: __m256i, out: *mut f32) {
     unsafe { _mm256_storeu_ps(out, values) };
 }
 
+/// Converts `num_vectors` words of bits to vectors of `u8`.
+///
 /// # Safety
-/// AVX2; `words` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `words` and `out` hold `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_u8_vectors(words: *const u32, num_vectors: usize, out: *mut u8) {
     let bits = _mm256_set1_epi64x(0x8040_2010_0804_0201_u64 as i64);

@@ -35,8 +35,10 @@ pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool)
     }
 }
 
+/// Converts bits to values of `f32`, one cache line at a time.
+///
 /// # Safety
-/// `words` hold `lead` bits and one for each value.
+/// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
 unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [f32]) {
     let one = _mm512_set1_ps(1.0);
@@ -62,8 +64,10 @@ unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize,
     }
 }
 
+/// Converts bits to values of `u8`, one cache line at a time.
+///
 /// # Safety
-/// `words` hold `lead` bits and one for each value.
+/// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
 unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [u8]) {
     let one = _mm512_set1_epi8(1);

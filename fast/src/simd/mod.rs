@@ -99,9 +99,9 @@ impl fmt::Display for SimdPath {
 pub(crate) enum Channels {
     /// Obstacles, agents, goal.
     All,
-    /// Obstacles alone.
+    /// Only obstacles.
     Obstacles,
-    /// Agents alone.
+    /// Only agents.
     Agents,
 }
 
@@ -204,7 +204,7 @@ pub(crate) fn fetch<T>(what: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: a hint changes nothing, and every x86-64 has it.
+        // SAFETY: a prefetch has no effect on memory, and every x86-64 processor supports it.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(what).cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
