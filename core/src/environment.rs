@@ -145,10 +145,16 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
 /// Borrowed buffers for the results of a step, one value per agent.
 #[derive(Debug)]
 pub struct StepOut<'a> {
+    /// The reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub rewards: &'a mut [f32],
+    /// Which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub terminated: &'a mut [bool],
+    /// Which agents are truncated.
+    ///
     /// Rule: end/truncated
     pub truncated: &'a mut [bool],
 }
@@ -168,10 +174,16 @@ impl StepOut<'_> {
 /// Owned buffers for the results of a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepResults {
+    /// The reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub rewards: Vec<f32>,
+    /// Which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub terminated: Vec<bool>,
+    /// Which agents are truncated.
+    ///
     /// Rule: end/truncated
     pub truncated: Vec<bool>,
 }

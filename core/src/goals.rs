@@ -87,7 +87,7 @@ impl GoalStream {
         self.first
     }
 
-    /// Returns the length of a cyclic sequence and the index of the current goal in it, from 0.
+    /// Returns the length of a cyclic sequence and the index of the current goal in it, or `None` for other goals.
     pub fn turn(&self) -> Option<(usize, usize)> {
         match &self.rest {
             Rest::Cycle { cells, index } => Some((cells.len(), *index)),

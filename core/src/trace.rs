@@ -83,6 +83,8 @@ pub struct TraceStep {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "type")]
 pub enum Observed {
+    /// The arrays of the `default` observation.
+    ///
     /// Rule: observe/default
     #[serde(rename = "default")]
     Default {
@@ -94,9 +96,13 @@ pub enum Observed {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         odd: Vec<String>,
     },
+    /// The arrays of the `POMAPF` observation.
+    ///
     /// Rule: observe/pomapf
     #[serde(rename = "POMAPF")]
     Pomapf(ObservedPomapf),
+    /// The arrays of the `MAPF` observation.
+    ///
     /// Rule: observe/mapf
     #[serde(rename = "MAPF")]
     Mapf(ObservedMapf),

@@ -1,8 +1,9 @@
 //! Conflicting moves under the three collision systems.
 //!
-//! The reference defines the systems. Here every agent first claims the square it requests, and the agent with the
-//! lowest index wins the claim. The order in which agents are processed therefore does not matter, and threads can
-//! share the work. Only `priority` processes agents in their order, because its rule requires this.
+//! The reference defines the systems. Here every agent first claims the square it requests. Under `soft`, the agent with
+//! the lowest index wins a square; under `block_both`, a square that several agents request goes to none of them. The
+//! order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
+//! processes agents in their order, because its rule requires this.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
