@@ -262,7 +262,7 @@ fn ended_episodes_are_observed_in_the_requested_order() {
     let per_lane = config().num_observed();
     let mut observed = vec![0.5; 2 * per_lane];
     let too_early = error_of(batch.observe_ended(&[4, 1], Observations::F32(&mut observed)));
-    assert_eq!(too_early, "no episode of lane 4 ended yet");
+    assert_eq!(too_early, "no episode of lane 4 has ended yet");
     let last = (0..9).map(|step| step_batch(&mut batch, step)).last().unwrap();
     let short = error_of(batch.observe_ended(&[4], Observations::F32(&mut observed)));
     assert_eq!(short, format!("observations has length {}, expected {per_lane}", 2 * per_lane));
