@@ -191,7 +191,7 @@ def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter(action)
             if action == "error":
-                with pytest.raises(UserWarning, match="goes round"):
+                with pytest.raises(UserWarning, match="wraps around"):
                     each.step([3])
             else:
                 each.step([3])

@@ -128,7 +128,7 @@ def test_a_copied_grid_cannot_be_written_to() -> None:
 @pytest.mark.parametrize("change", ["", "{}", "[]", "nonsense", b"\xff", b"[" * 10000])
 def test_foreign_bytes_are_refused(change: Any) -> None:
     """Only what was saved is restored."""
-    with pytest.raises(ValueError, match="no saved environment"):
+    with pytest.raises(ValueError, match="not a saved environment"):
         _engine.restore_engine(change if isinstance(change, bytes) else change.encode())
 
 

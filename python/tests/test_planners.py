@@ -82,7 +82,7 @@ def test_conflicts_are_told():
     cells = [STARTS, [[0, 1], [0, 1]]]
     assert validate(OBSTACLES, STARTS, GOALS, cells) == "step 1: agents 0 and 1 are both at (0, 1)"
     assert validate(OBSTACLES, STARTS, None, [STARTS]) is None
-    with pytest.raises(ValueError, match="expected the shape"):
+    with pytest.raises(ValueError, match="expected an array of shape"):
         validate(OBSTACLES, STARTS, None, [[[0], [1]]])
 
 

@@ -185,7 +185,7 @@ def _warned(outcome: Outcome) -> list[str]:
     """The warnings that both give, without the words: POGEMA's own are told by what they speak of."""
     marks = (
         ("cycling back", "round"),
-        ("goes round", "round"),
+        ("wraps around", "round"),
         ("obstacle on a", "obstacle"),
         ("is on an obstacle", "obstacle"),
     )
