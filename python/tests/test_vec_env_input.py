@@ -101,13 +101,13 @@ def test_actions_may_be_of_any_whole_type_and_layout(env, dtype):
 
 
 BAD_OUT = [
-    ([0], TypeError, f"list, expected a numpy array of float32 and the shape {SHAPE}"),
+    ([0], TypeError, f"list, expected a numpy array of float32 with shape {SHAPE}"),
     (np.zeros(SHAPE), TypeError, "float64, expected float32"),
     (np.zeros(SHAPE, ">f4"), TypeError, ">f4, expected float32"),
     (np.zeros((1, *SHAPE[1:]), np.float32), ValueError, f"expected {SHAPE}"),
     (np.zeros((4, *SHAPE[1:]), np.float32)[::2], ValueError, "expected a C-contiguous array"),
     (np.asfortranarray(np.zeros(SHAPE, np.float32)), ValueError, "expected a C-contiguous array"),
-    (np.zeros(751 * 4, np.uint8)[1:-3].view(np.float32).reshape(SHAPE), ValueError, "scattered"),
+    (np.zeros(751 * 4, np.uint8)[1:-3].view(np.float32).reshape(SHAPE), ValueError, "not contiguous in memory"),
     (readonly(), ValueError, "expected a writeable array"),
 ]
 
@@ -131,10 +131,10 @@ BAD_RESETS = [
     ({"seed": [1]}, ValueError, "seed holds 1 seeds, expected 2, one per environment"),
     ({"seed": [1, None]}, TypeError, "seed[1] is None, expected a whole number"),
     ({"seed": [1, -3]}, ValueError, "seed[1] is -3, expected 0"),
-    ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected `reset_mask` alone"),
+    ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected only `reset_mask`"),
     ({"options": {"reset_mask": [True, False]}}, TypeError, "is a list, expected a numpy array of bool"),
     ({"options": {"reset_mask": np.array([1, 0])}}, TypeError, "is an array of int64, expected a numpy array of bool"),
-    ({"options": {"reset_mask": np.array([True])}}, ValueError, "has the shape (1,), expected (2,)"),
+    ({"options": {"reset_mask": np.array([True])}}, ValueError, "has shape (1,), expected (2,)"),
     ({"options": {"reset_mask": np.zeros(2, bool)}}, ValueError, "expected at least one True"),
 ]
 
