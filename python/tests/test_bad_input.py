@@ -126,7 +126,7 @@ def test_history_needs_persistent() -> None:
 
 
 def test_elapsed_steps_can_be_set() -> None:
-    """A step back restores the elapsed steps."""
+    """A step back sets them to the number of steps that remain in the history."""
     env = started(persistent=True, max_episode_steps=10)
     env.set_elapsed_steps(8)
     assert [env.step([0, 0, 0])[3][0] for _ in range(2)] == [False, True]
