@@ -23,7 +23,8 @@ _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the fields with each value in a form that JSON can hold.
 
-    Errors: `RefusedConfigError` naming the field, its value and what was expected.
+    Errors: `RefusedConfigError` with the field, its value and what was expected; `OutsideMapError` for cells outside
+    any map; `NoCellError` for an empty list of goals.
     """
     result: dict[str, Any] = {}
     for name, value in fields.items():

@@ -57,7 +57,8 @@ def _as_array(actions: Any) -> np.ndarray:
     try:
         return np.asarray(actions)
     except ValueError as error:
-        raise ValueError(f"actions, expected whole numbers in the shape (envs, agents): {error}") from None
+        reason = f"actions are not an array, expected whole numbers in the shape (envs, agents): {error}"
+        raise ValueError(reason) from None
 
 
 def check_out(out: Any, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:

@@ -31,7 +31,7 @@ def _differ(one: Any, other: Any) -> bool:
 
 
 class ActionsSampler:
-    """Draws random actions from its own generator.
+    """A source of random actions with its own generator.
 
     Rule: seed/streams
     """
@@ -144,7 +144,7 @@ class Pogema(PogemaBase):
     ) -> Union[tuple[list, list], list]:
         """Begins an episode and returns the lists of observations and infos.
 
-        As in POGEMA 1.4.0, `seed` has no effect. With the semantics "2.0" it becomes the seed of the config, for this
+        With the default semantics "1.4.0", `seed` has no effect. With "2.0" it becomes the seed of the config, for this
         reset and all later ones.
 
         Rule: seed/reset
@@ -165,7 +165,7 @@ class Pogema(PogemaBase):
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
         In the step that ends an episode `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
-        POGEMA overwrites them with `soft` collisions.
+        POGEMA writes into them if `collision_system` is `soft`.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 
@@ -184,7 +184,7 @@ class Pogema(PogemaBase):
             raise NotResetError("the environment was not reset yet")
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
         return self._started().render(mode=mode)
 
     def sample_actions(self) -> np.ndarray:
@@ -246,7 +246,7 @@ class Pogema(PogemaBase):
         Errors: `ValueError` for a config that is not persistent, and for a number below 0.
         """
         if not self._fixed["persistent"]:
-            raise NotKeptError("the time limit can be moved only with persistent=True in the config")
+            raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
         if elapsed_steps < 0:
             raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
         self._engine.elapsed = elapsed_steps

@@ -36,7 +36,7 @@ class _Quiet(KeyError):
 
 
 class RefusedConfigError(ValueError):
-    """A field of a config has an invalid value; `GridConfig` raises it as pydantic's ValidationError."""
+    """An invalid value in a config field; `GridConfig` raises it as pydantic's ValidationError."""
 
     def __init__(self, message: str, field: Optional[str] = None, reason: Optional[str] = None) -> None:
         super().__init__(message)
@@ -47,60 +47,63 @@ class RefusedConfigError(ValueError):
 
 
 class OutsideMapError(IndexError, ValueError):
-    """A start or goal lies outside the map."""
+    """A start or goal outside the map."""
 
 
 class NoCellError(IndexError, ValueError):
-    """An agent's list of goals is empty."""
+    """An empty list of goals for an agent."""
 
 
 class EmptyMapError(ZeroDivisionError, ValueError):
-    """A map has no cells."""
+    """A map without cells."""
 
 
 class MapTextError(_Quiet, ValueError):
-    """A map text has an unknown character, or has letters in addition to other starts and goals."""
+    """A map text with an unknown character, or with letters in addition to other starts and goals.
+
+    Also an unknown or duplicate name of a registered map.
+    """
 
 
 class InstanceError(OverflowError, IndexError, ValueError):
-    """A config has no instance: the map has no room, or starts and goals do not match."""
+    """A config without an instance: the map has no room, or starts and goals do not match."""
 
 
 class ActionCountError(AssertionError, ValueError):
-    """The number of actions differs from the number of agents."""
+    """A number of actions that differs from the number of agents."""
 
 
 class ActionError(IndexError, ValueError):
-    """A number is not an action."""
+    """A number that is not an action."""
 
 
 class NotResetError(ResetNeeded, AttributeError):
-    """The environment was not reset yet."""
+    """A call before the first reset."""
 
 
 class StateError(ValueError, RuntimeError):
-    """A call is not allowed in the current state."""
+    """A call that the current state does not allow."""
 
 
 class NoHistoryError(NotResetError, TypeError):
-    """The history is not available, because the environment was not reset yet."""
+    """A call that needs the history, before the first reset."""
 
 
 class NotKeptError(StateError, AttributeError):
-    """The call needs the kept steps, and thus `persistent` in the config."""
+    """A call that needs the history, without `persistent` in the config."""
 
 
 class ElapsedStepsError(AssertionError, ValueError):
-    """A number of elapsed steps is negative."""
+    """A negative number of elapsed steps."""
 
 
 class JumpedError(IndexError, ValueError):
-    """An A* agent observes itself in a cell that it cannot reach in one step."""
+    """An A* agent in a cell that it cannot reach in one step."""
 
 
 class AutoResetError(_Quiet, ValueError):
-    """`auto_reset` is set with an integration that does not support it."""
+    """`auto_reset` with an integration that does not support it."""
 
 
 class UnknownIntegrationError(_Quiet, ValueError):
-    """An integration is unknown."""
+    """An unknown integration."""

@@ -77,7 +77,7 @@ class Grid:
 
     @property
     def finishes_xy(self) -> list[tuple[Union[int, np.int64], Union[int, np.int64]]]:
-        """The goal of each agent, of NumPy integers if it was drawn since the reset, as in POGEMA."""
+        """The goal of each agent; a goal drawn since the reset consists of NumPy integers, as in POGEMA."""
         goals = self._engine.goals(self.config.obs_radius)
         is_drawn = self._engine.is_drawn
         return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
@@ -207,7 +207,7 @@ class Grid:
         return self.positions_xy[agent_id] == self.finishes_xy[agent_id]
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
     def _refuse(self, *_: Any, **__: Any) -> None:

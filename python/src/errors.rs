@@ -47,7 +47,7 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
     of_class(py, class, error)
 }
 
-/// Returns the error of a call that overlaps with one of another thread.
+/// Returns the error of a call that was made during a call of another thread.
 pub fn busy(py: Python<'_>) -> PyErr {
     of_class(py, "StateError", Error::Busy { what: "this environment" })
 }

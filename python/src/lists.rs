@@ -32,7 +32,7 @@ pub fn read_actions(
     Ok(None)
 }
 
-/// Replaces an integer that does not fit 64 bits by one that is no action either.
+/// Maps an integer that does not fit 64 bits to `i64::MAX`, which is not an action either.
 fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
     if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(item.py()) {
         Ok(i64::MAX)

@@ -22,7 +22,7 @@ class IsMultiAgentWrapper(Wrapper):
 
 
 class MetricsForwardingWrapper(Wrapper):
-    """Puts a copy of the metrics where Sample Factory looks for them, `episode_extra_stats`."""
+    """Copies the metrics to `episode_extra_stats`, where Sample Factory reads them."""
 
     def step(self, action: Any) -> Any:
         """Plays one step of the inner environment."""

@@ -15,7 +15,7 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 #: Episodes submitted per process, so that no process is idle.
 _AHEAD = 2
 #: Process deaths after which the lost episodes are reported as failed; also the retries on Dask.
-_MOST_DEATHS = 3
+_MAX_DEATHS = 3
 
 
 def sequential(tasks: Iterable[Task]) -> Iterator[Outcome]:
@@ -44,7 +44,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
             deaths += 1
             lost = list(under_way.values())
             ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
-            if deaths >= _MOST_DEATHS:
+            if deaths >= _MAX_DEATHS:
                 reason = f"its process, or another process of the pool, died {deaths} times"
                 yield from (Outcome(task.index, error=reason) for task in lost)
                 deaths = 0
@@ -65,7 +65,7 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
         state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
         rest = iter(tasks)
         num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        submit = {"pure": False, "retries": _MOST_DEATHS}
+        submit = {"pure": False, "retries": _MAX_DEATHS}
         names: dict[Any, int] = {}
 
         def send(task: Task) -> Any:

@@ -41,7 +41,7 @@ def evaluation(
     """Plays the missing episodes of a suite and returns all results in the layout of pogema-toolbox.
 
     `evaluation_config` is a YAML file or its content. `begin` says how to treat earlier results in the folder
-    `eval_dir`: `new` refuses them, `resume` continues an interrupted run of the same suite, `anew` deletes them
+    `eval_dir`: `new` rejects them, `resume` continues an interrupted run of the same suite, `anew` deletes them
     [default: `new`]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
     of a scheduler for algorithms with a Dask `parallel_backend` [default: the one in the suite, otherwise a cluster of
     processes on this machine]. At the end the tables of `results_views` are printed, and plots are written to `views`

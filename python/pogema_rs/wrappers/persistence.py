@@ -11,7 +11,7 @@ from pogema_rs import _engine
 
 __all__ = ["AgentState", "PersistentWrapper"]
 
-# A goal drawn since the reset is of NumPy integers, as in POGEMA.
+# A goal drawn since the reset consists of NumPy integers, as in POGEMA.
 _Whole = Union[int, np.int64]
 
 

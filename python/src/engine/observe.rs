@@ -61,7 +61,7 @@ impl Engine {
         Ok(all)
     }
 
-    /// Returns goals as tuples, of NumPy integers where the goal was drawn.
+    /// Returns goals as tuples; drawn goals consist of NumPy integers.
     fn goal_tuples<'py>(&self, py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {
         let list = tuples(py, pairs)?;
         for agent in (0..pairs.len()).filter(|&agent| self.drawn.now()[agent]) {

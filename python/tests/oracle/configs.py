@@ -56,14 +56,14 @@ class Draw:
         if self.chance(0.3):
             fields["persistent"] = True
             self.note("persistent")
-        rows = self._ground(fields)
+        rows = self._map(fields)
         self._places(fields, rows)
         if self.chance(0.04) and fields["on_target"] != "restart":
             fields["max_episode_steps"] = self.one((0, -3))
             self.note("no steps")
         return fields
 
-    def _ground(self, fields: Fields) -> list[str]:
+    def _map(self, fields: Fields) -> list[str]:
         """Chooses the map and returns its rows; if the package draws the map, the rows have no obstacles."""
         kind = self.one(MAPS)
         self.note(f"map {kind}")

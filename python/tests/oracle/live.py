@@ -20,7 +20,7 @@ VARIABLE = "POGEMA_ORACLE_PYTHON"
 
 
 class Oracle:
-    """POGEMA 1.4.0 in a process of its own."""
+    """POGEMA 1.4.0 in a separate process."""
 
     def __init__(self) -> None:
         python = os.environ.get(VARIABLE)

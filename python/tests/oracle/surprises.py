@@ -58,7 +58,7 @@ SURPRISES = (
     ),
     # differences, Starts and goals: a pool of one goal makes POGEMA draw forever.
     _surprise(
-        "pool goal for ever",
+        "pool goal drawn forever",
         {
             **{"map": "....\n....", "num_agents": 1, "on_target": "restart", "obs_radius": 1, "seed": 1},
             **{"possible_targets_xy": [[1, 1]]},
