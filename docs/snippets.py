@@ -11,6 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+# The program `pogema`, as ./check has built it.
+BUILT = Path(os.environ.get("CARGO_TARGET_DIR", "target")).resolve() / "checked"
 BLOCK = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 OUTPUT = re.compile(r"(^<!-- output: (.*?) -->\n```text\n)(.*?)(^```$)", re.MULTILINE | re.DOTALL)
 
@@ -26,7 +28,8 @@ def in_profile(script: str) -> str:
 def run(script: str) -> str:
     """Returns the output of a script; ends the program if the script fails."""
     script = in_profile(script)
-    done = subprocess.run(["bash", "-euo", "pipefail", "-c", script], stdout=subprocess.PIPE, text=True)
+    env = {**os.environ, "PATH": f"{BUILT}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(["bash", "-euo", "pipefail", "-c", script], stdout=subprocess.PIPE, text=True, env=env)
     if done.returncode != 0:
         sys.exit(f"snippets: exit status {done.returncode} from\n{script}{done.stdout}")
     return done.stdout

@@ -49,3 +49,8 @@ pub use request::{
 pub use runner::{Fault, Progress, Report, RunPart};
 pub use script::{Script, play_script};
 pub use tally::{Tally, families_of};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

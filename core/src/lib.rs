@@ -55,3 +55,8 @@ pub use observe::{from_border, from_starts};
 pub use threads::{MAX_THREADS, check_threads, threads_note};
 pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};
 pub use words::{Word, Words, deserialize_word, serialize_word};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

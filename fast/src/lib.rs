@@ -54,3 +54,8 @@ pub use batch::{Autoreset, Batch, Instances, ObservationBuffers, Observations};
 pub use observe::words_per_agent;
 pub use simd::{SimdPath, Value};
 pub use step::Engine;
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -46,3 +46,8 @@ pub use source::{Generated, InstanceSource, MadeInstance};
 pub use stats::{Infeasibility, MapStats, ScenarioPart, ScenarioStats};
 pub use text::{MapText, parse_map_text};
 pub use tiles::{PUBLISHED_TILE, tiles};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -48,3 +48,8 @@ pub use binomial::Binomial1;
 pub use error::NumpyError;
 pub use generator::Generator;
 pub use seed_sequence::SeedSequence;
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -71,3 +71,8 @@ pub use registry::{LifelongName, PlannerName, PlannerSettings};
 pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub use validate::{Conflict, ConflictKind, validate};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

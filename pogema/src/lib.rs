@@ -69,6 +69,8 @@ pub use seeds::Seed;
 mod book {
     #[doc = include_str!("../../README.md")]
     struct Readme;
+    #[doc = include_str!("../README.md")]
+    struct Crate;
     #[doc = include_str!("../../docs/guide/rust.md")]
     struct Guide;
     #[doc = include_str!("../../docs/start/rust.md")]

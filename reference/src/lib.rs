@@ -39,3 +39,8 @@ mod observe;
 mod step;
 
 pub use step::Reference;
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

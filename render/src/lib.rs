@@ -32,3 +32,8 @@ pub use check::check;
 pub use ground::{Border, Ground};
 pub use motion::{MOST_FRAMES, MOST_PIXELS as MOST_FRAME_PIXELS};
 pub use style::{Color, Colors, Style};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -37,3 +37,8 @@ pub use store::{Begin, REPORT, Store};
 pub use suite::{Algorithm, Backend, Replacement, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
