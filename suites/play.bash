@@ -1,8 +1,8 @@
-# Shared by the scripts in this folder, which source it in the root of the repository.
+# Shared by the scripts in this folder, which source it from the root of the repository.
 cargo build --quiet --release
 pogema=${CARGO_TARGET_DIR:-target}/release/pogema
 
-# Plays all suites of a setting, or continues: play SETTING MAPS RESULTS [OPTION...]
+# Plays all suites of a setting, or continues an earlier run: play SETTING MAPS RESULTS [OPTION...]
 play() {
     local setting=$1 maps=$2 results=$3 suite name
     shift 3

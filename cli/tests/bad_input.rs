@@ -38,7 +38,7 @@ const REFUSED: [(&str, &str); 53] = [
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
     (
         "run unknown-key.yaml",
-        "unknown-key.yaml: config: unknown field `colision_system`, the nearest known one is `collision_system`",
+        "unknown-key.yaml: config: unknown field `colision_system`; did you mean `collision_system`?",
     ),
     (
         "run wrong-type.yaml",
@@ -72,7 +72,7 @@ const REFUSED: [(&str, &str); 53] = [
     (
         "run --map five-rooms",
         "five-rooms: there is no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
-         known map; the nearest is `four-rooms`",
+         known map; did you mean `four-rooms`?",
     ),
     ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
     ("run goals.yaml", "goals.yaml: targets_xy has length 1, expected 2"),

@@ -278,14 +278,14 @@ fn a_suite_that_is_wrong_is_told_with_its_line() {
         ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that a file of results may have"),
         ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
         ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
-        ("seed: {grid_search: [3, 1, 2]}", "size: 4", "`size` stands twice"),
+        ("seed: {grid_search: [3, 1, 2]}", "size: 4", "duplicate key `size`"),
         ("density: 0.2", "density: {grid_search: [0.1, 2]}", "line 9: config: `density`"),
         (
             "size: 16",
             "map_name: {grid_search: [wall-e, wall-f, four-rooms]}",
             "2 maps are not known: `wall-e`, `wall-f`",
         ),
-        ("size: 16", "map_name: four-room", "the nearest is `four-rooms`"),
+        ("size: 16", "map_name: four-room", "did you mean `four-rooms`?"),
         ("name: Environment", "name: MyEnv", "line 3: config: `name` is `MyEnv`, expected `Environment`"),
         (
             "algorithms:",

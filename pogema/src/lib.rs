@@ -15,7 +15,7 @@
 //! # Ok::<(), pogema::Error>(())
 //! ```
 //!
-//! [`batch`] turns it into a [`Batch`] of environments that one call steps and observes:
+//! [`batch`] turns it into a [`Batch`] of environments, which one call steps and observes:
 //!
 //! ```
 //! use pogema::{Action, GridConfig, Observations, StepResults};
@@ -36,8 +36,8 @@
 //! | --- | --- |
 //! | `planners` | [`planners`]: LaCAM*, CBS, RHCR, PIBT and POGEMA's own policies |
 //! | `render` | [`render`]: SVG, PNG, GIF, video and replay pages |
-//! | `reference` | [`reference`](mod@reference): the rules as plain as possible, to compare other engines with |
-//! | `toolbox` | [`toolbox`]: evaluations of many methods on many episodes |
+//! | `reference` | [`reference`](mod@reference): the simplest implementation of the rules, for comparison with other engines |
+//! | `toolbox` | [`toolbox`]: evaluations of many algorithms on many episodes |
 
 #![forbid(unsafe_code)]
 
@@ -64,7 +64,7 @@ pub use pogema_render as render;
 pub use pogema_toolbox as toolbox;
 pub use seeds::Seed;
 
-/// The blocks of the guide.
+/// Compiles and runs the code blocks of the guide.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/guide/rust.md")]
 struct Guide;

@@ -51,7 +51,7 @@ function pairLetters(letters, pool) {
   const goals = sorted.filter(([letter]) => letter < "a");
   if (starts.length !== goals.length) {
     const [, { at }] = (starts.length > goals.length ? starts : goals).at(-1);
-    const reason = `the map has ${starts.length} starts (a-z) and ${goals.length} goals (A-Z), expected as many`;
+    const reason = `the map has ${starts.length} starts (a-z) and ${goals.length} goals (A-Z), expected equal numbers`;
     throw new Wrong(...at, reason);
   }
   if (starts.length > 0 && pool) {
