@@ -1,4 +1,4 @@
-//! Steps, observations and resets of one environment, and batches.
+//! Benchmarks of steps, observations and resets of one environment, and of batches.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -12,7 +12,7 @@ use pogema_fast::{Batch, Engine, Observations, SimdPath, words_per_agent};
 use pogema_numpy::Generator;
 use pogema_planners::sample;
 
-/// Side, agents.
+/// Side of the map and number of agents.
 const SIZES: [(usize, usize); 3] = [(32, 64), (64, 64), (256, 10_000)];
 const NUM_STEPS: usize = 16;
 

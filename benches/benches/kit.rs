@@ -1,4 +1,4 @@
-//! How fast the kit checks: steps in lockstep with an engine in this process, and with the template over a pipe.
+//! Benchmarks of the kit for ports: lockstep checks of an engine in this process, and of the template over a pipe.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -13,7 +13,7 @@ use serde_json::json;
 const NUM_STEPS: usize = 128;
 const NUM_AGENTS: usize = 8;
 
-/// An episode of eight agents that both can play.
+/// Returns an episode of eight agents that the engine and the template can both play.
 fn request() -> Request {
     let step =
         |step: usize| (0..NUM_AGENTS).map(|agent| ((step * 3 + agent * 2 + step / 5) % 5) as i64).collect();

@@ -1,4 +1,4 @@
-//! From config to instance: the time one reset needs.
+//! Benchmark of placement: the time to generate an instance from a config.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -9,7 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pogema_benches::config;
 use pogema_maps::InstanceSource;
 
-/// Side, agents: from a training map to the largest instance of POGEMA's paper.
+/// Side of the map and number of agents, from a training map to the largest instance of POGEMA's paper.
 const SIZES: [(usize, usize); 4] = [(32, 64), (256, 10_000), (1024, 100_000), (3072, 1_000_000)];
 
 fn placement(criterion: &mut Criterion) {

@@ -1,6 +1,7 @@
-//! First plans of LaCAM on the paper's largest crowds and maps, and steps of lifelong PIBT in its warehouse.
+//! Benchmarks of LaCAM's first plan with the paper's largest numbers of agents and maps, and of lifelong PIBT in the
+//! paper's warehouse.
 //!
-//! `POGEMA_MAPS` names the folder with the paper's maps of cities; without it, first plans are skipped.
+//! Set `POGEMA_MAPS` to the folder with the paper's city maps; otherwise the benchmark of LaCAM is skipped.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -16,7 +17,7 @@ use pogema_planners::{
 };
 use pogema_toolbox::Suite;
 
-/// The instances of a suite with seed 0, each map once, with a number of agents of our own.
+/// Returns the instances of a suite with seed 0, each map once, with `num_agents` agents instead of the suite's number.
 fn instances(suite: &str, maps: &[PathBuf], num_agents: usize) -> Vec<Instance> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites").join(suite);
     let suite = Suite::read(&path).unwrap();
@@ -28,7 +29,7 @@ fn instances(suite: &str, maps: &[PathBuf], num_agents: usize) -> Vec<Instance> 
     configs.map(|config| instance(GridConfig { num_agents, ..config })).collect()
 }
 
-/// Time until the first plan of an instance, which is then checked; none if there is no plan.
+/// Returns the time until the first plan of an instance, or `None` if there is no plan. The plan is validated.
 fn first_plan(instance: &Instance) -> Option<Duration> {
     let problem = Problem::of(instance).unwrap();
     let mut planner = Lacam::new(LacamParams { refine: false, ..LacamParams::default() });
@@ -51,7 +52,7 @@ fn first_plans(criterion: &mut Criterion) {
         let name = BenchmarkId::new(suite, format!("{num_agents} agents"));
         let mut instances = instances(suite, &[PathBuf::from(&maps)], num_agents);
         let mut times: Vec<Duration> = Vec::new();
-        // One round, whatever criterion measures, for the spread over instances.
+        // A separate round, independent of criterion, measures the spread over instances.
         instances.retain(|instance| first_plan(instance).inspect(|time| times.push(*time)).is_some());
         times.sort_unstable();
         let (median, longest) = (times[times.len() / 2], times[times.len() - 1]);
@@ -67,10 +68,10 @@ fn first_plans(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Number of steps of one episode of PIBT.
+/// Number of steps in an episode of PIBT.
 const NUM_STEPS: u64 = 256;
 
-/// Time of the steps of an episode of PIBT, tables of costs to go included.
+/// Returns the time that PIBT takes for an episode, including its tables of costs-to-go.
 fn walk(instance: &Instance) -> Duration {
     let graph = Arc::new(Graph::new(instance.map()));
     let mut streams = instance.goals().to_vec();

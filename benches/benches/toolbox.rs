@@ -1,4 +1,4 @@
-//! Suites of the random policy, whole, beside the same episodes on the engine alone: what an evaluation costs.
+//! Benchmarks of evaluations: whole suites of the random policy, compared with the same episodes on the engine alone.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -19,7 +19,7 @@ const NUM_AGENTS: usize = 64;
 const NUM_STEPS: usize = 256;
 const NUM_EPISODES: usize = 32;
 
-/// A grid so large that only a suite that makes its environments one by one can begin with it.
+/// A number of episodes for which a suite must create its environments one by one to start quickly.
 const MANY: usize = 100_000;
 
 fn suite(num_episodes: usize) -> Suite {
@@ -37,26 +37,26 @@ fn environments(suite: &Suite) -> EpisodeConfigs {
     suite.environments(&[]).unwrap().0
 }
 
-/// All episodes on one thread, kept in a folder.
-fn evaluated(suite: &Suite) {
+/// Evaluates all episodes on one thread and stores the results in a folder.
+fn evaluate(suite: &Suite) {
     let folder = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(folder.path(), suite, Begin::New).unwrap());
     let running = Running { threads: 1, stop: &AtomicBool::new(false), watch: &|_| {} };
     assert!(run(suite, &environments(suite), &store, running).unwrap().is_whole);
 }
 
-/// Instance, reset, and for each step actions, moves and what agents see.
-fn played(config: &GridConfig) -> f32 {
+/// Plays an episode on the engine: instance, reset, and for each step actions, moves and observations.
+fn play(config: &GridConfig) -> f32 {
     let instance = InstanceSource::new(config.clone(), None).unwrap().generate().unwrap().instance;
     let mut engine = Engine::new(config.rules()).unwrap();
     engine.reset(&instance).unwrap();
     let mut observations = vec![0.0; config.rules().num_observed()];
     let (mut rewards, mut terminated, mut truncated) =
         ([0.0; NUM_AGENTS], [false; NUM_AGENTS], [false; NUM_AGENTS]);
-    let mut dice = Generator::seeded(config.seed.unwrap());
+    let mut generator = Generator::seeded(config.seed.unwrap());
     let mut total = 0.0;
     for _ in 0..NUM_STEPS {
-        let actions = sample(&mut dice, NUM_AGENTS);
+        let actions = sample(&mut generator, NUM_AGENTS);
         let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
         engine.step(&actions, out).unwrap();
         engine.observe(&mut observations).unwrap();
@@ -71,25 +71,25 @@ fn evaluation(criterion: &mut Criterion) {
     let configs: Vec<GridConfig> = (0..all.len()).map(|index| all.at(index).unwrap().config).collect();
     let mut group = criterion.benchmark_group("episodes of 64 agents, 256 steps");
     group.throughput(Throughput::Elements((NUM_EPISODES * NUM_AGENTS * NUM_STEPS) as u64));
-    group.bench_function("engine, seen as f32", |bench| {
-        bench.iter(|| configs.iter().map(|config| played(black_box(config))).sum::<f32>());
+    group.bench_function("engine, observed as f32", |bench| {
+        bench.iter(|| configs.iter().map(|config| play(black_box(config))).sum::<f32>());
     });
-    group.bench_function("evaluation", |bench| bench.iter(|| evaluated(black_box(&suite))));
+    group.bench_function("evaluation", |bench| bench.iter(|| evaluate(black_box(&suite))));
     group.finish();
 }
 
-fn beginning(criterion: &mut Criterion) {
+fn first_episode(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("grid of 100,000 episodes");
     group.sample_size(10);
-    let begun = || {
+    let start = || {
         let suite = suite(MANY);
         let environments = environments(&suite);
         let to_do = environments.by_cost((0..environments.len()).collect());
         environments.at(to_do[0]).unwrap()
     };
-    group.bench_function("until its first episode", |bench| bench.iter(begun));
+    group.bench_function("until its first episode", |bench| bench.iter(start));
     group.finish();
 }
 
-criterion_group!(benches, evaluation, beginning);
+criterion_group!(benches, evaluation, first_episode);
 criterion_main!(benches);

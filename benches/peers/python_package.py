@@ -1,9 +1,9 @@
-"""Times the Python package beside POGEMA 1.4.0 and beside the Rust batch, in one run on one machine.
+"""Compares the speed of the Python package with POGEMA 1.4.0 and with the Rust batch, in one run on one machine.
 
 python3.11 benches/peers/python_package.py [--rounds N] [--json FILE]
 
-Needs the program built (`cargo build --release`), the package installed by `python/run`, and POGEMA behind
-POGEMA_ORACLE_PYTHON. The peers take turns; each ratio is the median over the rounds of the ratios within a round.
+Build the program (`cargo build --release`), install the package with `python/run`, and set POGEMA_ORACLE_PYTHON to a
+Python that has POGEMA. The peers take turns. Each ratio is the median over the rounds of the ratios within a round.
 """
 
 import argparse
@@ -23,7 +23,7 @@ BATCH = "64 lanes of 64 agents"
 
 
 class Worker:
-    """A package in a process of its own."""
+    """A package in a separate process."""
 
     def __init__(self, python, package):
         self.child = subprocess.Popen(
@@ -34,16 +34,16 @@ class Worker:
         )
 
     def time(self, *work):
-        """Calls per second."""
+        """Returns calls per second."""
         print(json.dumps(work), file=self.child.stdin, flush=True)
         line = self.child.stdout.readline()
         if not line:
-            sys.exit(f"python_package: {self.child.args[-1]} ended at {work}")
+            sys.exit(f"python_package: the worker of {self.child.args[-1]} exited during {work}")
         return json.loads(line)
 
 
 def imports_per_second(python, statement):
-    """Runs of an import in a process each, less what Python itself takes to start."""
+    """Returns imports per second, each in a new process, without the start-up time of Python itself."""
 
     def seconds(code):
         began = time.perf_counter()
@@ -54,7 +54,7 @@ def imports_per_second(python, statement):
 
 
 def rust_batch():
-    """Steps of all environments of the Rust batch, with observations."""
+    """Returns steps of the whole Rust batch per second, with observations."""
     table = ROOT / "target/python/batch.json"
     command = [PROGRAM, "bench", "--rows", BATCH, "--seconds", "0.3", "--json", table]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -63,7 +63,7 @@ def rust_batch():
 
 
 def measure(peer, ours, pogema):
-    """The rows of one round: name, figure of the peer, ours; both per second and of the same amount of work."""
+    """Returns the rows of one round: name, the peer's speed, our speed. Both are per second and for the same work."""
     vector = ours.time("vector", 64, 64, 2)
     step_64 = peer.time("step", 64)
     return [
@@ -71,10 +71,10 @@ def measure(peer, ours, pogema):
         ("step, 1 agent", peer.time("step", 1), ours.time("step", 1)),
         ("reset with a new seed, 64 agents", peer.time("reset", 64), ours.time("reset", 64)),
         ("VecEnv of 64, 64 agents, 2 threads", step_64, 64 * vector),
-        ("the same, beside the Rust batch", rust_batch(), vector),
+        ("the same, against the Rust batch", rust_batch(), vector),
         ("import", imports_per_second(pogema, "import pogema"), imports_per_second(OURS, "import pogema_rs")),
         (
-            "import of what an environment needs",
+            "import for an environment",
             imports_per_second(pogema, "from pogema import GridConfig, pogema_v0"),
             imports_per_second(OURS, "from pogema_rs import GridConfig, pogema_v0"),
         ),

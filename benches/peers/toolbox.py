@@ -1,9 +1,9 @@
-"""Times evaluations of a policy in Python beside pogema-toolbox 0.1.1, in one run on one machine.
+"""Compares the speed of evaluating a Python policy with pogema-toolbox 0.1.1, in one run on one machine.
 
 python3.11 benches/peers/toolbox.py [--rounds N] [--seeds N]
 
-Needs the package installed by `python/run`, and POGEMA behind POGEMA_ORACLE_PYTHON. What counts is the time outside
-the policy; the peers take turns, and the ratio is the median over the rounds.
+Install the package with `python/run`, and set POGEMA_ORACLE_PYTHON to a Python that has POGEMA. Only the time outside
+the policy counts. The peers take turns, and the ratio is the median over the rounds.
 """
 
 import argparse
@@ -19,7 +19,7 @@ FOLDER = HERE.parent.parent / "target/python"
 
 
 def outside(python, package, seeds, *folder):
-    """Seconds that an evaluation took outside the policy."""
+    """Returns the seconds that an evaluation takes outside the policy."""
     command = [python, "-B", HERE / "toolbox_worker.py", package, str(seeds), *folder]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     total, policy = json.loads(done.stdout)
@@ -27,7 +27,7 @@ def outside(python, package, seeds, *folder):
 
 
 def main():
-    """Prints the seconds of both, and their ratio."""
+    """Prints the seconds of both toolboxes, and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seeds", type=int, default=4)

@@ -1,4 +1,4 @@
-"""Times one toolbox: prints the seconds of an evaluation, and of those the ones that the policy took, as JSON.
+"""Times one toolbox: prints the seconds of an evaluation, and how many of them the policy takes, as JSON.
 
 toolbox_worker.py pogema_toolbox|pogema_rs.toolbox NUM_SEEDS [FOLDER_OF_POGEMA_TOOLBOX]
 """
@@ -18,15 +18,15 @@ Registry = registry.ToolboxRegistry
 
 
 class Stay:
-    """Nobody moves; what it takes is not counted."""
+    """A policy whose agents never move. Its own time is subtracted."""
 
     seconds = 0.0
 
     def reset_states(self):
-        """Forgets nothing."""
+        """Does nothing, because the policy has no state."""
 
     def act(self, observations):
-        """Stays."""
+        """Returns the action stay for every agent."""
         began = time.perf_counter()
         actions = [0] * len(observations)
         Stay.seconds += time.perf_counter() - began
@@ -51,7 +51,7 @@ SUITE = {
 
 
 def main():
-    """Registers, runs, tells."""
+    """Registers the policy, runs the evaluation and prints the times."""
     Registry.setup_logger("ERROR")
     Registry.register_env("Environment", create_env.create_env_base, create_env.Environment)
     Registry.register_algorithm("Stay", Stay)

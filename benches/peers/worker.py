@@ -1,4 +1,4 @@
-"""Times one package: a line of JSON on stdin names the work, one on stdout gives the figure per second.
+"""Times one package: each line of JSON on stdin names the work, and the reply on stdout is the speed per second.
 
 python worker.py pogema|pogema_rs
 """
@@ -11,16 +11,16 @@ import time
 import numpy as np
 
 SECONDS = 0.3
-STRETCHES = 3
+RUNS = 3
 ACTIONS = 64
 
 package = importlib.import_module(sys.argv[1])
 
 
 def fastest(work):
-    """Calls of `work` per second, in the fastest stretch: other work on the machine only ever slows it down."""
+    """Returns calls of `work` per second in the fastest of several runs, since other jobs can only slow a run down."""
     best = 0.0
-    for _ in range(STRETCHES):
+    for _ in range(RUNS):
         calls, start = 0, time.perf_counter()
         while (spent := time.perf_counter() - start) < SECONDS or calls == 0:
             work()
@@ -29,7 +29,7 @@ def fastest(work):
     return best
 
 
-def drawn(*shape):
+def random_actions(*shape):
     return np.random.default_rng(0).integers(0, 5, (ACTIONS, *shape))
 
 
@@ -53,8 +53,8 @@ def environment(num_agents):
 
 
 def step(num_agents):
-    """Steps with observations."""
-    env, actions, at = environment(num_agents), drawn(num_agents).tolist(), 0
+    """Returns steps per second, with observations."""
+    env, actions, at = environment(num_agents), random_actions(num_agents).tolist(), 0
 
     def work():
         nonlocal at
@@ -65,7 +65,7 @@ def step(num_agents):
 
 
 def reset(num_agents):
-    """Resets, each with another seed."""
+    """Returns resets per second, each with another seed."""
     env = environment(num_agents)
 
     def work():
@@ -76,10 +76,10 @@ def reset(num_agents):
 
 
 def vector(num_envs, num_agents, num_threads):
-    """Steps of all environments with observations."""
+    """Returns steps of the whole VecEnv per second, with observations."""
     env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads)
     env.reset(seed=0)
-    actions, at = drawn(num_envs, num_agents), 0
+    actions, at = random_actions(num_envs, num_agents), 0
 
     def work():
         nonlocal at

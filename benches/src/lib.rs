@@ -1,4 +1,4 @@
-//! What the benches have in common: the environments of POGEMA's paper.
+//! The environments of POGEMA's paper, shared by the benchmarks.
 
 #![forbid(unsafe_code)]
 
@@ -6,7 +6,7 @@ use pogema_core::{Config, Error, Instance};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
 
-/// The paper's config for a crowd on a map, lifelong.
+/// Returns the paper's lifelong config for a map of `size` × `size` cells.
 ///
 /// # Errors
 /// If the sizes are out of range.
@@ -17,10 +17,10 @@ pub fn config(size: usize, num_agents: usize, seed: u64) -> Result<GridConfig, E
     }))
 }
 
-/// The rules and the instance of such a config.
+/// Returns the rules and the instance of the paper's config.
 ///
 /// # Errors
-/// If the map has no room for so many agents.
+/// If the sizes are out of range, or the map has too few cells for the agents.
 pub fn episode(size: usize, num_agents: usize, seed: u64) -> Result<(Config, Instance), Error> {
     let config = config(size, num_agents, seed)?;
     let rules = config.rules();

@@ -1,4 +1,4 @@
-//! `pogema evaluate`: all episodes of a suite, kept one by one.
+//! `pogema evaluate`: plays all episodes of a suite and stores each as soon as it ends.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -15,31 +15,31 @@ use pogema_toolbox::{
 };
 
 use crate::maps::Sources;
-use crate::output::{check_writable, progress_bar, say};
+use crate::output::{check_writable, print_line, progress_bar};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
 pub struct Evaluate {
-    /// What to play: a YAML file with environments, algorithms and views
+    /// Suite to play: a YAML file with environments, algorithms and views
     suite: PathBuf,
-    /// A YAML file whose `algorithms` replace those of the suite
+    /// YAML file whose `algorithms` replace those of the suite
     #[arg(long, value_name = "FILE")]
     algorithms: Option<PathBuf>,
-    /// The folder for the results
+    /// Folder for the results
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     #[command(flatten)]
     sources: Sources,
-    /// Threads that play; by default as many as the machine has
+    /// Number of threads that play episodes [default: the number of processors]
     #[arg(long, value_name = "N", value_parser = number_of_threads())]
     threads: Option<usize>,
-    /// Go on with the results of an earlier run that broke off
+    /// Resume an interrupted run: play only the missing episodes
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Delete the results that are in the folder
+    /// Delete the results of earlier runs in the folder
     #[arg(long)]
     force: bool,
-    /// Write a page with tables, plots and replays; `report.html` in the folder unless a file is named
+    /// Write an HTML page with tables, plots and replays [default file: `report.html` in the folder of the results]
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     html: Option<Vec<PathBuf>>,
 }
@@ -71,12 +71,12 @@ impl Evaluate {
         let summary = run(&suite, &environments, &store, running)?;
         let write = |path: &PathBuf| write_report(path, &self.out, &suite, &environments, &store);
         let written = report.as_ref().map_or(Ok(()), write);
-        // That nothing could be played is the reason why there is no page.
-        tell(&self.out, &suite, &summary).and(written)
+        // If no episode could be played, the page fails too: report the cause, not the consequence.
+        print_summary(&self.out, &suite, &summary).and(written)
     }
 }
 
-/// The environments of a suite with maps of files, after all warnings.
+/// Returns the environments of a suite, with maps from files, and prints all warnings.
 pub fn environments(suite: &Suite, sources: &Sources) -> Result<EpisodeConfigs, Error> {
     let (environments, warnings) = suite.environments(sources.paths())?;
     for warning in warnings {
@@ -106,25 +106,26 @@ fn write_report(
     Ok(())
 }
 
-fn tell(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
+fn print_summary(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), Error> {
     let Summary { num_played, num_failed, is_whole } = summary;
     if *num_failed > 0 {
         let files = suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key));
         let files: Vec<String> = files.filter(|name| folder.join(name).exists()).collect();
-        let reason =
-            format!("{num_failed} episodes could not be played; {files:?} say why, `--resume` tries again");
+        let reason = format!(
+            "{num_failed} episodes could not be played; see {files:?} for the reasons; `--resume` tries them again"
+        );
         return Err(Error::io(folder, reason));
     }
-    let rest = if *is_whole { "all results are there" } else { "`--resume` plays the rest" };
-    say(&format!("{num_played} episodes played; {rest}: {}", folder.display()))
+    let rest = if *is_whole { "all results are complete" } else { "`--resume` plays the rest" };
+    print_line(&format!("{num_played} episodes played; {rest}: {}", folder.display()))
 }
 
-/// A bar for each algorithm, or a line now and then where there is no terminal.
+/// A progress bar per algorithm, or a line every [`INTERVAL`] if the output is not a terminal.
 #[derive(Default)]
 struct Bar(Mutex<Option<(ProgressBar, Instant)>>);
 
-/// How often a line is written.
-const EVERY: Duration = Duration::from_secs(30);
+/// Time between two progress lines.
+const INTERVAL: Duration = Duration::from_secs(30);
 
 impl Bar {
     fn show(&self, event: Event<'_>) {
@@ -133,10 +134,10 @@ impl Bar {
             (Event::Begin { algorithm, total, done }, _) => {
                 *bar = Some((begin(algorithm, total, done), Instant::now()));
             }
-            (Event::Played, Some((bar, told))) => {
+            (Event::Played, Some((bar, last_line))) => {
                 bar.inc(1);
-                if bar.is_hidden() && told.elapsed() >= EVERY {
-                    *told = Instant::now();
+                if bar.is_hidden() && last_line.elapsed() >= INTERVAL {
+                    *last_line = Instant::now();
                     let (name, done, all) = (bar.message(), bar.position(), bar.length().unwrap_or_default());
                     eprintln!("{name}: {done} of {all} episodes, {} left", HumanDuration(bar.eta()));
                 }

@@ -1,10 +1,11 @@
-//! `pogema`: run, check and inspect POGEMA episodes.
+//! `pogema`: runs, checks and inspects POGEMA episodes.
 
 #![forbid(unsafe_code)]
 
 mod bench;
 mod conform;
 mod evaluate;
+mod help;
 mod maps;
 mod output;
 mod plan;
@@ -21,7 +22,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
-/// Multi-agent path finding by POGEMA 1.4.0's rules, bit for bit.
+/// Multi-agent pathfinding under the rules of POGEMA 1.4.0, bit for bit
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Arguments {
@@ -33,32 +34,32 @@ struct Arguments {
 enum Command {
     /// Play one episode and print its metrics
     Run(run::Run),
-    /// Make a plan that brings every agent of an instance to its goal
+    /// Plan paths that bring all agents of an instance to their goals
     Plan(plan::MakePlan),
-    /// Check anyone's plan: exit status 0 if it is valid
+    /// Validate a plan; exit status 0 only if it is valid
     Validate(plan::Validate),
-    /// Look at maps, make, convert and judge them
+    /// List, show, generate, convert and analyse maps
     Maps(maps::Maps),
-    /// Play all episodes of a suite, and keep their results
+    /// Play all episodes of a suite and store the results
     Evaluate(evaluate::Evaluate),
     /// Show results as tables and plots
     Views(views::Views),
-    /// Play an episode of results again: draw it, or write what happened
+    /// Replay an episode of an evaluation: draw it or write its trace
     Replay(replay::Replay),
     /// Draw a recorded episode
     Render(render::Render),
-    /// Check that all engines follow the rules; exit status 0 only if they do
+    /// Check that all engines, or ports, follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
-    /// Answer the questions of `conform --port` on standard input, as a port of our own
+    /// Serve a built-in engine as a port: answer the requests of `conform --port` on standard input
     Port(port::Port),
-    /// Measure the speed of this machine, and of POGEMA 1.4.0 beside it
+    /// Measure the speed of the engine on this machine, optionally against POGEMA 1.4.0
     Bench(bench::Bench),
 }
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let arguments = match help::parse() {
         Ok(arguments) => arguments,
-        Err(error) if is_mistake(&error) => {
+        Err(error) if is_usage_error(&error) => {
             eprintln!("{}", error.to_string().lines().next().unwrap_or_default());
             return ExitCode::from(2);
         }
@@ -83,7 +84,7 @@ fn main() -> ExitCode {
     })
 }
 
-/// Whether the arguments are wrong, and not a call for help or for the version.
-fn is_mistake(error: &clap::Error) -> bool {
+/// Returns whether the arguments are wrong; requests for help or the version are not.
+fn is_usage_error(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }

@@ -1,4 +1,4 @@
-//! What the program says on standard output and writes to files.
+//! Standard output and output files of the program.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -9,39 +9,39 @@ use pogema_core::{Error, Trace};
 use pogema_toolbox::short;
 use serde::Serialize;
 
-/// Writes a line; ends the program quietly if nobody reads any more, as in `pogema conform | head`.
-pub fn say(text: &str) -> Result<(), Error> {
+/// Prints a line; exits with status 0 if the reader has closed the pipe, as in `pogema conform | head`.
+pub fn print_line(text: &str) -> Result<(), Error> {
     let mut output = std::io::stdout().lock();
-    said(writeln!(output, "{text}").and_then(|()| output.flush()))
+    check_printed(writeln!(output, "{text}").and_then(|()| output.flush()))
 }
 
-/// The outcome of writing to standard output; ends the program quietly if nobody reads any more.
-pub fn said(outcome: std::io::Result<()>) -> Result<(), Error> {
+/// Checks the outcome of a write to standard output; exits with status 0 if the reader has closed the pipe.
+pub fn check_printed(outcome: std::io::Result<()>) -> Result<(), Error> {
     match outcome {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
         outcome => outcome.map_err(|error| Error::io("standard output", error)),
     }
 }
 
-/// Passes if a file can be written here, so that a long run does not find out at its end that it was for nothing.
+/// Checks that a file can be written at `path`, so that a long run fails at its start and not at its end.
 ///
 /// # Errors
-/// [`Error::Io`] if the folder takes no file, or something other than a file is in the way.
+/// [`Error::Io`] if no file can be created in the folder, or if `path` exists and is not a regular file.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match std::fs::metadata(folder) {
         Ok(there) if !there.is_dir() => {
-            return Err(Error::io(path, format!("`{}` is no folder", folder.display())));
+            return Err(Error::io(path, format!("`{}` is not a folder", folder.display())));
         }
         Ok(_) => {}
         Err(error) => return Err(Error::io(path, format!("`{}`: {error}", folder.display()))),
     }
-    // What is written takes the place of what was there, which would be the end of a device or a pipe.
+    // Writing replaces the file at `path`, which would destroy a device or a pipe.
     let is_taken = std::fs::metadata(path).is_ok_and(|there| !there.is_file());
     if is_taken || path.file_name().is_none() {
-        return Err(Error::io(path, "is no file"));
+        return Err(Error::io(path, "is not a regular file"));
     }
-    // A file without a name: nothing is left of it, however the run ends.
+    // The test file has no name, so that nothing remains of it, even if the process is killed.
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
 }
 
@@ -54,7 +54,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
     pogema_conformance::files::write(path, &text)
 }
 
-/// Writes what happened in an episode, compressed if the file's name ends in `.zst`.
+/// Writes the trace of an episode, compressed if the file's name ends in `.zst`.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
@@ -64,7 +64,7 @@ pub fn write_trace(path: &Path, trace: &Trace) -> Result<(), Error> {
     pogema_conformance::files::write(path, &text)
 }
 
-/// A progress bar in a layout of indicatif.
+/// Returns a progress bar with an indicatif template.
 pub fn progress_bar(layout: &str, total: u64) -> ProgressBar {
     let bar = ProgressBar::new(total);
     if let Ok(style) = ProgressStyle::with_template(layout) {
@@ -73,13 +73,13 @@ pub fn progress_bar(layout: &str, total: u64) -> ProgressBar {
     bar
 }
 
-/// Metrics in one line.
-pub fn in_a_line<'a>(metrics: impl IntoIterator<Item = (&'a str, f64)>) -> String {
+/// Formats metrics in one line.
+pub fn in_one_line<'a>(metrics: impl IntoIterator<Item = (&'a str, f64)>) -> String {
     let shown = metrics.into_iter().map(|(name, value)| format!("{name}={}", short(value)));
     shown.collect::<Vec<_>>().join("  ")
 }
 
-/// Names the flag whose value an error is about.
+/// Returns a function that names `flag` in errors about a value out of range.
 pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     move |error| match error {
         Error::OutOfRange { value, expected, .. } => Error::argument(flag, value, expected),
@@ -87,12 +87,12 @@ pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     }
 }
 
-/// A table that is Markdown too, its numbers to the right of a first column of names; ` | ` separates the titles.
+/// Returns a Markdown table: a column of names, then right-aligned numbers; ` | ` separates the titles in `head`.
 pub fn markdown_table(head: &str) -> Table {
     table(presets::ASCII_MARKDOWN, &head.split(" | ").collect::<Vec<_>>())
 }
 
-/// A table with lines between its columns, its numbers to the right of a first column of names.
+/// Returns a table with lines between its columns: a column of names, then right-aligned numbers.
 pub fn lined_table(head: &[&str]) -> Table {
     table(presets::UTF8_FULL_CONDENSED, head)
 }

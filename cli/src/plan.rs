@@ -1,4 +1,4 @@
-//! Plans for whole problems.
+//! The commands `plan` and `validate`, and the flags of planners.
 
 mod make;
 mod planner_args;

@@ -1,4 +1,4 @@
-//! `pogema port`: an engine of ours as a port.
+//! `pogema port`: serves a built-in engine as a port.
 
 use clap::Args;
 use pogema_conformance::NamedEngine;
@@ -9,7 +9,7 @@ use crate::conform::ENGINES;
 
 #[derive(Args, Debug)]
 pub struct Port {
-    /// Which engine answers
+    /// Engine that answers
     #[arg(long, default_value = NamedEngine::REFERENCE.name, value_parser = ENGINES.map(|engine| engine.name))]
     engine: String,
 }

@@ -1,4 +1,4 @@
-//! `pogema render`: pictures of a recorded episode.
+//! `pogema render`: draws a recorded episode.
 
 mod pictures;
 mod screen;
@@ -17,19 +17,19 @@ pub use pictures::Pictures;
 
 #[derive(Args, Debug)]
 pub struct Render {
-    /// What `pogema run --trace` wrote
+    /// Trace, as `pogema run --trace` writes it
     trace: PathBuf,
-    /// Play the episode in the terminal, as happens if no file is asked for
+    /// Play the episode in the terminal [default if no picture is requested]
     #[arg(long)]
     text: bool,
-    /// The part from one step to another, such as `10..20`; `--frame` then counts from its beginning
+    /// Draw only these steps, such as `10..20`; `--frame` then counts from the first of them [default: all]
     #[arg(long, value_name = "A..B")]
     steps: Option<Steps>,
     #[command(flatten)]
     pictures: Pictures,
 }
 
-/// Two frames and all between them.
+/// A range of frames; both ends are included.
 #[derive(Clone, Copy, Debug)]
 struct Steps {
     first: usize,
@@ -60,13 +60,13 @@ impl Render {
             None => (0, trace),
         };
         let name = self.trace.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        if self.text || !self.pictures.are_wanted() {
+        if self.text || !self.pictures.are_requested() {
             self.play(&trace, first)?;
         }
         self.pictures.draw(&trace, &name)
     }
 
-    /// Shows an episode in the terminal, or one frame of it; its first frame is the state after `first` steps.
+    /// Plays an episode in the terminal, or shows one frame of it; frame 0 is the state after `first` steps.
     fn play(&self, trace: &Trace, first: usize) -> Result<(), Error> {
         let (mut screen, ground) = (self.pictures.screen(), Ground::of(trace));
         match self.pictures.frame() {

@@ -1,4 +1,4 @@
-//! `pogema replay`: an episode of results, played again.
+//! `pogema replay`: replays an episode of an evaluation.
 
 use std::path::PathBuf;
 
@@ -8,20 +8,20 @@ use pogema_toolbox::{Pairs, Results, Suite, differences};
 
 use crate::evaluate::environments;
 use crate::maps::Sources;
-use crate::output::{check_writable, in_a_line, say, write_trace};
+use crate::output::{check_writable, in_one_line, print_line, write_trace};
 use crate::render::Pictures;
 
 #[derive(Args, Debug)]
 pub struct Replay {
-    /// A folder of results that `pogema evaluate` wrote
+    /// Folder of results that `pogema evaluate` wrote
     folder: PathBuf,
-    /// Whose episode, by the name of its results
+    /// Algorithm, by its name in the results
     algorithm: String,
-    /// Its number: 0 is the first of the suite
+    /// Number of the episode; the first one of the suite is 0
     episode: usize,
     #[command(flatten)]
     sources: Sources,
-    /// Write what happened to this file, as JSON lines; compressed if it ends in `.zst`
+    /// Write the trace of the episode to this file as JSON lines; compressed if its name ends in `.zst`
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     #[command(flatten)]
@@ -38,28 +38,31 @@ impl Replay {
         if let Some(path) = &self.trace {
             write_trace(path, &trace)?;
         }
-        if self.pictures.are_wanted() {
+        if self.pictures.are_requested() {
             let title = format!("{}, episode {}", self.algorithm, self.episode);
             self.pictures.draw(&trace, &title)?;
         }
         let figures = metrics.iter().filter_map(|(name, value)| Some((name.as_str(), value.as_f64()?)));
-        say(&format!("{} steps  {}", trace.steps.len(), in_a_line(figures)))?;
+        print_line(&format!("{} steps  {}", trace.steps.len(), in_one_line(figures)))?;
         self.compare(&metrics);
         Ok(())
     }
 
-    /// Says in what the episode differs from what is in the results.
+    /// Prints how the metrics differ from those in the results.
     fn compare(&self, metrics: &Pairs) {
         let results = Results::read(std::slice::from_ref(&self.folder));
-        let note = |error| eprintln!("note: nothing to compare it with: {error}");
+        let note = |error| eprintln!("note: cannot compare the replay with the results: {error}");
         let Ok(results) = results.map_err(note) else { return };
         let row = results.rows.iter().filter(|row| row.algorithm == self.algorithm).nth(self.episode);
         let Some(row) = row else {
-            eprintln!("note: `{}` is not finished, so there is nothing to compare it with", self.algorithm);
+            eprintln!(
+                "note: cannot compare the replay with the results: `{}` is not finished",
+                self.algorithm
+            );
             return;
         };
         for difference in differences(row, metrics) {
-            eprintln!("note: it came out otherwise: {difference}");
+            eprintln!("note: the replay differs from the results: {difference}");
         }
     }
 }

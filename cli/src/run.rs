@@ -1,4 +1,4 @@
-//! `pogema run`: one episode.
+//! `pogema run`: plays one episode.
 
 mod policy;
 mod settings;
@@ -12,7 +12,7 @@ use pogema_reference::Reference;
 use pogema_render::Ground;
 use serde_json::json;
 
-use crate::output::{check_writable, in_a_line, say, write_trace};
+use crate::output::{check_writable, in_one_line, print_line, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use policy::ActionSource;
@@ -22,21 +22,21 @@ pub use settings::Settings;
 pub struct Run {
     #[command(flatten)]
     settings: Settings,
-    /// Who chooses the actions
+    /// Policy that chooses the actions
     #[arg(long, value_parser = policy::names(), default_value = "random")]
     policy: String,
-    /// The actions for `--policy file`: a trace, or a JSON list of action numbers per line
+    /// Actions for `--policy file`: a trace, or a file with a JSON list of action numbers per line
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
     #[command(flatten)]
     planner_args: PlannerArgs,
-    /// Tell `--policy rhcr` also of the goals that are still to come
+    /// Provide future goals to `--policy rhcr`
     #[arg(long)]
     future_goals: bool,
     /// Draw every step in the terminal
     #[arg(long)]
     render: bool,
-    /// Write what happened to this file, as JSON lines; compressed if it ends in `.zst`
+    /// Write the trace of the episode to this file as JSON lines; compressed if its name ends in `.zst`
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     /// Print the summary as JSON
@@ -58,7 +58,7 @@ impl Run {
         }
         let rules = config.rules();
         let mut episode = Episode::new(Reference::new(rules)?).with_density().with_collisions();
-        let is_recorded = self.trace.is_some() || self.pictures.are_wanted();
+        let is_recorded = self.trace.is_some() || self.pictures.are_requested();
         episode.record(is_recorded);
         episode.start(generated.instance)?;
         let instance = episode.instance()?;
@@ -77,26 +77,26 @@ impl Run {
             episode.step(&actions)?;
         }
         if is_recorded {
-            self.keep(&episode.trace()?)?;
+            self.write(&episode.trace()?)?;
         }
-        self.summarise(&config, &generated.warnings, &episode)
+        self.print_summary(&config, &generated.warnings, &episode)
     }
 
     /// Writes and draws a recorded episode.
-    fn keep(&self, trace: &Trace) -> Result<(), Error> {
+    fn write(&self, trace: &Trace) -> Result<(), Error> {
         if let Some(path) = &self.trace {
             write_trace(path, trace)?;
         }
-        if self.pictures.are_wanted() { self.pictures.draw(trace, &self.title()) } else { Ok(()) }
+        if self.pictures.are_requested() { self.pictures.draw(trace, &self.title()) } else { Ok(()) }
     }
 
-    /// What was played, in a few words.
+    /// Returns a title: the map, the seed and the policy.
     fn title(&self) -> String {
-        let words = [self.settings.what(), Some(self.policy.clone())];
+        let words = [self.settings.title(), Some(self.policy.clone())];
         words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
-    fn summarise(
+    fn print_summary(
         &self,
         config: &GridConfig,
         warnings: &[String],
@@ -111,8 +111,8 @@ impl Run {
                 "metrics": episode.metrics(),
                 "warnings": warnings,
             });
-            return say(&summary.to_string());
+            return print_line(&summary.to_string());
         }
-        say(&format!("{} steps  {}", episode.num_steps(), in_a_line(episode.metrics().named())))
+        print_line(&format!("{} steps  {}", episode.num_steps(), in_one_line(episode.metrics().named())))
     }
 }

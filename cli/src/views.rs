@@ -9,36 +9,37 @@ use pogema_toolbox::six::Definition;
 use pogema_toolbox::views::{Format, Gallery, ImageFormat, ShownView, View};
 use pogema_toolbox::{Node, Results};
 
-use crate::output::say;
+use crate::output::print_line;
 use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Views {
-    /// Folders of results, which are shown together
+    /// Folders of results, shown together
     #[arg(required = true, value_name = "FOLDER")]
     folders: Vec<PathBuf>,
-    /// A YAML file with `results_views`, in place of the one that is with the results
+    /// YAML file with `results_views` [default: the file stored with the results]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Only the view of this name; may be given several times
+    /// Show only the view of this name; may be given several times [default: all views]
     #[arg(long = "view", value_name = "NAME")]
     names: Vec<String>,
-    /// How tables are written, whatever the views say
+    /// Format of tables [default: as each view sets it]
     #[arg(long, value_parser = word::<Format>())]
     format: Option<Format>,
-    /// The format of plots, whatever the views say
+    /// Format of plots [default: as each view sets it]
     #[arg(long, value_parser = word::<ImageFormat>(), value_name = "FORMAT")]
     plots: Option<ImageFormat>,
-    /// Where plots are written; by default `views` in the first folder
+    /// Folder for plots [default: `views` in the first folder]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// The six metrics by this definition, in place of views; beside `--config` or `--view`, the definition for theirs
+    /// Show the six metrics by this definition instead of views; with `--config` or `--view`, set the definition that
+    /// those views use
     #[arg(long, value_parser = word::<Definition>(), value_name = "DEFINITION")]
     six: Option<Definition>,
 }
 
 impl Views {
-    /// Shows all views that can be shown; exit status 2 if one could not.
+    /// Shows the requested views; exit status 2 if one of them cannot be shown.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let gallery = self.gallery()?;
         let results = Results::read(&self.folders)?;
@@ -48,7 +49,7 @@ impl Views {
         let mut status = ExitCode::SUCCESS;
         for (number, (name, view)) in gallery.views.iter().enumerate() {
             match gallery.show(name, view, &results) {
-                Ok(shown) => tell(&shown, if number == 0 { "" } else { "\n" })?,
+                Ok(shown) => print_view(&shown, if number == 0 { "" } else { "\n" })?,
                 Err(error) => {
                     eprintln!("error: {error}");
                     status = ExitCode::from(2);
@@ -58,7 +59,7 @@ impl Views {
         Ok(status)
     }
 
-    /// The views that were asked for.
+    /// Returns the requested views.
     fn gallery(&self) -> Result<Gallery, Error> {
         let gallery = if self.six.is_some() && self.config.is_none() && self.names.is_empty() {
             let star = View::read("six", &Node::parse("type: radar")?)?;
@@ -76,10 +77,10 @@ impl Views {
     }
 }
 
-/// Prints the tables of a view, and says what was written and what left out.
-fn tell(shown: &ShownView, gap: &str) -> Result<(), Error> {
+/// Prints the tables of a view, the files that were written, and the notes.
+fn print_view(shown: &ShownView, gap: &str) -> Result<(), Error> {
     for table in &shown.tables {
-        say(&format!("{gap}{table}"))?;
+        print_line(&format!("{gap}{table}"))?;
     }
     for path in &shown.files {
         eprintln!("wrote {}", path.display());

@@ -1,4 +1,4 @@
-//! What the program says to bad input: one line, exit status 2, nothing on standard output, nothing written.
+//! Tests of bad input: the program prints one line, exits with status 2 and writes nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -10,7 +10,7 @@ const TRACE: &str = r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","confi
 {"cells":[[0,0]],"goals":[[0,1]],"active":[true],"on_goal":[false],"occupied":[[0,0]]}
 "#;
 
-/// The files of the folder that every run begins in.
+/// The files of the folder in which every run starts.
 const FILES: [(&str, &str); 17] = [
     ("unreadable.yaml", "size: 8\nmap: [\n"),
     ("unknown-key.yaml", "colision_system: soft\n"),
@@ -31,8 +31,8 @@ const FILES: [(&str, &str); 17] = [
     ("blank.yaml", ""),
 ];
 
-/// Arguments and the line they are answered with.
-const REFUSED: [(&str, &str); 53] = [
+/// Arguments and the error message that they cause.
+const REJECTED: [(&str, &str); 53] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     ("run --sped 3", "unexpected argument '--sped' found"),
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
@@ -54,8 +54,8 @@ const REFUSED: [(&str, &str); 53] = [
     ("run --density nan", "`--density` is `\"NaN\"`, expected a number from 0 to 1"),
     ("run nan.yaml", "nan.yaml: config: line 1, column 10: `density` is `NaN`, expected a finite number"),
     ("run list.yaml", "list.yaml: expected fields and values such as `size: 8`"),
-    ("run two.json --set sise=4", "`--set` is `sise`, expected a field of a config; the nearest is `size`"),
-    // The file is not at fault.
+    ("run two.json --set sise=4", "`--set` is `sise`, expected a config field; did you mean `size`?"),
+    // The flag is at fault, not the file.
     (
         "run two.json --set map=.?",
         "map: line 1, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
@@ -71,7 +71,7 @@ const REFUSED: [(&str, &str); 53] = [
     ),
     (
         "run --map five-rooms",
-        "five-rooms: there is no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
+        "five-rooms: no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
          known map; did you mean `four-rooms`?",
     ),
     ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
@@ -101,13 +101,16 @@ const REFUSED: [(&str, &str); 53] = [
     ("run two.json --policy file --actions trace.jsonl", "trace.jsonl: actions has length 1, expected 2"),
     ("run two.json --policy file", "`--policy file` needs `--actions FILE`"),
     ("run two.json --actions trace.jsonl", "`--actions` needs `--policy file`"),
-    // Long runs, which would only end long after the tests' patience.
+    // Long runs: if the output were checked only at the end, the test would time out.
     (
         "run --steps 9000000000 --policy stay --trace no/where.jsonl",
         "no/where.jsonl: `no`: No such file or directory (os error 2)",
     ),
-    ("run --steps 9000000000 --policy stay --trace blank.yaml/x", "blank.yaml/x: `blank.yaml` is no folder"),
-    ("conform --cases 9000000000 --json ./", "./: is no file"),
+    (
+        "run --steps 9000000000 --policy stay --trace blank.yaml/x",
+        "blank.yaml/x: `blank.yaml` is not a folder",
+    ),
+    ("conform --cases 9000000000 --json ./", "./: is not a regular file"),
     ("bench --rows nothing", "`--rows` is `nothing`, expected a part of a row's name, such as `64 agents`"),
     ("bench --seconds 0", "`--seconds` is `0`, expected a time above 0"),
     ("bench --rounds 0", "invalid value '0' for '--rounds <N>': 0 is not in 1..18446744073709551615"),
@@ -132,8 +135,11 @@ const REFUSED: [(&str, &str); 53] = [
         "render trace.jsonl --gif a.gif --fps 0.001",
         "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",
     ),
-    ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name one file, `a`"),
-    ("render trace.jsonl --video a.avi", "a.avi: the name of a video ends in `.mp4` or `.webm`"),
+    ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name the same file, `a`"),
+    (
+        "render trace.jsonl --video a.avi",
+        "a.avi: unknown video format, expected a name ending in `.mp4` or `.webm`",
+    ),
     (
         "render trace.jsonl --steps 3..1",
         "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected two steps such as `10..20`",
@@ -141,7 +147,7 @@ const REFUSED: [(&str, &str); 53] = [
     ("render trace.jsonl --steps 0..1", "`--steps` is `1`, expected 0 to 0"),
     (
         "render trace.jsonl --colors red",
-        "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected one such as `#c1433c`",
+        "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected a colour such as `#c1433c`",
     ),
     ("run --gif a.gif --view 5", "`--egocentric` is `5`, expected 0 to 0"),
 ];
@@ -158,7 +164,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap()
 }
 
-/// Every file of a folder and what it holds.
+/// Returns the names and contents of all files in a folder.
 fn contents(folder: &Path) -> BTreeMap<String, String> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
@@ -169,8 +175,8 @@ fn lines(text: &[u8]) -> Vec<&str> {
     std::str::from_utf8(text).unwrap().lines().collect()
 }
 
-/// Passes if the run is refused with one line and leaves no trace of itself.
-fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
+/// Checks that a run fails with one line and leaves all files unchanged.
+fn assert_rejected(folder: &Path, arguments: &[&str], expected: &str) {
     let output = run(folder, arguments);
     assert_eq!(lines(&output.stderr), [format!("error: {expected}")], "{arguments:?}");
     assert_eq!(output.stdout, b"", "{arguments:?}");
@@ -180,15 +186,15 @@ fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
 }
 
 #[test]
-fn bad_input_is_refused_with_one_line() {
+fn bad_input_is_rejected_with_one_line() {
     let folder = folder();
-    for (arguments, expected) in REFUSED {
-        assert_refused(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), expected);
+    for (arguments, expected) in REJECTED {
+        assert_rejected(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), expected);
     }
 }
 
 #[test]
-fn a_trace_of_another_version_is_refused() {
+fn a_trace_of_another_version_is_rejected() {
     for (what, old, new) in
         [("spec", "pogema-1.4.0/1", "pogema-2.0/1"), ("format", "pogema-trace/1", "other/7")]
     {
@@ -204,26 +210,26 @@ fn a_trace_of_another_version_is_refused() {
 }
 
 #[test]
-fn input_cannot_break_the_line() {
+fn control_characters_in_input_are_escaped() {
     let folder = folder();
     let field = "a\nb\u{1b}[2J=1";
-    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a field of a config; the nearest is `map`";
-    assert_refused(folder.path(), &["run", "--set", field], expected);
-    assert_refused(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
+    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a config field; did you mean `map`?";
+    assert_rejected(folder.path(), &["run", "--set", field], expected);
+    assert_rejected(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
 }
 
 #[cfg(unix)]
 #[test]
-fn a_device_is_no_file_to_write() {
+fn a_device_is_rejected_as_output_file() {
     use std::os::unix::fs::FileTypeExt;
 
     let folder = folder();
-    assert_refused(folder.path(), &["run", "--trace", "/dev/null"], "/dev/null: is no file");
+    assert_rejected(folder.path(), &["run", "--trace", "/dev/null"], "/dev/null: is not a regular file");
     assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
 }
 
 #[test]
-fn an_obstacle_under_a_start_is_warned_of() {
+fn an_obstacle_under_a_start_triggers_a_warning() {
     let folder = folder();
     let config = "{map: '.#.', agents_xy: [[0, 1]], targets_xy: [[0, 2]]}";
     std::fs::write(folder.path().join("start.yaml"), config).unwrap();
@@ -237,7 +243,7 @@ fn an_obstacle_under_a_start_is_warned_of() {
 }
 
 #[test]
-fn a_reader_that_leaves_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let mut process = Command::new(env!("CARGO_BIN_EXE_pogema"))
         .args(["run", "--seed", "1", "--steps", "2000", "--render", "--policy", "stay"])
         .stdout(Stdio::piped())

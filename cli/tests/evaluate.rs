@@ -1,4 +1,4 @@
-//! `pogema evaluate`: whole runs, runs that break off, and wrong input.
+//! Tests of `pogema evaluate`: complete runs, interrupted runs, and wrong input.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -49,10 +49,10 @@ fn read(folder: &Path, name: &str) -> Value {
 }
 
 #[test]
-fn results_are_those_of_the_suite_in_its_order() {
+fn results_follow_the_order_of_the_suite() {
     let folder = folder_with(SUITE);
     let (text, error, status) = run(folder.path(), &EVALUATE);
-    assert_eq!((text.as_str(), status), ("18 episodes played; all results are there: out", 0), "{error}");
+    assert_eq!((text.as_str(), status), ("18 episodes played; all results are complete: out", 0), "{error}");
     for algorithm in ["Dice", "LaCAM", "A star"] {
         let rows = read(folder.path(), &format!("{algorithm}.json"));
         let rows = rows.as_array().unwrap();
@@ -74,25 +74,25 @@ fn results_are_those_of_the_suite_in_its_order() {
         assert_eq!(episodes.as_array().unwrap().len(), rows.len());
         assert!(!folder.path().join(format!("out/{algorithm}.jsonl")).exists());
     }
-    // The figures are those of the same episodes played one by one on the reference.
+    // The metrics equal those of the same episodes played one by one on the reference.
     for (index, seed, num_agents) in [(1, "3", "8"), (4, "2", "4")] {
         for (algorithm, policy) in [("Dice", "random"), ("A star", "astar")] {
             let settings = ["--seed", seed, "--num-agents", num_agents, "--size", "16", "--density", "0.2"];
             let rules = ["--on-target", "nothing", "--collision-system", "soft", "--steps", "128"];
             let policy = ["run", "--json", "--obs-radius", "5", "--policy", policy];
             let (text, ..) = run(folder.path(), &[policy.as_slice(), &settings, &rules].concat());
-            let told: Value = serde_json::from_str(&text).unwrap();
+            let summary: Value = serde_json::from_str(&text).unwrap();
             let rows = read(folder.path(), &format!("{algorithm}.json"));
             let numbers = |metrics: &Value| -> BTreeMap<String, Option<f64>> {
                 let all = metrics.as_object().unwrap().iter();
                 all.map(|(name, value)| (name.clone(), value.as_f64())).collect()
             };
-            assert_eq!(numbers(&rows[index]["metrics"]), numbers(&told["metrics"]), "{algorithm} {index}");
+            assert_eq!(numbers(&rows[index]["metrics"]), numbers(&summary["metrics"]), "{algorithm} {index}");
         }
     }
 }
 
-/// All files of the results, but for those that tell which run played what, and how long it took.
+/// Returns all files of the results, except those that record which run played what, and its duration.
 fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder.join("out")).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -102,7 +102,7 @@ fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files.iter().map(|path| (name(path), fs::read(path).unwrap())).collect()
 }
 
-/// How much was kept of episodes so far.
+/// Returns the size of the episode lines written so far.
 fn num_bytes(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder.join("out")).into_iter().flatten().flatten();
     let lines = entries.filter(|entry| entry.file_name().to_string_lossy().ends_with(".jsonl"));
@@ -110,13 +110,13 @@ fn num_bytes(folder: &Path) -> u64 {
 }
 
 #[test]
-fn a_run_that_is_killed_anywhere_and_resumed_gives_the_same_bytes() {
-    // So many that a fast machine is not done with them before it is killed.
+fn a_killed_and_resumed_run_gives_the_same_bytes() {
+    // Enough episodes that even a fast machine is killed before it has played them all.
     let seeds: Vec<u32> = (0..200).collect();
     let suite = SUITE.replace("[3, 1, 2]", &format!("{seeds:?}"));
     let (whole, broken) = (folder_with(&suite), folder_with(&suite));
     assert_eq!(run(whole.path(), &EVALUATE).2, 0);
-    let wanted = bytes(whole.path());
+    let expected_bytes = bytes(whole.path());
     let is_whole = || broken.path().join("out/A star.json").exists();
     let mut num_killed = 0;
     for attempt in 0..100 {
@@ -125,7 +125,8 @@ fn a_run_that_is_killed_anywhere_and_resumed_gives_the_same_bytes() {
         child.args(command).current_dir(broken.path()).stdout(Stdio::null()).stderr(Stdio::null());
         let before = num_bytes(broken.path());
         let mut child = child.spawn().unwrap();
-        // Some at once, the others as soon as something was kept or a little later, however fast the machine is.
+        // Kill the early runs after a fixed delay, the others only after they have written something: this meets all
+        // stages of a run on machines of any speed.
         let is_early = attempt < 20;
         while !is_early && num_bytes(broken.path()) == before && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_micros(200));
@@ -141,19 +142,23 @@ fn a_run_that_is_killed_anywhere_and_resumed_gives_the_same_bytes() {
             break;
         }
     }
-    assert!(num_killed > 2, "a run that is killed {num_killed} times shows little");
+    assert!(num_killed > 2, "the run was killed only {num_killed} times");
     let (text, error, status) = run(broken.path(), &RESUME);
     assert_eq!(status, 0, "{text}{error}");
-    assert!(bytes(broken.path()) == wanted, "some files are others, or more or less than {}", wanted.len());
+    assert!(
+        bytes(broken.path()) == expected_bytes,
+        "the files differ from those of the uninterrupted run, expected {} files",
+        expected_bytes.len()
+    );
 }
 
-/// A limit on the size of files stops a write half way, as a full disk does.
+/// A limit on the size of files stops a write in the middle, like a full disk.
 #[cfg(unix)]
 #[test]
-fn a_disk_that_is_full_loses_no_episode() {
+fn a_full_disk_loses_no_episode() {
     let (whole, full) = (folder_with(SUITE), folder_with(SUITE));
     assert_eq!(run(whole.path(), &EVALUATE).2, 0);
-    // The file of lines reaches this size, a kilobyte, after some of its episodes.
+    // The file of episode lines reaches this limit, a kilobyte, after some episodes.
     let mut limited = Command::new("bash");
     limited.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"", PROGRAM]).args(EVALUATE);
     let output = limited.current_dir(full.path()).output().unwrap();
@@ -168,19 +173,19 @@ fn a_disk_that_is_full_loses_no_episode() {
 }
 
 #[test]
-fn what_broke_off_within_a_line_is_played_again_and_other_damage_is_told() {
+fn a_torn_last_line_is_played_again_and_other_damage_is_reported() {
     let folder = folder_with(SUITE);
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);
-    let wanted = bytes(folder.path());
+    let expected_bytes = bytes(folder.path());
     let path = |name: &str| folder.path().join("out").join(name);
     fs::remove_file(path("Dice.json")).unwrap();
     let line = r#"{"index":2,"metrics":{"ISR":0.5},"runtime":0.25}"#;
     fs::write(path("Dice.jsonl"), format!("{line}\n{}", &line[..20])).unwrap();
     let (text, ..) = run(folder.path(), &RESUME);
-    assert!(text.starts_with("5 episodes played; all results are there"), "{text}");
+    assert!(text.starts_with("5 episodes played; all results are complete"), "{text}");
     let rows = read(folder.path(), "Dice.json");
-    assert_eq!(rows[2]["metrics"], serde_json::json!({"ISR": 0.5}), "what is kept is not played again");
-    for (text, told) in [
+    assert_eq!(rows[2]["metrics"], serde_json::json!({"ISR": 0.5}), "a stored episode is not played again");
+    for (text, expected) in [
         (format!("{line}\n{line}\n"), "Dice.jsonl: line 2: duplicate episode `2`, first in line 1"),
         (line.replace('2', "9") + "\n", "Dice.jsonl: line 1: episode `9`, expected one below 6"),
         (format!("{line}\nnonsense\n"), "Dice.jsonl: line 2: expected"),
@@ -189,15 +194,15 @@ fn what_broke_off_within_a_line_is_played_again_and_other_damage_is_told() {
         fs::remove_file(path("Dice.json")).ok();
         fs::write(path("Dice.jsonl"), &text).unwrap();
         let (_, error, status) = run(folder.path(), &RESUME);
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
         assert_eq!((status, fs::read_to_string(path("Dice.jsonl")).unwrap()), (2, text));
     }
     assert_eq!(run(folder.path(), &[&EVALUATE[..], &["--force"]].concat()).2, 0);
-    assert_eq!(bytes(folder.path()), wanted);
+    assert_eq!(bytes(folder.path()), expected_bytes);
 }
 
 #[test]
-fn a_folder_of_something_else_is_left_as_it_is() {
+fn a_folder_with_foreign_files_is_left_unchanged() {
     let folder = folder_with(SUITE);
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
@@ -212,25 +217,25 @@ fn a_folder_of_something_else_is_left_as_it_is() {
     let before = bytes(folder.path());
     let (_, error, _) = run(folder.path(), &EVALUATE);
     assert!(error.contains("`--resume` continues them, `--force` deletes them"), "{error}");
-    for (from, to, told) in [
+    for (from, to, expected) in [
         ("density: 0.2", "density: 0.3", "results of other environments"),
         ("nodes: 500", "nodes: 400", "results of `LaCAM` with other parameters"),
     ] {
         fs::write(folder.path().join("suite.yaml"), SUITE.replace(from, to)).unwrap();
         let (_, error, status) = run(folder.path(), &RESUME);
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
         assert_eq!((status, bytes(folder.path())), (2, before.clone()));
     }
-    // Further algorithms may join; those that leave keep their results.
-    let changed = SUITE.replace("  A star: {name: \"A*\"}\n", "  Nobody: {name: stay}\n");
+    // Algorithms may be added; the results of removed ones stay.
+    let changed = SUITE.replace("  A star: {name: \"A*\"}\n", "  Idle: {name: stay}\n");
     fs::write(folder.path().join("suite.yaml"), changed).unwrap();
     let (text, error, _) = run(folder.path(), &RESUME);
     assert!(text.starts_with("6 episodes played"), "{text}{error}");
-    assert!(out.join("A star.json").exists() && out.join("Nobody.json").exists());
+    assert!(out.join("A star.json").exists() && out.join("Idle.json").exists());
 }
 
 #[test]
-fn an_episode_that_cannot_be_played_is_told_and_the_rest_goes_on() {
+fn a_failed_episode_is_reported_and_the_run_continues() {
     let suite = SUITE.replace("num_agents: {grid_search: [4, 8]}", "num_agents: {grid_search: [4, 200]}");
     let folder = folder_with(&suite.replace("size: 16", "size: 14").replace("density: 0.2", "density: 0"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
@@ -253,16 +258,16 @@ fn an_episode_that_cannot_be_played_is_told_and_the_rest_goes_on() {
     }
     assert_eq!(lines.lines().count(), 3);
     assert_eq!(fs::read_to_string(folder.path().join("out/Dice.jsonl")).unwrap().lines().count(), 3);
-    // There is nothing to show on a page, and why is told all the same.
+    // The page fails as well, but the error still names the cause.
     let (_, error, status) = run(folder.path(), &[&RESUME[..], &["--html"]].concat());
     assert!(error.contains("9 episodes could not be played"), "{error}");
     assert_eq!(status, 2);
 }
 
 #[test]
-fn a_suite_that_is_wrong_is_told_with_its_line() {
+fn errors_in_a_suite_are_reported_with_line_numbers() {
     let folder = folder_with("");
-    for (from, to, told) in [
+    for (from, to, expected) in [
         (
             "  size: 16",
             "  sise: 16",
@@ -292,14 +297,14 @@ fn a_suite_that_is_wrong_is_told_with_its_line() {
         assert!(SUITE.contains(from), "{from}");
         fs::write(folder.path().join("suite.yaml"), SUITE.replacen(from, to, 1)).unwrap();
         let (_, error, status) = run(folder.path(), &EVALUATE);
-        assert!(error.contains(told), "{to}: {error}");
+        assert!(error.contains(expected), "{to}: {error}");
         assert_eq!((error.lines().count(), status), (1, 2), "{error}");
         assert!(!folder.path().join("out").exists(), "{to}");
     }
 }
 
 #[test]
-fn algorithms_of_another_file_replace_those_of_the_suite() {
+fn algorithms_from_another_file_replace_those_of_the_suite() {
     let folder = folder_with(SUITE);
     let path = |name: &str| folder.path().join(name);
     let quick =
@@ -308,11 +313,11 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
     let replaced =
         |more: &[&str]| run(folder.path(), &[&EVALUATE[..], &["--algorithms", "quick.yaml"], more].concat());
     let (text, error, _) = replaced(&[]);
-    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert!(text.starts_with("12 episodes played; all results are complete"), "{text}{error}");
     assert_eq!(fs::read_to_string(path("out/suite.yaml")).unwrap(), SUITE);
     assert_eq!(fs::read_to_string(path("out/algorithms.yaml")).unwrap(), quick);
     assert!(!path("out/LaCAM.json").exists());
-    // What a planner proves is told of how it played alone.
+    // The lower bound is in the file of episodes and not among the metrics.
     let (rows, episodes) = (read(folder.path(), "Quick.json"), read(folder.path(), "Quick.episodes.json"));
     for (row, episode) in rows.as_array().unwrap().iter().zip(episodes.as_array().unwrap()) {
         assert!(row["metrics"].get("lower_bound").is_none());
@@ -321,7 +326,7 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
     assert!(read(folder.path(), "Dice.episodes.json")[0].get("lower_bound").is_none());
     let (text, notes, status) = run(folder.path(), &["replay", "out", "Quick", "1"]);
     assert_eq!((notes.as_str(), status), ("", 0), "{text}");
-    for (from, to, told) in [
+    for (from, to, expected) in [
         ("nodes: 100", "nodes: 200", "results of `Quick` with other parameters"),
         ("nodes", "nods", "quick.yaml: line 2: unknown parameter `Quick.nods`; did you mean `nodes`?"),
         ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
@@ -335,26 +340,29 @@ fn algorithms_of_another_file_replace_those_of_the_suite() {
     ] {
         fs::write(path("quick.yaml"), quick.replacen(from, to, 1)).unwrap();
         let (_, error, status) = replaced(&["--resume"]);
-        assert!(error.contains(told), "{to}: {error}");
+        assert!(error.contains(expected), "{to}: {error}");
         assert_eq!((error.lines().count(), status), (1, 2), "{error}");
     }
-    // The suite's own join the results that are there.
+    // The suite's own algorithms are added to the existing results.
     let (text, error, _) = run(folder.path(), &RESUME);
-    assert!(text.starts_with("12 episodes played; all results are there"), "{text}{error}");
+    assert!(text.starts_with("12 episodes played; all results are complete"), "{text}{error}");
     assert!(path("out/Quick.json").exists() && !path("out/algorithms.yaml").exists());
 }
 
 #[test]
-fn a_single_attempt_is_for_planners_of_one_goal() {
+fn only_one_shot_planners_accept_a_single_attempt() {
     let folder = folder_with(&SUITE.replace("{name: random}", "{name: random, single_attempt: true}"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
-    assert!(error.contains("`random` does not use a single attempt; only one-shot planners do"), "{error}");
+    assert!(
+        error.contains("`random` does not support a single attempt; only one-shot planners do"),
+        "{error}"
+    );
     assert_eq!(status, 2);
     let cbs = "{name: cbs, nodes: 1, single_attempt: true}";
     let folder = folder_with(&SUITE.replace("{name: random}", cbs).replace("[3, 1, 2]", "[3]"));
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);
     let (rows, episodes) = (read(folder.path(), "Dice.json"), read(folder.path(), "Dice.episodes.json"));
-    assert_eq!(rows[1]["metrics"]["ISR"], 0.0, "agents stay where there is no plan");
+    assert_eq!(rows[1]["metrics"]["ISR"], 0.0, "without a plan, agents stay where they are");
     assert!(episodes[1]["lower_bound"].as_u64().unwrap() > 0);
 }
 

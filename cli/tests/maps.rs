@@ -1,4 +1,4 @@
-//! `pogema maps`, and maps in `pogema run`.
+//! Tests of `pogema maps`, and of maps in `pogema run`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,7 +11,7 @@ fn pogema(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> String {
+fn stdout_of(folder: &Path, arguments: &[&str]) -> String {
     let output = pogema(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{arguments:?}: {errors}");
@@ -20,7 +20,7 @@ fn said(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[track_caller]
-fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+fn assert_rejected(folder: &Path, arguments: &[&str], parts: &[&str]) {
     let output = pogema(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {errors}");
@@ -45,108 +45,114 @@ const CITY: &str = "type octile\nheight 4\nwidth 4\nmap\n....\n.@@.\n.@@.\nT..S\
 fn a_generated_set_is_read_back() {
     let folder = folder(&[]);
     let at = folder.path();
-    let set = said(at, &["maps", "generate", "mazes", "--seeds", "5..8", "--width-min", "9"]);
+    let set = stdout_of(at, &["maps", "generate", "mazes", "--seeds", "5..8", "--width-min", "9"]);
     assert_eq!(set.matches("\"mazes-seed-").count(), 3);
-    said(at, &["maps", "generate", "mazes", "--seeds", "5..8", "--width-min", "9", "--out", "mazes.yaml"]);
+    stdout_of(
+        at,
+        &["maps", "generate", "mazes", "--seeds", "5..8", "--width-min", "9", "--out", "mazes.yaml"],
+    );
     assert_eq!(std::fs::read_to_string(at.join("mazes.yaml")).unwrap(), set);
-    assert_eq!(said(at, &["maps", "import", "mazes.yaml"]), set);
-    assert!(said(at, &["maps", "list", "mazes-.*", "--maps", "mazes.yaml"]).contains("mazes-seed-6"));
-    assert!(said(at, &["maps", "generate", "shelves", "--bays", "toolbox"]).contains('$'));
-    assert_eq!(said(at, &["maps", "generate", "warehouse"]).lines().count(), 34);
+    assert_eq!(stdout_of(at, &["maps", "import", "mazes.yaml"]), set);
+    assert!(stdout_of(at, &["maps", "list", "mazes-.*", "--maps", "mazes.yaml"]).contains("mazes-seed-6"));
+    assert!(stdout_of(at, &["maps", "generate", "shelves", "--bays", "toolbox"]).contains('$'));
+    assert_eq!(stdout_of(at, &["maps", "generate", "warehouse"]).lines().count(), 34);
     let random = ["maps", "generate", "random", "--seeds", "0..2", "--name", "mine", "--width-max", "17"];
-    assert!(said(at, &random).starts_with("\"mine-seed-0\": |-\n"));
+    assert!(stdout_of(at, &random).starts_with("\"mine-seed-0\": |-\n"));
 }
 
 #[test]
-fn maps_go_from_format_to_format() {
+fn maps_convert_between_formats() {
     let folder = folder(&[("city.map", CITY), ("pair.txt", "a..A\nB..b\n")]);
     let at = folder.path();
-    said(at, &["maps", "export", "city.map", "--to", "text", "--out", "city.txt"]);
+    stdout_of(at, &["maps", "export", "city.map", "--to", "text", "--out", "city.txt"]);
     assert_eq!(std::fs::read_to_string(at.join("city.txt")).unwrap(), "....\n.##.\n.##.\n#...\n");
     assert_eq!(
-        said(at, &["maps", "export", "city.txt", "--to", "map"]),
+        stdout_of(at, &["maps", "export", "city.txt", "--to", "map"]),
         CITY.replace('T', "@").replace('S', ".")
     );
-    let stripped = said(at, &["maps", "import", "city.map", "--strip-border"]);
+    let stripped = stdout_of(at, &["maps", "import", "city.map", "--strip-border"]);
     assert_eq!(stripped, "\"city\": |-\n  ##\n  ##\n");
-    said(at, &["maps", "export", "city.map", "--to", "zip", "--out", "cities.zip"]);
-    assert_eq!(said(at, &["maps", "import", "cities.zip"]), said(at, &["maps", "import", "city.map"]));
-    said(at, &["maps", "export", "pair.txt", "--to", "scen", "--out", "pair.scen"]);
-    said(at, &["maps", "export", "pair.txt", "--to", "map", "--out", "pair.map"]);
-    let config = said(at, &["maps", "export", "pair.map", "--scenario", "pair.scen", "--to", "config"]);
-    assert_eq!(config, said(at, &["maps", "export", "pair.txt", "--to", "config"]));
+    stdout_of(at, &["maps", "export", "city.map", "--to", "zip", "--out", "cities.zip"]);
+    assert_eq!(
+        stdout_of(at, &["maps", "import", "cities.zip"]),
+        stdout_of(at, &["maps", "import", "city.map"])
+    );
+    stdout_of(at, &["maps", "export", "pair.txt", "--to", "scen", "--out", "pair.scen"]);
+    stdout_of(at, &["maps", "export", "pair.txt", "--to", "map", "--out", "pair.map"]);
+    let config = stdout_of(at, &["maps", "export", "pair.map", "--scenario", "pair.scen", "--to", "config"]);
+    assert_eq!(config, stdout_of(at, &["maps", "export", "pair.txt", "--to", "config"]));
     assert!(config.contains("agents_xy: [[0, 0], [1, 3]]\ntargets_xy: [[0, 3], [1, 0]]\n"), "{config}");
     let back = ["maps", "export", "pair.map", "--scenario", "pair.scen", "--to", "text"];
-    assert_eq!(said(at, &back), "a..A\nB..b\n");
+    assert_eq!(stdout_of(at, &back), "a..A\nB..b\n");
     let one = ["maps", "export", "pair.map", "--scenario", "pair.scen", "--to", "text", "--num-agents", "1"];
-    assert_eq!(said(at, &one), "a..A\n....\n");
-    let tiles = said(at, &["maps", "tiles", "city.map", "--side", "2"]);
+    assert_eq!(stdout_of(at, &one), "a..A\n....\n");
+    let tiles = stdout_of(at, &["maps", "tiles", "city.map", "--side", "2"]);
     assert_eq!(tiles.matches("\"city_0").count(), 4);
 }
 
 #[test]
-fn maps_are_shown_and_judged() {
+fn maps_are_shown_and_analysed() {
     let folder = folder(&[("pocket.txt", "a.B#.\nA.b#.\n####.\n.....\n"), ("row.txt", "aBbA\n")]);
     let at = folder.path();
-    let shown = said(at, &["maps", "show", "row.txt"]);
+    let shown = stdout_of(at, &["maps", "show", "row.txt"]);
     assert_eq!(shown, "row: 1 rows, 4 columns, 4 free cells, density 0.000, 1 component\naBbA\n");
-    let small = said(at, &["maps", "show", "four-rooms", "--width", "7"]);
+    let small = stdout_of(at, &["maps", "show", "four-rooms", "--width", "7"]);
     assert_eq!(small.lines().skip(1).map(|line| line.chars().count()).collect::<Vec<_>>(), [7; 4]);
-    let turn = said(at, &["maps", "show", "puzzle-square-turn"]);
+    let turn = stdout_of(at, &["maps", "show", "puzzle-square-turn"]);
     assert!(
         turn.ends_with("\n#####  #####\n#ab##  #DA##\n#dc##  #CB##\n#####  #####\n#####  #####\n"),
         "{turn}"
     );
-    let judged = said(at, &["maps", "stats", "row.txt"]);
-    assert!(judged.contains("unsolvable: agents 0, 1 share a corridor"), "{judged}");
-    let judged = said(at, &["maps", "stats", "row.txt", "--on-target", "finish", "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&judged).unwrap();
-    assert_eq!(told[0]["scenario"]["solvable"], true);
-    let placed = said(at, &["maps", "stats", "pocket.txt", "--num-agents", "2", "--seed", "3"]);
-    assert!(placed.contains("2 agents, no sum of costs below"), "{placed}");
-    assert_eq!(said(at, &["maps", "stats", "puzzle-.*"]).matches("; unsolvable:").count(), 0);
+    let stats = stdout_of(at, &["maps", "stats", "row.txt"]);
+    assert!(stats.contains("unsolvable: agents 0, 1 share a corridor"), "{stats}");
+    let stats = stdout_of(at, &["maps", "stats", "row.txt", "--on-target", "finish", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&stats).unwrap();
+    assert_eq!(summary[0]["scenario"]["solvable"], true);
+    let placed = stdout_of(at, &["maps", "stats", "pocket.txt", "--num-agents", "2", "--seed", "3"]);
+    assert!(placed.contains("2 agents, sum of costs at least"), "{placed}");
+    assert_eq!(stdout_of(at, &["maps", "stats", "puzzle-.*"]).matches("; unsolvable:").count(), 0);
 }
 
 #[test]
-fn a_seed_chooses_among_maps() {
+fn the_seed_chooses_among_matching_maps() {
     let folder = folder(&[("set.yaml", "one: \"a.A\"\ntwo: \"a..A\"\nthree: \"a...A\"\n")]);
     let at = folder.path();
     let cells = |seed: &str| {
         let run = ["run", "--maps", "set.yaml", "--map", "one|t.*", "--seed", seed, "--json"];
-        let told: serde_json::Value = serde_json::from_str(&said(at, &run)).unwrap();
-        told["config"]["map"][0].as_array().unwrap().len()
+        let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
+        summary["config"]["map"][0].as_array().unwrap().len()
     };
     let lengths: BTreeSet<usize> = (0..16).map(|seed| cells(&seed.to_string())).collect();
     assert_eq!(lengths, [3, 4, 5].into());
     std::fs::write(at.join("config.yaml"), "map_name: tw.\nseed: 1\n").unwrap();
     let run = ["run", "config.yaml", "--maps", "set.yaml", "--policy", "astar", "--json"];
-    let told: serde_json::Value = serde_json::from_str(&said(at, &run)).unwrap();
-    assert_eq!((&told["steps"], &told["metrics"]["CSR"]), (&3.into(), &1.0.into()));
+    let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
+    assert_eq!((&summary["steps"], &summary["metrics"]["CSR"]), (&3.into(), &1.0.into()));
     let puzzle =
         ["run", "--map", "puzzle-full-ring", "--num-agents", "3", "--set", "on_target=nothing", "--json"];
-    let told: serde_json::Value = serde_json::from_str(&said(at, &puzzle)).unwrap();
-    assert_eq!(told["config"]["num_agents"], 3);
+    let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &puzzle)).unwrap();
+    assert_eq!(summary["config"]["num_agents"], 3);
 }
 
 #[test]
-fn a_scenario_is_cut_to_the_agents_there_are() {
+fn a_scenario_is_truncated_to_the_number_of_agents() {
     let yaml = "agents_xy: [[0, 0], [0, 3]]\ntargets_xy: [[[0, 1], [0, 2]], [[0, 2], [0, 3]]]\n";
     let folder = folder(&[("row.txt", "....\n"), ("scenario.yaml", yaml)]);
     let at = folder.path();
     let run = ["run", "--map", "row.txt", "--scenario", "scenario.yaml", "--on-target", "restart", "--json"];
-    let told: serde_json::Value = serde_json::from_str(&said(at, &run)).unwrap();
-    assert_eq!(told["config"]["num_agents"], 2);
+    let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
+    assert_eq!(summary["config"]["num_agents"], 2);
     let one: Vec<&str> = run.into_iter().chain(["--num-agents", "1"]).collect();
-    let told: serde_json::Value = serde_json::from_str(&said(at, &one)).unwrap();
-    assert_eq!(told["config"]["targets_xy"], serde_json::json!([[[0, 1], [0, 2]]]));
+    let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &one)).unwrap();
+    assert_eq!(summary["config"]["targets_xy"], serde_json::json!([[[0, 1], [0, 2]]]));
     let config = ["maps", "export", "row.txt", "--scenario", "scenario.yaml", "--to", "config"];
-    assert!(said(at, &config).contains("targets_xy: [[[0, 1], [0, 2]], [[0, 2], [0, 3]]]"));
+    assert!(stdout_of(at, &config).contains("targets_xy: [[[0, 1], [0, 2]], [[0, 2], [0, 3]]]"));
     let lost = ["maps", "export", "row.txt", "--scenario", "scenario.yaml", "--to", "scen"];
-    refused(at, &lost, &["sequences"]);
+    assert_rejected(at, &lost, &["sequences"]);
 }
 
 #[test]
-fn wrong_input_is_told_with_file_and_place() {
+fn wrong_input_is_reported_with_file_and_position() {
     let files = [
         ("bad.map", "type octile\nheight 1\nwidth 2\nmap\n.x\n"),
         ("bad.yaml", "one: |-\n  ..\n  .?\n"),
@@ -163,32 +169,32 @@ fn wrong_input_is_told_with_file_and_place() {
     let at = folder.path();
     std::fs::write(at.join("latin.txt"), b"..\xe9.").unwrap();
     std::fs::create_dir(at.join("empty")).unwrap();
-    let refuse = |arguments: &[&str], parts: &[&str]| refused(at, arguments, parts);
-    refuse(&["maps", "show", "nowhere.map"], &["nowhere.map"]);
-    refuse(&["maps", "show", "empty"], &["empty", "no map"]);
-    refuse(&["maps", "show", "latin.txt"], &["latin.txt", "byte 3"]);
-    refuse(&["maps", "show", "four-room"], &["`four-rooms`"]);
-    refuse(&["maps", "import", "bad.map"], &["bad.map", "line 5, column 2", "`x`"]);
-    refuse(&["maps", "import", "bad.yaml"], &["bad.yaml", "line 3, column 4"]);
-    refuse(&["maps", "import", "two.yaml", "copy.yaml"], &["copy.yaml", "second map named `one`"]);
-    refuse(&["maps", "export", "two.yaml", "--to", "text"], &["2 maps"]);
-    refuse(&["maps", "export", "row.txt", "--to", "text", "--scenario", "far.scen"], &["far.scen", "9 rows"]);
+    let reject = |arguments: &[&str], parts: &[&str]| assert_rejected(at, arguments, parts);
+    reject(&["maps", "show", "nowhere.map"], &["nowhere.map"]);
+    reject(&["maps", "show", "empty"], &["empty", "no map"]);
+    reject(&["maps", "show", "latin.txt"], &["latin.txt", "byte 3"]);
+    reject(&["maps", "show", "four-room"], &["`four-rooms`"]);
+    reject(&["maps", "import", "bad.map"], &["bad.map", "line 5, column 2", "`x`"]);
+    reject(&["maps", "import", "bad.yaml"], &["bad.yaml", "line 3, column 4"]);
+    reject(&["maps", "import", "two.yaml", "copy.yaml"], &["copy.yaml", "second map named `one`"]);
+    reject(&["maps", "export", "two.yaml", "--to", "text"], &["2 maps"]);
+    reject(&["maps", "export", "row.txt", "--to", "text", "--scenario", "far.scen"], &["far.scen", "9 rows"]);
     for to in ["text", "scen", "config", "set"] {
         let export = ["maps", "export", "row.txt", "--to", to, "--scenario", "far.yaml"];
-        refuse(&export, &["far.yaml", "agents_xy", "(5, 5)"]);
+        reject(&export, &["far.yaml", "agents_xy", "(5, 5)"]);
     }
-    refuse(&["maps", "stats", "row.txt", "--scenario", "loop.yaml"], &["loop.yaml", "targets_xy", "(7, 0)"]);
-    refuse(&["maps", "export", "pools.yaml", "--to", "text"], &["possible_agents_xy", "(9, 9)"]);
-    refuse(&["run", "five.yaml"], &["map_name", "`5`"]);
-    refuse(&["maps", "tiles", "row.txt", "--side", "3"], &["`3`", "1 rows and 4 columns"]);
-    refuse(&["maps", "stats", "row.txt", "--num-agents", "9", "--seed", "1"], &["num_agents"]);
-    refuse(&["maps", "stats", "two.yaml", "--scenario", "far.scen"], &["2 maps"]);
-    refuse(&["maps", "generate", "validation-maze"], &["`validation-mazes`"]);
-    refuse(&["maps", "generate", "mazes", "--seeds", "3..3"], &["0..128"]);
-    refuse(&["maps", "generate", "mazes", "--width-min", "99"], &["width_min", "`99`"]);
-    refuse(&["maps", "generate", "mazes", "--out", "nowhere/mazes.yaml"], &["nowhere"]);
-    refuse(&["maps", "list", "("], &["regular expression"]);
-    refuse(&["run", "--map", "two.yaml"], &["two.yaml", "2 maps"]);
-    refuse(&["run", "--scenario", "far.scen"], &["--scenario", "map"]);
+    reject(&["maps", "stats", "row.txt", "--scenario", "loop.yaml"], &["loop.yaml", "targets_xy", "(7, 0)"]);
+    reject(&["maps", "export", "pools.yaml", "--to", "text"], &["possible_agents_xy", "(9, 9)"]);
+    reject(&["run", "five.yaml"], &["map_name", "`5`"]);
+    reject(&["maps", "tiles", "row.txt", "--side", "3"], &["`3`", "1 rows and 4 columns"]);
+    reject(&["maps", "stats", "row.txt", "--num-agents", "9", "--seed", "1"], &["num_agents"]);
+    reject(&["maps", "stats", "two.yaml", "--scenario", "far.scen"], &["2 maps"]);
+    reject(&["maps", "generate", "validation-maze"], &["`validation-mazes`"]);
+    reject(&["maps", "generate", "mazes", "--seeds", "3..3"], &["0..128"]);
+    reject(&["maps", "generate", "mazes", "--width-min", "99"], &["width_min", "`99`"]);
+    reject(&["maps", "generate", "mazes", "--out", "nowhere/mazes.yaml"], &["nowhere"]);
+    reject(&["maps", "list", "("], &["regular expression"]);
+    reject(&["run", "--map", "two.yaml"], &["two.yaml", "2 maps"]);
+    reject(&["run", "--scenario", "far.scen"], &["--scenario", "map"]);
     assert!(!at.join("nowhere").exists());
 }

@@ -1,4 +1,4 @@
-//! `pogema plan`, and planners as policies of `pogema run`.
+//! Tests of `pogema plan`, and of planners as policies of `pogema run`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -17,29 +17,29 @@ fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
 const TASK: [&str; 6] = ["--map", "four-rooms", "--num-agents", "4", "--seed", "1"];
 
 #[test]
-fn every_planner_writes_plans_that_are_valid() {
+fn every_planner_writes_valid_plans() {
     let folder = tempfile::tempdir().unwrap();
     for planner in ["lacam", "pibt", "pbs", "ecbs", "cbs"] {
         let plan = ["plan", "--planner", planner, "--nodes", "300", "--json", "--out", "plan.txt"];
         let files = ["--result", "result.txt", "--trace", "plan.jsonl"];
         let (text, error, status) = run(folder.path(), &[&plan, files.as_slice(), &TASK].concat());
         assert_eq!((error.as_str(), status), ("", 0), "{planner}");
-        let told: Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(told["outcome"], "solved", "{planner}");
-        assert!(told["sum_of_costs"].as_u64() >= told["lower_bound"].as_u64(), "{told}");
+        let summary: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(summary["outcome"], "solved", "{planner}");
+        assert!(summary["sum_of_costs"].as_u64() >= summary["lower_bound"].as_u64(), "{summary}");
         for arguments in [
             [&["validate", "plan.txt"], TASK.as_slice()].concat(),
             vec!["validate", "result.txt", "--map", "four-rooms"],
         ] {
             let (text, error, status) = run(folder.path(), &arguments);
-            let costs = format!("sum of costs {}, makespan {}", told["sum_of_costs"], told["makespan"]);
+            let costs = format!("sum of costs {}, makespan {}", summary["sum_of_costs"], summary["makespan"]);
             assert!(
                 text.starts_with("valid: 4 agents") && text.ends_with(&costs),
                 "{planner}: {text}{error}"
             );
             assert_eq!(status, 0);
         }
-        // The trace is an episode of every engine.
+        // The trace conforms to the rules.
         let (_, error, status) = run(folder.path(), &["conform", "--trace", "plan.jsonl"]);
         assert_eq!((error.as_str(), status), ("", 0), "{planner}");
     }
@@ -58,9 +58,9 @@ fn without_a_plan_the_status_is_one_and_nothing_is_written() {
     assert!(!folder.path().join("plan.txt").exists());
     let late = ["plan", "--nodes", "0", "--json"];
     let (text, _, status) = run(folder.path(), &[&late, TASK.as_slice()].concat());
-    let told: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(told["outcome"], "timed_out");
-    assert!(told["lower_bound"].as_u64() > Some(0), "{told}");
+    let summary: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["outcome"], "timed_out");
+    assert!(summary["lower_bound"].as_u64() > Some(0), "{summary}");
     assert_eq!(status, 1);
 }
 
@@ -72,28 +72,28 @@ fn planners_play_whole_episodes() {
         let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
         let (text, error, status) = run(folder.path(), &arguments);
         assert_eq!((error.as_str(), status), ("", 0), "{policy}");
-        let told: Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(told["metrics"]["CSR"], 1.0, "{policy}: {told}");
-        assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
+        let summary: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(summary["metrics"]["CSR"], 1.0, "{policy}: {summary}");
+        assert_eq!(summary["metrics"]["a_collisions"], 0.0, "{policy}: {summary}");
     }
     for policy in ["rhcr", "pibt", "guided-pibt"] {
         let arguments = ["run", "--policy", policy, "--nodes", "300", "--json", "--on-target", "restart"];
         let arguments = [&arguments, TASK.as_slice(), &["--collision-system", "soft"]].concat();
         let (text, error, status) = run(folder.path(), &arguments);
         assert_eq!((error.as_str(), status), ("", 0), "{policy}");
-        let told: Value = serde_json::from_str(&text).unwrap();
-        assert!(told["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{policy}: {told}");
-        assert_eq!(told["metrics"]["a_collisions"], 0.0, "{policy}: {told}");
+        let summary: Value = serde_json::from_str(&text).unwrap();
+        assert!(summary["metrics"]["avg_throughput"].as_f64().unwrap() > 0.2, "{policy}: {summary}");
+        assert_eq!(summary["metrics"]["a_collisions"], 0.0, "{policy}: {summary}");
     }
-    let foreseeing =
+    let with_future_goals =
         ["run", "--policy", "rhcr", "--nodes", "300", "--on-target", "restart", "--future-goals"];
-    let foreseeing = [&foreseeing, TASK.as_slice(), &["--collision-system", "soft"]].concat();
-    let (_, error, status) = run(folder.path(), &foreseeing);
+    let with_future_goals = [&with_future_goals, TASK.as_slice(), &["--collision-system", "soft"]].concat();
+    let (_, error, status) = run(folder.path(), &with_future_goals);
     assert_eq!((error.as_str(), status), ("", 0));
 }
 
 #[test]
-fn wrong_calls_are_one_line() {
+fn invalid_arguments_are_reported_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, part) in [
         (vec!["plan", "--planner", "none"], "invalid value 'none' for '--planner <NAME>'"),
@@ -104,7 +104,7 @@ fn wrong_calls_are_one_line() {
         (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
         (
             vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],
-            "expected `rhcr`, to make use of goals still to come",
+            "expected a planner that uses future goals, such as `rhcr`",
         ),
     ] {
         let (_, error, status) = run(folder.path(), &arguments);

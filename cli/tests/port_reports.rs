@@ -1,4 +1,4 @@
-//! What `pogema conform --port` writes: JUnit XML, a page, a badge, and what it bears as known.
+//! Tests of the reports of `pogema conform --port`: JUnit XML, a page, a badge, and known deviations.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,16 +7,16 @@ use std::process::{Command, Output};
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-/// An engine of our own as a port.
+/// A built-in engine as a port.
 const CONFORMING: &str = concat!("'", env!("CARGO_BIN_EXE_pogema"), "' port");
 const WRONG: &str = "python3.11 wrong.py";
 
-/// One line of the template, and what makes it wrong.
+/// A part of the template, and the text that replaces it to plant an error.
 const LATE: [&str; 2] = ["self.steps >= self.max_steps", "self.steps > self.max_steps"];
 const CROWDED: [&str; 2] = ["and there not in taken", "and (there not in taken or agent == 1)"];
 const MUTE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
-/// Mute too, but not often enough to end the run.
-const AT_TIMES_MUTE: [&str; 2] = [
+/// Like [`MUTE`], but too rarely to cut the run short.
+const SOMETIMES_MUTE: [&str; 2] = [
     "    return {**state, **results",
     "    if len(environment.cells) > 20: del state[\"active\"]\n    return {**state, **results",
 ];
@@ -25,7 +25,7 @@ const NAMED: [&str; 2] = [r#""name": "template""#, r#""name": "<b>&\"'\x1b[2J""#
 const KNOWN_LATE: &str =
     "- {rule: end/truncated, what: truncated, since: 2026-11-22, reason: one step late}\n";
 
-/// A folder with `wrong.py`, a port that is wrong in some lines.
+/// Returns a folder with `wrong.py`, a port with planted errors.
 fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/ports/template.py");
@@ -40,12 +40,12 @@ fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     folder
 }
 
-/// A run with all reports that there are, without the recordings, which take a while.
+/// Checks a port and writes all reports; skips the recordings, which take long.
 fn conform(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, String) {
     conform_whole(folder, port, &[&["--part", "cases", "--part", "drawn"], more].concat())
 }
 
-/// A run over everything.
+/// Checks a port with all parts and writes all reports.
 fn conform_whole(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, String) {
     let files = ["--junit", "report.xml", "--html", "report.html", "--badge", "badge.svg"];
     let first = ["--port", port, "--cases", "50", "--workers", "1"];
@@ -65,22 +65,23 @@ fn read(folder: &Path, name: &str) -> String {
     std::fs::read_to_string(folder.join(name)).unwrap()
 }
 
-/// The suites of the JUnit report, whose counts are checked.
+/// Reads the suites of the JUnit report and checks their counts.
 fn suites(folder: &Path) -> Vec<TestSuite> {
     let text = read(folder, "report.xml");
     let xml = roxmltree::Document::parse(&text).unwrap();
     for suite in xml.descendants().filter(|node| node.has_tag_name("testsuite")) {
-        let held = |tag| suite.descendants().filter(|node| node.has_tag_name(tag)).count().to_string();
+        let num_elements =
+            |tag| suite.descendants().filter(|node| node.has_tag_name(tag)).count().to_string();
         for (count, tag) in
             [("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")]
         {
-            assert_eq!(suite.attribute(count), Some(held(tag).as_str()), "{count}");
+            assert_eq!(suite.attribute(count), Some(num_elements(tag).as_str()), "{count}");
         }
     }
     Report::deserialize_from_str(&text).unwrap().test_suites
 }
 
-/// The suite of the only port.
+/// Reads the suite of the only port.
 fn suite(folder: &Path) -> TestSuite {
     let mut suites = suites(folder);
     assert_eq!(suites.len(), 1);
@@ -103,7 +104,7 @@ fn skip_message(case: &TestCase) -> Option<&str> {
     }
 }
 
-/// The page, which must be well-formed and load nothing.
+/// Reads the page and checks that it is well-formed and loads nothing.
 fn page(folder: &Path) -> String {
     let text = read(folder, "report.html");
     assert_loads_nothing(&text);
@@ -112,7 +113,7 @@ fn page(folder: &Path) -> String {
     for link in page.descendants().filter_map(|node| node.attribute("href")) {
         assert!(link.starts_with("https://pogema-rs.github.io/pogema-rs/spec/"), "{link}");
     }
-    // Every row of a table is as wide as its head.
+    // All rows of a table have the same width, the head included.
     for table in page.descendants().filter(|node| node.has_tag_name("table")) {
         let rows = table.descendants().filter(|node| node.has_tag_name("tr")).map(|row| {
             let span =
@@ -139,7 +140,7 @@ fn badge(folder: &Path) -> String {
 }
 
 #[test]
-fn a_conforming_port_is_told_to_conform() {
+fn a_conforming_port_is_reported_as_conforming() {
     let folder = folder(&[]);
     let (status, text) = conform(folder.path(), CONFORMING, &[]);
     assert_eq!(status, Some(0), "{text}");
@@ -154,7 +155,7 @@ fn a_conforming_port_is_told_to_conform() {
 }
 
 #[test]
-fn every_report_tells_what_is_wrong() {
+fn every_report_lists_the_failures() {
     let folder = folder(&[LATE, CROWDED]);
     let (status, text) = conform(folder.path(), WRONG, &[]);
     assert_eq!(status, Some(1), "{text}");
@@ -162,16 +163,17 @@ fn every_report_tells_what_is_wrong() {
     let failures = failures(suite);
     for (rule, what) in [("collide/priority", "cell"), ("end/truncated", "truncated")] {
         assert!(text.contains(&format!("FAIL {rule}: {what} differs")) && failures.contains(&rule), "{text}");
-        let TestCaseStatus::NonSuccess { description: Some(told), .. } = &case(suite, rule).status else {
+        let TestCaseStatus::NonSuccess { description: Some(description), .. } = &case(suite, rule).status
+        else {
             panic!("{rule} passes")
         };
-        let told = told.as_str();
+        let description = description.as_str();
         for part in ["  expected ", "  got  ", "agents and goals", "play it again: pogema conform --port"] {
-            assert!(told.contains(part), "{part} in {told}");
+            assert!(description.contains(part), "{part} in {description}");
         }
     }
-    let told = skip_message(case(suite, "metrics/finish"));
-    assert_eq!(told, Some("not claimed: profile metrics"));
+    let message = skip_message(case(suite, "metrics/finish"));
+    assert_eq!(message, Some("not claimed: profile metrics"));
     let page = page(folder.path());
     for part in
         ["#collidepriority\">collide/priority</a>: cell differs", "rule: end/truncated", "end-truncated"]
@@ -185,7 +187,7 @@ fn every_report_tells_what_is_wrong() {
 }
 
 #[test]
-fn a_misbehaving_port_is_an_error_and_its_name_is_only_text() {
+fn a_misbehaving_port_is_an_error_and_its_name_is_escaped() {
     let folder = folder(&[MUTE, NAMED]);
     let (status, text) = conform(folder.path(), WRONG, &[]);
     assert_eq!(status, Some(3), "{text}");
@@ -200,7 +202,7 @@ fn a_misbehaving_port_is_an_error_and_its_name_is_only_text() {
 }
 
 #[test]
-fn ports_stand_side_by_side() {
+fn several_ports_are_compared_side_by_side() {
     let folder = folder(&[LATE]);
     let files = ["--junit", "report.xml", "--html", "report.html", "--rules", "end/*", "--cases", "50"];
     let output = run(folder.path(), &[&["--port", CONFORMING, "--port", WRONG], &files[..]].concat());
@@ -214,7 +216,7 @@ fn ports_stand_side_by_side() {
 }
 
 #[test]
-fn what_is_known_is_told_apart_and_borne() {
+fn known_deviations_are_listed_separately_and_accepted() {
     let folder = folder(&[LATE]);
     let known = "- {rule: metrics/finish, what: metrics, since: 2026-01-31, reason: not claimed any more}\n";
     let other = "- {rule: collide/priority, what: cell, since: 2026-01-31, reason: it was so, port: other}\n";
@@ -224,7 +226,7 @@ fn what_is_known_is_told_apart_and_borne() {
     for part in [
         "KNOWN end/truncated: truncated, ",
         "  since 2026-11-22: one step late\n",
-        "conforms to all it claims, but for 1 known: ",
+        "conforms to all it claims, except for 1 known: ",
         "not played: metrics/finish: metrics, known since 2026-01-31: not claimed any more",
         "not played: collide/priority: cell of other, known since 2026-01-31: it was so",
     ] {
@@ -242,43 +244,45 @@ fn what_is_known_is_told_apart_and_borne() {
 }
 
 #[test]
-fn what_stopped_occurring_fails_the_run() {
+fn deviations_that_stopped_occurring_fail_the_run() {
     let folder = folder(&[LATE]);
     let fixed =
         "- {rule: reward/own, what: reward, since: 2026-01-31, reason: twice as much, port: template}\n";
     std::fs::write(folder.path().join("known.yaml"), format!("{KNOWN_LATE}{fixed}")).unwrap();
     let (status, text) = conform_whole(folder.path(), WRONG, &["--known", "known.yaml"]);
-    let told = "reward/own: reward of template, known since 2026-01-31: twice as much";
+    let title = "reward/own: reward of template, known since 2026-01-31: twice as much";
     assert_eq!(status, Some(1), "{text}");
     assert!(
-        text.ends_with(&format!("STOPPED {told}\n  it stopped occurring and can be removed from the list\n")),
+        text.ends_with(&format!(
+            "STOPPED {title}\n  it stopped occurring and can be removed from the list\n"
+        )),
         "{text}"
     );
     let suites = suites(folder.path());
-    assert_eq!(suites.iter().map(failures).collect::<Vec<_>>(), [vec![], vec![told]]);
-    assert!(page(folder.path()).contains(told));
+    assert_eq!(suites.iter().map(failures).collect::<Vec<_>>(), [vec![], vec![title]]);
+    assert!(page(folder.path()).contains(title));
     for left_out in
         [["--rules", "move/*"], ["--part", "cases"], ["--case", "pogema-found/end-truncated-truncated.yaml"]]
     {
         let (status, text) =
             conform_whole(folder.path(), WRONG, &[&["--known", "known.yaml"], &left_out[..]].concat());
         assert_eq!(status, Some(0), "{left_out:?}: {text}");
-        assert!(text.contains(&format!("not played: {told}")), "{left_out:?}: {text}");
+        assert!(text.contains(&format!("not played: {title}")), "{left_out:?}: {text}");
     }
 }
 
 #[test]
-fn faults_that_are_known_are_borne_unless_they_end_the_run() {
-    for (wrong, expected, told, not_asked) in [
-        (MUTE, 3, "misbehaves as is known, too often to be asked everything: ", vec!["(not asked)"]),
-        (AT_TIMES_MUTE, 0, "but for 1 known: ", vec![]),
+fn known_faults_are_accepted_unless_they_cut_the_run_short() {
+    for (wrong, expected_status, expected, failing) in [
+        (MUTE, 3, "misbehaves only in known ways, but too often to finish the run: ", vec!["(not run)"]),
+        (SOMETIMES_MUTE, 0, "except for 1 known: ", vec![]),
     ] {
         let folder = folder(&[wrong]);
         let known = "- {rule: protocol, what: left `active` out of an answer that needs it, since: 2026-11-22, reason: r}";
         std::fs::write(folder.path().join("known.yaml"), known).unwrap();
         let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
-        assert_eq!(status, Some(expected), "{text}");
-        assert!(text.contains("KNOWN protocol: left `active` out") && text.contains(told), "{text}");
-        assert_eq!(failures(&suite(folder.path())), not_asked);
+        assert_eq!(status, Some(expected_status), "{text}");
+        assert!(text.contains("KNOWN protocol: left `active` out") && text.contains(expected), "{text}");
+        assert_eq!(failures(&suite(folder.path())), failing);
     }
 }

@@ -1,11 +1,11 @@
-//! What `pogema conform --port` says before a run of files that it cannot write and of lists that it cannot read.
+//! Tests of `pogema conform --port` with unwritable report files and invalid lists of known deviations.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
 use std::process::Command;
 
-/// A folder with one file.
+/// Returns a folder with an empty list of known deviations.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("known.yaml"), "[]").unwrap();
@@ -13,7 +13,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 #[test]
-fn bad_lists_of_what_is_known_are_refused_with_one_line() {
+fn invalid_lists_of_known_deviations_are_rejected_with_one_line() {
     let entry = |text: &str| {
         let (at, text) = text.split_once(": ").unwrap();
         let all = [("rule", "collide/soft"), ("what", "cell"), ("since", "2026-11-22"), ("reason", "r")];
@@ -24,7 +24,7 @@ fn bad_lists_of_what_is_known_are_refused_with_one_line() {
     };
     let good = entry("reason: r");
     let date = |text: &str| format!("entry 1: `since` is `{text}`, expected a date such as 2026-11-22");
-    let refused = [
+    let rejected = [
         (
             good.clone() + &entry("until: 2027"),
             "entry 2: unknown field `until`, expected one of `rule`, `what`, `since`, `reason`, `port`".into(),
@@ -32,13 +32,13 @@ fn bad_lists_of_what_is_known_are_refused_with_one_line() {
         ("- {rule: end/after, what: cell, since: 2026-11-22}".into(), "entry 1: missing field `reason`".into()),
         (
             entry("rule: colide/soft"),
-            "entry 1: unknown rule `colide/soft`, the nearest known one is `collide/soft`".into(),
+            "entry 1: unknown rule `colide/soft`; did you mean `collide/soft`?".into(),
         ),
         (entry("since: 2026-02-30"), date("2026-02-30")),
         (entry("since: 20261122"), date("20261122")),
         (entry("since: 2026-11-22T10:00"), date("2026-11-22T10:00")),
         (entry("reason: '  '"), "entry 1: `reason` is empty".into()),
-        (good.clone() + &good, "entry 2: says the same as entry 1".into()),
+        (good.clone() + &good, "entry 2: duplicates entry 1".into()),
         ("rule: end/after".into(), "expected a list of entries".into()),
         (
             "- end/after".into(),
@@ -48,32 +48,35 @@ fn bad_lists_of_what_is_known_are_refused_with_one_line() {
         ("- [\n".into(), "line 1 column 3: unclosed bracket '['".into()),
     ];
     let folder = folder();
-    for (text, expected) in refused {
+    for (text, expected) in rejected {
         std::fs::write(folder.path().join("known.yaml"), &text).unwrap();
         let arguments = ["--port", "a", "--known", "known.yaml", "--html", "report.html"];
-        assert_refused(folder.path(), &arguments, &format!("known.yaml: {expected}"));
+        assert_rejected(folder.path(), &arguments, &format!("known.yaml: {expected}"));
     }
 }
 
 #[test]
-fn reports_that_cannot_be_written_are_refused_before_the_run() {
+fn unwritable_reports_are_rejected_before_the_run() {
     let folder = folder();
     let missing = "No such file or directory (os error 2)";
     for (arguments, expected) in [
         ("--port a --port b --badge badge.svg", "`--badge` needs exactly one port".into()),
         ("--port a --html no/report.html", format!("no/report.html: `no`: {missing}")),
-        ("--port a --junit known.yaml/x", "known.yaml/x: `known.yaml` is no folder".into()),
-        ("--port a --badge ./", "./: is no file".into()),
-        ("--port a --html report.html --junit ./report.html", "report.html: is to hold two reports".into()),
+        ("--port a --junit known.yaml/x", "known.yaml/x: `known.yaml` is not a folder".into()),
+        ("--port a --badge ./", "./: is not a regular file".into()),
+        (
+            "--port a --html report.html --junit ./report.html",
+            "report.html: two reports would be written to this file".into(),
+        ),
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
         ("--html report.html", "the following required arguments were not provided:".into()),
     ] {
-        assert_refused(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), &expected);
+        assert_rejected(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), &expected);
     }
 }
 
-/// Passes if the run is refused with one line before it began.
-fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
+/// Checks that a run fails with one line before it starts.
+fn assert_rejected(folder: &Path, arguments: &[&str], expected: &str) {
     let files = || std::fs::read_dir(folder).unwrap().count();
     let before = files();
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));

@@ -1,4 +1,4 @@
-//! `pogema render` and the pictures of `pogema run`.
+//! Tests of `pogema render` and of the pictures of `pogema run`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -9,7 +9,7 @@ const RUN: &str = "run --size 6 --num-agents 3 --seed 1 --steps 12 --on-target r
 const KINDS: [(&str, &str, &[u8]); 3] =
     [("--svg", "a.svg", b"<svg"), ("--png", "a.png", b"\x89PNG"), ("--gif", "a.gif", b"GIF89a")];
 
-/// Runs the program in a folder; of `path` alone programs are found.
+/// Runs the program in a folder, with `path` as the only folder on the PATH.
 fn pogema(folder: &Path, path: &Path, arguments: &str) -> Output {
     let arguments = arguments.split_whitespace();
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
@@ -45,20 +45,20 @@ fn run_and_render_draw_the_same() {
 #[test]
 fn without_a_file_the_episode_is_played_as_text() {
     let folder = tempfile::tempdir().unwrap();
-    let said = |arguments: &str| {
+    let stdout_of = |arguments: &str| {
         let output = pogema(folder.path(), folder.path(), arguments);
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    let run = said(&format!("{RUN} --render --trace t.jsonl"));
-    let played = said("render t.jsonl");
+    let run = stdout_of(&format!("{RUN} --render --trace t.jsonl"));
+    let played = stdout_of("render t.jsonl");
     assert_eq!(run.rsplit_once("\n12 steps").unwrap().0, played.trim_end());
     assert_eq!(played.matches("step ").count(), 13);
-    let part = said("render t.jsonl --steps 4..6 --svg a.svg --text");
+    let part = stdout_of("render t.jsonl --steps 4..6 --svg a.svg --text");
     assert!(played.contains(part.trim_end()) && part.starts_with("step 4\n") && part.contains("step 6\n"));
-    let frame = said("render t.jsonl --frame 5");
+    let frame = stdout_of("render t.jsonl --frame 5");
     assert!(frame.starts_with("step 5\n") && frame.matches("step").count() == 1 && played.contains(&frame));
-    let view = said("render t.jsonl --frame 5 --view 2 --border none");
+    let view = stdout_of("render t.jsonl --frame 5 --view 2 --border none");
     assert!(view.contains('c') && !view.contains('A') && !view.contains('│'));
 }
 
@@ -69,7 +69,7 @@ mod videos {
 
     use super::{RUN, names, pogema};
 
-    /// A folder with a program `ffmpeg`, and a folder with a trace.
+    /// Returns a folder with a program `ffmpeg`, if given, and a folder with a trace.
     fn folders(ffmpeg: Option<&str>) -> [tempfile::TempDir; 2] {
         let [programs, work] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         if let Some(script) = ffmpeg {
@@ -81,7 +81,7 @@ mod videos {
         [programs, work]
     }
 
-    fn refused(folder: &Path, programs: &Path, arguments: &str) -> String {
+    fn error_of(folder: &Path, programs: &Path, arguments: &str) -> String {
         let output = pogema(folder, programs, arguments);
         assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{output:?}");
         String::from_utf8(output.stderr).unwrap().trim_end().to_owned()
@@ -89,7 +89,7 @@ mod videos {
 
     #[test]
     fn ffmpeg_gets_every_frame_and_the_file_appears_at_the_end() {
-        // A stand-in that writes what it was asked for and how much it was given.
+        // A stand-in that writes its arguments and the size of its input.
         let script = r#"[ "$1" = -version ] && exit; for last; do :; done; (echo "$*"; wc -c) > "$last""#;
         let [programs, work] = folders(Some(script));
         for (name, codec) in [("a.mp4", "libx264"), ("b.webm", "libvpx-vp9")] {
@@ -97,42 +97,45 @@ mod videos {
             let output = pogema(work.path(), programs.path(), &arguments);
             assert!(output.status.success(), "{output:?}");
             let text = std::fs::read_to_string(work.path().join(name)).unwrap();
-            let (asked, given) = text.split_once('\n').unwrap();
-            assert!(asked.contains("-pix_fmt rgba -video_size 62x62 -framerate 30.0000 -i -"), "{asked}");
-            assert!(asked.contains(codec), "{asked}");
-            // 13 states and one more to hold the first, three frames each.
-            assert_eq!(given.trim().parse::<usize>().unwrap(), 14 * 3 * 62 * 62 * 4);
+            let (arguments, size) = text.split_once('\n').unwrap();
+            assert!(
+                arguments.contains("-pix_fmt rgba -video_size 62x62 -framerate 30.0000 -i -"),
+                "{arguments}"
+            );
+            assert!(arguments.contains(codec), "{arguments}");
+            // 13 states, and the first one once more, three frames each.
+            assert_eq!(size.trim().parse::<usize>().unwrap(), 14 * 3 * 62 * 62 * 4);
         }
         assert_eq!(names(work.path()), ["a.mp4", "b.webm", "t.jsonl"]);
     }
 
     #[test]
-    fn a_failing_ffmpeg_is_quoted_and_leaves_what_was_there() {
+    fn a_failing_ffmpeg_is_quoted_and_the_old_file_stays() {
         let script = r#"[ "$1" = -version ] && exit; for last; do :; done; echo half > "$last"
             echo first >&2; echo "Unknown encoder 'libx264'" >&2; exit 3"#;
         let [programs, work] = folders(Some(script));
         std::fs::write(work.path().join("a.mp4"), "before").unwrap();
-        let said = refused(work.path(), programs.path(), "render t.jsonl --video a.mp4");
-        assert_eq!(said, "error: a.mp4: ffmpeg failed (exit status: 3): Unknown encoder 'libx264'");
+        let error = error_of(work.path(), programs.path(), "render t.jsonl --video a.mp4");
+        assert_eq!(error, "error: a.mp4: ffmpeg failed (exit status: 3): Unknown encoder 'libx264'");
         assert_eq!(std::fs::read_to_string(work.path().join("a.mp4")).unwrap(), "before");
         assert_eq!(names(work.path()), ["a.mp4", "t.jsonl"]);
     }
 
     #[test]
-    fn an_ffmpeg_that_writes_nothing_has_failed() {
+    fn an_ffmpeg_that_writes_nothing_is_an_error() {
         let [programs, work] = folders(Some("cat > /dev/null"));
-        let said = refused(work.path(), programs.path(), "render t.jsonl --video a.mp4");
-        assert_eq!(said, "error: a.mp4: ffmpeg wrote nothing");
+        let error = error_of(work.path(), programs.path(), "render t.jsonl --video a.mp4");
+        assert_eq!(error, "error: a.mp4: ffmpeg wrote nothing");
         assert_eq!(names(work.path()), ["t.jsonl"]);
     }
 
     #[test]
-    fn without_ffmpeg_nothing_is_played() {
+    fn without_ffmpeg_no_episode_is_played() {
         let [programs, work] = folders(None);
         for arguments in ["render t.jsonl --video a.mp4", "run --trace b.jsonl --video a.mp4"] {
-            let said = refused(work.path(), programs.path(), arguments);
+            let error = error_of(work.path(), programs.path(), arguments);
             let begin = "error: videos need the program `ffmpeg`, which is not on the PATH: install it";
-            assert!(said.starts_with(begin) && said.lines().count() == 1, "{said}");
+            assert!(error.starts_with(begin) && error.lines().count() == 1, "{error}");
         }
         assert_eq!(names(work.path()), ["t.jsonl"]);
     }

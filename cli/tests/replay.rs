@@ -1,4 +1,4 @@
-//! `pogema replay` and the page of `pogema evaluate --html`.
+//! Tests of `pogema replay` and of the page of `pogema evaluate --html`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -44,7 +44,7 @@ fn evaluated(more: &[&str]) -> tempfile::TempDir {
 }
 
 #[test]
-fn an_episode_is_played_again_by_its_number() {
+fn an_episode_is_replayed_by_its_number() {
     let folder = evaluated(&[]);
     let rows: Value =
         serde_json::from_str(&fs::read_to_string(folder.path().join("out/RHCR.json")).unwrap()).unwrap();
@@ -58,13 +58,13 @@ fn an_episode_is_played_again_by_its_number() {
     assert!(fs::read_to_string(folder.path().join("t.svg")).unwrap().starts_with("<svg"));
     let (_, error, status) = run(folder.path(), &["render", "t.jsonl", "--png", "t.png"]);
     assert_eq!(status, 0, "{error}");
-    // Not from there alone: the results say where the suite was, beside which its maps are.
+    // It works from another folder: the results name the folder of the suite, which holds its maps.
     let (_, error, status) = run(&folder.path().join("out"), &["replay", ".", "Dice", "0"]);
     assert_eq!((status, error.as_str()), (0, ""));
 }
 
 #[test]
-fn what_comes_out_otherwise_is_told() {
+fn differences_from_the_results_are_reported() {
     let folder = evaluated(&[]);
     let path = folder.path().join("out/Dice.json");
     let text = fs::read_to_string(&path).unwrap();
@@ -72,45 +72,52 @@ fn what_comes_out_otherwise_is_told() {
     fs::write(&path, format!("{}\"a_collisions\":9{}", &text[..at], &text[at + 15..])).unwrap();
     let (_, error, status) = run(folder.path(), &["replay", "out", "Dice", "0"]);
     assert_eq!(status, 0);
-    assert!(error.starts_with("note: it came out otherwise: a_collisions "), "{error}");
+    assert!(error.starts_with("note: the replay differs from the results: a_collisions "), "{error}");
     fs::write(&path, &text[..40]).unwrap();
     let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
-    assert!(error.starts_with("note: nothing to compare it with: out/Dice.json: expected a list"), "{error}");
+    assert!(
+        error.starts_with("note: cannot compare the replay with the results: out/Dice.json: expected a list"),
+        "{error}"
+    );
     fs::remove_file(&path).unwrap();
     let (_, error, _) = run(folder.path(), &["replay", "out", "Dice", "0"]);
-    assert_eq!(error, "note: `Dice` is not finished, so there is nothing to compare it with");
+    assert_eq!(error, "note: cannot compare the replay with the results: `Dice` is not finished");
 }
 
 #[test]
-fn what_cannot_be_replayed_is_told() {
+fn invalid_requests_are_reported() {
     let folder = evaluated(&[]);
-    for (arguments, told) in [
+    for (arguments, expected) in [
         (["replay", "out", "RHCE", "0"], "`algorithm` is `RHCE`, expected one of the suite's: RHCR, Dice"),
         (["replay", "out", "RHCR", "4"], "`episode` is `4`, expected below 4"),
         (["replay", "suites", "RHCR", "0"], "suites: holds no results of `pogema evaluate`"),
     ] {
         let (text, error, status) = run(folder.path(), &arguments);
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
         assert_eq!((text.as_str(), error.lines().count(), status), ("", 1, 2));
     }
 }
 
 #[test]
-fn the_page_holds_all_it_needs() {
+fn the_page_is_self_contained() {
     let folder = evaluated(&["--html"]);
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     for place in ["http:", "https:", "src=\"/", "@import", "url("] {
         assert!(!page.contains(place), "{place}");
     }
-    assert_eq!(page.matches("data-replay=").count(), 2 * 6, "three of the worst and of the best of each");
+    assert_eq!(
+        page.matches("data-replay=").count(),
+        2 * 6,
+        "the three worst and three best episodes of each algorithm"
+    );
     assert!(page.contains("RHCR, nodes: 100") && page.contains("map_name: own"));
     assert!(page.contains("frame-src blob:") && !page.contains("unsafe-"));
-    // A page of results that are there already, somewhere else; nothing is played.
+    // A page of existing results, in another place; no episode is played.
     let again = ["evaluate", "suites/small.yaml", "--out", "out", "--resume", "--html", "page.html"];
     let (text, error, status) = run(folder.path(), &again);
     assert!(text.starts_with("0 episodes played") && error.ends_with("wrote page.html"), "{text}{error}");
     assert_eq!((status, fs::read_to_string(folder.path().join("page.html")).unwrap()), (0, page));
-    // One that cannot be written is told before anything is played.
+    // A page that cannot be written is reported before any episode is played.
     let nowhere = ["evaluate", "suites/small.yaml", "--out", "new", "--html", "no/page.html"];
     let (_, error, status) = run(folder.path(), &nowhere);
     assert!(error.contains("no/page.html: `no`: No such file"), "{error}");

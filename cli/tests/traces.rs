@@ -1,4 +1,4 @@
-//! `pogema conform --trace`: what a port wrote is checked like what it answers.
+//! Tests of `pogema conform --trace`, which checks traces that a port wrote.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -17,28 +17,28 @@ fn write_trace(path: &Path) {
 }
 
 #[test]
-fn a_trace_of_ours_conforms_and_an_altered_one_does_not() {
+fn our_trace_conforms_and_an_altered_one_diverges() {
     let folder = tempfile::tempdir().unwrap();
     let (right, wrong) = (folder.path().join("right.jsonl"), folder.path().join("wrong.jsonl"));
     write_trace(&right);
-    let text = std::fs::read_to_string(&right).unwrap();
-    let altered = text.replacen(r#""rewards":[0.0"#, r#""rewards":[1.0"#, 1);
-    assert_ne!(text, altered);
+    let trace = std::fs::read_to_string(&right).unwrap();
+    let altered = trace.replacen(r#""rewards":[0.0"#, r#""rewards":[1.0"#, 1);
+    assert_ne!(trace, altered);
     std::fs::write(&wrong, altered).unwrap();
 
     let output = pogema(&["conform", "--trace", right.to_str().unwrap()]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success(), "{said}");
-    assert!(said.contains("conforms to all it claims: 1 cases, 20 steps"), "{said}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("conforms to all it claims: 1 cases, 20 steps"), "{text}");
 
     let output = pogema(&["conform", "--trace", right.to_str().unwrap(), wrong.to_str().unwrap()]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("FAIL reward/own: reward differs, once") && said.contains("wrong.jsonl"), "{said}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("FAIL reward/own: reward differs, once") && text.contains("wrong.jsonl"), "{text}");
 }
 
 #[test]
-fn what_is_no_trace_is_refused_in_one_line() {
+fn invalid_traces_are_rejected_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty");
     std::fs::write(&path, "").unwrap();
@@ -49,8 +49,8 @@ fn what_is_no_trace_is_refused_in_one_line() {
         vec!["conform", "--trace"],
     ] {
         let output = pogema(&arguments);
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert_eq!(told.lines().count(), 1, "{arguments:?}: {told}");
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
     }
 }

@@ -1,11 +1,11 @@
-//! `pogema validate` on plans that are valid, and on those that are not.
+//! Tests of `pogema validate` with valid and invalid plans.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
 use std::process::Command;
 
-/// Standard output and error of a run in a folder, and its exit status.
+/// Runs the command in a folder; returns standard output, standard error and the exit status.
 fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
     let program = env!("CARGO_BIN_EXE_pogema");
     let output = Command::new(program).arg("validate").args(arguments).current_dir(folder).output().unwrap();
@@ -13,7 +13,7 @@ fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
     (text(output.stdout), text(output.stderr), output.status.code().unwrap())
 }
 
-/// A folder with a map, a scenario of two agents and what else is given.
+/// Returns a folder with a map, a scenario of two agents and the given files.
 fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let map = "type octile\nheight 3\nwidth 3\nmap\n...\n.@.\n...\n";
@@ -27,14 +27,14 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 const TASK: [&str; 5] = ["plan.txt", "--map", "three.map", "--scenario", "two.yaml"];
 
 #[test]
-fn a_valid_plan_is_told_with_its_costs() {
+fn a_valid_plan_is_reported_with_its_costs() {
     let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,0) (1,2)\n2: (0,1) (1,2)\n")]);
     let (text, _, status) = run(folder.path(), &TASK);
     assert_eq!((text.as_str(), status), ("valid: 2 agents, 2 steps; sum of costs 3, makespan 2", 0));
 }
 
 #[test]
-fn the_first_conflict_is_told_and_drawn() {
+fn the_first_conflict_is_reported_and_drawn() {
     let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,1) (0,1)\n")]);
     let (text, _, status) = run(folder.path(), &TASK);
     let expected = "not valid: step 1: agents 0 and 1 are both at (0, 1)\n\n\
@@ -50,7 +50,7 @@ fn the_first_conflict_is_told_and_drawn() {
 }
 
 #[test]
-fn agents_may_be_let_end_anywhere() {
+fn any_end_accepts_agents_off_their_goals() {
     let folder = folder(&[("plan.txt", "(0,0) (0,2)\n(0,0) (1,2)\n")]);
     let (text, _, status) = run(folder.path(), &TASK);
     assert!(text.starts_with("not valid: agent 0 ends at (0, 0), which is not its goal"), "{text}");
@@ -59,7 +59,7 @@ fn agents_may_be_let_end_anywhere() {
 }
 
 #[test]
-fn a_result_names_its_own_map_and_agents() {
+fn a_result_file_supplies_map_and_agents() {
     let result = "agents=2\nmap_file=maps/three.map\nstarts=(0,0),(2,0),\ngoals=(1,0),(2,1),\n\
         solution=\n0:(0,0),(2,0),\n1:(1,0),(2,1),\n";
     let folder = folder(&[("result.txt", result), ("lost.txt", &result.replace("three", "four"))]);
@@ -67,22 +67,22 @@ fn a_result_names_its_own_map_and_agents() {
     assert_eq!((text.as_str(), status), ("valid: 2 agents, 1 steps; sum of costs 2, makespan 1", 0));
     let (_, error, status) = run(folder.path(), &["lost.txt"]);
     let expected =
-        "error: lost.txt: its map `maps/four.map` is not there, expected it beside the plan, or `--map FILE`";
+        "error: lost.txt: map `maps/four.map` not found, expected it next to the plan, or `--map FILE`";
     assert_eq!((error.as_str(), status), (expected, 2));
     assert_eq!(run(folder.path(), &["lost.txt", "--map", "three.map"]).2, 0);
 }
 
 #[test]
-fn what_is_no_plan_is_one_line() {
+fn invalid_plans_are_reported_in_one_line() {
     let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,1) 5\n"), ("short.txt", "0: (0,0)\n")]);
-    let told = |arguments: &[&str]| {
+    let error_of = |arguments: &[&str]| {
         let (_, error, status) = run(folder.path(), arguments);
         assert_eq!((status, error.lines().count()), (2, 1), "{error}");
         error
     };
-    assert_eq!(told(&TASK), "error: plan.txt: line 2: found `5`, expected a cell such as `(3,4)`");
-    assert!(told(&["none.txt", "--map", "three.map"]).starts_with("error: none.txt: "));
-    // A plan for the first of two agents is one for a scenario of the first.
+    assert_eq!(error_of(&TASK), "error: plan.txt: line 2: found `5`, expected a cell such as `(3,4)`");
+    assert!(error_of(&["none.txt", "--map", "three.map"]).starts_with("error: none.txt: "));
+    // A plan for one agent is checked against the scenario truncated to its first agent.
     let short = [&["short.txt"], &TASK[1..]].concat();
     assert!(run(folder.path(), &short).0.starts_with("not valid: agent 0 ends at (0, 0)"));
 }

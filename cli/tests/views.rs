@@ -1,4 +1,4 @@
-//! `pogema views`: tables, plots, and results or views that are wrong.
+//! Tests of `pogema views`: tables, plots, and invalid results or views.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -32,7 +32,7 @@ fn row(algorithm: &str, num_agents: u64, seed: u64, cost: &str) -> String {
     )
 }
 
-/// A folder `out` of results of two algorithms, and a third that is not finished.
+/// Returns a folder whose subfolder `out` holds the results of two algorithms, and of a third that is not finished.
 fn results() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
@@ -71,7 +71,7 @@ fn tables_are_printed_and_plots_are_written() {
         run(folder.path(), &["views", "out", "--view", "Costs / all", "--plots", "pdf", "--out", "plots"]);
     assert_eq!(status, 0, "{notes}");
     assert!(fs::read(folder.path().join("plots/Costs _ all.pdf")).unwrap().starts_with(b"%PDF"));
-    // The same again, to the last bit.
+    // A second run prints the same text.
     assert_eq!(run(folder.path(), &["views", "out", "--format", "csv"]).0, text);
 }
 
@@ -89,7 +89,7 @@ fn the_six_metrics_need_no_views() {
 }
 
 #[test]
-fn a_view_that_cannot_be_shown_does_not_keep_others_from_being_shown() {
+fn a_failing_view_does_not_stop_the_others() {
     let folder = results();
     let config = "results_views:\n  A: {type: plot, x: num_agents, y: makespan}\n  B: {type: tabular}\n";
     fs::write(folder.path().join("two.yaml"), config).unwrap();
@@ -103,7 +103,7 @@ fn a_view_that_cannot_be_shown_does_not_keep_others_from_being_shown() {
 }
 
 #[test]
-fn files_of_a_view_lie_beside_the_file_that_holds_it() {
+fn paths_in_a_view_are_relative_to_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let view = "results_views:\n  A: {type: published, file: means.csv, setting: MAPF, algorithm: LaCAM, \
                 dataset: 01-random, metrics: CSR}\n";
@@ -127,7 +127,7 @@ fn files_of_a_view_lie_beside_the_file_that_holds_it() {
 }
 
 #[test]
-fn what_is_wrong_is_one_line() {
+fn errors_are_reported_in_one_line() {
     let folder = results();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     for empty in ["empty", "broken", "foreign", "other"] {

@@ -1,12 +1,12 @@
-//! Records what POGEMA 1.4.0 does, for `conformance/golden/pogema-1.4.0`.
+//! Records the answers of POGEMA 1.4.0 for `conformance/golden/pogema-1.4.0`.
 //!
 //! ```text
 //! cargo run --release -p pogema-conformance --example record -- random 400
 //! cargo run --release -p pogema-conformance --example record -- benchmark 01-random.yaml 02-mazes.yaml
 //! ```
 //!
-//! `random` plays freshly drawn episodes. `benchmark` resets every map of toolbox map sets as the published
-//! benchmark does, with seed 0, from 8 to 64 agents, in one-shot and in lifelong mode.
+//! `random NUMBER` plays that many random episodes. `benchmark FILE...` resets every map of the given toolbox map
+//! sets as the published benchmark does: with seed 0, from 8 to 64 agents, in one-shot and in lifelong mode.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,15 +17,15 @@ use pogema_conformance::{NamedEngine, Op, Oracle, Request, draw_request, find_or
 use pogema_core::Error;
 use serde_json::json;
 
-/// A seed that no other run uses by default.
+/// Differs from the default seeds of all other runs.
 const SEED: u64 = 1_400;
-const CROWDS: [usize; 6] = [8, 16, 24, 32, 48, 64];
+const NUMS_AGENTS: [usize; 6] = [8, 16, 24, 32, 48, 64];
 
 fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let result = match words.split_first() {
-        Some((what, [number])) if what == "random" => random(number),
-        Some((what, files)) if what == "benchmark" && !files.is_empty() => benchmark(files),
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let result = match arguments.split_first() {
+        Some((mode, [number])) if mode == "random" => random(number),
+        Some((mode, files)) if mode == "benchmark" && !files.is_empty() => benchmark(files),
         _ => Err(Error::Request { reason: "expected `random NUMBER` or `benchmark FILE...`".into() }),
     };
     match result {
@@ -55,9 +55,9 @@ fn benchmark(files: &[String]) -> Result<usize, Error> {
         let maps: BTreeMap<String, String> =
             serde_saphyr::from_str(&text).map_err(|error| Error::io(file, error.to_string()))?;
         for map in maps.values() {
-            for num_agents in CROWDS {
+            for num_agents in NUMS_AGENTS {
                 for (on_target, max_steps) in [("nothing", 128), ("restart", 256)] {
-                    requests.push(scenario(map, num_agents, on_target, max_steps));
+                    requests.push(reset_request(map, num_agents, on_target, max_steps));
                 }
             }
         }
@@ -65,7 +65,7 @@ fn benchmark(files: &[String]) -> Result<usize, Error> {
     record("benchmark.jsonl.zst", requests.into_iter())
 }
 
-fn scenario(map: &str, num_agents: usize, on_target: &str, max_steps: usize) -> Request {
+fn reset_request(map: &str, num_agents: usize, on_target: &str, max_steps: usize) -> Request {
     let config = json!({
         "map": map,
         "num_agents": num_agents,
@@ -73,7 +73,7 @@ fn scenario(map: &str, num_agents: usize, on_target: &str, max_steps: usize) -> 
         "max_episode_steps": max_steps,
         "seed": 0,
         "collision_system": "soft",
-        // The places do not depend on how far agents see, and small windows keep the file small.
+        // Starts and goals do not depend on the radius, and small windows keep the file small.
         "obs_radius": 1,
     });
     Request { id: 0, config, register: None, density: false, collisions: false, ops: vec![Op::Reset(None)] }

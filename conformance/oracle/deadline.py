@@ -1,4 +1,4 @@
-"""The watchdog: POGEMA loops for ever on some inputs, so everything it is asked to do has a time limit."""
+"""The watchdog: limits the time of every call, because POGEMA never terminates on some inputs."""
 
 import os
 import signal
@@ -9,21 +9,21 @@ from typing import Any
 
 LIMIT = float(os.environ.get("POGEMA_ORACLE_TIMEOUT", "20"))
 if not 0 < LIMIT < 1e6:
-    raise ValueError("POGEMA_ORACLE_TIMEOUT is not a sensible number of seconds")
+    raise ValueError(f"POGEMA_ORACLE_TIMEOUT is {LIMIT}, expected a number of seconds above 0 and below 1e6")
 
 
 class Timeout(BaseException):
-    """The time is up; not an Exception, so that no handler within POGEMA takes it for its own."""
+    """The time limit is exceeded. Not an `Exception`, so that no handler within POGEMA catches it."""
 
 
 def expire(*_: Any) -> None:
-    """The alarm's handler."""
-    raise Timeout("the time limit is over")
+    """Handles the alarm."""
+    raise Timeout("the time limit is exceeded")
 
 
 @contextmanager
 def deadline(seconds: float) -> Iterator[None]:
-    """Raises Timeout in its body when the time is up, and again each second if that is lost; may be nested."""
+    """Raises Timeout in its body after some seconds, and again every second in case it was lost. Can be nested."""
     start = time.monotonic()
     outer, _ = signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
     try:
@@ -34,7 +34,7 @@ def deadline(seconds: float) -> Iterator[None]:
 
 
 def disarm() -> None:
-    """Stops the alarm, should it have gone off within `deadline`'s own exit."""
+    """Stops an alarm that fired while `deadline` was exiting."""
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 

@@ -1,4 +1,4 @@
-"""One environment of POGEMA, driven op by op, with a record of everything that can be seen from outside."""
+"""Drives one POGEMA environment operation by operation, and records everything that is visible from outside."""
 
 import json
 from typing import Any
@@ -15,20 +15,20 @@ Array = NDArray[Any]
 
 FLOAT32 = np.dtype(np.float32)
 INTEGER = (int, np.integer)
-LONGEST_GOAL_LISTS = 4096
+MAX_GOAL_LIST_STEPS = 4096
 
 
 class ProtocolError(ValueError):
-    """The request, not POGEMA, is at fault."""
+    """The request is invalid; POGEMA is not at fault."""
 
 
 def unpad(cells: Any, radius: int) -> list[list[Any]]:
-    """Positions less the padding."""
+    """Converts positions to map coordinates, without the padding."""
     return [[row - radius, column - radius] for row, column in cells]
 
 
 def draw(grid: Array) -> list[str]:
-    """A grid as rows of '.' for 0, '#' for 1 and '?' for anything else."""
+    """Draws a grid as rows of '.' for 0, '#' for 1 and '?' for other values."""
     codes = np.full(grid.shape, ord("?"), np.uint8)
     codes[grid == 0] = ord(".")
     codes[grid == 1] = ord("#")
@@ -37,27 +37,27 @@ def draw(grid: Array) -> list[str]:
 
 
 def same(left: Array, right: Array) -> bool:
-    """Equality of type, shape and every bit."""
+    """Returns whether two arrays are equal in type, shape and every bit."""
     return left is right or (left.dtype, left.shape, left.tobytes()) == (right.dtype, right.shape, right.tobytes())
 
 
 def pack(name: str, windows: list[Array], shape: tuple[int, ...], odd: list[str]) -> list[str]:
-    """Each agent's window as hexadecimal; what has another type, shape or value than it should is told in `odd`."""
+    """Encodes the window of each agent as hexadecimal; reports unexpected types, shapes and values in `odd`."""
     if wrong := [i for i, window in enumerate(windows) if window.dtype != FLOAT32 or window.shape != shape]:
         odd.extend(f"{name}[{i}] is {windows[i].dtype} {windows[i].shape}" for i in wrong)
         return [np.packbits(window.ravel() != 0).tobytes().hex() for window in windows]
     values = np.concatenate(windows).reshape(len(windows), -1)
     bits = values != 0
     if not same(bits.astype(FLOAT32), values):
-        strange = [(i, set(row.tolist()) - {0.0, 1.0}) for i, row in enumerate(values)]
-        odd.extend(f"{name}[{i}] has values {sorted(found)}" for i, found in strange if found)
+        unexpected = [(i, set(row.tolist()) - {0.0, 1.0}) for i, row in enumerate(values)]
+        odd.extend(f"{name}[{i}] has values {sorted(found)}" for i, found in unexpected if found)
     packed = np.packbits(bits, axis=1)
     text, size = packed.tobytes().hex(), 2 * packed.shape[1]
     return [text[start : start + size] for start in range(0, len(text), size)]
 
 
 def is_integer_pair(value: Any) -> bool:
-    """Whether a value is a tuple of two integers, Python's or NumPy's."""
+    """Returns whether a value is a tuple of two integers of Python or NumPy."""
     if type(value) is not tuple or len(value) != 2:
         return False
     row, column = value
@@ -65,13 +65,13 @@ def is_integer_pair(value: Any) -> bool:
 
 
 class Episodes:
-    """One request at work: its config, which POGEMA may change, its environment, and what the last call left."""
+    """The state of one request: its config, which POGEMA may change, its environment and its last observations."""
 
     def __init__(self, config: GridConfig, density: bool) -> None:
         """Makes the environment."""
         env = pogema_v0(grid_config=config)
         if config.integration not in (None, "SampleFactory"):
-            raise ProtocolError(f"the oracle does not serve integration {config.integration}")
+            raise ProtocolError(f"`integration` is `{config.integration}`, expected none or `SampleFactory`")
         self.env = AgentsDensityWrapper(env) if density else env
         self.base = self.env.unwrapped
         self.config = config
@@ -81,7 +81,7 @@ class Episodes:
         self.planner: BatchAStarAgent | None = None
 
     def perform(self, op: Any) -> Record:
-        """Carries out one operation."""
+        """Executes one operation; returns its record."""
         match op:
             case ["reset", seed]:
                 return self.reset(seed)
@@ -96,7 +96,7 @@ class Episodes:
                 return {"op": "back", "moved": self.env.step_back(), **self.state()}
             case ["history"]:
                 return self.history()
-        raise ProtocolError(f"no such operation: {json.dumps(op)}")
+        raise ProtocolError(f"unknown operation: {json.dumps(op)}")
 
     def reset(self, seed: Any) -> Record:
         """Resets and records the whole instance."""
@@ -117,12 +117,12 @@ class Episodes:
         }
 
     def step(self, name: str, actions: Any) -> Record:
-        """Steps and records; `actions` is the caller's container, which POGEMA may write to."""
-        given = list(actions)
+        """Steps and records the results. `actions` is the caller's container; POGEMA may write to it."""
+        requested = list(actions)
         self.observations, rewards, terminated, truncated, infos = self.env.step(actions)
         return {
             "op": name,
-            "actions": given,
+            "actions": requested,
             "actions_after": list(actions),
             **self.state(),
             "rewards": rewards,
@@ -134,7 +134,7 @@ class Episodes:
         }
 
     def history(self) -> Record:
-        """What a persistent environment has recorded, step by step and change by change."""
+        """Returns the history of a persistent environment: all steps, and all changes."""
 
         def rows(histories: Any) -> list[Any]:
             r = self.radius
@@ -143,7 +143,7 @@ class Episodes:
         return {"op": "history", "full": rows(self.env.get_full_history()), "changes": rows(self.env.get_history())}
 
     def state(self) -> Record:
-        """Where everybody is, and the occupancy matrix, which may say otherwise."""
+        """Returns the cells of all agents, and the occupied cells, which may differ."""
         grid = self.base.grid
         return {
             "cells": unpad(grid.positions_xy, self.radius),
@@ -154,7 +154,7 @@ class Episodes:
         }
 
     def observed(self) -> Record:
-        """The last observations, checked."""
+        """Encodes and checks the last observations."""
         kind, side, seen = self.config.observation_type, 2 * self.radius + 1, self.observations
         odd: list[str] = []
         if kind == "default":
@@ -170,13 +170,13 @@ class Episodes:
         return {**record, "odd": odd} if odd else record
 
     def pairs(self, name: str, odd: list[str]) -> Record:
-        """One position per agent, as it stands; what is not a pair of integers is told in `odd`."""
+        """Returns one position per agent, unchanged; reports values other than integer pairs in `odd`."""
         values = [one[name] for one in self.observations]
         odd.extend([f"{name}[{i}] is {value!r}" for i, value in enumerate(values) if not is_integer_pair(value)])
         return {name: values}
 
     def global_obstacles(self, odd: list[str]) -> Record | None:
-        """The padded grid all agents were given, or null if it is the last reset's."""
+        """Returns the padded grid that all agents observe, or null if it equals the grid of the last reset."""
         first, *others = [one["global_obstacles"] for one in self.observations]
         odd.extend([f"global_obstacles[{i}] is not [0]" for i, other in enumerate(others, 1) if not same(first, other)])
         if self.obstacles_at_reset is not None and same(first, self.obstacles_at_reset):
@@ -184,15 +184,15 @@ class Episodes:
         expected = np.float64 if self.config.empty_outside else np.int64
         if first.dtype != expected or first.shape != self.base.grid.obstacles.shape:
             odd.append(f"global_obstacles is {first.dtype} {first.shape}")
-        if strange := set(np.unique(first).tolist()) - {0, 1}:
-            odd.append(f"global_obstacles has values {sorted(strange)}")
+        if unexpected := set(np.unique(first).tolist()) - {0, 1}:
+            odd.append(f"global_obstacles has values {sorted(unexpected)}")
         if self.obstacles_at_reset is None:
             self.obstacles_at_reset = first
         return {"dtype": str(first.dtype), "rows": draw(first)}
 
     def goal_lists(self) -> Record:
-        """The goals POGEMA foretells, or null and why: on some pools it would go on for ever."""
-        if self.config.max_episode_steps > LONGEST_GOAL_LISTS:
+        """Returns the future goals, or null and the reason: on some pools POGEMA never terminates."""
+        if self.config.max_episode_steps > MAX_GOAL_LIST_STEPS:
             return {"goal_lists": None}
         try:
             with deadline(LIMIT / 10):

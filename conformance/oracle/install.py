@@ -1,11 +1,11 @@
-"""Makes the oracle's virtual environment: `python3.11 install.py DIR` prints the path of its python as the last line.
+"""Creates the oracle's virtual environment: `python3.11 install.py DIR` prints the path of its Python as the last line.
 
-Does nothing when DIR is complete, that is, when its stamp holds the hash of requirements.txt. The stamp is written
-last, so an interrupted run is done again from the start. A lock beside DIR makes a second process wait for the first,
-and for the children of a first that was killed, which inherit it.
+Does nothing if DIR is complete: its stamp holds the hash of requirements.txt. The stamp is written last, so a run after
+an interruption starts from scratch. A lock file next to DIR makes a second process wait for the first. If the first is
+killed, the second also waits for its children, which inherit the lock.
 """
 
-from __future__ import annotations  # an older Python gets as far as the message that it is too old
+from __future__ import annotations  # so that an older Python reaches the version check
 
 import fcntl
 import hashlib
@@ -25,38 +25,38 @@ def fail(message: str) -> None:
     sys.exit(f"install.py: {message}")
 
 
-def wanted_stamp() -> str:
-    """The content of the stamp of a complete environment."""
+def expected_stamp() -> str:
+    """Returns the stamp of a complete environment."""
     return hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest() + "\n"
 
 
 def write_stamp(directory: Path, text: str) -> None:
-    """Replaces the stamp in one move, so that no reader sees half of it."""
+    """Replaces the stamp atomically, so that no reader sees a partial stamp."""
     fresh = directory / f"{STAMP}.new"
     fresh.write_text(text)
     os.replace(fresh, directory / STAMP)
 
 
 def is_complete(directory: Path) -> bool:
-    """Whether the stamp fits the requirements and the interpreter is still there."""
+    """Returns whether the stamp matches the requirements and the interpreter exists."""
     stamp = directory / STAMP
-    return stamp.is_file() and stamp.read_text() == wanted_stamp() and (directory / "bin" / "python").exists()
+    return stamp.is_file() and stamp.read_text() == expected_stamp() and (directory / "bin" / "python").exists()
 
 
-def run(command: list[str], otherwise: str) -> None:
-    """Runs a command with its output on stderr; its failure is ours."""
+def run(command: list[str], error: str) -> None:
+    """Runs a command with its output on stderr; if it fails, ends the program with `error`."""
     code = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, close_fds=False).returncode
     if code != 0:
-        fail(f"{otherwise} (exit code {code})")
+        fail(f"{error} (exit code {code})")
 
 
 def clear(directory: Path) -> None:
-    """Empties the directory, or refuses if it holds something other than a virtual environment."""
+    """Empties the directory; fails if it contains anything other than a virtual environment."""
     if directory.exists() and not directory.is_dir():
         fail(f"{directory} is not a directory")
     directory.mkdir(parents=True, exist_ok=True)
-    ours = (directory / STAMP).exists() or (directory / "pyvenv.cfg").exists()
-    if any(directory.iterdir()) and not ours:
+    is_environment = (directory / STAMP).exists() or (directory / "pyvenv.cfg").exists()
+    if any(directory.iterdir()) and not is_environment:
         fail(f"{directory} is not empty and not a virtual environment; remove it or choose another")
     write_stamp(directory, INCOMPLETE)
     for entry in directory.iterdir():
@@ -67,20 +67,20 @@ def clear(directory: Path) -> None:
 
 
 def build(directory: Path) -> None:
-    """Makes the environment from nothing; the stamp comes last."""
+    """Creates the environment from scratch; writes the stamp last."""
     clear(directory)
-    run([sys.executable, "-m", "venv", str(directory)], "cannot make a virtual environment; is `venv` installed?")
+    run([sys.executable, "-m", "venv", str(directory)], "cannot create a virtual environment; is `venv` installed?")
     pip = [str(directory / "bin" / "python"), "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
-    run([*pip, "--retries", "2", "--no-deps", "-r", str(REQUIREMENTS)], "pip cannot install requirements.txt; is there a network?")
-    write_stamp(directory, wanted_stamp())
+    run([*pip, "--retries", "2", "--no-deps", "-r", str(REQUIREMENTS)], "pip cannot install requirements.txt; is the network up?")
+    write_stamp(directory, expected_stamp())
 
 
 def main(arguments: list[str]) -> None:
-    """Checks the call, takes the lock, builds if need be, prints the interpreter's path."""
+    """Checks the arguments, takes the lock, builds if needed, and prints the path of the interpreter."""
     if len(arguments) != 1:
         fail("usage: python3.11 install.py DIR")
     if sys.version_info[:2] != (3, 11):
-        fail(f"Python 3.11 is needed, this is {sys.version_info.major}.{sys.version_info.minor}")
+        fail(f"found Python {sys.version_info.major}.{sys.version_info.minor}, expected 3.11")
     directory = Path(arguments[0]).absolute()
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)

@@ -2,12 +2,12 @@
 
 Request   {"id", "config": GridConfig's fields, "register": {"name", "rows"} | null, "density": bool, "ops": [op, ...]}
   op      ["reset", seed | null]  ["step", [actions]]  ["astar"]  ["sample"]  ["back"]  ["history"]
-Response  {"id", "records": [one per op], "warnings": [text, ...]}, and where it ended early
+Response  {"id", "records": [one per op], "warnings": [text, ...]}, and if the request failed
           "error": {"when": "request" | "register" | "config" | "make" | index of the op, "type", "message"}
 
-Cells are [row, column] without the padding, but for `global_xy` and `global_target_xy`, which are as POGEMA gives them.
-Windows of zeros and ones are hexadecimal, eight cells a byte, the first cell in the highest bit. A float that JSON has
-no number for is a string. A request may take POGEMA_ORACLE_TIMEOUT seconds (20): then its error is a `Timeout`.
+Cells are [row, column] without the padding, except `global_xy` and `global_target_xy`, which are copied from POGEMA.
+Windows of zeros and ones are hexadecimal, eight cells per byte, the first cell in the highest bit. Infinite floats and
+NaN are strings. A request that exceeds POGEMA_ORACLE_TIMEOUT seconds [default: 20] ends with a `Timeout` error.
 """
 
 import gc
@@ -28,7 +28,7 @@ try:
     import pogema
 
     if pogema.__version__ != VERSION:
-        raise ImportError(f"pogema {VERSION} is needed, this is {pogema.__version__}")
+        raise ImportError(f"found pogema {pogema.__version__}, expected {VERSION}")
     from pogema import GridConfig
     from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 
@@ -40,7 +40,7 @@ except (ImportError, ValueError) as failure:
 
 @contextmanager
 def registered(grid: Record | None) -> Iterator[None]:
-    """Keeps the request's map in POGEMA's registry during its body."""
+    """Registers the map of the request in POGEMA for the duration of the body."""
     if grid is None:
         yield
         return
@@ -52,15 +52,15 @@ def registered(grid: Record | None) -> Iterator[None]:
 
 
 def describe(when: str | int, error: BaseException) -> Record:
-    """An exception as the protocol tells it."""
+    """Converts an exception to the form of the protocol."""
     return {"when": when, "type": type(error).__name__, "message": str(error)}
 
 
 def parse(line: bytes) -> Record:
-    """A request with every field present and of its type; the config's fields are left to POGEMA."""
+    """Parses a request, fills in defaults and checks types; POGEMA checks the fields of the config."""
     request = json.loads(line)
     if not isinstance(request, dict) or not {"id", "config", "ops"} <= request.keys():
-        raise ProtocolError("a request is an object with `id`, `config` and `ops`")
+        raise ProtocolError("expected a request: an object with `id`, `config` and `ops`")
     if unknown := request.keys() - {"id", "config", "register", "density", "ops"}:
         raise ProtocolError(f"unknown field `{min(unknown)}`")
     request = {"register": None, "density": False, **request}
@@ -74,7 +74,7 @@ def parse(line: bytes) -> Record:
 
 
 def run(request: Record) -> Record:
-    """Carries out a request, up to its end or its first error."""
+    """Executes a request up to its end or its first error."""
     response: Record = {"id": request["id"], "records": []}
     when: str | int = "register"
     try:
@@ -93,7 +93,7 @@ def run(request: Record) -> Record:
 
 
 def answer(line: bytes) -> Record:
-    """The response to one line, whatever the line is."""
+    """Returns the response to one line, also to an invalid one."""
     try:
         request = parse(line)
     except (ValueError, RecursionError) as error:
@@ -104,33 +104,33 @@ def answer(line: bytes) -> Record:
     return {**response, "warnings": [str(warning.message) for warning in caught]}
 
 
-def plain(value: Any) -> Any:
-    """What JSON has no form for: NumPy's numbers as Python's, the rest as text."""
+def to_native(value: Any) -> Any:
+    """Converts values that JSON cannot encode: NumPy's numbers to Python's, other values to text."""
     return value.item() if isinstance(value, np.generic) else repr(value)
 
 
-def spelt(value: Any) -> Any:
-    """The same value with every float that is not finite as text."""
+def with_text_floats(value: Any) -> Any:
+    """Returns the same value with every float that is not finite as text."""
     if isinstance(value, dict):
-        return {key: spelt(part) for key, part in value.items()}
+        return {key: with_text_floats(part) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [spelt(part) for part in value]
+        return [with_text_floats(part) for part in value]
     return str(float(value)) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def encode(response: Record) -> bytes:
-    """One line of JSON in ASCII."""
-    encoder = json.JSONEncoder(default=plain, allow_nan=False, separators=(",", ":"), check_circular=False)
+    """Encodes a response as one line of JSON in ASCII."""
+    encoder = json.JSONEncoder(default=to_native, allow_nan=False, separators=(",", ":"), check_circular=False)
     try:
         return encoder.encode(response).encode("ascii") + b"\n"
     except ValueError:
-        return encoder.encode(spelt(response)).encode("ascii") + b"\n"
+        return encoder.encode(with_text_floats(response)).encode("ascii") + b"\n"
 
 
 def main() -> None:
-    """Says who it is, then serves until stdin ends."""
+    """Writes its versions, then answers requests until stdin ends."""
     out = open(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever else prints, prints to stderr
+    os.dup2(2, 1)  # anything else that is printed goes to stderr
     gc.freeze()
     versions = {"version": VERSION, "numpy": np.__version__, "python": platform.python_version()}
     try:

@@ -1,4 +1,4 @@
-"""The oracle as its tests speak to it: over a pipe, line by line."""
+"""The client that the oracle's tests use: sends requests over a pipe, line by line."""
 
 import json
 import os
@@ -18,21 +18,21 @@ SMALL: Config = {"size": 6, "num_agents": 4, "obs_radius": 2, "seed": 3, "densit
 STEPS = [[1, 2, 3, 4], [4, 4, 2, 1], [0, 1, 2, 3]]
 
 
-def unpacked(text: str, shape: tuple[int, ...]) -> NDArray[Any]:
-    """The window that a hexadecimal string stands for."""
+def unpack_window(text: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Decodes a window from a hexadecimal string."""
     bits = np.unpackbits(np.frombuffer(bytes.fromhex(text), np.uint8))
     size = int(np.prod(shape))
     assert not bits[size:].any()
     return bits[:size].reshape(shape)
 
 
-def pictured(grid: NDArray[Any]) -> list[str]:
-    """A 0/1 array as the oracle draws it."""
+def draw_grid(grid: NDArray[Any]) -> list[str]:
+    """Draws a 0/1 array in the form of the oracle."""
     return ["".join(".#"[int(cell)] for cell in row) for row in grid]
 
 
 class Oracle:
-    """The program under test in a process of its own."""
+    """The oracle in its own process."""
 
     def __init__(self, timeout: str = "20") -> None:
         environment = {**os.environ, "POGEMA_ORACLE_TIMEOUT": timeout}
@@ -45,7 +45,7 @@ class Oracle:
         self.greeting = json.loads(self.output.readline())
 
     def send(self, line: bytes) -> dict[str, Any]:
-        """The response to a raw line."""
+        """Sends a raw line; returns the response."""
         self.input.write(line + b"\n")
         self.input.flush()
         response: dict[str, Any] = json.loads(self.output.readline(), parse_constant=self.refuse)
@@ -53,11 +53,11 @@ class Oracle:
 
     @staticmethod
     def refuse(constant: str) -> None:
-        """Strict JSON has no NaN."""
+        """Rejects NaN and infinity, which strict JSON does not allow."""
         raise ValueError(constant)
 
     def close(self) -> tuple[int, bytes, bytes]:
-        """Ends the input; the exit code and whatever else was written."""
+        """Closes the input; returns the exit code and the remaining output."""
         out, err = self.process.communicate(timeout=30)
         return self.process.returncode, out, err
 
@@ -78,11 +78,11 @@ class OracleTest(unittest.TestCase):
         assert (code, out, err) == (0, b"", b""), (code, out, err)
 
     def ask(self, config: dict[str, Any], *ops: Any, **fields: Any) -> dict[str, Any]:
-        """The response to a request."""
+        """Sends a request; returns the response."""
         return self.oracle.send(json.dumps({"id": 7, "config": config, "ops": ops, **fields}).encode())
 
     def records(self, config: dict[str, Any], *ops: Any, **fields: Any) -> list[dict[str, Any]]:
-        """The records of a request that must succeed."""
+        """Sends a request that must succeed; returns its records."""
         response = self.ask(config, *ops, **fields)
         self.assertNotIn("error", response)
         records: list[dict[str, Any]] = response["records"]
@@ -90,7 +90,7 @@ class OracleTest(unittest.TestCase):
         return records
 
     def error(self, config: dict[str, Any], *ops: Any, **fields: Any) -> tuple[Any, str]:
-        """When and with which exception a request fails."""
+        """Sends a request that must fail; returns when it failed and the type of the exception."""
         error = self.ask(config, *ops, **fields)["error"]
         self.assertIsInstance(error["message"], str)
         return error["when"], error["type"]

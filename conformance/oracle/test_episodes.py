@@ -1,4 +1,4 @@
-"""Tests of whole episodes, compared with the package called directly: `python test_episodes.py`."""
+"""Compares whole episodes of the oracle with direct calls of the package: `python test_episodes.py`."""
 
 import sys
 import unittest
@@ -8,11 +8,11 @@ import numpy as np
 from pogema import BatchAStarAgent, GridConfig, pogema_v0
 from pogema.wrappers.metrics import AgentsDensityWrapper
 
-from oracle_client import SMALL, STEPS, OracleTest, pictured, unpacked
+from oracle_client import SMALL, STEPS, OracleTest, draw_grid, unpack_window
 
 
 class Episode(OracleTest):
-    """What is recorded, held against the package called directly."""
+    """Records against direct calls of the package."""
 
     def test_greeting(self) -> None:
         python = "3.11." + str(sys.version_info.micro)
@@ -20,7 +20,7 @@ class Episode(OracleTest):
         self.assertEqual(self.oracle.greeting, expected)
 
     def check_state(self, record: dict[str, Any], env: Any) -> None:
-        """The state part of a record against a second environment."""
+        """Compares the state in a record with a second environment."""
         grid = env.unwrapped.grid
         self.assertEqual(record["cells"], grid.get_agents_xy(ignore_borders=True))
         self.assertEqual(record["goals"], grid.get_targets_xy(ignore_borders=True))
@@ -31,21 +31,21 @@ class Episode(OracleTest):
         self.assertEqual(record["occupied"], occupied)
 
     def check_observations(self, record: dict[str, Any], observations: list[Any], at_reset: bool) -> None:
-        """The observations of a record against those of a second environment."""
+        """Compares the observations in a record with those of a second environment."""
         seen = record["observations"]
         self.assertNotIn("odd", seen)
         self.assertEqual(seen["dtype"], "float32")
         for agent, one in enumerate(observations):
             if seen["type"] == "default":
-                np.testing.assert_array_equal(unpacked(seen["windows"][agent], (3, 5, 5)), one)
+                np.testing.assert_array_equal(unpack_window(seen["windows"][agent], (3, 5, 5)), one)
                 continue
             for name in ("obstacles", "agents"):
-                np.testing.assert_array_equal(unpacked(seen[name][agent], (5, 5)), one[name])
+                np.testing.assert_array_equal(unpack_window(seen[name][agent], (5, 5)), one[name])
             for name in one.keys() - {"obstacles", "agents", "global_obstacles"}:
                 self.assertEqual(seen[name][agent], list(one[name]))
         if seen["type"] == "MAPF":
             grid = observations[0]["global_obstacles"]
-            expected = {"dtype": str(grid.dtype), "rows": pictured(grid)} if at_reset else None
+            expected = {"dtype": str(grid.dtype), "rows": draw_grid(grid)} if at_reset else None
             self.assertEqual(seen["global_obstacles"], expected)
 
     def test_each_observation_type_and_goal_rule(self) -> None:
@@ -58,16 +58,16 @@ class Episode(OracleTest):
                         )
 
     def check_episode(self, config: dict[str, Any]) -> None:
-        """A whole episode against a second environment."""
+        """Compares a whole episode with a second environment."""
         config = {**config, "max_episode_steps": 3}
         first, *later = self.records(config, ["reset", None], *(["step", actions] for actions in STEPS))
         env = pogema_v0(grid_config=GridConfig(**config))
         observations, _ = env.reset()
         derived = {"width": 6, "height": 6, "size": 6, "density": 0.2, "num_agents": 4}
         self.assertEqual((first["op"], first["derived"]), ("reset", derived))
-        self.assertEqual(first["map"], pictured(env.get_obstacles(ignore_borders=True)))
+        self.assertEqual(first["map"], draw_grid(env.get_obstacles(ignore_borders=True)))
         dtype = "float64" if config["empty_outside"] else "int64"
-        self.assertEqual(first["padded"], {"dtype": dtype, "rows": pictured(env.get_obstacles())})
+        self.assertEqual(first["padded"], {"dtype": dtype, "rows": draw_grid(env.get_obstacles())})
         self.check_state(first, env)
         self.check_observations(first, observations, at_reset=True)
         self.assertEqual("goal_lists" in first, config["on_target"] == "restart")
@@ -95,7 +95,7 @@ class Episode(OracleTest):
         record = self.records(config, ["reset", None], ["step", [4, 4]])[1]
         self.assertEqual((record["cells"], record["occupied"]), ([[0, 1], [0, 2]], [[0, 2]]))
 
-    def test_astar_forgets_at_reset(self) -> None:
+    def test_reset_clears_astar(self) -> None:
         config = {**SMALL, "size": 4, "num_agents": 5, "observation_type": "POMAPF", "density": 0.1}
         records = self.records(config, *2 * [["reset", None], *6 * [["astar"]]])
         env, planner = pogema_v0(grid_config=GridConfig(**config)), BatchAStarAgent()
@@ -106,7 +106,7 @@ class Episode(OracleTest):
             self.assertEqual((record["op"], record["actions"]), ("astar", actions))
             self.assertEqual(record, again)
 
-    def test_sample_continues_over_resets(self) -> None:
+    def test_resets_do_not_restart_the_sample_stream(self) -> None:
         records = self.records(SMALL, ["reset", None], ["sample"], ["reset", 5], ["sample"])
         generator = np.random.default_rng(SMALL["seed"])
         for record in (records[1], records[3]):
@@ -136,7 +136,7 @@ class Episode(OracleTest):
         self.assertEqual(record["changes"], [changes])
         self.assertEqual(record["full"], [[changes[0], changes[0], changes[1]]])
 
-    def test_pools_drift_over_resets_but_not_over_requests(self) -> None:
+    def test_pools_change_between_resets_but_not_between_requests(self) -> None:
         config = {"map": ".....!", "seed": 5, "num_agents": 2, "obs_radius": 1}
         starts = [record["cells"] for record in self.records(config, *3 * [["reset", None]])]
         self.assertEqual(starts, [[[0, 4], [0, 3]], [[0, 0], [0, 2]], [[0, 4], [0, 1]]])
@@ -150,7 +150,7 @@ class Episode(OracleTest):
         self.assertEqual(metrics, env.step(STEPS[0])[4][0]["metrics"])
         self.assertIn("avg_agents_density", metrics)
 
-    def test_registered_map_lasts_for_its_request_only(self) -> None:
+    def test_registered_map_exists_only_during_its_request(self) -> None:
         config = {**SMALL, "map_name": "own", "num_agents": 1}
         rows = ["..#.", "....", ".#.."]
         for _ in range(2):

@@ -1,4 +1,4 @@
-"""Tests of what the oracle makes of odd and wrong requests: `python test_failures.py`."""
+"""Tests the oracle with unusual and invalid requests: `python test_failures.py`."""
 
 import json
 import os
@@ -9,19 +9,19 @@ import unittest
 from pathlib import Path
 from typing import Any, ClassVar
 
-from oracle_client import HERE, SMALL, STEPS, Config, OracleTest, unpacked
+from oracle_client import HERE, SMALL, STEPS, Config, OracleTest, unpack_window
 
 
 class Odd(OracleTest):
-    """What breaks the expected form is told, not hidden."""
+    """The oracle reports observations of an unexpected form."""
 
     def test_windows_cut_by_the_edge(self) -> None:
         config = {"map": "a.A", "obs_radius": 2, "observation_type": "POMAPF", "MOVES": [[0, 0], [0, 4]]}
         seen = self.records(config, ["reset", None], ["step", [1]])[1]["observations"]
         self.assertEqual(seen["odd"], ["obstacles[0] is float32 (5, 3)", "agents[0] is float32 (5, 3)"])
-        self.assertEqual(unpacked(seen["agents"][0], (5, 3)).nonzero(), (2, 2))
+        self.assertEqual(unpack_window(seen["agents"][0], (5, 3)).nonzero(), (2, 2))
 
-    def test_strange_map_values(self) -> None:
+    def test_unexpected_map_values(self) -> None:
         config = {"map": [[0, 2, 0, 0]], "obs_radius": 1, "seed": 1, "num_agents": 1}
         config |= {"agents_xy": [[0, 0]], "targets_xy": [[0, 3]], "observation_type": "MAPF"}
         record = self.records(config, ["reset", None])[0]
@@ -46,7 +46,7 @@ class Odd(OracleTest):
         line = json.dumps({"id": 1, "config": config, "ops": [["reset", None]]}).replace("Infinity", "1e999")
         self.assertEqual(self.oracle.send(line.encode())["records"][0]["derived"]["density"], "inf")
 
-    def test_goal_lists_that_are_none(self) -> None:
+    def test_goal_lists_that_are_null(self) -> None:
         config = {**SMALL, "on_target": "restart"}
         record = self.records({**config, "max_episode_steps": 5000}, ["reset", None])[0]
         self.assertEqual((record["goal_lists"], "goal_lists_error" in record), (None, False))
@@ -56,7 +56,7 @@ class Odd(OracleTest):
 
 
 class Failure(OracleTest):
-    """Errors end a request, never the oracle."""
+    """An error ends its request, but never the oracle."""
 
     def test_config_and_make(self) -> None:
         self.assertEqual(self.error({"size": 1}), ("config", "ValidationError"))
@@ -69,7 +69,7 @@ class Failure(OracleTest):
         self.assertEqual((response["error"]["when"], response["error"]["type"]), (2, "IndexError"))
         self.assertEqual([record["op"] for record in response["records"]], ["reset", "step"])
 
-    def test_the_package_speaks_for_itself(self) -> None:
+    def test_errors_of_the_package_are_passed_through(self) -> None:
         self.assertEqual(self.error(SMALL, ["step", STEPS[0]]), (0, "AttributeError"))
         self.assertEqual(self.error(SMALL, ["reset", None], ["step", [0]]), (1, "AssertionError"))
         self.assertEqual(self.error(SMALL, ["reset", None], ["back"]), (1, "AttributeError"))
@@ -121,7 +121,7 @@ class Failure(OracleTest):
 
 
 class Hanging(OracleTest):
-    """On some pools POGEMA looks for ever for a goal that is not the agent's own cell, one padded, one not."""
+    """On some pools POGEMA searches for a goal forever, because it compares padded with unpadded cells."""
 
     timeout = "0.5"
     config: ClassVar[Config] = {"map": "..", "obs_radius": 1, "seed": 3, "on_target": "restart", "max_episode_steps": 8}
@@ -144,10 +144,10 @@ class Hanging(OracleTest):
 
 
 class Start(unittest.TestCase):
-    """The oracle refuses to be something else."""
+    """The oracle and its installer refuse invalid settings."""
 
     def refused(self, script: str, *arguments: str, **environment: str) -> str:
-        """The single line on stderr of a run that must fail with exit code 1."""
+        """Runs a script that must fail with exit code 1; returns its single line on stderr."""
         command = [sys.executable, str(HERE / script), *arguments]
         done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment})
         self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1))
@@ -156,13 +156,13 @@ class Start(unittest.TestCase):
     def test_another_version(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             Path(directory, "pogema.py").write_text("__version__ = '2.0.0'\n")
-            self.assertIn("1.4.0 is needed", self.refused("oracle.py", PYTHONPATH=directory))
+            self.assertIn("expected 1.4.0", self.refused("oracle.py", PYTHONPATH=directory))
 
-    def test_a_senseless_timeout(self) -> None:
+    def test_an_invalid_timeout(self) -> None:
         for value in ("soon", "0", "-1", "nan"):
             self.refused("oracle.py", POGEMA_ORACLE_TIMEOUT=value)
 
-    def test_install_spares_a_directory_that_is_not_its_own(self) -> None:
+    def test_install_keeps_a_directory_that_is_no_environment(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             target = Path(directory, "precious")
             target.mkdir()

@@ -1,30 +1,31 @@
-"""Any environment object in Python as a port: write two functions, and call `serve`.
+"""Serves any environment object in Python as a port: write two functions, and call `serve`.
 
     from environment_object import serve
 
-    def make_env(instance):             # an environment for what docs/PORTING.md calls an instance
+    def make_env(instance):             # returns an environment for an instance, see docs/PORTING.md
         return MyEnv(instance["map"], instance["starts"], instance["goals"], **instance["config"])
 
-    def read_state(env):                # cells and goals counted on the map without its border
+    def read_state(env):                # returns cells and goals in map coordinates, without the border
         return {"cells": env.cells, "goals": env.goals, "active": env.active}
 
     serve(make_env, claims={"name": "mine", "profiles": ["core"], "collision": ["priority"], "on_goal": ["finish"]},
           read_state=read_state)
 
-The environment is one of two kinds:
+Two kinds of environments are supported:
 
-- lists, as POGEMA's own: `reset()` gives observations and infos, `step(actions)` gives observations, rewards,
+- lists, as in POGEMA: `reset()` returns observations and infos, `step(actions)` returns observations, rewards,
   terminated, truncated and infos, each a list with one entry for each agent;
-- dictionaries, as a `ParallelEnv` of PettingZoo: the same keyed by the names in `possible_agents`, where agents drop
-  out of `agents` and of the answers as they end. While there are any in `agents`, only they are given actions;
-  afterwards all are, since the checks play on after the end.
+- dictionaries, as in a `ParallelEnv` of PettingZoo: the same, keyed by the names in `possible_agents`. Agents that end
+  drop out of `agents` and of the results. While `agents` is not empty, only these agents get actions. Afterwards all
+  agents do, because the checks continue after the end.
 
-The checks ask of all agents, also of those that have dropped out. For them `read_state` may give `rewards`,
-`terminated`, `truncated` and `observations` too, as lists for all agents. What it leaves out is put down as the rules
-have it: no reward, terminated if it was, truncated from `max_steps` on. All its other keys go into the answers as they
-are: so can `occupied`, `on_goal` or `metrics`. Without them `metrics` are taken from the first info.
+The answers must cover all agents, including those that have dropped out. For them, `read_state` may also return
+`rewards`, `terminated`, `truncated` and `observations`, as lists for all agents. Missing values follow the rules:
+reward 0, terminated if the agent was terminated before, truncated from `max_steps` on. All other keys of `read_state`,
+such as `occupied`, `on_goal` or `metrics`, are copied into the answers. If `metrics` is missing, the first info
+provides it.
 
-`python3 environment_object.py --example` serves the environment of template.py in the form of a ParallelEnv.
+`python3 environment_object.py --example` serves the environment of template.py as a ParallelEnv.
 """
 
 from __future__ import annotations
@@ -38,60 +39,60 @@ from typing import Any
 
 Record = dict[str, Any]
 
-FILLED = ("rewards", "terminated", "truncated", "observations")
+RESULT_KEYS = ("rewards", "terminated", "truncated", "observations")
 
 
 class Refusal(Exception):
-    """A question that is answered with an error."""
+    """A question that the port answers with an error."""
 
 
-def native(value: Any) -> Any:
-    """What JSON has no form for: arrays and their numbers as Python's own."""
+def to_native(value: Any) -> Any:
+    """Converts arrays and their numbers, which JSON cannot encode, to Python's own types."""
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"an answer cannot hold a {type(value).__name__}")
+    raise TypeError(f"an answer cannot contain a value of type {type(value).__name__}")
 
 
-def told(observations: list[Any], at_reset: bool) -> Any:
-    """Observations in the form of the protocol; where each agent has a dictionary, one list for each of its names."""
+def to_protocol(observations: list[Any], at_reset: bool) -> Any:
+    """Converts observations to the form of the protocol: if they are dictionaries, one list for each key."""
     if not isinstance(observations[0], dict):
         return observations
     arrays = {name: [each[name] for each in observations] for name in observations[0]}
     obstacles = arrays.pop("global_obstacles", None)
-    if obstacles and at_reset:  # one grid for all
+    if obstacles and at_reset:  # all agents share one grid
         arrays["global_obstacles"] = ["".join(".#"[bool(cell)] for cell in row) for row in obstacles[0]]
     return arrays
 
 
 class Episodes:
-    """One environment at work."""
+    """The episodes of one environment."""
 
     def __init__(self, env: Any, instance: Record, read_state: Callable[[Any], Record], profiles: list[str]) -> None:
         self.env, self.read_state, self.profiles = env, read_state, profiles
         self.num_agents, self.max_steps = len(instance["starts"]), instance["config"]["max_steps"]
         self.elapsed, self.terminated = 0, [False] * self.num_agents
 
-    def listed(self, values: Any, for_the_rest: list[Any]) -> list[Any]:
-        """One value for each agent, whatever the environment's kind."""
+    def listed(self, values: Any, defaults: list[Any]) -> list[Any]:
+        """Returns one value for each agent; `defaults` fills in agents that dropped out."""
         if not isinstance(values, dict):
             return list(values)
-        return [values.get(name, other) for name, other in zip(self.env.possible_agents, for_the_rest)]
+        return [values.get(name, other) for name, other in zip(self.env.possible_agents, defaults)]
 
     def reset(self, seed: Any) -> Record:
-        """Begins an episode."""
+        """Begins an episode; returns the answer."""
         result = self.env.reset() if seed is None else self.env.reset(seed=seed)
         self.elapsed, self.terminated = 0, [False] * self.num_agents
         return self.answer(result[0] if isinstance(result, tuple) else result, self.read_state(self.env), {})
 
     def step(self, actions: Any) -> Record:
-        """Plays a step."""
+        """Plays a step; returns the answer."""
         if not isinstance(actions, list) or len(actions) != self.num_agents:
             raise Refusal(f"expected {self.num_agents} actions")
-        given: Any = list(actions)
+        env_actions: Any = list(actions)
         if hasattr(self.env, "possible_agents"):
             by_name = dict(zip(self.env.possible_agents, actions))
-            given = {name: by_name[name] for name in self.env.agents} or by_name
-        observations, rewards, terminated, truncated, infos = self.env.step(given)
+            env_actions = {name: by_name[name] for name in self.env.agents} or by_name
+        observations, rewards, terminated, truncated, infos = self.env.step(env_actions)
         self.elapsed += 1
         state, late = self.read_state(self.env), [self.elapsed >= self.max_steps] * self.num_agents
         self.terminated = [bool(flag) for flag in self.listed(terminated, state.get("terminated", self.terminated))]
@@ -105,18 +106,18 @@ class Episodes:
         return self.answer(observations, state, results)
 
     def answer(self, observations: Any, state: Record, results: Record) -> Record:
-        """What the answers to a reset and to a step have in common."""
-        answer = {**results, **{key: value for key, value in state.items() if key not in FILLED}}
+        """Returns the answer to a reset or a step."""
+        answer = {**results, **{key: value for key, value in state.items() if key not in RESULT_KEYS}}
         if "observations" in self.profiles:
             seen = self.listed(observations, state.get("observations", [None] * self.num_agents))
             if any(each is None for each in seen):
-                raise Refusal("an agent has dropped out, and `read_state` gives no observations")
-            answer["observations"] = told(seen, at_reset=not results)
+                raise Refusal("an agent has dropped out, and `read_state` returns no observations for it")
+            answer["observations"] = to_protocol(seen, at_reset=not results)
         return answer
 
 
 class Server:
-    """Answers one question after the other."""
+    """The port: answers questions about its current environment."""
 
     def __init__(self, make_env: Callable[[Record], Any], claims: Record, read_state: Callable[[Any], Record]) -> None:
         self.make_env, self.read_state = make_env, read_state
@@ -124,13 +125,13 @@ class Server:
         self.episodes: Episodes | None = None
 
     def answer(self, question: Any) -> Record:
-        """The answer to any question but `bye`."""
+        """Returns the answer to a question other than `bye`."""
         kind = question.get("type") if isinstance(question, dict) else None
         if kind == "hello":
             return self.claims
         if kind == "reset":
             if "config" in question:
-                raise Refusal("only instances can be played")
+                raise Refusal("configs are not supported, expected an instance")
             if "instance" in question:
                 env, self.episodes = self.make_env(question["instance"]), None
                 self.episodes = Episodes(env, question["instance"], self.read_state, self.claims["profiles"])
@@ -138,7 +139,7 @@ class Server:
             return self.episodes.reset(question.get("seed"))
         if kind == "step" and self.episodes is not None:
             return self.episodes.step(question.get("actions"))
-        raise Refusal("this is not claimed, or comes too early")
+        raise Refusal("this question is not claimed, or arrived before an instance")
 
 
 def serve(
@@ -148,11 +149,11 @@ def serve(
     read_state: Callable[[Any], Record],
     trace: bool = False,
 ) -> None:
-    """Answers questions until `bye`. With `trace`, what the environment raises is shown on stderr besides."""
+    """Answers questions until `bye`. With `trace`, also prints the environment's exceptions to stderr."""
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever the environment prints, it prints to stderr
+    os.dup2(2, 1)  # anything the environment prints goes to stderr
     server = Server(make_env, claims, read_state)
-    encode = json.JSONEncoder(separators=(",", ":"), default=native, check_circular=False).encode
+    encode = json.JSONEncoder(separators=(",", ":"), default=to_native, check_circular=False).encode
     for line in sys.stdin:
         try:
             question = json.loads(line)
@@ -161,7 +162,7 @@ def serve(
             reply = encode(server.answer(question))
         except Refusal as refusal:
             reply = encode({"error": str(refusal)})
-        except Exception as error:  # the environment refuses in its own way
+        except Exception as error:  # the environment may raise anything
             if trace:
                 traceback.print_exc()
             reply = encode({"error": f"{type(error).__name__}: {error}"})
@@ -170,7 +171,7 @@ def serve(
 
 
 class ExampleParallelEnv:
-    """The environment of template.py, spoken to as one speaks to a ParallelEnv."""
+    """The environment of template.py with the interface of a ParallelEnv."""
 
     def __init__(self, environment: Any) -> None:
         self.environment = environment
@@ -179,21 +180,21 @@ class ExampleParallelEnv:
         self.results: tuple[list[Any], ...] = ([], [], [])
 
     def observe(self) -> list[list[int]]:
-        """What everybody sees, as numbers."""
+        """Returns the observations of all agents, as numbers."""
         return [[int(bit) for bit in bits] for bits in self.environment.observe()]
 
     def of_agents(self, values: list[Any]) -> Record:
-        """The values of those who have not dropped out."""
+        """Returns the values of the agents that have not dropped out, by name."""
         return {name: value for name, value in zip(self.possible_agents, values) if name in self.agents}
 
     def reset(self, seed: Any = None, options: Any = None) -> tuple[Record, Record]:
-        """Begins an episode."""
+        """Begins an episode; returns observations and infos."""
         self.environment.reset()
         self.agents = list(self.possible_agents)
         return self.of_agents(self.observe()), {name: {} for name in self.agents}
 
     def step(self, actions: Record) -> tuple[Record, Record, Record, Record, Record]:
-        """Plays a step; then those that are terminated or truncated drop out."""
+        """Plays a step; then terminated and truncated agents drop out."""
         self.results = self.environment.step([actions.get(name, 0) for name in self.possible_agents])
         observations = self.of_agents(self.observe())
         infos: Record = {name: {} for name in self.agents}
@@ -203,7 +204,7 @@ class ExampleParallelEnv:
 
 
 def read_example(env: ExampleParallelEnv) -> Record:
-    """Cells, goals and who is active, and what those see and get who have dropped out."""
+    """Returns cells, goals and activity; if agents have dropped out, also results and observations."""
     inner, (rewards, terminated, truncated) = env.environment, env.results
     state = {"cells": inner.cells, "goals": inner.goals, "active": inner.active}
     if len(env.agents) == len(env.possible_agents):
@@ -213,7 +214,7 @@ def read_example(env: ExampleParallelEnv) -> Record:
 
 
 def serve_example() -> None:
-    """How this module is used."""
+    """Serves the example environment."""
     import template
 
     def make_env(instance: Record) -> ExampleParallelEnv:

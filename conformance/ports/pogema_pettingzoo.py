@@ -1,7 +1,7 @@
-"""POGEMA through its PettingZoo integration, as a port; an example of `environment_object.serve` besides.
+"""Serves POGEMA through its PettingZoo integration as a port, and shows how to use `environment_object.serve`.
 
-Works with the POGEMA that is installed, from 1.2.2 to 1.4.0. Only the default observation can be had in this way: the
-integration fails on others. Metrics get lost with the agent in whose info they are, and are not claimed.
+Works with the installed POGEMA, from 1.2.2 to 1.4.0. Claims only the default observation, because the integration fails
+on others. Claims no metrics, because they are lost when the agent that holds them in its info drops out.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ CLAIMED = ("version", "collision", "on_goal", "noise", "max_radius", "max_side",
 
 
 def make_env(instance: Record) -> Any:
-    """A ParallelEnv that plays an instance, and that remembers what its inner environment gave last."""
+    """Returns a ParallelEnv that plays an instance and stores the last results of its inner environment."""
     config = release.config_of(instance)
     config.integration = "PettingZoo"
     env = pogema_v0(grid_config=config)
-    release.settle(env.pogema.unwrapped, instance)
+    release.patch_grids(env.pogema.unwrapped, instance)
     play = env.pogema.step
 
-    def play_and_remember(actions: list[int]) -> Any:
+    def play_and_store(actions: list[int]) -> Any:
         env.results = play(actions)
         return env.results
 
-    env.pogema.step = play_and_remember
+    env.pogema.step = play_and_store
     return env
 
 
 def read_state(env: Any) -> Record:
-    """Cells, goals and who is active, and what those see and get who have dropped out."""
+    """Returns cells, goals and activity; if agents have dropped out, also results and observations."""
     base = env.pogema.unwrapped
     grid, radius = base.grid, base.grid_config.obs_radius
     state = {
-        "cells": views.plain(grid.positions_xy, radius),
-        "goals": views.plain(grid.finishes_xy, radius),
+        "cells": views.cell_lists(grid.positions_xy, radius),
+        "goals": views.cell_lists(grid.finishes_xy, radius),
         "active": list(grid.is_active.values()),
         "on_goal": list(base.was_on_goal),
-        "occupied": views.plain(zip(*grid.positions.nonzero()), radius),
+        "occupied": views.cell_lists(zip(*grid.positions.nonzero()), radius),
     }
     if len(env.agents) == len(env.possible_agents):
         return state
@@ -56,10 +56,10 @@ def read_state(env: Any) -> Record:
 
 
 def main() -> None:
-    """Claims what the integration can do, and serves."""
+    """Claims the abilities of the integration, and serves."""
     warnings.simplefilter("ignore")
     if "soft" not in release.choices("collision_system"):
-        sys.exit("pogema_pettingzoo.py: POGEMA 1.2.2 or later is needed, whose steps tell terminated from truncated")
+        sys.exit("pogema_pettingzoo.py: needs POGEMA 1.2.2 or later, where a step returns `truncated`")
     claims = {key: value for key, value in release.claims(raw=True).items() if key in CLAIMED}
     claims["name"] = "pogema (PettingZoo)"
     claims["profiles"] = ["core", "observations"]

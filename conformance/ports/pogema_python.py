@@ -1,8 +1,8 @@
-"""The POGEMA that is installed, as a port: `python pogema_python.py [--raw] [--limit SECONDS]`.
+"""Serves the installed POGEMA as a port: `python pogema_python.py [--raw] [--limit SECONDS]`.
 
-It serves the releases 1.4.0, 1.3.1, 1.3.0, 1.2.2 and 1.1.6, and claims what the installed one can do. With `--raw` the
-environment's class is driven without the wrappers that `pogema_v0` puts around it: no metrics, no history, and the
-time limit, which is a wrapper, is kept here. Python 3.9 or newer.
+Supports the releases 1.4.0, 1.3.1, 1.3.0, 1.2.2 and 1.1.6, and claims the abilities of the installed one. With `--raw`,
+the port drives the environment class without the wrappers that `pogema_v0` adds: no metrics and no history. The time
+limit of POGEMA is one of these wrappers, so the port applies it itself. Needs Python 3.9 or newer.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from pogema_release import Refusal
 
 Record = dict[str, Any]
 
-# So many steps ahead goals are foretold; beyond, POGEMA's lists are long to draw and to tell.
-LONGEST_FORESIGHT = 4096
+# The step limit up to which the port lists future goals; POGEMA's lists for longer episodes are slow and large.
+MAX_FORECAST_STEPS = 4096
 
 
 class Timeout(BaseException):
-    """The time is up; not an Exception, so that no handler within POGEMA takes it for its own."""
+    """The time limit is exceeded. Not an `Exception`, so that no handler within POGEMA catches it."""
 
 
 def expire(*_: Any) -> None:
-    """The alarm's handler."""
-    raise Timeout("the time limit is over")
+    """Handles the alarm."""
+    raise Timeout("the time limit is exceeded")
 
 
 def set_alarm(seconds: float) -> None:
-    """Sets the alarm, which goes off again each second, or stops it; only some systems have one."""
+    """Sets the alarm, which then repeats every second, or stops it with 0. Does nothing on systems without alarms."""
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, expire)
         signal.setitimer(signal.ITIMER_REAL, seconds, 1.0 if seconds else 0.0)
 
 
 @contextmanager
-def calling(seconds: float) -> Iterator[None]:
-    """Turns what POGEMA raises into refusals, and its endless loops too."""
+def errors_as_refusals(seconds: float) -> Iterator[None]:
+    """Turns POGEMA's exceptions and endless loops into refusals."""
     try:
         set_alarm(seconds)
         yield
@@ -60,7 +60,7 @@ def calling(seconds: float) -> Iterator[None]:
 
 
 class Port:
-    """Answers one question after the other."""
+    """The port: answers questions about its current environment."""
 
     def __init__(self, raw: bool, limit: float) -> None:
         self.raw, self.limit = raw, limit
@@ -70,30 +70,30 @@ class Port:
         self.has_config = False
         self.planner: Any = None
         self.elapsed = 0
-        self.seen: Any = None
-        self.figures: Any = None
+        self.observations: Any = None
+        self.metrics: Any = None
 
     def answer(self, question: Any) -> Record:
-        """The answer to any question but `bye`."""
+        """Returns the answer to a question other than `bye`."""
         kind = question.get("type") if isinstance(question, dict) else None
         if kind == "hello":
             return self.claims
         if kind == "reset":
             return self.reset(question)
         if kind is None:
-            raise Refusal("a question is an object with a `type`")
+            raise Refusal("expected a question: an object with a `type`")
         if self.env is None:
-            raise Refusal("there is no episode; reset comes first")
+            raise Refusal("no episode has begun; send `reset` first")
         if kind == "step":
             if not isinstance(question.get("actions"), list):
-                raise Refusal("`actions` is no list")
+                raise Refusal("`actions` is not a list")
             return self.step(question["actions"])
         if kind == "act":
             return self.act(question.get("policy"))
         if kind == "observe":
-            return {"observations": views.observations(self.seen, self.config, at_reset=self.elapsed == 0)}
+            return {"observations": views.observations(self.observations, self.config, at_reset=self.elapsed == 0)}
         if kind == "metrics" and not self.raw:
-            return {"metrics": self.figures}
+            return {"metrics": self.metrics}
         if kind == "back" and not self.raw:
             return self.back()
         if kind == "history" and not self.raw:
@@ -102,25 +102,25 @@ class Port:
 
     @property
     def config(self) -> GridConfig:
-        """The config at work, with all that POGEMA derives."""
+        """The config of the environment, with the values that POGEMA derived."""
         return self.env.unwrapped.grid_config
 
     def reset(self, question: Record) -> Record:
-        """Begins an episode of an instance, of a config, or of the environment that is there."""
+        """Begins an episode of an instance, of a config, or of the current environment."""
         try:
-            with calling(self.limit):
+            with errors_as_refusals(self.limit):
                 if "instance" in question or "config" in question:
                     self.make(question)
                 if self.env is None:
-                    raise Refusal("there is nothing to reset")
+                    raise Refusal("no environment to reset, expected `instance` or `config`")
                 seed = question.get("seed")
-                told = self.env.reset() if seed is None else self.env.reset(seed=seed)
+                result = self.env.reset() if seed is None else self.env.reset(seed=seed)
         except Refusal:
             self.env = None
             raise
-        # The reset of 1.1 gives observations alone, later ones a pair; infos are not looked at.
-        self.seen = told[0] if isinstance(told, tuple) else told
-        self.elapsed, self.figures = 0, None
+        # `reset` returns only observations in 1.1, and a pair in later releases. The infos are ignored.
+        self.observations = result[0] if isinstance(result, tuple) else result
+        self.elapsed, self.metrics = 0, None
         if self.planner is not None:
             self.planner.reset_states()
         return {**self.instance(), **self.state(at_reset=True)}
@@ -135,113 +135,114 @@ class Port:
         if instance is None:
             fields = question["config"]
             if fields.get("occupancy", "as_released") != "as_released" or fields.get("reward", "own") != "own":
-                raise Refusal("POGEMA has neither exact occupancy nor a shared reward")
+                raise Refusal("POGEMA supports only occupancy `as_released` and reward `own`")
             config = GridConfig(**fields)
         else:
             config = release.config_of(instance)
         env = release.make(config, self.raw, "avg_agents_density" in question.get("measure", []))
         if instance is not None:
-            release.settle(env.unwrapped, instance)
+            release.patch_grids(env.unwrapped, instance)
         self.env = env
 
     def instance(self) -> Record:
-        """What a reset has made."""
+        """Returns the instance that the reset made."""
         grid, radius, config = self.env.unwrapped.grid.obstacles, self.config.obs_radius, self.config
-        rows = views.drawn(grid)
-        told: Record = {"padded": rows}
+        rows = views.grid_rows(grid)
+        record: Record = {"padded": rows}
         if self.has_config:
-            told["map"] = [row[radius:-radius] for row in rows[radius:-radius]]
-            if release.TELLS_SIZES:
+            record["map"] = [row[radius:-radius] for row in rows[radius:-radius]]
+            if release.HAS_SIZES:
                 sizes = ("width", "height", "size", "density", "num_agents")
-                told["derived"] = {name: getattr(config, name) for name in sizes}
-        if release.FORETELLS and config.on_target == "restart":
-            told["foretold"] = self.foretold()
-        return told
+                record["derived"] = {name: getattr(config, name) for name in sizes}
+        if release.FORECASTS_GOALS and config.on_target == "restart":
+            record["foretold"] = self.goal_forecast()
+        return record
 
-    def foretold(self) -> Any:
-        """The goals to come, or nothing where POGEMA fails or would never end."""
-        if self.config.max_episode_steps > LONGEST_FORESIGHT:
+    def goal_forecast(self) -> Any:
+        """Returns the future goals, or nothing if POGEMA fails or exceeds the time limit."""
+        if self.config.max_episode_steps > MAX_FORECAST_STEPS:
             return None
         try:
-            with calling(self.limit / 10):
-                return [views.plain(goals) for goals in self.env.unwrapped.get_lifelong_targets_xy(ignore_borders=True)]
+            with errors_as_refusals(self.limit / 10):
+                lists = self.env.unwrapped.get_lifelong_targets_xy(ignore_borders=True)
+                return [views.cell_lists(goals) for goals in lists]
         except Refusal:
             return None
 
     def state(self, at_reset: bool) -> Record:
-        """Where everybody is and what everybody sees."""
-        return {**self.places(), "observations": views.observations(self.seen, self.config, at_reset)}
+        """Returns the state and observations of all agents."""
+        return {**self.places(), "observations": views.observations(self.observations, self.config, at_reset)}
 
     def places(self) -> Record:
-        """Where everybody is, and the occupancy grid, which may say otherwise."""
+        """Returns the cells of all agents, and the occupied cells, which may differ."""
         base, radius = self.env.unwrapped, self.config.obs_radius
         return {
-            "cells": views.plain(base.grid.positions_xy, radius),
-            "goals": views.plain(base.grid.finishes_xy, radius),
+            "cells": views.cell_lists(base.grid.positions_xy, radius),
+            "goals": views.cell_lists(base.grid.finishes_xy, radius),
             "active": [bool(flag) for flag in base.grid.is_active.values()],
             "on_goal": [bool(flag) for flag in base.was_on_goal],
-            "occupied": views.plain(zip(*base.grid.positions.nonzero()), radius),
+            "occupied": views.cell_lists(zip(*base.grid.positions.nonzero()), radius),
         }
 
     def step(self, actions: Any) -> Record:
-        """Plays a step; `actions` is the caller's list, into which POGEMA may write."""
-        with calling(self.limit):
+        """Plays a step. `actions` is the caller's list; POGEMA may write into it."""
+        with errors_as_refusals(self.limit):
             chosen = [int(action) for action in actions]
             result = self.env.step(actions)
         self.elapsed += 1
-        self.seen, rewards, terminated, truncated, infos = as_five(result)
+        self.observations, rewards, terminated, truncated, infos = five_results(result)
         if self.raw:
             truncated = [self.elapsed >= self.config.max_episode_steps] * len(rewards)
-        told: Record = {"rewards": rewards, "terminated": terminated, "truncated": truncated, "actions": chosen}
-        told["actions_after"] = [int(action) for action in actions]
+        record: Record = {"rewards": rewards, "terminated": terminated, "truncated": truncated, "actions": chosen}
+        record["actions_after"] = [int(action) for action in actions]
         if not self.raw:
-            told["metrics"] = self.figures = infos[0].get("metrics")
-        return {**told, **self.state(at_reset=False)}
+            record["metrics"] = self.metrics = infos[0].get("metrics")
+        return {**record, **self.state(at_reset=False)}
 
     def act(self, policy: Any) -> Record:
-        """Plays a step that a policy of POGEMA's chooses."""
+        """Plays a step with the actions of a POGEMA policy."""
         if policy == "sample":
             return self.step(self.env.sample_actions())
         if policy != "astar" or release.PLANNER is None:
-            raise Refusal(f"there is no policy `{policy}`")
-        with calling(self.limit):
+            raise Refusal(f"policy `{policy}` is not available")
+        with errors_as_refusals(self.limit):
             self.planner = self.planner or release.PLANNER()
-            actions = self.planner.act(self.seen)
+            actions = self.planner.act(self.observations)
         return self.step(actions)
 
     def back(self) -> Record:
-        """Takes a step back."""
-        with calling(self.limit):
-            moved = release.keeper_of(self.env).step_back()
+        """Undoes the last step."""
+        with errors_as_refusals(self.limit):
+            moved = release.persistent_layer(self.env).step_back()
         self.elapsed -= moved
         return {"moved": moved, **self.places()}
 
     def history(self) -> Record:
-        """What a persistent environment has kept."""
-        keeper, radius = release.keeper_of(self.env), self.config.obs_radius
+        """Returns the history of a persistent environment."""
+        keeper, radius = release.persistent_layer(self.env), self.config.obs_radius
         full = views.histories(release.full_history(keeper), radius)
         return {"full": full, "changes": views.histories(keeper.get_history(), radius)}
 
 
-def as_five(result: Any) -> Any:
-    """The results of a step; those of 1.1 know `done` alone, and note in the infos what the time limit has changed."""
+def five_results(result: Any) -> Any:
+    """Converts results of 1.1 to the five values of later releases; 1.1 marks truncation in the infos."""
     if len(result) == 5:
         return result
-    seen, rewards, done, infos = result
-    # Where the limit has struck every agent is done, and its info says whether it was not before.
+    observations, rewards, done, infos = result
+    # At the time limit every agent is done; its info states whether it was not done before.
     truncated = ["TimeLimit.truncated" in info for info in infos]
     terminated = [not info.get("TimeLimit.truncated", not ended) for info, ended in zip(infos, done)]
-    return seen, rewards, terminated, truncated, infos
+    return observations, rewards, terminated, truncated, infos
 
 
 def main() -> None:
     """Serves until `bye`."""
-    parser = argparse.ArgumentParser(description="The POGEMA that is installed, as a port.")
-    parser.add_argument("--raw", action="store_true", help="without POGEMA's wrappers")
-    parser.add_argument("--limit", type=float, default=8.0, help="seconds that POGEMA may take for one answer")
+    parser = argparse.ArgumentParser(description="Serves the installed POGEMA as a port.")
+    parser.add_argument("--raw", action="store_true", help="drive the environment without POGEMA's wrappers")
+    parser.add_argument("--limit", type=float, default=8.0, help="time limit for one answer in seconds [default: 8]")
     options = parser.parse_args()
     out = os.fdopen(os.dup(1), "w", encoding="ascii")
-    os.dup2(2, 1)  # whatever POGEMA prints, it prints to stderr
+    os.dup2(2, 1)  # anything POGEMA prints goes to stderr
     warnings.simplefilter("ignore")
     port = Port(options.raw, options.limit)
     encode = json.JSONEncoder(separators=(",", ":"), check_circular=False).encode
@@ -251,7 +252,7 @@ def main() -> None:
             if isinstance(question, dict) and question.get("type") == "bye":
                 return
             reply = port.answer(question)
-        except (Refusal, Timeout, json.JSONDecodeError) as error:  # an alarm may go off while it is being stopped
+        except (Refusal, Timeout, json.JSONDecodeError) as error:  # an alarm may fire while it is being stopped
             set_alarm(0)
             reply = {"error": str(error)}
         out.write(encode(reply) + "\n")

@@ -1,6 +1,6 @@
-"""What the installed POGEMA can do, and how to make an environment of it; releases from 1.1.6 to 1.4.0 differ.
+"""The abilities of the installed POGEMA, and the construction of its environments, for releases from 1.1.6 to 1.4.0.
 
-Nothing here goes by version numbers: each difference is looked for where it shows.
+This module never compares version numbers: it detects each difference directly.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 from pogema.wrappers import metrics as wrappers
 from pogema.wrappers.persistence import PersistentWrapper
 
-FIGURES = {
+METRICS = {
     "ISRMetric": ["ISR"],
     "CSRMetric": ["CSR"],
     "EpLengthMetric": ["ep_length"],
@@ -23,22 +23,22 @@ FIGURES = {
     "LifeLongAverageThroughputMetric": ["avg_throughput"],
     "AgentsDensityWrapper": ["avg_agents_density"],
 }
-PLANNER: Any = getattr(pogema, "BatchAStarAgent", None)  # from 1.2 on
-TELLS_SIZES = "width" in get_type_hints(GridConfig)
-TAKES_SEQUENCES = FORETELLS = hasattr(envs.PogemaLifeLong, "get_lifelong_targets_xy")
+PLANNER: Any = getattr(pogema, "BatchAStarAgent", None)  # since 1.2
+HAS_SIZES = "width" in get_type_hints(GridConfig)
+ACCEPTS_SEQUENCES = FORECASTS_GOALS = hasattr(envs.PogemaLifeLong, "get_lifelong_targets_xy")
 
 
 class Refusal(Exception):
-    """A question that is answered with an error, by POGEMA or by us."""
+    """A question that is answered with an error, raised by POGEMA or by the port."""
 
 
 def choices(field: str) -> list[str]:
-    """The words that a field of the config may hold."""
+    """Returns the accepted values of a config field."""
     return list(get_args(get_type_hints(GridConfig)[field]))
 
 
 def is_valid(**fields: Any) -> bool:
-    """Whether the config takes these values."""
+    """Returns whether the config accepts these values."""
     try:
         GridConfig(**fields)
     except ValueError:
@@ -47,14 +47,14 @@ def is_valid(**fields: Any) -> bool:
 
 
 def claims(raw: bool) -> dict[str, Any]:
-    """The answer to `hello`."""
+    """Returns the answer to `hello`."""
     profiles = ["core", "observations", "seeding"]
     profiles += [] if raw else ["metrics", "history"]
     profiles += ["policies"] if PLANNER else []
     tells = ["on_goal", "occupied", "padded", "actions_after"]
-    tells += ["derived"] if TELLS_SIZES else []
-    tells += ["foretold"] if FORETELLS else []
-    figures = [name for wrapper, names in FIGURES.items() if hasattr(wrappers, wrapper) for name in names]
+    tells += ["derived"] if HAS_SIZES else []
+    tells += ["foretold"] if FORECASTS_GOALS else []
+    metrics = [name for wrapper, names in METRICS.items() if hasattr(wrappers, wrapper) for name in names]
     limits = {"max_radius": 128}
     if not is_valid(size=4096):
         limits.update(max_side=1024, max_agents=10_000)
@@ -67,24 +67,24 @@ def claims(raw: bool) -> dict[str, Any]:
         "on_goal": choices("on_target"),
         "observation": choices("observation_type"),
         "noise": True,
-        "metrics": [] if raw else figures,
+        "metrics": [] if raw else metrics,
         "tells": tells,
         **limits,
     }
 
 
 def make(config: GridConfig, raw: bool, with_density: bool) -> Any:
-    """An environment with the wrappers that POGEMA puts around it, or, raw, without any."""
+    """Returns an environment with the wrappers that POGEMA adds, or with `raw` without any."""
     if config.integration not in (None, "SampleFactory"):
-        raise Refusal(f"integration {config.integration} gives an environment of another form")
+        raise Refusal(f"`integration` is `{config.integration}`, expected none or `SampleFactory`")
     env = pogema_v0(grid_config=config)
     if raw:
         return env.unwrapped
     return wrappers.AgentsDensityWrapper(env) if with_density else env
 
 
-def keeper_of(env: Any) -> PersistentWrapper:
-    """The layer that keeps the steps."""
+def persistent_layer(env: Any) -> PersistentWrapper:
+    """Returns the wrapper that records the steps."""
     while not isinstance(env, PersistentWrapper):
         if env is env.unwrapped:
             raise Refusal("steps are only kept with persistent: true")
@@ -92,41 +92,41 @@ def keeper_of(env: Any) -> PersistentWrapper:
     return env
 
 
-def full_history(keeper: PersistentWrapper) -> Any:
-    """Each agent's state at every step; before 1.4.0 POGEMA's own helper stops one step short unless told to go on."""
-    if hasattr(keeper, "get_full_history"):
-        return keeper.get_full_history()
-    num_states = keeper._step + 1
-    return [keeper.agent_state_to_full_list(states, num_states) for states in keeper.get_history()]
+def full_history(wrapper: PersistentWrapper) -> Any:
+    """Returns each agent's state at every step; before 1.4.0, POGEMA's helper omits the last step by default."""
+    if hasattr(wrapper, "get_full_history"):
+        return wrapper.get_full_history()
+    num_states = wrapper._step + 1
+    return [wrapper.agent_state_to_full_list(states, num_states) for states in wrapper.get_history()]
 
 
 class Registration:
-    """At most one map in POGEMA's registry, until the next one."""
+    """Keeps at most one map in POGEMA's registry."""
 
     def __init__(self) -> None:
         self.name: str | None = None
 
     def clear(self) -> None:
-        """Takes the map out."""
+        """Removes the map."""
         GRID_STR_REGISTRY.pop(self.name, None)
         self.name = None
 
     def register(self, grid: dict[str, Any]) -> None:
-        """Puts a map in."""
+        """Registers a map."""
         RegisteredGrid(grid["name"], "\n".join(grid["rows"]))
         self.name = grid["name"]
 
 
-# What follows makes POGEMA play an instance, in which everything is drawn already.
+# The rest of this module makes POGEMA play an instance, in which nothing is drawn at random.
 
 
 def config_of(instance: dict[str, Any]) -> GridConfig:
-    """The config that comes nearest to an instance; `settle` does the rest."""
+    """Returns the config closest to an instance; `patch_grids` applies the rest of the instance."""
     rules, rows, goals = instance["config"], instance["map"], instance["goals"]
     if rules["occupancy"] != "as_released" or rules["reward"] != "own":
-        raise Refusal("POGEMA has neither exact occupancy nor a shared reward")
-    is_sequence = TAKES_SEQUENCES and rules["on_goal"] == "restart"
-    # A sequence has to have two entries, though it may be put in with one afterwards.
+        raise Refusal("POGEMA supports only occupancy `as_released` and reward `own`")
+    is_sequence = ACCEPTS_SEQUENCES and rules["on_goal"] == "restart"
+    # POGEMA rejects sequences with one entry, but accepts one that is assigned afterwards.
     targets = [2 * each if is_sequence and len(each) == 1 else each for each in goals]
     config = GridConfig(
         map=[[int(letter == "#") for letter in row] for row in rows],
@@ -140,8 +140,8 @@ def config_of(instance: dict[str, Any]) -> GridConfig:
         observation_type=rules["observation"],
         persistent=rules["persistent"],
         empty_outside=instance.get("outside", "free") == "free",
-        # Where the config knows no width, it checks positions against the size before it looks at the map.
-        **({} if TELLS_SIZES else {"size": max(len(rows), len(rows[0]), 2)}),
+        # A config without `width` checks positions against the size before it reads the map.
+        **({} if HAS_SIZES else {"size": max(len(rows), len(rows[0]), 2)}),
     )
     if is_sequence:
         config.targets_xy = goals
@@ -149,34 +149,34 @@ def config_of(instance: dict[str, Any]) -> GridConfig:
 
 
 class GoalList:
-    """In the place of an agent's random generator, where POGEMA knows no sequences: it draws what the list says."""
+    """Replaces an agent's random generator where POGEMA has no sequences; draws the goals of a list in order."""
 
     def __init__(self, goals: list[Any], radius: int) -> None:
         self.goals, self.radius, self.index = goals, radius, 0
 
     def choice(self, _candidates: Any, _size: int) -> list[tuple[int, int]]:
-        """The next goal, counted from the border's corner as the candidates are."""
+        """Returns the next goal in grid coordinates, like the candidates."""
         self.index = (self.index + 1) % len(self.goals)
         row, col = self.goals[self.index]
         return [(row + self.radius, col + self.radius)]
 
 
-def settle(base: Any, instance: dict[str, Any]) -> None:
-    """Puts into every new grid what no field of the config can say."""
+def patch_grids(base: Any, instance: dict[str, Any]) -> None:
+    """Applies to every new grid the parts of an instance that the config cannot express."""
     make_grid: Callable[[], None] = base._initialize_grid
 
-    def make_settled_grid() -> None:
+    def make_patched_grid() -> None:
         make_grid()
         place_obstacles(base.grid.obstacles, instance)
-        if not TAKES_SEQUENCES and base.grid_config.on_target == "restart":
+        if not ACCEPTS_SEQUENCES and base.grid_config.on_target == "restart":
             radius = base.grid_config.obs_radius
             base.random_generators = [GoalList(goals, radius) for goals in instance["goals"]]
 
-    base._initialize_grid = make_settled_grid
+    base._initialize_grid = make_patched_grid
 
 
 def place_obstacles(grid: Any, instance: dict[str, Any]) -> None:
-    """Obstacles under starts and goals, which POGEMA clears, and beyond the wall, which it draws."""
+    """Restores obstacles under starts and goals, which POGEMA clears, and outside the wall, which it draws."""
     radius, outside = instance["config"]["radius"], instance.get("outside", "free")
     if outside != "free":
         wall = grid[radius - 1 : 1 - radius or None, radius - 1 : 1 - radius or None].copy()
@@ -186,6 +186,6 @@ def place_obstacles(grid: Any, instance: dict[str, Any]) -> None:
 
 
 def flags(rows: list[str]) -> Any:
-    """Rows of text as an array, 1 for an obstacle."""
+    """Converts rows of text to an array, 1 for an obstacle."""
     letters = np.frombuffer("".join(rows).encode("ascii"), np.uint8)
     return (letters == ord("#")).reshape(len(rows), -1)

@@ -1,4 +1,4 @@
-"""POGEMA's arrays in the forms of the protocol."""
+"""Converts POGEMA's arrays to the forms of the protocol."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 
 
-def plain(cells: Any, radius: int = 0) -> list[list[int]]:
-    """Cells as lists of Python's own integers, counted without the border."""
+def cell_lists(cells: Any, radius: int = 0) -> list[list[int]]:
+    """Converts cells to lists of Python integers in map coordinates."""
     return [[int(row) - radius, int(col) - radius] for row, col in cells]
 
 
-def drawn(grid: Any) -> list[str]:
-    """A grid as rows of `.` and `#`."""
+def grid_rows(grid: Any) -> list[str]:
+    """Converts a grid to rows of `.` and `#`."""
     letters = np.where(grid == 0, ord("."), ord("#")).astype(np.uint8)
     return [row.tobytes().decode("ascii") for row in letters]
 
 
 def windows(arrays: list[Any], shape: tuple[int, ...]) -> list[Any]:
-    """Each agent's window as hexadecimal digits, or, where that would hide something, as numbers."""
+    """Encodes the window of each agent as hexadecimal digits, or as numbers if bits cannot represent it."""
     if any(array.shape != shape for array in arrays):
         return [array.tolist() for array in arrays]
     values = np.stack(arrays).reshape(len(arrays), -1)
@@ -31,24 +31,24 @@ def windows(arrays: list[Any], shape: tuple[int, ...]) -> list[Any]:
     return [text[start : start + size] for start in range(0, len(text), size)]
 
 
-def observations(seen: Any, config: Any, at_reset: bool) -> Any:
-    """What all agents see."""
+def observations(arrays_of_agents: Any, config: Any, at_reset: bool) -> Any:
+    """Encodes the observations of all agents."""
     side = 2 * config.obs_radius + 1
     if config.observation_type == "default":
-        return windows(seen, (3, side, side))
-    told: dict[str, Any] = {
-        name: windows([one[name] for one in seen], (side, side)) for name in ("obstacles", "agents")
+        return windows(arrays_of_agents, (3, side, side))
+    record: dict[str, Any] = {
+        name: windows([one[name] for one in arrays_of_agents], (side, side)) for name in ("obstacles", "agents")
     }
     is_global = config.observation_type == "MAPF"
     for name in ("xy", "target_xy", *(["global_xy", "global_target_xy"] if is_global else [])):
-        told[name] = plain(one[name] for one in seen)
+        record[name] = cell_lists(one[name] for one in arrays_of_agents)
     if is_global and at_reset:
-        told["global_obstacles"] = drawn(seen[0]["global_obstacles"])
-    return told
+        record["global_obstacles"] = grid_rows(arrays_of_agents[0]["global_obstacles"])
+    return record
 
 
 def histories(states: Any, radius: int) -> list[Any]:
-    """Each agent's states as lists, counted without the border."""
+    """Converts the states of each agent to lists, in map coordinates."""
 
     def row(state: Any) -> list[Any]:
         places = [int(number) - radius for number in (state.x, state.y, state.tx, state.ty)]

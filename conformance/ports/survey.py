@@ -1,6 +1,7 @@
-"""Runs the kit on POGEMA's releases and writes what it finds as a page: `python3.11 conformance/ports/survey.py`.
+"""Runs the conformance kit on POGEMA's releases and writes docs/survey.md: `python3.11 conformance/ports/survey.py`.
 
-The environments are made below target/survey (`--venvs FOLDER` for another place). Needs `target/release/pogema`.
+Creates the virtual environments in target/survey/venvs; `--venvs FOLDER` selects another folder. Needs
+`target/release/pogema`.
 """
 
 from __future__ import annotations
@@ -18,25 +19,25 @@ ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
 Report = dict[str, Any]
 
-# What a cause comes down to, in words; a cause that is not told here is told by its rule and field alone.
-WORDS = {
-    ("config/fields", "error"): "configs that 1.4.0 takes are refused, or others taken",
-    ("metrics/nothing", "metrics"): "`ep_length` under `nothing` is one too small",
-    ("goal/restart/draw", "goal"): "a next goal may be the cell just reached",
-    ("place/obstacles", "map"): "`width` and `height` are ignored, maps are squares",
-    ("place/obstacles", "number of map entries"): "`width` and `height` are ignored, maps are squares",
+# Descriptions of known causes. Other causes are described by their rule and field.
+CAUSES = {
+    ("config/fields", "error"): "accepts configs that 1.4.0 rejects, or rejects configs that 1.4.0 accepts",
+    ("metrics/nothing", "metrics"): "`ep_length` under `nothing` is too small by one",
+    ("goal/restart/draw", "goal"): "a next goal may equal the goal just reached",
+    ("place/obstacles", "map"): "`width` and `height` are ignored, maps are square",
+    ("place/obstacles", "number of map entries"): "`width` and `height` are ignored, maps are square",
 }
 
 
 def environments(folder: Path) -> dict[str, str]:
-    """For each release its python, or why it has none."""
+    """Returns the Python of each release, or why it could not be installed."""
     command = [sys.executable, str(PORTS / "survey_venvs.py"), str(folder)]
-    told = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-    return dict(line.split("\t", 1) for line in told.splitlines())
+    output = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return dict(line.split("\t", 1) for line in output.splitlines())
 
 
 def survey(pythons: dict[str, str], cases: int, seed: int) -> dict[str, Report]:
-    """For each release what the kit finds."""
+    """Runs the kit on each release; returns the reports."""
     reports = {}
     for version, python in pythons.items():
         print(f"POGEMA {version}", file=sys.stderr, flush=True)
@@ -51,7 +52,7 @@ def survey(pythons: dict[str, str], cases: int, seed: int) -> dict[str, Report]:
 
 
 def mark(report: Report, rule: str) -> str:
-    """One cell of the table."""
+    """Returns one cell of the table."""
     row = report["rules"].get(rule)
     if row is None:
         return ""
@@ -61,7 +62,7 @@ def mark(report: Report, rule: str) -> str:
 
 
 def table(reports: dict[str, Report]) -> list[str]:
-    """Every rule that was checked against every release."""
+    """Returns the table of rules and releases."""
     rules = sorted({rule for report in reports.values() for rule in report["rules"]})
     lines = [f"| rule | {' | '.join(reports)} |", f"| --- |{' --- |' * len(reports)}"]
     for rule in rules:
@@ -69,8 +70,8 @@ def table(reports: dict[str, Report]) -> list[str]:
     return lines
 
 
-def told_config(request: Report) -> list[str]:
-    """A request as its reader sees it: fields, map, and what is done."""
+def request_lines(request: Report) -> list[str]:
+    """Returns the lines that describe a request: fields, map and operations."""
     lines = []
     for field, value in request["config"].items():
         if isinstance(value, str) and ("\n" in value or field == "map"):
@@ -81,25 +82,25 @@ def told_config(request: Report) -> list[str]:
 
 
 def shorten(text: str, longest: int = 160) -> str:
-    """A value that fits a line."""
+    """Shortens a value to fit on a line."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def causes(reports: dict[str, Report]) -> list[str]:
-    """Each cause with the releases that show it and its smallest counterexample."""
+    """Returns a section for each cause, with its releases and its smallest counterexample."""
     shown: dict[tuple[str, str], list[tuple[str, Report]]] = defaultdict(list)
     for version, report in reports.items():
         for cause in report["causes"]:
             shown[(cause["rule"] or "(protocol)", cause["what"])].append((version, cause))
     lines = []
     for (rule, what), seen in sorted(shown.items()):
-        words = WORDS.get((rule, what), f"{what} differs")
+        words = CAUSES.get((rule, what), f"{what} differs")
         times = ", ".join(f"{version} ({cause['times']}×)" for version, cause in seen)
         example = min((cause["example"] for _, cause in seen), key=lambda each: len(json.dumps(each["request"])))
         found = example.get("divergence") or {"expected": "", "got": example.get("fault", {}).get("what", "")}
         given = "an instance" if example["mode"] == "instance" else "a config"
         lines += [f"### `{rule}`: {words}", "", f"Releases: {times}. The port was given {given}.", ""]
-        lines += ["```text", *told_config(example["request"]), ""]
+        lines += ["```text", *request_lines(example["request"]), ""]
         if "op" in found:
             lines.append(f"after operation {found['op']}, {found['field']}:")
         lines += [f"  expected {shorten(found['expected'])}", f"  got      {shorten(found['got'])}"]
@@ -109,25 +110,26 @@ def causes(reports: dict[str, Report]) -> list[str]:
 
 
 def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: int) -> str:
-    """The whole page."""
+    """Returns the whole page."""
     missing = [f"- {version}: {why}" for version, why in pythons.items() if version not in reports]
     lines = [
         "# Which release follows which rule",
         "",
-        "This page is written by a program and was checked in as it came:",
+        "This page is generated by these commands:",
         "",
         "```text",
         "cargo build --release",
         f"python3.11 conformance/ports/survey.py --cases {cases} --seed {seed}",
         "```",
         "",
-        "Each release runs in a virtual environment of its own, with the pins that `conformance/ports/survey_venvs.py` "
-        "lists, behind `conformance/ports/pogema_python.py`. It is given every hand-written case, every recording of "
-        f"1.4.0 and {cases} drawn cases, once as instances and once as configs. ✓: all as the rule says. ✗: so many "
-        "cases or episodes otherwise. –: the release does not claim it, mostly since it came later. A difference in "
-        "where agents start ends the comparison of an episode, so a rule marked ✓ held wherever it could be seen.",
+        "Each release runs behind `conformance/ports/pogema_python.py`, in its own virtual environment with the "
+        "versions that `conformance/ports/survey_venvs.py` pins. The kit plays every hand-written case, every "
+        f"recording of 1.4.0 and {cases} random cases, once as instances and once as configs. ✓: the release follows "
+        "the rule. ✗ n: n cases or episodes differ. –: the release does not claim the rule, usually because a later "
+        "release introduced it. If the starts of agents differ, the comparison of that episode ends there; so ✓ covers "
+        "only the steps that could be compared.",
         "",
-        *(["Could not be installed:", "", *missing, ""] if missing else []),
+        *(["Releases that could not be installed:", "", *missing, ""] if missing else []),
         *[
             f"POGEMA {version}: {report['num_played']} cases and {report['num_steps']} steps played, "
             f"{len(report['causes'])} causes of differences."
@@ -147,17 +149,18 @@ def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: 
 
 
 def main() -> None:
-    """Makes environments, runs the kit, writes docs/survey.md."""
-    parser = argparse.ArgumentParser(description="Runs the kit on POGEMA's releases.")
-    parser.add_argument("--cases", type=int, default=1000, help="how many cases to draw")
-    parser.add_argument("--seed", type=int, default=7, help="seed of the drawn cases")
-    parser.add_argument("--venvs", type=Path, default=WORK / "venvs", help="where the environments are made")
+    """Creates the environments, runs the kit, writes docs/survey.md."""
+    parser = argparse.ArgumentParser(description="Runs the conformance kit on POGEMA's releases.")
+    parser.add_argument("--cases", type=int, default=1000, help="number of random cases [default: 1000]")
+    parser.add_argument("--seed", type=int, default=7, help="seed of the random cases [default: 7]")
+    venvs = "folder of the virtual environments [default: target/survey/venvs]"
+    parser.add_argument("--venvs", type=Path, default=WORK / "venvs", help=venvs)
     options = parser.parse_args()
     WORK.mkdir(parents=True, exist_ok=True)
-    told = environments(options.venvs)
-    pythons = {version: python for version, python in told.items() if Path(python).exists()}
+    found = environments(options.venvs)
+    pythons = {version: python for version, python in found.items() if Path(python).exists()}
     reports = survey(pythons, options.cases, options.seed)
-    (ROOT / "docs" / "survey.md").write_text(page(told, reports, options.cases, options.seed))
+    (ROOT / "docs" / "survey.md").write_text(page(found, reports, options.cases, options.seed))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Makes one virtual environment for each POGEMA release that the survey compares: `python3.11 survey_venvs.py FOLDER`.
+"""Creates a virtual environment for each POGEMA release of the survey: `python3.11 survey_venvs.py FOLDER`.
 
-Prints a line for each: the version, a tab, and its python, or `cannot be installed: ` and why. `--only VERSION`, which
-may stand several times, makes only those. A second run does nothing where the first was done: the stamp in an
-environment, written last, says what it was made from.
+Prints one line for each release: the version, a tab, and the path of its Python, or `cannot be installed: ` and the
+reason. `--only VERSION`, which can be repeated, creates only these environments. Complete environments are kept: the
+stamp in an environment is written last and identifies what it was made from.
 
-Packages are installed without a look at their dependencies, all of which are pinned here: the releases from 1.1.6 to
-1.3.0 ask for NumPy 1.23.1 at most, of which there is no wheel for Python 3.11. NumPy 1.23.5 is the latest that 1.3.1
+Packages are installed without dependency resolution; all dependencies are pinned here. The releases from 1.1.6 to 1.3.0
+require NumPy 1.23.1 or earlier, which has no wheel for Python 3.11. NumPy 1.23.5 is the latest version that 1.3.1
 allows, has wheels, and draws the same random numbers.
 """
 
@@ -27,7 +27,7 @@ PINS = {
     "1.2.2": [*GYMNASIUM, "numpy==1.23.5"],
     "1.1.6": [*COMMON, "gym==0.25.0", "gym-notices==0.1.0", "numpy==1.23.5"],
 }
-# gym comes as source alone, and is built with these.
+# gym is distributed only as source; these packages build it.
 BUILD = ["setuptools==65.5.1", "wheel==0.45.1"]
 STAMP = "survey.stamp"
 TRIAL = """
@@ -40,11 +40,11 @@ print(pogema.__version__)
 
 
 class Failure(Exception):
-    """Why an environment cannot be made."""
+    """The reason why an environment cannot be created."""
 
 
 def run(command: list[str]) -> str:
-    """A command's output; what it says otherwise goes to stderr, and its last line is why it failed."""
+    """Runs a command; returns its output, and copies its errors to stderr. If it fails, the last line is the reason."""
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     sys.stderr.write(done.stderr)
     if done.returncode != 0:
@@ -54,27 +54,27 @@ def run(command: list[str]) -> str:
 
 
 def stamp_of(version: str) -> str:
-    """What an environment of this release is made from."""
+    """Returns a hash of everything that an environment of this release is made from."""
     text = "\n".join([sys.version, version, *PINS[version], *BUILD])
     return hashlib.sha256(text.encode()).hexdigest() + "\n"
 
 
 def build(folder: Path, version: str) -> None:
-    """Makes an environment from nothing and tries it; the stamp comes last."""
+    """Creates an environment from scratch and tests it; writes the stamp last."""
     if folder.exists() and any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists():
-        raise Failure(f"{folder} is not empty and no virtual environment")
+        raise Failure(f"{folder} is neither empty nor a virtual environment")
     run([sys.executable, "-m", "venv", "--clear", str(folder)])
     python = str(folder / "bin" / "python")
     pip = [python, "-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--retries", "2", "--no-deps"]
     run([*pip, *BUILD])
     run([*pip, "--no-build-isolation", f"pogema=={version}", *PINS[version]])
     if (found := run([python, "-c", TRIAL])) != version:
-        raise Failure(f"this is POGEMA {found}")
+        raise Failure(f"found POGEMA {found}, expected {version}")
     (folder / STAMP).write_text(stamp_of(version))
 
 
 def provide(folder: Path, version: str) -> str:
-    """What to print of a release."""
+    """Creates the environment of a release if needed; returns the path of its Python, or the reason of the failure."""
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder.with_name(folder.name + ".lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # a second process waits for the first
@@ -88,13 +88,13 @@ def provide(folder: Path, version: str) -> str:
 
 
 def main() -> None:
-    """Checks the call, then goes through the releases."""
-    parser = argparse.ArgumentParser(description="Makes one virtual environment for each POGEMA release.")
+    """Checks the arguments, then creates the environments."""
+    parser = argparse.ArgumentParser(description="Creates a virtual environment for each POGEMA release.")
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", action="append", choices=list(PINS), help="this release alone")
+    parser.add_argument("--only", action="append", choices=list(PINS), help="create only this release [default: all]")
     options = parser.parse_args()
     if sys.version_info[:2] != (3, 11):
-        parser.error(f"Python 3.11 is needed, this is {sys.version_info.major}.{sys.version_info.minor}")
+        parser.error(f"found Python {sys.version_info.major}.{sys.version_info.minor}, expected 3.11")
     for version in options.only or PINS:
         print(version, provide(options.folder.absolute() / version, version), sep="\t", flush=True)
 

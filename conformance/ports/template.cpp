@@ -1,6 +1,6 @@
-// A whole port to copy: a small environment with all three collision systems, and the adapter through which the checks
-// play on it. Put your own environment in the place of `Environment`, and claim in `claims` what it can do.
-// docs/PORTING.md explains questions and answers.
+// A complete port to copy: a small environment with all three collision systems, and the adapter that connects it to
+// the checks. Replace `Environment` by your own environment, and list its abilities in `CLAIMS`. docs/PORTING.md
+// explains the questions and answers.
 //
 // Needs nlohmann/json (Debian: nlohmann-json3-dev):   g++ -O2 -std=c++17 template.cpp -o template
 
@@ -18,7 +18,7 @@ using std::size_t;
 using std::string;
 using std::vector;
 
-// ------------------------------------ The environment. Put yours in its place. ------------------------------------
+// ------------------------------------ The environment. Replace it by yours. ---------------------------------------
 
 struct Cell {
     int row, col;
@@ -31,7 +31,7 @@ void to_json(json& pair, const Cell& cell) { pair = {cell.row, cell.col}; }
 
 constexpr Cell MOVES[] = {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}};  // stay, up, down, left, right
 
-// A map with its border, which is as wide as the radius, so that no window leaves it.
+// A map with its border. The border is as wide as the radius, so no window extends beyond it.
 using Grid = vector<string>;
 
 struct Results {
@@ -55,12 +55,12 @@ public:
         goal_lists = instance.at("goals").get<vector<vector<Cell>>>();
         if (config.at("reward") != "own" || config.at("occupancy") != "as_released" ||
             instance.value("outside", json("free")) != "free") {
-            throw std::invalid_argument("other rules than these are not claimed");
+            throw std::invalid_argument("the instance uses rules that this port does not claim");
         }
         const vector<string> map = instance.at("map");
         const int height = map.size(), width = map.front().size();
         obstacles = Grid(height + 2 * radius, string(width + 2 * radius, '0'));
-        // The border is free but for the wall around the map, which is one cell wide.
+        // The border is free except for the wall, which is one cell wide.
         for (int row = -1; row <= height; ++row) {
             for (int col = -1; col <= width; ++col) {
                 const bool is_inside = row >= 0 && row < height && col >= 0 && col < width;
@@ -69,7 +69,7 @@ public:
         }
     }
 
-    // Begins the episode anew. It finishes nobody, not even an agent that starts on its goal.
+    // Begins a new episode. All agents are active, even an agent that starts on its goal.
     void reset() {
         steps = 0;
         cells = starts;
@@ -84,7 +84,7 @@ public:
     Results step(const vector<int>& actions) {
         const auto is_wrong = [](int action) { return action < 0 || action > 4; };
         if (actions.size() != cells.size() || std::any_of(actions.begin(), actions.end(), is_wrong)) {
-            throw std::invalid_argument("expected an action from 0 to 4 for each agent");  // and nothing has changed
+            throw std::invalid_argument("expected an action from 0 to 4 for each agent");  // the state is unchanged
         }
         Results results;
         results.actions = actions;
@@ -97,7 +97,8 @@ public:
         return results;
     }
 
-    // What an agent sees, finished or not, row by row as `0` and `1`: obstacles, agents (itself too), and its goal.
+    // Returns the observation of an agent, also of a finished one, row by row as `0` and `1`: obstacles, agents (itself
+    // included), and its goal.
     string observe(size_t agent) const {
         const Cell cell = cells[agent], goal = goals[agent];
         const int side = 2 * radius + 1;
@@ -105,7 +106,7 @@ public:
         for (const Grid* grid : {&obstacles, &marks}) {
             for (int row = cell.row; row < cell.row + side; ++row) bits.append((*grid)[row], cell.col, side);
         }
-        // A goal out of sight is shown on the rim, each axis clamped by itself.
+        // A goal outside the window is drawn on its edge: each axis is clamped separately.
         const int down = std::clamp(goal.row - cell.row, -radius, radius);
         const int right = std::clamp(goal.col - cell.col, -radius, radius);
         string window(side * side, '0');
@@ -118,7 +119,7 @@ private:
     int radius = 0, max_steps = 0, steps = 0;
     vector<Cell> starts;
     vector<vector<Cell>> goal_lists;
-    vector<size_t> reached;  // how many goals of its list each agent has behind it
+    vector<size_t> reached;  // for each agent, the number of goals it has reached
     Grid obstacles, marks;
 
     char& at(Grid& grid, Cell cell) const { return grid[cell.row + radius][cell.col + radius]; }
@@ -135,7 +136,7 @@ private:
         cells[agent] = to;
     }
 
-    // `priority`: one after the other, each in view of what the ones before it did.
+    // `priority`: agents move one after the other, and each move takes effect before the next.
     void move_in_turn(const vector<int>& actions) {
         for (size_t agent = 0; agent < cells.size(); ++agent) {
             const Cell to = there(agent, actions[agent]);
@@ -143,7 +144,7 @@ private:
         }
     }
 
-    // `block_both`: those who aim at a cell that is free before anybody moves, and that nobody else aims at.
+    // `block_both`: an agent moves if its target is free before the step and no other agent has the same target.
     void move_apart(const vector<int>& actions) {
         std::map<Cell, vector<size_t>> claims;
         for (size_t agent = 0; agent < cells.size(); ++agent) {
@@ -155,7 +156,7 @@ private:
         }
     }
 
-    // `soft`: agents are kept back until no conflict is left. Their actions become 0, which POGEMA writes into the
+    // `soft`: agents in conflict stay, until no conflict is left. Their actions become 0, which POGEMA writes into the
     // caller's list.
     void move_softly(vector<int>& actions) {
         std::map<Cell, size_t> agent_on;
@@ -169,7 +170,7 @@ private:
                 if (!active[agent] || actions[agent] == 0) continue;
                 const Cell to = there(agent, actions[agent]);
                 const auto ahead = agent_on.find(to);
-                // The one ahead stays, or they want each other's cells.
+                // The agent ahead stays, or the two agents would swap.
                 const bool is_blocked = ahead != agent_on.end() && (actions[ahead->second] == 0 ||
                     there(ahead->second, actions[ahead->second]) == cells[agent]);
                 if (is_blocked || at(obstacles, to) == '1' || !winners.emplace(to, agent).second) {
@@ -178,14 +179,14 @@ private:
                 }
             }
         }
-        // In this order whoever leaves a cell takes away the mark of a lower index that has just come to it: so it is
-        // that POGEMA's agents vanish from the windows.
+        // Agents move in order of index. An agent that leaves a cell clears the mark of an agent of lower index that
+        // has just entered it. For this reason agents of POGEMA vanish from the windows.
         for (size_t agent = 0; agent < cells.size(); ++agent) {
             if (active[agent]) go(agent, there(agent, actions[agent]));
         }
     }
 
-    // Rewards and ends, then what reaching a goal does, all before anything is observed.
+    // Computes rewards, `terminated`, and the effects of reached goals. Observations are taken afterwards.
     void arrive(Results& results) {
         bool are_all_there = true;
         for (size_t agent = 0; agent < cells.size(); ++agent) are_all_there &= cells[agent] == goals[agent];
@@ -203,7 +204,7 @@ private:
     }
 };
 
-// ------------------------------- The adapter: from questions to calls, from results to answers. -------------------
+// ------------------------------- The adapter: turns questions into calls and results into answers. ----------------
 
 const json CLAIMS = {
     {"protocol", "pogema-conform/1"},
@@ -216,7 +217,7 @@ const json CLAIMS = {
     {"tells", {"actions_after"}},
 };
 
-// Zeros and ones as hexadecimal digits, eight to a byte. Nested lists of numbers are as right, only slower.
+// Packs bits into hexadecimal digits, eight bits per byte. Nested lists of numbers are also valid, but slower.
 string packed(string bits) {
     bits.append((8 - bits.size() % 8) % 8, '0');
     string digits;
@@ -226,7 +227,7 @@ string packed(string bits) {
     return digits;
 }
 
-// Carries out a `reset` or a `step`; the answers to both have most keys in common.
+// Executes a `reset` or a `step`. The two answers share most keys.
 json play(Environment& environment, const json& question) {
     json reply = json::object();
     if (question.at("type") == "reset") {
@@ -246,15 +247,15 @@ json play(Environment& environment, const json& question) {
 json answer(std::unique_ptr<Environment>& environment, const json& question) {
     const string type = question.at("type");
     if (type == "hello") return CLAIMS;
-    // A `reset` without an instance means the environment that is there already.
+    // A `reset` without an instance resets the current environment.
     if (question.contains("instance")) environment = std::make_unique<Environment>(question.at("instance"));
     if (!environment || (type != "reset" && type != "step") || question.contains("config")) {
-        throw std::invalid_argument("this is not claimed, or comes too early");
+        throw std::invalid_argument("this question is not claimed, or arrived before an instance");
     }
     return play(*environment, question);
 }
 
-// One line in, one line out, until `bye`.
+// Reads one question per line and writes one answer per line, until `bye`.
 int main() {
     std::unique_ptr<Environment> environment;
     for (string line; std::getline(std::cin, line);) {
@@ -263,7 +264,7 @@ int main() {
             const json question = json::parse(line);
             if (question.at("type") == "bye") break;
             reply = answer(environment, question);
-        } catch (const std::exception& error) {  // a refusal is an answer like any other
+        } catch (const std::exception& error) {  // a refusal is also an answer
             reply = {{"error", error.what()}};
         }
         std::cout << reply.dump() << std::endl;

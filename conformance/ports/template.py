@@ -1,29 +1,32 @@
-"""A whole port to copy: a small environment, and the adapter through which the checks play on it.
+"""A complete port to copy: a small environment, and the adapter that connects it to the checks.
 
-Put your own environment in the place of `Environment`, and claim in `CLAIMS` what it can do; the adapter may stay as
-it is. docs/PORTING.md explains questions and answers. Needs Python 3.9 or newer and the standard library.
+Replace `Environment` by your own environment, and list its abilities in `CLAIMS`; the adapter can stay unchanged.
+docs/PORTING.md explains the questions and answers. Needs Python 3.9 or newer and only the standard library.
 """
 
 import json
 import sys
 from typing import Any, Optional
 
-# ------------------------------------ The environment. Put yours in its place. ------------------------------------
+# ------------------------------------ The environment. Replace it by yours. ---------------------------------------
 
 MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))  # stay, up, down, left, right
 
 
 class Environment:
-    """POGEMA where agents move one after the other, each in view of what the ones before it did (`priority`)."""
+    """POGEMA with the collision system `priority`: agents move one after the other.
+
+    Each move takes effect before the next.
+    """
 
     def __init__(self, instance: dict[str, Any]) -> None:
         config = instance["config"]
         if (config["collision"], config["reward"], instance.get("outside", "free")) != ("priority", "own", "free"):
-            raise ValueError("other rules than these are not claimed")
+            raise ValueError("the instance uses rules that this port does not claim")
         self.radius, self.max_steps, self.on_goal = config["radius"], config["max_steps"], config["on_goal"]
         self.starts, self.goal_lists = instance["starts"], instance["goals"]
-        # A wall goes around the map, one cell wide, and free cells around that, so that no window leaves the grid:
-        # the cell (row, col) of the map is at [row + radius][col + radius].
+        # A wall one cell wide surrounds the map, and free cells surround the wall, so no window leaves the grid.
+        # The cell (row, col) of the map is at [row + radius][col + radius].
         free, width = "0" * (self.radius - 1), len(instance["map"][0])
         rows = [row.replace(".", "0").replace("#", "1") for row in instance["map"]]
         walled = [free + "1" + row + "1" + free for row in ["1" * width, *rows, "1" * width]]
@@ -31,17 +34,17 @@ class Environment:
         self.obstacles = [*beyond, *walled, *beyond]
 
     def reset(self) -> None:
-        """Begins the episode anew. It finishes nobody, not even an agent that starts on its goal."""
+        """Begins a new episode. All agents are active, even an agent that starts on its goal."""
         self.steps = 0
         self.cells = [tuple(cell) for cell in self.starts]
         self.goals = [tuple(goals[0]) for goals in self.goal_lists]
-        self.reached = [0] * len(self.cells)  # how many goals of its list each agent has behind it
+        self.reached = [0] * len(self.cells)  # for each agent, the number of goals it has reached
         self.active = [True] * len(self.cells)
 
     def step(self, actions: list[int]) -> tuple[list[float], list[bool], list[bool]]:
-        """Plays one step; gives rewards, `terminated` and `truncated`."""
+        """Plays one step; returns rewards, `terminated` and `truncated`."""
         if len(actions) != len(self.cells) or any(action not in range(5) for action in actions):
-            raise ValueError(f"expected {len(self.cells)} actions from 0 to 4")  # and nothing has changed
+            raise ValueError(f"expected {len(self.cells)} actions from 0 to 4")  # the state is unchanged
         moves = [MOVES[action] for action in actions]
         taken = {cell for cell, active in zip(self.cells, self.active) if active}
         for agent, ((row, col), (down, right)) in enumerate(zip(self.cells, moves)):
@@ -54,7 +57,7 @@ class Environment:
         self.steps += 1
         on_goal = [cell == goal for cell, goal in zip(self.cells, self.goals)]
         paid = [on and active for on, active in zip(on_goal, self.active)]
-        terminated = on_goal  # under `finish`: those that finished earlier too, though they are paid no more
+        terminated = on_goal  # under `finish`, also agents that finished earlier, although they get no more rewards
         if self.on_goal == "nothing":
             paid = terminated = [all(on_goal)] * len(on_goal)
         elif self.on_goal == "restart":
@@ -63,7 +66,7 @@ class Environment:
         return [float(each) for each in paid], terminated, [self.steps >= self.max_steps] * len(on_goal)
 
     def arrive(self, agents: list[int]) -> None:
-        """What reaching a goal does, after all moves and rewards and before anything is observed."""
+        """Applies the effects of reached goals, after all moves and rewards and before observations."""
         for agent in agents:
             if self.on_goal == "finish":
                 self.active[agent] = False
@@ -73,7 +76,10 @@ class Environment:
                 self.goals[agent] = tuple(goals[self.reached[agent] % len(goals)])
 
     def observe(self) -> list[str]:
-        """What each agent sees, finished or not: obstacles, agents (itself too) and goal, row by row as `0` and `1`."""
+        """Returns the observation of each agent, also of finished ones, row by row as `0` and `1`.
+
+        An observation holds obstacles, agents (itself included) and goal.
+        """
         radius, side = self.radius, 2 * self.radius + 1
         marks = [["0"] * len(row) for row in self.obstacles]
         for (row, col), active in zip(self.cells, self.active):
@@ -83,14 +89,14 @@ class Environment:
         for (row, col), (goal_row, goal_col) in zip(self.cells, self.goals):
             rows, cols = slice(row, row + side), slice(col, col + side)
             seen = [line[cols] for grid in (self.obstacles, agents) for line in grid[rows]]
-            # A goal out of sight is shown on the rim, each axis clamped by itself.
+            # A goal outside the window is drawn on its edge: each axis is clamped separately.
             down, right = (min(max(away, -radius), radius) for away in (goal_row - row, goal_col - col))
             before = (radius + down) * side + radius + right
             windows.append("".join(seen) + "0" * before + "1" + "0" * (side * side - before - 1))
         return windows
 
 
-# ------------------------------- The adapter: from questions to calls, from results to answers. -------------------
+# ------------------------------- The adapter: turns questions into calls and results into answers. ----------------
 
 CLAIMS: dict[str, Any] = {
     "protocol": "pogema-conform/1",
@@ -104,13 +110,13 @@ CLAIMS: dict[str, Any] = {
 
 
 def packed(bits: str) -> str:
-    """Zeros and ones as hexadecimal digits, eight to a byte. Nested lists of numbers are as right, only slower."""
+    """Packs bits into hexadecimal digits, eight bits per byte. Nested lists of numbers are also valid, but slower."""
     bits += "0" * (-len(bits) % 8)
     return f"{int(bits, 2):0{len(bits) // 4}x}"
 
 
 def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
-    """Carries out a `reset` or a `step`; the answers to both have these keys in common."""
+    """Executes a `reset` or a `step`; the two answers share the keys of the state."""
     results: dict[str, Any] = {}
     if question["type"] == "reset":
         environment.reset()
@@ -122,22 +128,22 @@ def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """One line in, one line out, until `bye`."""
+    """Reads one question per line and writes one answer per line, until `bye`."""
     environment: Optional[Environment] = None
     for line in sys.stdin:
         try:
             question = json.loads(line)
             if question["type"] == "bye":
                 break
-            if "instance" in question:  # without one, `reset` means the environment that is there already
+            if "instance" in question:  # without an instance, `reset` resets the current environment
                 environment = Environment(question["instance"])
             if question["type"] == "hello":
                 reply = CLAIMS
             elif environment and question["type"] in ("reset", "step") and "config" not in question:
                 reply = play(environment, question)
             else:
-                raise ValueError("this is not claimed, or comes too early")
-        except (KeyError, TypeError, ValueError) as error:  # a refusal is an answer like any other
+                raise ValueError("this question is not claimed, or arrived before an instance")
+        except (KeyError, TypeError, ValueError) as error:  # a refusal is also an answer
             reply = {"error": f"{type(error).__name__}: {error}"}
         print(json.dumps(reply, separators=(",", ":")), flush=True)
 

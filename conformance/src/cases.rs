@@ -1,10 +1,10 @@
-//! Hand-written cases: one rule each, small enough to be read.
+//! Hand-written cases: small, readable examples of one rule each.
 //!
 //! A case is a YAML file in the folder of its rule:
 //!
 //! ```yaml
 //! rule: collide/priority/contest
-//! says: Of two agents that want one free cell, the lower index gets it.
+//! says: If two agents move to one free cell, the lower index gets it.
 //! config: {map: "a.b\nB.A", collision_system: priority}
 //! steps:
 //!   - do: [right, left]
@@ -13,8 +13,8 @@
 //!       B.A
 //! ```
 //!
-//! `config` is a POGEMA config. `start` says what holds after the reset, each step what holds after it; only what
-//! is written is checked. `error` says what the last operation, or the config, is refused with.
+//! `config` is a POGEMA config. `start` lists the expectations after the reset, and each step those after it; keys
+//! that are left out are not checked. `error` is a part of the message that rejects the config or the last operation.
 
 mod draw;
 mod expect;
@@ -33,13 +33,13 @@ pub use expect::{Expect, Sees};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
-    /// The rule that it shows.
+    /// The rule it tests.
     pub rule: String,
-    /// What happens, in a sentence.
+    /// One sentence on what happens.
     pub says: String,
     /// A POGEMA config.
     pub config: Value,
-    /// A map to register first.
+    /// A map to register before the config is read.
     pub register: Option<Registered>,
     /// Whether to measure the density of agents.
     #[serde(default)]
@@ -47,19 +47,19 @@ pub struct Case {
     /// Whether to count collisions.
     #[serde(default)]
     pub collisions: bool,
-    /// What holds after the reset.
+    /// Expectations after the reset.
     #[serde(default)]
     pub start: Expect,
-    /// What is done then.
+    /// The operations after the reset.
     #[serde(default)]
     pub steps: Vec<CaseStep>,
-    /// A part of the error that the config, the reset or the last step gives.
+    /// A part of the expected error of the config, the reset or the last step.
     pub error: Option<String>,
-    /// Where POGEMA 1.4.0 does something else, by decision: what it does.
+    /// What POGEMA 1.4.0 does instead, if this project deviates from it by decision.
     pub pogema: Option<String>,
 }
 
-/// One operation and what holds after it.
+/// One operation and the expectations after it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct CaseStep {
     /// A step with these actions.
@@ -67,7 +67,7 @@ pub struct CaseStep {
     actions: Option<Vec<ActionWord>>,
     /// Any other operation: `reset`, `back`, `astar`, `sample` or `history`.
     op: Option<String>,
-    /// What holds then.
+    /// Expectations after the operation.
     #[serde(flatten)]
     expect: Expect,
 }
@@ -94,7 +94,7 @@ impl ActionWord {
     }
 }
 
-/// The cases that come with this crate.
+/// Returns the folder of the cases in this crate.
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("cases")
 }
@@ -102,7 +102,7 @@ pub fn folder() -> PathBuf {
 /// Reads one case.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read or is no case.
+/// [`Error::Io`] if the file cannot be read or is not a case.
 pub fn read(path: &Path) -> Result<Case, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
     serde_saphyr::from_str(&text).map_err(|error| {
@@ -112,10 +112,10 @@ pub fn read(path: &Path) -> Result<Case, Error> {
 }
 
 impl Case {
-    /// What to ask of an implementation.
+    /// Returns the request that plays the case.
     ///
     /// # Errors
-    /// For a step that names no action or operation.
+    /// If a step has an unknown action or operation.
     pub fn request(&self) -> Result<Request, Error> {
         let mut ops = vec![Op::Reset(None)];
         for step in &self.steps {
@@ -131,19 +131,19 @@ impl Case {
         })
     }
 
-    /// Whether POGEMA can be asked: it does not know our own fields.
+    /// Returns whether POGEMA can play the case: it lacks the fields that this project adds.
     pub fn is_for_pogema(&self) -> bool {
         !self.collisions
             && !["occupancy", "reward", "limits"].iter().any(|field| self.config.get(field).is_some())
     }
 
-    /// The first thing in an answer that is not as the case says, in words.
+    /// Describes the first deviation of an answer from the case.
     pub fn mismatch(&self, response: &Response) -> Option<String> {
-        if let Some(wanted) = &self.error {
+        if let Some(expected) = &self.error {
             return match &response.error {
-                Some(error) if error.message.contains(wanted.as_str()) => None,
-                Some(error) => Some(format!("expected the error `{wanted}`, got `{}`", error.message)),
-                None => Some(format!("expected the error `{wanted}`, got none")),
+                Some(error) if error.message.contains(expected.as_str()) => None,
+                Some(error) => Some(format!("expected the error `{expected}`, got `{}`", error.message)),
+                None => Some(format!("expected the error `{expected}`, got none")),
             };
         }
         if let Some(error) = &response.error {
@@ -163,12 +163,12 @@ impl Case {
         None
     }
 
-    /// Whether the case says anything that could fail.
+    /// Returns whether the case has any expectation.
     pub fn checks_something(&self) -> bool {
         self.error.is_some() || self.expectations().any(|expect| !expect.is_empty())
     }
 
-    /// What holds after each operation.
+    /// Returns the expectations after each operation.
     fn expectations(&self) -> impl Iterator<Item = &Expect> {
         std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.expect))
     }

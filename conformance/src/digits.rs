@@ -1,6 +1,6 @@
-//! Windows as hexadecimal digits.
+//! Windows as strings of hexadecimal digits.
 
-/// Eight cells to a byte, the first one in its highest bit, as hexadecimal digits.
+/// Packs eight cells into a byte, the first into its highest bit, and writes the bytes as hexadecimal digits.
 pub(crate) fn pack<T>(window: &[T], is_set: impl Fn(&T) -> bool) -> String {
     let digits = window.chunks(8).flat_map(|cells| {
         let byte =
@@ -10,7 +10,7 @@ pub(crate) fn pack<T>(window: &[T], is_set: impl Fn(&T) -> bool) -> String {
     digits.filter_map(|digit| char::from_digit(digit, 16)).collect()
 }
 
-/// What [`pack`] packed, and the zeros that filled the last byte.
+/// Returns the cells that [`pack`] packed, followed by the zeros that pad the last byte.
 pub(crate) fn unpack(window: &str) -> Vec<bool> {
     let digit = |character: char| character.to_digit(16).unwrap_or(0);
     window
@@ -19,7 +19,7 @@ pub(crate) fn unpack(window: &str) -> Vec<bool> {
         .collect()
 }
 
-/// The area of a window, three of which fill so many flags up to a whole byte.
+/// Returns the area of a square window, given the number of flags of three windows padded to whole bytes.
 pub(crate) fn area_of(num_flags: usize) -> Option<usize> {
     let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
     areas.last().filter(|area| num_flags < 3 * area + 8)

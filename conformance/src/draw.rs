@@ -1,4 +1,4 @@
-//! Random requests: every axis of the config, mostly small and crowded.
+//! Random requests that vary every axis of the config; most instances are small and crowded.
 
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};
@@ -6,9 +6,9 @@ use serde_json::{Map as Object, Value, json};
 use crate::dice::Dice;
 use crate::request::{Registered, Request};
 
-/// Where the map of a case comes from.
+/// The form in which a case gives its map, starts and goals.
 #[derive(Clone, Copy)]
-enum Ground {
+enum Layout {
     Seeded,
     Text,
     Rows,
@@ -22,20 +22,21 @@ enum Ground {
     Named,
 }
 
-/// Draws the config of a case; [`crate::play_script`] adds what to do with it.
+/// Draws the config of a case; [`crate::play_script`] adds the operations.
 pub fn draw_request(seed: u64, case: u64) -> Request {
     let mut dice = Dice::new(seed, case);
     loop {
         let mut request = draw_once(&mut dice);
         request.id = case;
-        if fits(&mut dice, &mut request) {
+        if try_fit(&mut dice, &mut request) {
             return request;
         }
     }
 }
 
-/// Whether the case can be played, with fewer agents if need be; now and then one that cannot is kept.
-fn fits(dice: &mut Dice, request: &mut Request) -> bool {
+/// Halves the number of agents until the case can be played, and returns whether to keep the case. Keeps a few
+/// unplayable cases.
+fn try_fit(dice: &mut Dice, request: &mut Request) -> bool {
     const KEPT_UNPLAYABLE: f64 = 0.005;
     let registered = request.register.as_ref().and_then(|map| pogema_core::Map::from_rows(&map.rows).ok());
     loop {
@@ -48,7 +49,7 @@ fn fits(dice: &mut Dice, request: &mut Request) -> bool {
             Some(num) if num > 1 && is_crowded && !dice.chance(KEPT_UNPLAYABLE) => {
                 request.config["num_agents"] = json!(num / 2);
             }
-            // POGEMA swaps a named map that is too small for a drawn one: not a case to compare.
+            // POGEMA replaces a named map that is too small by a generated one, so the case cannot be compared.
             Some(_) => return is_crowded && request.register.is_none(),
             None => return false,
         }
@@ -68,9 +69,9 @@ fn draw_once(dice: &mut Dice) -> Request {
     config.insert("empty_outside".into(), dice.chance(0.7).into());
     config.insert("persistent".into(), dice.chance(0.12).into());
     let (height, width) = draw_size(dice);
-    let ground = draw_ground(dice, on_target);
-    let register = put_ground(dice, &mut config, ground, height, width);
-    // From a window without a free cell, which a start on an obstacle can have, POGEMA's density divides by zero.
+    let layout = draw_layout(dice, on_target);
+    let register = put_layout(dice, &mut config, layout, height, width);
+    // A start on an obstacle can have a window without a free cell, where POGEMA's density divides by zero.
     let may_measure = config["observation_type"] != "default" && !config.contains_key("possible_agents_xy");
     let density = may_measure && dice.chance(0.5);
     Request { id: 0, config: Value::Object(config), register, density, collisions: false, ops: Vec::new() }
@@ -94,20 +95,20 @@ fn draw_radius(dice: &mut Dice) -> usize {
 }
 
 fn draw_size(dice: &mut Dice) -> (usize, usize) {
-    let longest = dice.pick(&[2, 3, 3, 4, 4, 5, 6, 8, 10, 12, 16, 24]);
+    let max_side = dice.pick(&[2, 3, 3, 4, 4, 5, 6, 8, 10, 12, 16, 24]);
     loop {
-        let (height, width) = (dice.between(1, longest), dice.between(1, longest));
+        let (height, width) = (dice.between(1, max_side), dice.between(1, max_side));
         if height * width > 1 {
             return (height, width);
         }
     }
 }
 
-fn draw_ground(dice: &mut Dice, on_target: &str) -> Ground {
-    use Ground::{
+fn draw_layout(dice: &mut Dice, on_target: &str) -> Layout {
+    use Layout::{
         Explicit, GoalPool, Letters, Named, PoolText, Pools, RandomStarts, Rows, Seeded, Sequences, Text,
     };
-    let (num_seeded, others): (usize, &[Ground]) = if on_target == "restart" {
+    let (num_seeded, others): (usize, &[Layout]) = if on_target == "restart" {
         (4, &[Text, Rows, PoolText, Pools, GoalPool, Sequences, RandomStarts, Named])
     } else {
         (3, &[Text, Rows, Letters, PoolText, Pools, Explicit, Explicit, Sequences, Named])
@@ -115,21 +116,22 @@ fn draw_ground(dice: &mut Dice, on_target: &str) -> Ground {
     dice.pick(&[&vec![Seeded; num_seeded], others].concat())
 }
 
-/// Writes map, starts and goals into the config; gives the map to register, if there is one.
-fn put_ground(
+/// Writes map, starts and goals into the config, and returns the map to register, if any.
+fn put_layout(
     dice: &mut Dice,
     config: &mut Object<String, Value>,
-    ground: Ground,
+    layout: Layout,
     height: usize,
     width: usize,
 ) -> Option<Registered> {
     let density = dice.pick(&[0.0, 0.0, 0.1, 0.2, 0.3, 0.5]);
     let obstacles = draw_obstacles(dice, height, width, density);
     let num_free = obstacles.iter().flatten().filter(|&&obstacle| !obstacle).count();
-    let crowd = dice.between(1, (num_free / 2).max(1));
-    let set_crowd = |config: &mut Object<String, Value>| config.insert("num_agents".into(), crowd.into());
-    match ground {
-        Ground::Seeded => {
+    let num_agents = dice.between(1, (num_free / 2).max(1));
+    let set_num_agents =
+        |config: &mut Object<String, Value>| config.insert("num_agents".into(), num_agents.into());
+    match layout {
+        Layout::Seeded => {
             if height == width && dice.chance(0.5) {
                 config.insert("size".into(), height.into());
             } else {
@@ -137,43 +139,43 @@ fn put_ground(
                 config.insert("width".into(), width.into());
             }
             config.insert("density".into(), density.into());
-            set_crowd(config);
+            set_num_agents(config);
         }
-        Ground::Text => {
+        Layout::Text => {
             config.insert("map".into(), text(&obstacles).into());
-            set_crowd(config);
+            set_num_agents(config);
         }
-        Ground::Rows => {
+        Layout::Rows => {
             config.insert("map".into(), rows(&obstacles));
-            set_crowd(config);
+            set_num_agents(config);
         }
-        Ground::Letters => {
+        Layout::Letters => {
             config.insert("map".into(), lettered(dice, &obstacles).into());
         }
-        Ground::PoolText => {
+        Layout::PoolText => {
             config.insert("map".into(), marked(dice, &obstacles).into());
-            set_crowd(config);
+            set_num_agents(config);
         }
-        Ground::Named => {
+        Layout::Named => {
             let name = "drawn-map";
             config.insert("map_name".into(), name.into());
-            set_crowd(config);
+            set_num_agents(config);
             return Some(Registered { name: name.into(), rows: lines(&obstacles) });
         }
-        Ground::Pools | Ground::GoalPool | Ground::Explicit | Ground::Sequences | Ground::RandomStarts => {
-            put_places(dice, config, ground, &obstacles, crowd);
+        Layout::Pools | Layout::GoalPool | Layout::Explicit | Layout::Sequences | Layout::RandomStarts => {
+            put_places(dice, config, layout, &obstacles, num_agents);
         }
     }
     None
 }
 
-/// Starts and goals as lists, on a map or on a drawn one.
+/// Writes starts and goals as lists into the config, with a given or a generated map.
 fn put_places(
     dice: &mut Dice,
     config: &mut Object<String, Value>,
-    ground: Ground,
+    layout: Layout,
     obstacles: &[Vec<bool>],
-    crowd: usize,
+    num_agents: usize,
 ) {
     let (height, width) = (obstacles.len(), obstacles[0].len());
     if dice.chance(0.6) {
@@ -187,35 +189,35 @@ fn put_places(
         (0..height).flat_map(|row| (0..width).map(move |col| [row, col])).collect();
     dice.shuffle(&mut cells);
     let any = |dice: &mut Dice| [dice.below(height), dice.below(width)];
-    let crowd = crowd.min(cells.len());
-    config.insert("num_agents".into(), crowd.into());
-    match ground {
-        Ground::Pools => {
-            let num_starts = dice.between(crowd, cells.len());
+    let num_agents = num_agents.min(cells.len());
+    config.insert("num_agents".into(), num_agents.into());
+    match layout {
+        Layout::Pools => {
+            let num_starts = dice.between(num_agents, cells.len());
             config.insert("possible_agents_xy".into(), json!(cells[..num_starts]));
             dice.shuffle(&mut cells);
-            let num_goals = dice.between(crowd, cells.len());
+            let num_goals = dice.between(num_agents, cells.len());
             config.insert("possible_targets_xy".into(), json!(cells[..num_goals]));
         }
-        Ground::GoalPool => {
+        Layout::GoalPool => {
             config.insert("possible_targets_xy".into(), json!(cells[..dice.between(2, cells.len())]));
         }
-        Ground::Explicit => {
-            let goals: Vec<_> = (0..crowd).map(|_| any(dice)).collect();
-            config.insert("agents_xy".into(), json!(cells[..crowd]));
+        Layout::Explicit => {
+            let goals: Vec<_> = (0..num_agents).map(|_| any(dice)).collect();
+            config.insert("agents_xy".into(), json!(cells[..num_agents]));
             config.insert("targets_xy".into(), json!(goals));
             match dice.below(3) {
                 0 => drop(config.remove("num_agents")),
-                1 => drop(config.insert("num_agents".into(), dice.between(1, crowd).into())),
+                1 => drop(config.insert("num_agents".into(), dice.between(1, num_agents).into())),
                 _ => {}
             }
         }
         _ => {
             let sequence = |dice: &mut Dice| (0..dice.between(2, 4)).map(|_| any(dice)).collect::<Vec<_>>();
-            let sequences: Vec<_> = (0..crowd).map(|_| sequence(dice)).collect();
+            let sequences: Vec<_> = (0..num_agents).map(|_| sequence(dice)).collect();
             config.insert("targets_xy".into(), json!(sequences));
-            if matches!(ground, Ground::Sequences) {
-                config.insert("agents_xy".into(), json!(cells[..crowd]));
+            if matches!(layout, Layout::Sequences) {
+                config.insert("agents_xy".into(), json!(cells[..num_agents]));
             }
         }
     }
@@ -230,7 +232,7 @@ fn lines(obstacles: &[Vec<bool>]) -> Vec<String> {
     obstacles.iter().map(line).collect()
 }
 
-/// A map as text, `#` for an obstacle.
+/// Writes a map as text, with `#` for obstacles.
 pub(crate) fn text(obstacles: &[Vec<bool>]) -> String {
     lines(obstacles).join("\n")
 }
@@ -240,7 +242,7 @@ fn rows(obstacles: &[Vec<bool>]) -> Value {
     json!(obstacles.iter().map(row).collect::<Vec<_>>())
 }
 
-/// A map text with some free cells marked by letters in pairs.
+/// Draws a map text in which pairs of letters mark starts and goals.
 fn lettered(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
     let mut letters: Vec<char> = text(obstacles).chars().collect();
     let mut free: Vec<usize> = (0..letters.len()).filter(|&at| letters[at] != '\n').collect();
@@ -259,7 +261,7 @@ fn lettered(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
     letters.into_iter().collect()
 }
 
-/// A map text with some free cells marked as possible starts, goals or neither.
+/// Draws a map text in which some free cells are marked as possible starts, possible goals or neither.
 fn marked(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
     let mark = |character: char, dice: &mut Dice| {
         if character == '.' { dice.pick(&['.', '@', '@', '$', '$', '!']) } else { character }

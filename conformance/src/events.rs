@@ -1,26 +1,26 @@
-//! How often the interesting things happened: a run that met none of them proves little.
+//! Counts of conflicts and other events. A run without such events proves little.
 
 use pogema_core::{Action, Cell, Snapshot};
 use serde::Serialize;
 
 use crate::request::{Record, Response};
 
-/// Defines counters, each with its name in reports.
+/// Defines counters and their names in reports.
 macro_rules! counters {
     ($($(#[$attribute:meta])* $field:ident = $name:literal,)+) => {
-        /// Counts of what happened in the episodes that were compared.
+        /// Counts of events in the compared episodes.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
         pub struct Events {
             $($(#[$attribute])* pub $field: u64,)+
         }
 
         impl Events {
-            /// The counts by name.
+            /// Returns the counts with their names.
             pub fn named(&self) -> impl Iterator<Item = (&'static str, u64)> {
                 [$(($name, self.$field)),+].into_iter()
             }
 
-            /// Adds other counts.
+            /// Adds the counts of other episodes.
             pub fn add(&mut self, other: &Self) {
                 $(self.$field += other.$field;)+
             }
@@ -33,47 +33,47 @@ counters! {
     episodes = "episodes",
     /// Steps.
     steps = "steps",
-    /// Pairs of agents that wanted each other's cells.
+    /// Pairs of agents that tried to swap cells.
     swaps = "swaps",
-    /// Cells that two or more agents wanted.
+    /// Cells that two or more agents chose as their next cell.
     contests = "contests",
-    /// Agents that entered a cell another agent left in the same step.
+    /// Agents that entered a cell that another agent left in the same step.
     chains = "chains",
-    /// Rings of three or more agents that moved all at once.
+    /// Rings of three or more agents that moved in the same step.
     cycles = "cycles",
-    /// Agents that stayed because the agent ahead wanted to move and could not.
+    /// Agents that stayed because the agent ahead tried to move and could not.
     cascades = "cascades",
-    /// Active agents that the occupancy grid does not show.
+    /// Active agents without a mark in the occupancy grid.
     vanished = "vanished",
-    /// Agents that left the map on their goals.
+    /// Agents that finished on their goals and left the map.
     finished = "finished",
-    /// Goals that were replaced by others.
+    /// Goals that were replaced by new ones.
     new_goals = "new goals",
 }
 
 impl Events {
-    /// Counts what happened in a response.
+    /// Adds the events of a response to the counts.
     pub fn watch(&mut self, response: &Response) {
         let mut before: Option<&Snapshot> = None;
         for record in &response.records {
             if let (Some(before), Some(step)) = (before, record.step()) {
-                self.watch_step(before, &step.step.actions, &step.step.state);
+                self.count_step(before, &step.step.actions, &step.step.state);
             }
             self.episodes += u64::from(matches!(record, Record::Reset(_)));
             before = record.state().or(before);
         }
     }
 
-    fn watch_step(&mut self, before: &Snapshot, actions: &[Action], after: &Snapshot) {
+    fn count_step(&mut self, before: &Snapshot, actions: &[Action], after: &Snapshot) {
         let step = Step::new(before, actions, after);
         self.steps += 1;
         for (index, &agent) in step.agents.iter().enumerate() {
             let ahead = step.occupant(step.targets[agent]);
-            let wants_to_move = |agent: usize| actions[agent] != Action::Stay;
+            let requests_move = |agent: usize| actions[agent] != Action::Stay;
             if let Some(ahead) = ahead.filter(|&ahead| ahead != agent) {
                 self.swaps += u64::from(ahead > agent && step.targets[ahead] == step.place(agent));
                 self.chains += u64::from(step.moved(agent));
-                self.cascades += u64::from(!step.moved(agent) && wants_to_move(ahead) && !step.moved(ahead));
+                self.cascades += u64::from(!step.moved(agent) && requests_move(ahead) && !step.moved(ahead));
             }
             let same = |&other: &usize| step.targets[other] == step.targets[agent];
             let is_first = !step.agents[..index].iter().any(same);
@@ -114,15 +114,15 @@ impl<'a> Step<'a> {
         self.agents.iter().copied().find(|&agent| self.place(agent) == place)
     }
 
-    /// Whether the agent is the lowest index of a ring of moves.
+    /// Returns whether the agent has the lowest index of a ring of moves.
     fn leads_cycle(&self, agent: usize) -> bool {
-        let cell_of = |cell: Cell| self.occupant(cell.toward(Action::Stay));
+        let occupant_of = |cell: Cell| self.occupant(cell.toward(Action::Stay));
         let mut at = agent;
         loop {
             if !self.moved(at) {
                 return false;
             }
-            match cell_of(self.after.cells[at]) {
+            match occupant_of(self.after.cells[at]) {
                 Some(next) if next == agent => return true,
                 Some(next) if next > agent => at = next,
                 _ => return false,

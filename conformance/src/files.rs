@@ -1,4 +1,4 @@
-//! Files of text, compressed where their name says so, written whole or not at all.
+//! Text files, compressed if their name ends in `.zst` and written atomically.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use pogema_core::Error;
 use pogema_core::files::write_whole;
 
-/// Opens a text, decompressing it if its name ends in `.zst`.
+/// Opens a text file, and decompresses it if its name ends in `.zst`.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be opened.
@@ -20,10 +20,10 @@ pub fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
     Ok(Box::new(BufReader::new(input)))
 }
 
-/// Writes a text under a temporary name and renames it, compressing it if its name ends in `.zst`.
+/// Writes a text file under a temporary name and renames it; compresses it if its name ends in `.zst`.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written; a file that was there before is then still there.
+/// [`Error::Io`] if the file cannot be written; an existing file is then unchanged.
 pub fn write(path: &Path, text: &[u8]) -> Result<(), Error> {
     if is_compressed(path) {
         let packed = zstd::encode_all(text, LEVEL).map_err(|error| Error::io(path, error))?;
@@ -33,7 +33,7 @@ pub fn write(path: &Path, text: &[u8]) -> Result<(), Error> {
     }
 }
 
-/// The strongest level that needs no more memory to read than usual.
+/// The highest level that does not need extra memory to decompress.
 const LEVEL: i32 = 19;
 
 fn is_compressed(path: &Path) -> bool {

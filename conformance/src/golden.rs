@@ -11,23 +11,23 @@ use crate::request::{Request, Response};
 /// A request and POGEMA's answer to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoldenRecording {
-    /// What was asked.
+    /// The request.
     pub request: Request,
-    /// What POGEMA 1.4.0 answered.
+    /// The answer of POGEMA 1.4.0.
     pub response: Response,
 }
 
-/// The recordings that come with this crate.
+/// Returns the folder of the recordings in this crate.
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/pogema-1.4.0")
 }
 
-/// Every mismatch that was ever seen, in the same form, with the right answer.
+/// Returns the folder of all mismatches found so far, recorded in the same format with the right answers.
 pub fn found_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("found")
 }
 
-/// The files of a folder with an ending, in the order of their names.
+/// Returns the files under a folder whose names have an ending, sorted by path.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be read.
@@ -48,7 +48,7 @@ pub fn files(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, Error> {
     Ok(found)
 }
 
-/// The recordings of a folder.
+/// Returns the files of recordings under a folder.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be read.
@@ -58,10 +58,10 @@ pub fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(found)
 }
 
-/// Reads the recordings of one file, compressed if its name ends in `.zst`.
+/// Reads the recordings of one file; decompresses it if its name ends in `.zst`.
 ///
 /// # Errors
-/// [`Error::Io`] with the line that cannot be read.
+/// [`Error::Io`] with the number of the line that cannot be read.
 pub fn read(path: &Path) -> Result<Vec<GoldenRecording>, Error> {
     let mut recordings = Vec::new();
     for (index, line) in crate::files::open(path)?.lines().enumerate() {
@@ -73,7 +73,7 @@ pub fn read(path: &Path) -> Result<Vec<GoldenRecording>, Error> {
     Ok(recordings)
 }
 
-/// Writes recordings to a file, whole or not at all, compressed if its name ends in `.zst`.
+/// Writes recordings to a file atomically; compresses it if its name ends in `.zst`.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.

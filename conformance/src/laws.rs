@@ -1,4 +1,4 @@
-//! Laws that hold in every episode, whatever the rules make of it.
+//! Invariants that hold in every episode under all rules.
 
 use std::collections::HashSet;
 
@@ -8,18 +8,18 @@ use pogema_maps::GridConfig;
 use crate::request::{Record, Request, Response};
 use crate::tally::{Families, families_of};
 
-/// A law that an answer breaks.
+/// An invariant that an answer breaks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BrokenLaw {
-    /// The operation that broke it.
+    /// The index of the operation that broke it.
     pub op: usize,
-    /// The rule that promises it.
+    /// The rule that guarantees it.
     pub rule: &'static str,
-    /// What happened, in words.
+    /// A description of the violation.
     pub text: String,
 }
 
-/// The first law that an answer breaks.
+/// Returns the first invariant that an answer breaks.
 pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
     let config = GridConfig::from_value(&request.config).ok()?;
     let families = families_of(&config);
@@ -30,8 +30,8 @@ pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
             obstacles = reset.map.iter().map(|row| row.bytes().collect()).collect();
         }
         let Some(state) = record.state() else { continue };
-        let broken = of_state(families, &config, state).or_else(|| match (record.step(), before) {
-            (Some(_), Some(before)) => of_step(families, &config, &obstacles, before, state),
+        let broken = broken_in_state(families, &config, state).or_else(|| match (record.step(), before) {
+            (Some(_), Some(before)) => broken_in_step(families, &config, &obstacles, before, state),
             _ => None,
         });
         if let Some((rule, text)) = broken {
@@ -42,7 +42,11 @@ pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
     None
 }
 
-fn of_state(families: Families, config: &GridConfig, state: &Snapshot) -> Option<(&'static str, String)> {
+fn broken_in_state(
+    families: Families,
+    config: &GridConfig,
+    state: &Snapshot,
+) -> Option<(&'static str, String)> {
     let active = || (0..state.cells.len()).filter(|&agent| state.active[agent]);
     let mut seen = HashSet::new();
     if let Some(agent) = active().find(|&agent| !seen.insert(state.cells[agent])) {
@@ -68,7 +72,7 @@ fn of_state(families: Families, config: &GridConfig, state: &Snapshot) -> Option
     None
 }
 
-fn of_step(
+fn broken_in_step(
     families: Families,
     config: &GridConfig,
     obstacles: &[Vec<u8>],
@@ -79,20 +83,20 @@ fn of_step(
         let (from, to) = (before.cells[agent], after.cells[agent]);
         let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
         if distance > u16::from(before.active[agent]) {
-            return Some(("move/actions", format!("agent {agent} went from {from} to {to}")));
+            return Some(("move/actions", format!("agent {agent} moved from {from} to {to} in one step")));
         }
         if from != to && obstacles[usize::from(to.row)][usize::from(to.col)] == b'#' {
             return Some((families.collide, format!("agent {agent} entered the obstacle at {to}")));
         }
         if after.active[agent] && !before.active[agent] {
-            return Some((families.goal, format!("agent {agent} came back")));
+            return Some((families.goal, format!("agent {agent} became active again")));
         }
         let swaps = (0..agent).any(|other| {
             let both = before.active[agent] && before.active[other] && from != to;
             both && before.cells[other] == to && after.cells[other] == from
         });
         if swaps {
-            return Some((families.collide, format!("agent {agent} swapped cells with another")));
+            return Some((families.collide, format!("agent {agent} swapped cells with another agent")));
         }
         if config.on_target != OnGoal::Restart && before.goals[agent] != after.goals[agent] {
             return Some((families.goal, format!("the goal of agent {agent} changed")));

@@ -1,20 +1,20 @@
 //! Checks that an implementation of POGEMA follows its rules.
 //!
-//! A [`Request`] is a config and a list of operations (reset, step, step back…); playing it gives a [`Response`]
-//! with one [`Record`] per operation. [`play`] plays it with an engine of this workspace, [`Oracle`] with POGEMA
-//! 1.4.0 itself, and [`compare`] finds the first place where two responses differ, and the rule it breaks.
+//! A [`Request`] is a config and a list of operations (reset, step, step back…). The answer is a [`Response`] with
+//! one [`Record`] per operation. [`play`] answers with an engine of this workspace, [`Oracle`] with POGEMA 1.4.0
+//! itself. [`compare`] finds the first difference between two responses and the rule it breaks.
 //!
-//! | module | what it holds |
+//! | item | content |
 //! | --- | --- |
-//! | [`Request`], [`Response`], [`Record`] | what is asked and what is answered, as JSON |
-//! | [`play`], [`NamedEngine`] | our engines' answers |
-//! | [`Oracle`] | POGEMA's own answers |
-//! | [`compare`], [`Divergence`] | the first difference, and its rule |
+//! | [`Request`], [`Response`], [`Record`] | requests and answers, as JSON |
+//! | [`play`], [`NamedEngine`] | answers of the engines of this workspace |
+//! | [`Oracle`] | answers of POGEMA 1.4.0 |
+//! | [`compare`], [`Divergence`] | the first difference and its rule |
 //! | [`draw_request`], [`Script`] | random configs and crowded episodes |
-//! | [`Events`] | how often the interesting things happened |
-//! | [`port`] | anyone's implementation, asked over a pipe |
-//! | [`cases`], [`golden`] | what is kept on disk |
-//! | [`Tally`] | what was checked, rule by rule |
+//! | [`Events`] | counts of conflicts and other events in the episodes |
+//! | [`port`] | implementations in any language, queried over a pipe |
+//! | [`cases`], [`golden`] | cases and recordings on disk |
+//! | [`Tally`] | counts of comparisons, rule by rule |
 
 #![forbid(unsafe_code)]
 

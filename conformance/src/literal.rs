@@ -1,7 +1,7 @@
-//! A second opinion: POGEMA's own procedures, followed step for step.
+//! A second engine that follows POGEMA's own procedures step for step.
 //!
-//! Where the reference *defines* (who may move, order-free), this engine *proceeds*, with the lists, edges and
-//! reverts of the original. The two were written apart and must agree on every step.
+//! The reference defines which agents may move, independent of any order. This engine instead runs the original
+//! procedures with their lists, edges and reverts. The two were written independently and must agree on every step.
 
 mod moves;
 
@@ -10,10 +10,10 @@ use pogema_core::{
     Reward, Snapshot, State, StepOut,
 };
 
-/// A place in the map with its border, counted from the border's corner.
+/// A cell of the map with its border, counted from the corner of the border.
 type Place = (usize, usize);
 
-/// One environment that proceeds as POGEMA 1.4.0 does.
+/// One environment that follows the procedures of POGEMA 1.4.0.
 #[derive(Clone, Debug, Default)]
 pub struct Literal {
     config: Config,
@@ -21,7 +21,7 @@ pub struct Literal {
     positions: Vec<Vec<u8>>,
     places: Vec<Place>,
     goals: Vec<Place>,
-    /// The same places and goals without the border, as others see them.
+    /// The same places and goals without the border, as the public API reports them.
     cells: Vec<Cell>,
     goal_cells: Vec<Cell>,
     active: Vec<bool>,
@@ -31,10 +31,10 @@ pub struct Literal {
 }
 
 impl Literal {
-    /// An environment for a config. Call `reset` before `step`.
+    /// Creates an environment for a config. Call `reset` before `step`.
     ///
     /// # Errors
-    /// If the config is out of range.
+    /// If a field of the config is out of range.
     pub fn new(config: Config) -> Result<Self, Error> {
         config.check()?;
         Ok(Self { config, ..Self::default() })
@@ -48,12 +48,12 @@ impl Literal {
         Cell::new((row - self.config.radius) as u16, (col - self.config.radius) as u16)
     }
 
-    fn note_cells(&mut self) {
+    fn update_cells(&mut self) {
         self.cells = self.places.iter().map(|&place| self.unpad(place)).collect();
         self.goal_cells = self.goals.iter().map(|&place| self.unpad(place)).collect();
     }
 
-    fn note_goals(&mut self) {
+    fn update_on_goal(&mut self) {
         let on_goal = |agent: usize| self.places[agent] == self.goals[agent] && self.active[agent];
         self.was_on_goal = (0..self.places.len()).map(on_goal).collect();
     }
@@ -104,8 +104,8 @@ impl Environment for Literal {
         self.streams = instance.goals().to_vec();
         self.active = vec![true; self.config.num_agents];
         self.elapsed = 0;
-        self.note_goals();
-        self.note_cells();
+        self.update_on_goal();
+        self.update_cells();
         Ok(())
     }
 
@@ -124,7 +124,7 @@ impl Environment for Literal {
                 self.positions[row][col] = 1;
             }
         }
-        self.note_goals();
+        self.update_on_goal();
         let solved = self.was_on_goal.iter().all(|&reached| reached);
         let share = self.was_on_goal.iter().filter(|&&reached| reached).count() as f32 / actions.len() as f32;
         for agent in 0..actions.len() {
@@ -152,7 +152,7 @@ impl Environment for Literal {
         }
         self.elapsed += 1;
         out.truncated.fill(self.elapsed as i64 >= self.config.max_steps);
-        self.note_cells();
+        self.update_cells();
         Ok(())
     }
 
@@ -171,7 +171,7 @@ impl Environment for Literal {
         for (row, col) in state.occupied.iter().map(|&cell| self.pad(cell)).collect::<Vec<_>>() {
             self.positions[row][col] = 1;
         }
-        self.note_cells();
+        self.update_cells();
         Ok(())
     }
 

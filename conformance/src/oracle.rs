@@ -1,4 +1,4 @@
-//! POGEMA 1.4.0 itself, in a process of its own.
+//! POGEMA 1.4.0 itself, in a child process.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use pogema_core::Error;
 
 use crate::request::{Request, Response};
 
-/// The server's files; its main one first.
+/// The files of the server, the main file first.
 const SERVER: [(&str, &str); 3] = [
     ("oracle.py", include_str!("../oracle/oracle.py")),
     ("episodes.py", include_str!("../oracle/episodes.py")),
@@ -23,16 +23,16 @@ pub struct Oracle {
     process: Child,
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
-    /// Holds the server's files for as long as it runs.
+    /// Keeps the server's files until the server ends.
     _folder: tempfile::TempDir,
 }
 
-/// Finds, or makes under `folder`, a Python that has POGEMA 1.4.0.
+/// Returns a Python that has POGEMA 1.4.0, and installs one under `folder` if necessary.
 ///
-/// The environment variable `POGEMA_ORACLE_PYTHON` names one that is there already.
+/// If the environment variable `POGEMA_ORACLE_PYTHON` is set, returns its value.
 ///
 /// # Errors
-/// [`Error::Io`] if there is no Python 3.11 or POGEMA cannot be installed.
+/// [`Error::Io`] if Python 3.11 is missing or POGEMA cannot be installed.
 pub fn find_oracle_python(folder: &Path) -> Result<PathBuf, Error> {
     if let Some(python) = std::env::var_os("POGEMA_ORACLE_PYTHON") {
         return Ok(PathBuf::from(python));
@@ -63,10 +63,10 @@ fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, Error> {
 }
 
 impl Oracle {
-    /// Starts POGEMA with a Python that has it.
+    /// Starts POGEMA with the given Python.
     ///
     /// # Errors
-    /// [`Error::Io`] if it does not come up, or is not 1.4.0.
+    /// [`Error::Io`] if it does not start or is not version 1.4.0.
     pub fn start(python: &Path) -> Result<Self, Error> {
         let folder = tempfile::tempdir().map_err(|error| Error::io("temporary folder", error))?;
         for (name, text) in SERVER {
@@ -86,26 +86,26 @@ impl Oracle {
             Self { process, input: Some(input), output: BufReader::new(output), _folder: folder };
         let hello = oracle.read_line()?;
         if !hello.contains(r#""version":"1.4.0""#) {
-            return Err(Error::io(python, format!("the oracle is no POGEMA 1.4.0: {}", hello.trim())));
+            return Err(Error::io(python, format!("the oracle is not POGEMA 1.4.0: {}", hello.trim())));
         }
         Ok(oracle)
     }
 
-    /// Sends a request; its answer comes with [`Oracle::receive`], so that several can be under way.
+    /// Sends a request without waiting. [`Oracle::receive`] returns the answer, so several requests can be pending.
     ///
     /// # Errors
-    /// [`Error::Io`] if the oracle is gone.
+    /// [`Error::Io`] if the oracle has ended.
     pub fn send(&mut self, request: &Request) -> Result<(), Error> {
         let text = serde_json::to_string(request).map_err(|error| Error::io("oracle", error))?;
-        let Some(input) = &mut self.input else { return Err(Error::io("oracle", "was told to end")) };
+        let Some(input) = &mut self.input else { return Err(Error::io("oracle", "its input is closed")) };
         let sent = writeln!(input, "{text}").and_then(|()| input.flush());
         sent.map_err(|error| Error::io("oracle", error))
     }
 
-    /// Takes the next answer.
+    /// Receives the next answer.
     ///
     /// # Errors
-    /// [`Error::Io`] if the oracle is gone or answers what is no response.
+    /// [`Error::Io`] if the oracle has ended or its answer is not a response.
     pub fn receive(&mut self) -> Result<Response, Error> {
         let line = self.read_line()?;
         serde_json::from_str(&line).map_err(|error| {
@@ -114,7 +114,7 @@ impl Oracle {
         })
     }
 
-    /// Sends a request and takes its answer.
+    /// Sends a request and receives its answer.
     ///
     /// # Errors
     /// As [`Oracle::send`] and [`Oracle::receive`].
@@ -135,7 +135,7 @@ impl Oracle {
 
 impl Drop for Oracle {
     fn drop(&mut self) {
-        // Its input closed, the oracle ends by itself.
+        // The oracle ends when its input is closed.
         self.input = None;
         let _ = self.process.wait();
     }

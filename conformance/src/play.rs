@@ -1,4 +1,4 @@
-//! Our own answers to a request.
+//! The answers of the engines of this workspace to a request.
 
 use pogema_core::{
     Action, Change, Config, Environment, Episode, Error, Instance, Metrics, Observation, Observed,
@@ -15,31 +15,31 @@ use crate::request::{
     actions_of, padded_dtype,
 };
 
-/// Longer episodes have too many goals to list; the oracle lists none for them either.
-const MOST_FORETOLD_STEPS: i64 = 4096;
+/// Maximum episode length for which goals are foretold. The oracle has the same limit.
+const MAX_FORETOLD_STEPS: i64 = 4096;
 
-/// An engine to play with.
+/// An engine and its name.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedEngine {
-    /// Its name in reports.
+    /// The name in reports.
     pub name: &'static str,
-    /// Makes an environment of it.
+    /// Creates an environment of the engine.
     pub make: fn(Config) -> Result<Box<dyn Environment>, Error>,
 }
 
 impl NamedEngine {
-    /// The reference.
+    /// The reference engine.
     pub const REFERENCE: Self =
         Self { name: "reference", make: |config| Ok(Box::new(pogema_reference::Reference::new(config)?)) };
-    /// POGEMA's procedures, step for step.
+    /// The engine that follows POGEMA's procedures step for step.
     pub const LITERAL: Self =
         Self { name: "literal", make: |config| Ok(Box::new(crate::Literal::new(config)?)) };
 }
 
-/// Makes an environment for a config.
+/// A function that creates an environment for a config.
 pub type Make<'a> = dyn Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'a;
 
-/// Plays a request on the reference.
+/// Plays a request on the reference engine.
 pub fn play(request: &Request) -> Response {
     play_on(NamedEngine::REFERENCE, request)
 }
@@ -57,7 +57,7 @@ pub fn play_on(engine: NamedEngine, request: &Request) -> Response {
     response
 }
 
-/// Where the instances of the episodes come from.
+/// The source of the instances of the episodes.
 enum Source {
     Drawn(Box<InstanceSource>),
     Given(Box<Instance>),
@@ -72,7 +72,7 @@ impl Source {
     }
 }
 
-/// Which figures are measured beyond POGEMA's own.
+/// The optional metrics to measure.
 #[derive(Clone, Copy)]
 pub(crate) struct Measured {
     pub density: bool,
@@ -80,19 +80,19 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    pub fn of(figures: &[String]) -> Self {
-        let has = |name: &str| figures.iter().any(|figure| figure == name);
+    pub fn of(metric_names: &[String]) -> Self {
+        let has = |name: &str| metric_names.iter().any(|metric| metric == name);
         Self { density: has("avg_agents_density"), collisions: has("a_collisions") || has("o_collisions") }
     }
 }
 
-/// One request at work.
+/// The state of a request that is being played.
 pub(crate) struct Player {
     pub(crate) config: GridConfig,
     source: Source,
     pub(crate) episode: Episode<Box<dyn Environment>>,
     warnings: Vec<String>,
-    /// POGEMA answers for its history whether the config keeps steps or not.
+    /// The states so far. POGEMA reports its history whether the config keeps steps or not.
     past: Vec<Snapshot>,
     team: AStarTeam,
     sampler: Generator,
@@ -107,12 +107,12 @@ impl Player {
         Self::with_source(make, config, source, measured)
     }
 
-    /// A player of one instance, whose episodes all begin alike. It measures the figures named.
+    /// Creates a player whose episodes all begin from one instance. It measures the named optional metrics.
     pub(crate) fn of_instance(
         make: &Make<'_>,
         rules: &Config,
         instance: Instance,
-        figures: &[String],
+        metric_names: &[String],
     ) -> Result<Self, Error> {
         let config = GridConfig {
             num_agents: rules.num_agents,
@@ -127,7 +127,7 @@ impl Player {
             empty_outside: matches!(instance.outside(), Outside::Free),
             ..GridConfig::default()
         };
-        Self::with_source(make, config, Source::Given(Box::new(instance)), Measured::of(figures))
+        Self::with_source(make, config, Source::Given(Box::new(instance)), Measured::of(metric_names))
     }
 
     fn with_source(
@@ -188,9 +188,9 @@ impl Player {
         let padded = self.padded(instance)?;
         self.padded = Some(padded.clone());
         let observations = self.observed(true)?;
-        let may_foretell =
-            self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MOST_FORETOLD_STEPS;
-        let goal_lists = may_foretell.then(|| foretold_goals(&self.config, instance)).flatten();
+        let is_foretold =
+            self.config.on_target == OnGoal::Restart && self.config.max_episode_steps <= MAX_FORETOLD_STEPS;
+        let goal_lists = is_foretold.then(|| foretold_goals(&self.config, instance)).flatten();
         let record = ResetRecord {
             derived: Derived::of(&self.config),
             map: instance.map().rows(),
@@ -225,7 +225,7 @@ impl Player {
         })
     }
 
-    /// What POGEMA leaves of the caller's list: under `soft` a prevented move becomes a wait.
+    /// Returns the caller's action list as POGEMA leaves it: under `soft`, 0 replaces a prevented move.
     ///
     /// Rule: collide/soft/rewrite
     fn actions_after(&self, before: &Snapshot, actions: &[Action], after: &Snapshot) -> Vec<i64> {
@@ -239,7 +239,7 @@ impl Player {
 
     fn metrics(&self) -> Option<Metrics> {
         let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
-        // POGEMA's persistent environments lack its own figures; only wrappers around them measure.
+        // POGEMA's persistent environments do not report its own metrics; only the optional metrics remain.
         let metrics = if self.config.persistent {
             let Metrics { avg_agents_density, a_collisions, o_collisions, .. } = metrics;
             Metrics { avg_agents_density, a_collisions, o_collisions, ..Metrics::default() }

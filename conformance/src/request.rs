@@ -1,28 +1,28 @@
-//! What is asked of an implementation, and what it answers: the same JSON for every implementation.
+//! Requests to an implementation and its answers, in the same JSON format for every implementation.
 
 use pogema_core::{Action, Cell, Change, Error, Map, Observed, Padded, Snapshot, TraceStep};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// A config and what to do with an environment of it.
+/// A config and the operations on its environment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// Comes back in the response.
+    /// An identifier that the response repeats.
     #[serde(default)]
     pub id: u64,
     /// POGEMA's config fields.
     pub config: Value,
-    /// A map to register under a name first.
+    /// A map to register under a name before the config is read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub register: Option<Registered>,
     /// Whether to measure the density of agents.
     #[serde(default)]
     pub density: bool,
-    /// Whether to count collisions, which POGEMA itself does not.
+    /// Whether to count collisions. POGEMA itself does not count them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collisions: bool,
-    /// What to do, in order.
+    /// The operations, in order.
     pub ops: Vec<Op>,
 }
 
@@ -39,7 +39,7 @@ pub struct Registered {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Value>", into = "Vec<Value>")]
 pub enum Op {
-    /// Reset, with the seed that POGEMA 1.4.0 ignores.
+    /// A reset with an optional seed, which POGEMA 1.4.0 ignores.
     Reset(Option<u64>),
     /// One step.
     Step(Vec<i64>),
@@ -53,26 +53,26 @@ pub enum Op {
     History,
 }
 
-/// One record per operation done, and why it ended early if it did.
+/// One record per completed operation, and the error that ended the request early, if any.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Response {
-    /// The request's.
+    /// The identifier of the request.
     pub id: Option<u64>,
-    /// What each operation gave.
+    /// The result of each operation.
     #[serde(default)]
     pub records: Vec<Record>,
-    /// What was warned of.
+    /// Warnings.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// Why not all was done.
+    /// The error that prevented the other operations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<Failure>,
 }
 
-/// An error and when it came.
+/// An error and the moment when it occurred.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
-    /// During what.
+    /// The operation or phase.
     pub when: When,
     /// The class of the error.
     #[serde(rename = "type")]
@@ -87,7 +87,7 @@ impl Failure {
     }
 }
 
-/// During what an error came.
+/// The operation or phase in which an error occurred.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum When {
@@ -97,7 +97,7 @@ pub enum When {
     Phase(String),
 }
 
-/// What one operation gave.
+/// The result of one operation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "lowercase")]
 #[expect(missing_docs, reason = "each is the operation of its name")]
@@ -108,7 +108,7 @@ pub enum Record {
     Sample(Box<StepRecord>),
     Back(Back),
     History(History),
-    /// What fits none of these.
+    /// A value that matches none of these.
     #[serde(untagged)]
     Odd(Value),
 }
@@ -116,7 +116,7 @@ pub enum Record {
 /// The instance and the state after a reset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResetRecord {
-    /// What the config derived.
+    /// The derived config fields.
     pub derived: Derived,
     /// The map without its border.
     pub map: Vec<String>,
@@ -125,13 +125,13 @@ pub struct ResetRecord {
     /// The state.
     #[serde(flatten)]
     pub state: Snapshot,
-    /// What agents see.
+    /// The observations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observations: Option<Observed>,
-    /// In lifelong mode, the goals foretold for each agent.
+    /// In lifelong mode, the foretold goals of each agent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_lists: Option<Vec<Vec<Cell>>>,
-    /// Why there are none.
+    /// The reason why `goal_lists` is missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_lists_error: Option<String>,
 }
@@ -153,7 +153,7 @@ pub struct StepRecord {
     /// The step.
     #[serde(flatten)]
     pub step: TraceStep,
-    /// The caller's action list after the step: `soft` writes 0 for every move it takes back.
+    /// The caller's action list after the step; `soft` replaces each move it reverts by 0.
     pub actions_after: Vec<i64>,
     /// The `is_active` of each agent's info.
     pub infos_active: Vec<bool>,
@@ -169,17 +169,17 @@ pub struct Back {
     pub state: Snapshot,
 }
 
-/// What a persistent environment has kept.
+/// The history that a persistent environment keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct History {
-    /// For each agent its state at every step.
+    /// The state of each agent at every step.
     pub full: Vec<Vec<Change>>,
-    /// For each agent its first state and every later one that differs.
+    /// The first state of each agent and every later state that differs from the one before.
     pub changes: Vec<Vec<Change>>,
 }
 
 impl Record {
-    /// The results of a step, if the operation was one.
+    /// Returns the results of the step, if the operation was a step.
     pub fn step(&self) -> Option<&StepRecord> {
         match self {
             Self::Step(step) | Self::Astar(step) | Self::Sample(step) => Some(step),
@@ -187,7 +187,7 @@ impl Record {
         }
     }
 
-    /// The state after the operation.
+    /// Returns the state after the operation, if recorded.
     pub fn state(&self) -> Option<&Snapshot> {
         match self {
             Self::Reset(reset) => Some(&reset.state),
@@ -199,10 +199,10 @@ impl Record {
 }
 
 impl Request {
-    /// The source of the instances of its config.
+    /// Returns the source of the instances of the config.
     ///
     /// # Errors
-    /// If the registered map cannot be read, or the config names another.
+    /// If the registered map cannot be read, or the config names a different map.
     pub(crate) fn source(&self, config: &GridConfig) -> Result<InstanceSource, Error> {
         let named = self.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
         let registered = named.map(|map| Map::from_rows(&map.rows)).transpose()?;
@@ -211,12 +211,12 @@ impl Request {
 }
 
 impl Response {
-    /// An answer to a request, without a record.
+    /// Creates an answer to a request, without records.
     pub(crate) fn to(request: &Request) -> Self {
         Self { id: Some(request.id), ..Self::default() }
     }
 
-    /// Records what each operation of a request gives, up to the first error.
+    /// Records the result of each operation of a request, up to the first error.
     pub(crate) fn record(
         &mut self,
         request: &Request,
@@ -233,7 +233,7 @@ impl Response {
         }
     }
 
-    /// The map of the episode that an operation belongs to.
+    /// Returns the map of the episode that contains an operation.
     pub fn map_at(&self, op: usize) -> Option<Map> {
         self.records.iter().take(op + 1).rev().find_map(|record| match record {
             Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
@@ -241,31 +241,31 @@ impl Response {
         })
     }
 
-    /// The last state before an operation.
+    /// Returns the last state before an operation.
     pub fn state_before(&self, op: usize) -> Option<&Snapshot> {
         self.records.iter().take(op).rev().find_map(Record::state)
     }
 }
 
 impl Derived {
-    /// The fields of a config.
+    /// Returns the derived fields of a config.
     pub(crate) fn of(config: &GridConfig) -> Self {
         let GridConfig { width, height, size, density, num_agents, .. } = *config;
         Self { width, height, size, density, num_agents }
     }
 }
 
-/// NumPy's name of the element type of the map with its border.
+/// Returns NumPy's name of the element type of the map with its border.
 pub(crate) fn padded_dtype(config: &GridConfig) -> &'static str {
     if config.empty_outside { "float64" } else { "int64" }
 }
 
-/// The actions of a request.
+/// Converts the action numbers of a request to actions.
 pub(crate) fn actions_of(numbers: &[i64]) -> Result<Vec<Action>, Error> {
     numbers.iter().enumerate().map(|(agent, &number)| Action::from_number(agent, number)).collect()
 }
 
-/// Actions as a request writes them.
+/// Converts actions to the numbers that a request contains.
 pub fn numbers(actions: &[Action]) -> Vec<i64> {
     actions.iter().map(|&action| action as i64).collect()
 }
@@ -274,12 +274,12 @@ impl Op {
     /// The operations without an argument.
     const PLAIN: [Self; 4] = [Self::Astar, Self::Sample, Self::Back, Self::History];
 
-    /// The operation of a word, if it needs no argument; a reset then has no seed.
+    /// Returns the operation with a name, if it needs no argument. A reset then has no seed.
     pub(crate) fn of_word(word: &str) -> Option<Self> {
         Self::PLAIN.into_iter().chain([Self::Reset(None)]).find(|op| op.word() == word)
     }
 
-    /// The word that names the operation.
+    /// Returns the name of the operation.
     pub(crate) fn word(&self) -> &'static str {
         match self {
             Self::Reset(_) => "reset",

@@ -1,4 +1,4 @@
-//! One run over everything there is to check.
+//! Runs of all checks of the engines.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -20,33 +20,33 @@ use crate::script::play_script;
 use crate::tally::Tally;
 use crate::{cases, golden};
 
-/// What a run found.
+/// The results of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// The parts of the run, in order.
     pub parts: Vec<RunPart>,
     /// Comparisons by rule.
     pub tally: Tally,
-    /// What happened in the episodes.
+    /// Events in the episodes.
     pub events: Events,
-    /// What went wrong.
+    /// The failures.
     pub failures: Vec<Fault>,
 }
 
-/// One part of a run: the golden recordings, the cases, and so on.
+/// One part of a run, such as the golden recordings or the cases.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct RunPart {
-    /// Its name.
+    /// The name of the part.
     pub name: String,
-    /// Files or cases checked.
+    /// Number of files or cases checked.
     pub checked: u64,
-    /// Those that failed.
+    /// Number of them that failed.
     pub failed: u64,
-    /// What happened in their episodes.
+    /// Events in their episodes.
     pub events: Events,
 }
 
-/// One thing that went wrong.
+/// One failure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
     /// The part of the run.
@@ -56,14 +56,14 @@ pub struct Fault {
     /// The difference, if two answers differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub divergence: Option<Divergence>,
-    /// What is wrong, in words.
+    /// A description of the failure.
     pub text: String,
-    /// Where it was kept, to be played again.
+    /// The file that keeps the case for replay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<PathBuf>,
 }
 
-/// How a run goes on; called after each case.
+/// A function that a run calls after each case.
 pub type Progress<'a> = &'a (dyn Fn() + Sync);
 
 /// The result of one case.
@@ -75,14 +75,14 @@ struct Checked {
 }
 
 impl Checked {
-    /// A case whose episodes are counted.
+    /// Creates a result with the events of a response.
     fn of(response: &Response) -> Self {
         let mut checked = Self::default();
         checked.events.watch(response);
         checked
     }
 
-    /// Compares one engine's answer; the first fault stays.
+    /// Compares the answer of one engine, and keeps the first fault.
     fn compare(
         &mut self,
         part: &str,
@@ -101,12 +101,12 @@ impl Checked {
 }
 
 impl Report {
-    /// Whether everything agreed.
+    /// Returns whether all checks passed.
     pub fn agrees(&self) -> bool {
         self.failures.is_empty()
     }
 
-    fn take(&mut self, name: &str, results: Vec<Checked>) {
+    fn add(&mut self, name: &str, results: Vec<Checked>) {
         let checked = results.len() as u64;
         let mut part = RunPart { name: name.into(), checked, failed: 0, events: Events::default() };
         for checked in results {
@@ -134,7 +134,7 @@ impl Report {
                 results.push(check(part, &name, &recording.request, &recording.response, &got));
             }
         }
-        self.take(part, results);
+        self.add(part, results);
         Ok(())
     }
 
@@ -153,11 +153,11 @@ impl Report {
             checked.fault = mismatch.map(|text| fault(part, &path.display().to_string(), text));
             results.push(checked);
         }
-        self.take(part, results);
+        self.add(part, results);
         Ok(())
     }
 
-    /// Checks the engines against each other, and the first against the laws, on freshly drawn cases.
+    /// Checks the engines against each other, and the first one against the invariants, on random cases.
     ///
     /// # Errors
     /// If a worker fails.
@@ -187,11 +187,11 @@ impl Report {
             progress();
             Ok(checked)
         };
-        self.take("fresh", on_workers(None, num_cases, || Ok(()), check)?);
+        self.add("fresh", on_workers(None, num_cases, || Ok(()), check)?);
         Ok(())
     }
 
-    /// Checks engines against POGEMA itself on freshly drawn cases.
+    /// Checks engines against POGEMA itself on random cases.
     ///
     /// # Errors
     /// If POGEMA cannot be started or ends.
@@ -206,7 +206,7 @@ impl Report {
     ) -> Result<(), Error> {
         let check = |oracle: &mut Oracle, case| {
             let request = play_script(NamedEngine::REFERENCE, draw_request(seed, case), seed).0;
-            // POGEMA works on its answer while we work on ours.
+            // POGEMA computes its answer while the engines compute theirs.
             oracle.send(&request)?;
             let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
             let expected = oracle.receive()?;
@@ -219,7 +219,7 @@ impl Report {
             progress();
             Ok(checked)
         };
-        self.take("oracle", on_workers(None, num_cases, || Oracle::start(python), check)?);
+        self.add("oracle", on_workers(None, num_cases, || Oracle::start(python), check)?);
         Ok(())
     }
 
@@ -240,18 +240,18 @@ impl Report {
             let expected = oracle.ask(&request)?;
             let got = crate::play(&request);
             let agreed = check("cases with oracle", &name, &request, &expected, &got);
-            // Where we differ by decision, POGEMA must really do otherwise.
+            // If the case is a deviation by decision, POGEMA must really differ.
             let checked = match (&case.pogema, agreed.fault.is_some()) {
                 (None, _) => agreed,
                 (Some(_), true) => Checked::default(),
                 (Some(_), false) => {
-                    let text = "POGEMA does the same, though the case says that it does not".into();
+                    let text = "POGEMA agrees, but the key `pogema` of the case says that it differs".into();
                     Checked { fault: Some(fault("cases with oracle", &name, text)), ..Checked::default() }
                 }
             };
             results.push(checked);
         }
-        self.take("cases with oracle", results);
+        self.add("cases with oracle", results);
         Ok(())
     }
 }
@@ -271,7 +271,7 @@ fn diverged(part: &str, name: &str, found: Divergence) -> Fault {
     Fault { text: found.to_string(), divergence: Some(found), ..fault(part, name, String::new()) }
 }
 
-/// Keeps a failed case on disk, with the expected answer; a failure to do so is told along with it.
+/// Writes a failed case and its expected answer to a file. If that fails, adds the error to the description.
 fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected: &Response) {
     let Some(fault) = &mut checked.fault else { return };
     let path = folder.join(format!("{}-{}.jsonl", fault.part, fault.name.replace(' ', "-")));
@@ -281,13 +281,13 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
         .and_then(|()| golden::write(&path, &[recording]));
     match kept {
         Ok(()) => fault.kept = Some(path),
-        Err(error) => fault.text = format!("{}\n  could not be kept: {error}", fault.text),
+        Err(error) => fault.text = format!("{}\n  the case could not be saved: {error}", fault.text),
     }
 }
 
-/// Runs cases on some workers, or as many as there are cores; the results come in the order of the cases.
+/// Runs cases on the given number of workers [default: one per core] and returns the results in case order.
 ///
-/// A worker may be a process that is slow to start, so there is one for each thread and not for each part of the work.
+/// A worker may be a process that is slow to start, so each thread has one and reuses it.
 pub(crate) fn on_workers<W: Send, T: Send>(
     num_workers: Option<usize>,
     num_cases: u64,
@@ -298,12 +298,12 @@ pub(crate) fn on_workers<W: Send, T: Send>(
     let pool = pool.map_err(|error| Error::external("threads", error))?;
     let idle = Mutex::new(Vec::new());
     let locked = || idle.lock().unwrap_or_else(PoisonError::into_inner);
-    let one = |case| {
+    let run_case = |case| {
         let taken = locked().pop();
         let mut worker = taken.map_or_else(&make_worker, Ok)?;
         let result = run(&mut worker, case);
         locked().push(worker);
         result
     };
-    pool.install(|| (0..num_cases).into_par_iter().map(one).collect())
+    pool.install(|| (0..num_cases).into_par_iter().map(run_case).collect())
 }

@@ -1,4 +1,4 @@
-//! What the agents of a random case do: wander, seek their goals, or get in each other's way.
+//! Action scripts of random cases, for example random moves, moves to the goals, and conflicts.
 
 use pogema_core::{Action, Cell, Map, Snapshot};
 
@@ -6,30 +6,30 @@ use crate::dice::Dice;
 use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, Response};
 
-/// How the agents of an episode choose their actions.
+/// The way in which the agents of an episode choose their actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Script {
-    /// Each at random.
+    /// Uniformly at random.
     Random,
     /// Mostly towards the goal.
     GoalSeeking,
-    /// At a neighbour, or at a cell that a neighbour can enter too.
+    /// Towards an adjacent agent, or into a cell that another agent can enter too.
     Adversarial,
-    /// Nearly all in one direction: long chains, and long cascades at walls.
+    /// Nearly all in one direction, which makes long chains, and long cascades at walls.
     Convoy,
-    /// Round and round the four cells of a block.
+    /// In circles over the four cells of a block.
     Carousel,
-    /// As POGEMA's A* policy.
+    /// With POGEMA's A* policy.
     Astar,
-    /// As POGEMA's random policy.
+    /// With POGEMA's random policy.
     Sample,
 }
 
-const MOST_STEPS: usize = 26;
+const MAX_STEPS: usize = 26;
 
-/// Adds operations to a request while playing it, so that the actions can answer to what happens.
+/// Adds operations to a request while playing it, so that the actions can depend on the state.
 ///
-/// The result is the whole request and our answer to it, on the given engine.
+/// Returns the complete request and the answer of the given engine.
 pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Request, Response) {
     let mut dice = Dice::new(seed ^ 0x5ca1_ab1e, request.id);
     let mut response = Response { id: Some(request.id), ..Response::default() };
@@ -44,21 +44,21 @@ pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Req
             break;
         }
     }
-    // Played afresh from the operations alone, as any other implementation will.
+    // Play the operations again from the start, as every other implementation will.
     let response = crate::play_on(engine, &request);
     (request, response)
 }
 
 fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, response: &mut Response) {
     let script = draw_script(dice, player);
-    // Without a step in between, so that nothing of an episode is left when the next begins.
+    // No step between the resets, because in POGEMA an abandoned episode leaves its counters to the next one.
     for _ in 0..if dice.chance(0.15) { 3 } else { 1 } {
         let seed = dice.chance(0.2).then(|| dice.below(1000) as u64);
         if !perform(player, Op::Reset(seed), request, response) {
             return;
         }
     }
-    let max_steps = player.config.max_episode_steps.clamp(1, MOST_STEPS as i64) as usize;
+    let max_steps = player.config.max_episode_steps.clamp(1, MAX_STEPS as i64) as usize;
     let num_extra = if dice.chance(0.2) { 2 } else { 0 };
     let can_go_back = player.config.persistent && script != Script::Astar && can_compare_back(player);
     let mut ended = 0;
@@ -90,7 +90,7 @@ fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, res
     }
 }
 
-/// Taking steps back goes wrong in POGEMA where its occupancy has lost agents, and back onto an obstacle.
+/// Returns whether steps back can be compared. In POGEMA they fail if an agent has vanished or returns to an obstacle.
 fn can_compare_back(player: &Player) -> bool {
     player.config.collision_system != pogema_core::Collision::Soft
         && player.config.possible_agents_xy.is_none()
@@ -153,8 +153,8 @@ fn toward_goal(state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     }
 }
 
-/// Towards another agent next to it (a swap, if that one does the same), or else towards one that is two cells
-/// away (a contest for the cell between).
+/// Moves towards another agent that is adjacent (a swap, if that agent does the same) or two cells away (a contest
+/// for the cell between).
 fn at_neighbour(map: &Map, state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     let mut moves = [Action::Up, Action::Down, Action::Left, Action::Right];
     dice.shuffle(&mut moves);

@@ -1,4 +1,4 @@
-//! What was checked, and with what result, rule by rule.
+//! Counts of comparisons and divergences, rule by rule.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,14 @@ use pogema_core::{Collision, Observation, Occupancy, OnGoal};
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
-/// How often each rule was compared, and how often it was broken.
+/// The number of comparisons and divergences of each rule.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Tally {
-    /// By rule id.
+    /// The counts by rule id.
     pub rules: BTreeMap<String, Count>,
 }
 
-/// Comparisons and divergences.
+/// Numbers of comparisons and divergences.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Count {
     /// Comparisons made.
@@ -25,7 +25,7 @@ pub struct Count {
 impl Tally {
     /// Counts one comparison under a rule.
     pub fn count(&mut self, rule: &str, holds: bool) {
-        // Most rules are there already; no copy of the name is made for them.
+        // Most rules exist already, so the name is only copied for a new rule.
         if !self.rules.contains_key(rule) {
             self.rules.insert(rule.to_owned(), Count::default());
         }
@@ -45,24 +45,24 @@ impl Tally {
     }
 }
 
-/// The rules that a config brings into play, one for each thing compared.
+/// The rules that apply to a config, one for each compared aspect.
 #[derive(Clone, Copy, Debug)]
 pub struct Families {
-    /// Where agents start and want to go.
+    /// The rule of starts and goals.
     pub place: &'static str,
-    /// Who moves.
+    /// The rule of conflicting moves.
     pub collide: &'static str,
-    /// What reaching a goal does.
+    /// The rule of a reached goal.
     pub goal: &'static str,
-    /// What agents see.
+    /// The rule of observations.
     pub observe: &'static str,
-    /// What the occupancy grid shows.
+    /// The rule of the occupancy grid.
     pub occupancy: &'static str,
-    /// What sums the episode up.
+    /// The rule of the metrics.
     pub metrics: &'static str,
 }
 
-/// The rules that a config brings into play.
+/// Returns the rules that apply to a config.
 pub fn families_of(config: &GridConfig) -> Families {
     let is_explicit =
         config.agents_xy.as_ref().is_some_and(|starts| !starts.is_empty()) && config.targets_xy.is_some();

@@ -1,5 +1,5 @@
-//! The engines agree with the recordings and with each other, on episodes that meet every kind of conflict; and a
-//! wrong engine is caught, under the rule it breaks.
+//! Checks that the engines agree with the recordings and with each other on episodes with every kind of conflict, and
+//! that a wrong engine is caught under the rule it breaks.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -9,7 +9,7 @@ use pogema_core::{Instance, Occupancy, Snapshot, State, StepOut};
 use pogema_reference::Reference;
 
 #[test]
-fn engines_give_what_was_recorded() {
+fn engines_agree_with_the_recordings() {
     for engine in [NamedEngine::REFERENCE, NamedEngine::LITERAL] {
         let mut report = Report::default();
         report.check_recordings("golden", &golden::folder(), engine).unwrap();
@@ -36,7 +36,7 @@ fn engines_agree_on_crowded_episodes_of_every_kind() {
     }
 }
 
-/// The reference, but for one thing.
+/// The reference with one error.
 struct Wrong {
     inner: Reference,
     config: Config,
@@ -91,7 +91,7 @@ impl Environment for Wrong {
     }
 }
 
-/// Wrong engines, and the rule under which each must be caught.
+/// The rule under which each wrong engine must be caught, and the engine.
 const WRONG: [(&str, NamedEngine); 8] = [
     (
         "occupancy/as-released",
@@ -115,7 +115,7 @@ const WRONG: [(&str, NamedEngine); 8] = [
     (
         "collide/soft",
         NamedEngine {
-            name: "goes by priority",
+            name: "uses priority",
             make: |config| Wrong::rules(config, |config| Config { collision: Collision::Priority, ..config }),
         },
     ),
@@ -157,7 +157,7 @@ const WRONG: [(&str, NamedEngine); 8] = [
     (
         "observe/default",
         NamedEngine {
-            name: "sees one thing more",
+            name: "flips one observed value",
             make: |config| Wrong::make(config, |config| config, |_, _| (), |seen| seen[0] = 1.0 - seen[0]),
         },
     ),

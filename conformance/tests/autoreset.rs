@@ -1,4 +1,4 @@
-//! What follows the end of a lane's episode, lane by lane beside a reference that is reset by hand; lanes have maps of
+//! Checks the autoreset modes of a batch: compares each lane with a reference that is reset by hand. Lanes have maps of
 //! different sizes.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -21,7 +21,7 @@ fn config() -> Config {
     Config { num_agents: NUM_AGENTS, radius: 2, max_steps: 9, collision, on_goal, ..Config::default() }
 }
 
-/// The instance of a lane and episode, of a size that depends on both.
+/// Returns the instance of a lane and episode, whose size depends on both.
 fn instance(salt: u64, lane: usize, episode: u64) -> Result<Instance, Error> {
     let seed = salt + 1000 * lane as u64 + episode;
     let fields = json!({"width": 5 + lane, "height": 6 + episode % 3, "density": 0.2, "num_agents": NUM_AGENTS,
@@ -34,15 +34,15 @@ fn new_batch(autoreset: Autoreset, num_threads: usize) -> Batch {
     Batch::new(config(), NUM_LANES, num_threads, source).unwrap().with_autoreset(autoreset)
 }
 
-/// Some action for each lane and agent; of a lane every third episode or so comes to its goals.
+/// Returns pseudo-random actions of all lanes and agents; about every third episode of a lane reaches its goals.
 fn actions(step: u64) -> Vec<Action> {
     let action = |agent: usize| Action::ALL[((agent as u64 * 7919 + step * 40_503) >> 5) as usize % 5];
     (0..NUM_LANES * NUM_AGENTS).map(action).collect()
 }
 
-/// What a step shows of a lane.
+/// The outputs of a lane in one step.
 #[derive(Clone, Debug, PartialEq)]
-struct Shown {
+struct LaneOutputs {
     rewards: Vec<f32>,
     terminated: Vec<bool>,
     truncated: Vec<bool>,
@@ -53,7 +53,7 @@ struct Shown {
 }
 
 /// A reference that is reset by hand.
-struct Plain {
+struct ManualLane {
     lane: usize,
     environment: Reference,
     meter: EpisodeMeter,
@@ -61,7 +61,7 @@ struct Plain {
     last: Option<(Vec<bool>, Vec<bool>)>,
 }
 
-impl Plain {
+impl ManualLane {
     fn new(lane: usize) -> Self {
         let mut environment = Reference::new(config()).unwrap();
         environment.reset(&instance(0, lane, 0).unwrap()).unwrap();
@@ -75,7 +75,7 @@ impl Plain {
         self.last = None;
     }
 
-    fn step(&mut self, autoreset: Autoreset, actions: &[Action]) -> Shown {
+    fn step(&mut self, autoreset: Autoreset, actions: &[Action]) -> LaneOutputs {
         let (mut rewards, mut terminated) = (vec![0.0; NUM_AGENTS], vec![false; NUM_AGENTS]);
         let mut truncated = terminated.clone();
         let mut has_ended = false;
@@ -101,15 +101,15 @@ impl Plain {
         let mut observed = vec![0.5; config().num_observed()];
         self.environment.observe(&mut observed).unwrap();
         let (state, episode) = (self.environment.snapshot(), Some(self.episode));
-        Shown { rewards, terminated, truncated, observed, state, episode, has_ended }
+        LaneOutputs { rewards, terminated, truncated, observed, state, episode, has_ended }
     }
 }
 
-fn step_batch(batch: &mut Batch, step: u64) -> Vec<Shown> {
+fn step_batch(batch: &mut Batch, step: u64) -> Vec<LaneOutputs> {
     step_masked(batch, step).0
 }
 
-fn step_masked(batch: &mut Batch, step: u64) -> (Vec<Shown>, Vec<i8>) {
+fn step_masked(batch: &mut Batch, step: u64) -> (Vec<LaneOutputs>, Vec<i8>) {
     let num_agents = NUM_LANES * NUM_AGENTS;
     let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![true; num_agents]);
     let mut truncated = terminated.clone();
@@ -120,7 +120,7 @@ fn step_masked(batch: &mut Batch, step: u64) -> (Vec<Shown>, Vec<i8>) {
     batch.step(&actions(step), out, view).unwrap();
     let shown = |lane: usize| {
         let agents = lane * NUM_AGENTS..(lane + 1) * NUM_AGENTS;
-        Shown {
+        LaneOutputs {
             rewards: rewards[agents.clone()].to_vec(),
             terminated: terminated[agents.clone()].to_vec(),
             truncated: truncated[agents].to_vec(),
@@ -141,21 +141,21 @@ fn lanes_of_different_sizes_follow_the_chosen_autoreset_on_any_number_of_threads
         let mut batch = new_batch(autoreset, num_threads);
         assert_eq!(batch.episode(0).unwrap(), None);
         batch.reset().unwrap();
-        let mut plain: Vec<_> = (0..NUM_LANES).map(Plain::new).collect();
+        let mut references: Vec<_> = (0..NUM_LANES).map(ManualLane::new).collect();
         let mut num_ended = 0;
         for step in 0..NUM_STEPS {
             let shown = step_batch(&mut batch, step);
             let actions = actions(step);
-            let lanes = plain.iter_mut().zip(actions.chunks(NUM_AGENTS));
+            let lanes = references.iter_mut().zip(actions.chunks(NUM_AGENTS));
             let expected: Vec<_> = lanes.map(|(lane, actions)| lane.step(autoreset, actions)).collect();
             assert_eq!(shown, expected, "{autoreset:?}, {num_threads} threads, step {step}");
             num_ended += shown.iter().filter(|lane| lane.has_ended).count();
-            // By hand at last, where nothing follows by itself.
+            // Without autoreset, reset the ended lanes by hand after some steps.
             let chosen: Vec<bool> =
-                (0..NUM_LANES).map(|lane| plain[lane].last.is_some() && step % 4 == 0).collect();
+                (0..NUM_LANES).map(|lane| references[lane].last.is_some() && step % 4 == 0).collect();
             if autoreset == Autoreset::Off {
                 batch.reset_lanes(&chosen).unwrap();
-                plain
+                references
                     .iter_mut()
                     .zip(chosen)
                     .filter(|(_, chosen)| *chosen)
@@ -189,22 +189,22 @@ fn a_reset_of_some_lanes_leaves_the_others_untouched_in_every_mode() {
     }
 }
 
-fn refusal<T>(result: Result<T, Error>) -> String {
+fn error_of<T>(result: Result<T, Error>) -> String {
     result.err().unwrap().to_string()
 }
 
 #[test]
 fn a_reset_without_a_next_instance_changes_nothing() {
     let source = |lane, episode| match (lane, episode) {
-        (2, 1) => Err(Error::instance("there is no more")),
+        (2, 1) => Err(Error::instance("no further instance")),
         _ => instance(0, lane, episode),
     };
     let mut batch = Batch::new(config(), NUM_LANES, 2, source).unwrap();
     let expected = "chosen lanes has length 2, expected 6";
-    assert_eq!(refusal(batch.reset_lanes(&[true; 2])), expected);
+    assert_eq!(error_of(batch.reset_lanes(&[true; 2])), expected);
     let mut chosen = [true; NUM_LANES];
     chosen[5] = false;
-    assert_eq!(refusal(batch.reset_lanes(&chosen)), "the environment was not reset yet");
+    assert_eq!(error_of(batch.reset_lanes(&chosen)), "the environment was not reset yet");
     batch.reset().unwrap();
     let state = |batch: &Batch| {
         let lanes = 0..NUM_LANES;
@@ -213,23 +213,23 @@ fn a_reset_without_a_next_instance_changes_nothing() {
             .collect::<Vec<_>>()
     };
     let before = state(&batch);
-    assert_eq!(refusal(batch.reset_lanes(&chosen)), "instance: there is no more");
-    assert_eq!(refusal(batch.reset_with(source_of_misfits, &chosen)), "starts has length 1, expected 5");
+    assert_eq!(error_of(batch.reset_lanes(&chosen)), "instance: no further instance");
+    assert_eq!(error_of(batch.reset_with(source_with_one_agent, &chosen)), "starts has length 1, expected 5");
     assert_eq!(state(&batch), before);
-    // The lanes that had an instance begin it now, and not the one after it.
+    // The lanes whose instances were already generated start those now, not the ones after them.
     chosen[2] = false;
     batch.reset_lanes(&chosen).unwrap();
     let episodes: Vec<_> = state(&batch).into_iter().map(|(_, episode)| episode.unwrap()).collect();
     assert_eq!(episodes, [1, 1, 0, 1, 1, 0]);
 }
 
-fn source_of_misfits(_: usize, _: u64) -> Result<Instance, Error> {
+fn source_with_one_agent(_: usize, _: u64) -> Result<Instance, Error> {
     let fields = json!({"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[0, 1]]});
     Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
 }
 
 #[test]
-fn another_source_begins_at_its_episode_0_in_the_lanes_chosen_and_goes_on_in_the_others() {
+fn a_new_source_starts_at_episode_0_in_chosen_lanes_and_continues_in_the_others() {
     for autoreset in MODES {
         for num_steps in [0, 4, 9] {
             let mut batch = new_batch(autoreset, 2);
@@ -240,31 +240,31 @@ fn another_source_begins_at_its_episode_0_in_the_lanes_chosen_and_goes_on_in_the
             let chosen: Vec<bool> = (0..NUM_LANES).map(|lane| lane % 2 == 1).collect();
             batch.reset_with(|lane, episode| instance(77, lane, episode), &chosen).unwrap();
             assert_eq!(batch.lane(0).unwrap().snapshot(), untouched);
-            let begun = |batch: &Batch, lane: usize, salt: u64, episode: u64| {
+            let assert_started = |batch: &Batch, lane: usize, salt: u64, episode: u64| {
                 let starts = instance(salt, lane, episode).unwrap().starts().to_vec();
                 assert_eq!(batch.lane(lane).unwrap().cells(), starts, "{autoreset:?} {num_steps} {lane}");
                 assert_eq!(batch.episode(lane).unwrap(), Some(episode));
             };
-            begun(&batch, 1, 77, 0);
+            assert_started(&batch, 1, 77, 0);
             batch.reset().unwrap();
-            begun(&batch, 3, 77, 1);
-            // What was prepared of the old source is still played.
+            assert_started(&batch, 3, 77, 1);
+            // An instance that was prepared from the old source is still played.
             let salt = if autoreset == Autoreset::NextStep && num_steps == 9 { 0 } else { 77 };
-            begun(&batch, 0, salt, episode + 1);
+            assert_started(&batch, 0, salt, episode + 1);
         }
     }
 }
 
 #[test]
-fn ends_are_observed_in_the_order_asked_for() {
+fn ended_episodes_are_observed_in_the_requested_order() {
     let mut batch = new_batch(Autoreset::NextStep, 2);
     batch.reset().unwrap();
     let per_lane = config().num_observed();
     let mut observed = vec![0.5; 2 * per_lane];
-    let too_early = refusal(batch.observe_ended(&[4, 1], Observations::F32(&mut observed)));
-    assert_eq!(too_early, "no episode of lane 4 ended yet");
+    let too_early = error_of(batch.observe_ended(&[4, 1], Observations::F32(&mut observed)));
+    assert_eq!(too_early, "no episode of lane 4 has ended yet");
     let last = (0..9).map(|step| step_batch(&mut batch, step)).last().unwrap();
-    let short = refusal(batch.observe_ended(&[4], Observations::F32(&mut observed)));
+    let short = error_of(batch.observe_ended(&[4], Observations::F32(&mut observed)));
     assert_eq!(short, format!("observations has length {}, expected {per_lane}", 2 * per_lane));
     for num_steps_later in 0..3 {
         let mut bytes = vec![9; 2 * per_lane];
@@ -277,15 +277,15 @@ fn ends_are_observed_in_the_order_asked_for() {
 }
 
 #[test]
-fn masks_allow_what_no_obstacle_forbids() {
+fn masks_forbid_only_moves_into_obstacles() {
     fn view(masks: &mut [i8]) -> ObservationBuffers<'_> {
         ObservationBuffers { observations: Observations::None, masks: Some(masks) }
     }
     let mut batch = new_batch(Autoreset::SameStep, 2);
     let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];
-    assert_eq!(refusal(batch.observe(view(&mut masks))), "the environment was not reset yet");
+    assert_eq!(error_of(batch.observe(view(&mut masks))), "the environment was not reset yet");
     batch.reset().unwrap();
-    assert_eq!(refusal(batch.observe(view(&mut [0]))), "action masks has length 1, expected 150");
+    assert_eq!(error_of(batch.observe(view(&mut [0]))), "action masks has length 1, expected 150");
     let (mut num_inactive, mut num_forbidden) = (0, 0);
     for step in 0..NUM_STEPS {
         let (shown, masks) = step_masked(&mut batch, step);
@@ -294,7 +294,7 @@ fn masks_allow_what_no_obstacle_forbids() {
         assert_eq!(again, masks);
         for (index, mask) in masks.chunks(5).enumerate() {
             let (lane, agent) = (index / NUM_AGENTS, index % NUM_AGENTS);
-            let Shown { state, episode, .. } = &shown[lane];
+            let LaneOutputs { state, episode, .. } = &shown[lane];
             let instance = instance(0, lane, episode.unwrap()).unwrap();
             let is_free = |(row, col): (i32, i32)| {
                 let cell = u16::try_from(row).ok().zip(u16::try_from(col).ok());
@@ -309,5 +309,8 @@ fn masks_allow_what_no_obstacle_forbids() {
             num_forbidden += mask.iter().filter(|&&allowed| allowed == 0).count();
         }
     }
-    assert!(num_inactive > 0 && num_forbidden > 4 * num_inactive, "nothing was seen");
+    assert!(
+        num_inactive > 0 && num_forbidden > 4 * num_inactive,
+        "the episodes met too few inactive agents or forbidden moves"
+    );
 }

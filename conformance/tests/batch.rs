@@ -1,5 +1,5 @@
-//! A batch plays each lane as the reference would alone, on any number of threads, and begins the next episode with
-//! the instance that POGEMA makes of the next seed.
+//! Checks that each lane of a batch plays like a reference alone, on any number of threads, and starts its next
+//! episode from the instance that POGEMA generates for the next seed.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -20,7 +20,7 @@ fn config(on_goal: OnGoal) -> Config {
     Config { num_agents: NUM_AGENTS, radius: 3, max_steps: 11, collision, on_goal, ..Config::default() }
 }
 
-/// The instance of a seed of its own for each lane and episode.
+/// Returns the instance of a lane and episode; each has its own seed.
 fn instance(on_goal: OnGoal, lane: usize, episode: u64) -> Result<Instance, Error> {
     let mode = match on_goal {
         OnGoal::Finish => "finish",
@@ -33,14 +33,14 @@ fn instance(on_goal: OnGoal, lane: usize, episode: u64) -> Result<Instance, Erro
     Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
 }
 
-/// Some action for each lane, agent and step.
+/// Returns pseudo-random actions of all lanes and agents in a step.
 fn actions(step: u64) -> Vec<Action> {
     let action =
         |agent: usize| Action::ALL[((agent as u64 * 2_654_435_761 + step * 40_503) >> 7) as usize % 5];
     (0..NUM_LANES * NUM_AGENTS).map(action).collect()
 }
 
-/// Everything that a batch gave, step by step.
+/// All outputs of a batch, step by step.
 #[derive(Debug, Default, PartialEq)]
 struct Played {
     rewards: Vec<f32>,
@@ -85,7 +85,7 @@ fn play_batch(on_goal: OnGoal, num_threads: usize) -> Played {
     played
 }
 
-/// The same lanes, one reference each.
+/// Plays the same lanes on one reference each.
 fn play_references(on_goal: OnGoal) -> Played {
     let config = config(on_goal);
     let mut played = Played::default();
@@ -124,7 +124,7 @@ fn play_references(on_goal: OnGoal) -> Played {
 }
 
 #[test]
-fn a_batch_plays_what_references_play_alone_on_any_number_of_threads() {
+fn a_batch_equals_separate_references_on_any_number_of_threads() {
     for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
         let expected = play_references(on_goal);
         assert!(expected.metrics.len() >= 5 * NUM_LANES, "only {} episodes ended", expected.metrics.len());
@@ -135,7 +135,7 @@ fn a_batch_plays_what_references_play_alone_on_any_number_of_threads() {
 }
 
 #[test]
-fn every_form_of_observation_holds_the_same_bits() {
+fn all_observation_formats_hold_the_same_bits() {
     let mut batch = new_batch(OnGoal::Restart, 2);
     batch.reset().unwrap();
     let per_agent = 3 * 7 * 7;
@@ -152,40 +152,40 @@ fn every_form_of_observation_holds_the_same_bits() {
     }
 }
 
-fn refusal<T>(result: Result<T, Error>) -> String {
+fn error_of<T>(result: Result<T, Error>) -> String {
     result.err().unwrap().to_string()
 }
 
 #[test]
-fn wrong_calls_name_both_numbers_and_change_nothing() {
+fn wrong_calls_report_both_numbers_and_change_nothing() {
     let source = |lane, episode| instance(OnGoal::Finish, lane, episode);
-    let new = |lanes, threads| refusal(Batch::new(config(OnGoal::Finish), lanes, threads, source));
+    let new = |lanes, threads| error_of(Batch::new(config(OnGoal::Finish), lanes, threads, source));
     assert_eq!(new(0, 1), "`num_lanes` is `0`, expected at least 1");
     assert_eq!(new(2, 1025), "`num_threads` is `1025`, expected 1 to 1024");
     assert_eq!(new(2, 0), "`num_threads` is `0`, expected 1 to 1024");
     let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
-    assert_eq!(refusal(batch.observe(Observations::None)), "the environment was not reset yet");
+    assert_eq!(error_of(batch.observe(Observations::None)), "the environment was not reset yet");
     batch.reset().unwrap();
     let before = [0, 1].map(|lane| batch.lane(lane).unwrap().snapshot());
     let mut step = |num_actions: usize, num_rewards: usize, num_observed: usize| {
         let (mut rewards, mut terminated, mut truncated) = (vec![0.0; num_rewards], [false; 24], [false; 24]);
         let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
         let mut observed = vec![0; num_observed];
-        refusal(batch.step(&vec![Action::Up; num_actions], out, Observations::U8(&mut observed)))
+        error_of(batch.step(&vec![Action::Up; num_actions], out, Observations::U8(&mut observed)))
     };
     assert_eq!(step(23, 24, 3528), "actions has length 23, expected 24");
     assert_eq!(step(24, 25, 3528), "rewards has length 25, expected 24");
     assert_eq!(step(24, 24, 3527), "observations has length 3527, expected 3528");
     assert_eq!([0, 1].map(|lane| batch.lane(lane).unwrap().snapshot()), before);
     let expected = "config: `lane` is `2`, expected below 2, the number of lanes";
-    assert_eq!(refusal(batch.lane(2)), expected);
-    assert_eq!(refusal(batch.ended(2)), expected);
+    assert_eq!(error_of(batch.lane(2)), expected);
+    assert_eq!(error_of(batch.ended(2)), expected);
 }
 
 #[test]
-fn an_episode_that_cannot_begin_is_told_at_the_next_step() {
+fn an_episode_that_cannot_start_is_reported_at_the_next_step() {
     let source = |lane, episode| match (lane, episode) {
-        (1, 1) => Err(Error::instance("there is no more")),
+        (1, 1) => Err(Error::instance("no further instance")),
         _ => instance(OnGoal::Finish, lane, episode),
     };
     for autoreset in [Autoreset::SameStep, Autoreset::NextStep] {
@@ -201,17 +201,17 @@ fn an_episode_that_cannot_begin_is_told_at_the_next_step() {
         assert!(truncated.iter().all(|&cut| cut));
         let (ended, _) = batch.ended(1).unwrap().unwrap();
         assert_eq!(ended.snapshot(), batch.lane(1).unwrap().snapshot());
-        assert_eq!(refusal(batch.reset()), "instance: there is no more");
+        assert_eq!(error_of(batch.reset()), "instance: no further instance");
     }
 }
 
 #[test]
-fn a_panic_of_the_source_is_refused() {
+fn a_panic_of_the_source_becomes_an_error() {
     let source = |lane: usize, episode: u64| {
         assert!(episode == 0, "no second episode");
         instance(OnGoal::Finish, lane, episode)
     };
     let mut batch = Batch::new(config(OnGoal::Finish), 1, 1, source).unwrap();
     batch.reset().unwrap();
-    assert_eq!(refusal(batch.reset()), "instance: the source panicked at lane 0, episode 1");
+    assert_eq!(error_of(batch.reset()), "instance: the source panicked at lane 0, episode 1");
 }

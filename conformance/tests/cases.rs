@@ -1,4 +1,4 @@
-//! The hand-written cases, each on every engine.
+//! Checks the hand-written cases on the reference and the literal engine.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

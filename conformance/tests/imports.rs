@@ -1,4 +1,4 @@
-//! No two files of a crate import each other. A folder's `mod.rs` and the files in it count as one.
+//! Checks that no two files of a crate import each other. A folder's `mod.rs` and the files in the folder count as one.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,11 +11,11 @@ use pogema_conformance::golden;
 /// The path of a module, or of a name in it, from the root of its crate.
 type Names = Vec<String>;
 
-/// The files of a crate and what they import.
+/// The modules of a crate and their re-exports.
 struct Sources {
     /// The text of each module, without comments and tests.
     texts: BTreeMap<Names, String>,
-    /// Where a name that a module passes on comes from.
+    /// The origin of each name that a module re-exports.
     reexports: BTreeMap<Names, Names>,
 }
 
@@ -44,7 +44,7 @@ impl Sources {
         sources
     }
 
-    /// A path from the root of the crate; none for one into another crate.
+    /// Returns a path from the root of the crate, or `None` for a path into another crate.
     fn absolute(&self, module: &Names, path: &str) -> Option<Names> {
         let mut names: Names = path.split("::").map(str::to_owned).collect();
         let mut base = module.clone();
@@ -65,10 +65,10 @@ impl Sources {
         Some([base, names].concat())
     }
 
-    /// The module that a name stands in.
+    /// Returns the module that defines a name.
     fn module_of(&self, name: &Names) -> Names {
         let mut name = name.clone();
-        // A chain of re-exports is short; one that turns in a circle ends here.
+        // Chains of re-exports are short; the limit ends a cyclic one.
         for _ in 0..8 {
             let longest = (0..=name.len()).rev().find(|&length| self.texts.contains_key(&name[..length]));
             let length = longest.unwrap_or(0);
@@ -97,7 +97,7 @@ impl Sources {
     }
 }
 
-/// Every path that a text imports, and whether the import is public.
+/// Returns every path that a text imports, and whether the import is public.
 fn uses(text: &str) -> Vec<(bool, String)> {
     let mut all = Vec::new();
     for (index, _) in text.match_indices("use ") {
@@ -112,7 +112,7 @@ fn uses(text: &str) -> Vec<(bool, String)> {
     all
 }
 
-/// The paths of a tree such as `a::{b, c::{d, e as f}}`.
+/// Passes each path of a tree such as `a::{b, c::{d, e as f}}` to `take`.
 fn expand(prefix: &str, tree: &str, take: &mut impl FnMut(&str)) {
     let (mut depth, mut begin) = (0, 0);
     let ends = tree.char_indices().chain([(tree.len(), ',')]);

@@ -1,4 +1,4 @@
-//! Who may depend on whom, and with which features.
+//! Checks the dependencies between the crates and their features.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,7 +7,7 @@ use std::path::Path;
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
-/// A crate uses lower layers only, never its own.
+/// The layer of each crate; a crate may use crates of lower layers only.
 const LAYERS: [(&str, u8); 14] = [
     ("pogema-core", 0),
     ("workspace-hack", 0),
@@ -43,7 +43,7 @@ fn crates_use_lower_layers_only() {
     assert_eq!(metadata.packages.len(), LAYERS.len());
 }
 
-/// The features of each dependency, as a set of packages asks for them, except those of the workspace.
+/// Returns the features with which a set of packages builds each external dependency.
 fn features(selection: &[&str]) -> BTreeMap<String, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut command = std::process::Command::new(env!("CARGO"));
@@ -52,13 +52,13 @@ fn features(selection: &[&str]) -> BTreeMap<String, String> {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     let pairs = text.lines().filter_map(|line| line.trim_end_matches(" (*)").split_once('|'));
-    let is_foreign = |package: &str| !package.contains(&*root.to_string_lossy());
-    pairs.filter(|(package, _)| is_foreign(package)).map(|(one, other)| (one.into(), other.into())).collect()
+    let is_external = |package: &str| !package.contains(&*root.to_string_lossy());
+    pairs.filter(|(package, _)| is_external(package)).map(|(one, other)| (one.into(), other.into())).collect()
 }
 
-/// What asks for other features is built a second time, and everything above it.
+/// Other features would build a dependency, and everything above it, a second time.
 #[test]
-fn the_program_and_the_wheel_ask_for_the_features_of_the_tests() {
+fn the_program_and_the_wheel_use_the_features_of_the_tests() {
     let tests = features(&["--edges", "all"]);
     let program = features(&["--package", "pogema-cli", "--edges", "normal,build"]);
     let wheel =

@@ -1,7 +1,7 @@
-//! Every rule has one statement, code, a case and a picture, and nobody cites a rule that does not exist.
+//! Checks that every rule has one statement, code, a case and a picture, and that every cited rule exists.
 //!
-//! The pictures and the index in `docs/spec` are made from the cases. With the environment variable `BLESS` set,
-//! this test writes them instead of comparing.
+//! The pictures and the index in `docs/spec` are generated from the cases. If the environment variable `BLESS` is set,
+//! these tests write them instead of comparing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -15,7 +15,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
 }
 
-/// A path as it reads from the root of the repository.
+/// Returns a path relative to the root of the repository.
 fn local(path: &Path) -> String {
     path.strip_prefix(root()).unwrap().display().to_string()
 }
@@ -40,7 +40,7 @@ fn chapters() -> Vec<PathBuf> {
     files.into_iter().filter(|path| !path.ends_with("index.md")).collect()
 }
 
-/// The rules that the spec defines, and what is wrong with the definitions.
+/// Returns the rules that the spec defines; adds errors in the definitions to `wrong`.
 fn defined(wrong: &mut Vec<String>) -> BTreeMap<String, Rule> {
     let mut rules: BTreeMap<String, Rule> = BTreeMap::new();
     for path in chapters() {
@@ -66,7 +66,7 @@ fn defined(wrong: &mut Vec<String>) -> BTreeMap<String, Rule> {
     rules
 }
 
-/// The rules that sources cite, with the files that do.
+/// Returns the rules that sources cite, each with the file.
 fn cited_in_code() -> Vec<(String, String)> {
     let mut cited = Vec::new();
     for package in cargo_metadata::MetadataCommand::new().no_deps().exec().unwrap().packages {
@@ -84,7 +84,7 @@ fn cited_in_code() -> Vec<(String, String)> {
     cited
 }
 
-/// The rules that reports can blame.
+/// Returns the rules that reports can cite.
 fn cited_in_reports() -> BTreeSet<String> {
     let mut cited = BTreeSet::new();
     for path in golden::files(&root().join("conformance/src"), ".rs").unwrap() {
@@ -138,7 +138,7 @@ fn every_rule_has_a_statement_code_a_case_and_a_picture() {
 }
 
 #[test]
-fn every_picture_is_the_one_its_case_makes() {
+fn every_picture_matches_its_case() {
     let mut wrong = Vec::new();
     for path in chapters() {
         let text = std::fs::read_to_string(&path).unwrap();
@@ -147,18 +147,18 @@ fn every_picture_is_the_one_its_case_makes() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
-fn check_text(path: &Path, wanted: &str, wrong: &mut Vec<String>) {
-    if std::fs::read_to_string(path).is_ok_and(|text| text == wanted) {
+fn check_text(path: &Path, expected: &str, wrong: &mut Vec<String>) {
+    if std::fs::read_to_string(path).is_ok_and(|text| text == expected) {
         return;
     }
     if std::env::var_os("BLESS").is_some() {
-        std::fs::write(path, wanted).unwrap();
+        std::fs::write(path, expected).unwrap();
     } else {
         wrong.push(format!("{} is out of date; `BLESS=1 ./check rules` writes it", local(path)));
     }
 }
 
-/// The page with all rules, made from the chapters.
+/// Generates the page with all rules.
 fn index(rules: &BTreeMap<String, Rule>) -> String {
     let mut text = String::from(
         "# All rules\n\nThis page is made by the checks from the chapters, the sources and the cases.\n\n\
@@ -173,7 +173,7 @@ fn index(rules: &BTreeMap<String, Rule>) -> String {
     text
 }
 
-/// A chapter with every picture block filled in.
+/// Returns a chapter with every picture block filled in.
 fn with_pictures(text: &str, wrong: &mut Vec<String>) -> String {
     let mut result = String::new();
     let mut lines = text.lines();

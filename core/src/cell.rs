@@ -1,10 +1,10 @@
-//! Cells and actions: the two words everything else is said in.
+//! Cells and actions, the two basic types of the workspace.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// One cell of a map, counted from the top left corner of the map itself, without its border.
+/// A cell of a map, counted from the top left corner of the map without its border.
 ///
 /// Shape: row first, then column, both 0-based.
 ///
@@ -19,12 +19,12 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// A cell from its row and column.
+    /// Creates a cell from its row and column.
     pub const fn new(row: u16, col: u16) -> Self {
         Self { row, col }
     }
 
-    /// The neighbour that `action` aims at, as signed (row, col), since it may lie outside the map.
+    /// Returns the neighbour that `action` leads to, as signed (row, col), since it may lie outside the map.
     ///
     /// Rule: move/actions
     pub fn toward(self, action: Action) -> (i32, i32) {
@@ -51,7 +51,7 @@ impl std::fmt::Display for Cell {
     }
 }
 
-/// What an agent wants to do in one step; the numbers are POGEMA's.
+/// The action of one agent in one step, with POGEMA's numbers.
 ///
 /// Rule: move/actions
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ impl Action {
     /// All actions in the order of their numbers.
     pub const ALL: [Self; 5] = [Self::Stay, Self::Up, Self::Down, Self::Left, Self::Right];
 
-    /// The change of (row, col) this action aims at.
+    /// Returns the change of (row, col) that this action requests.
     pub const fn delta(self) -> (i32, i32) {
         match self {
             Self::Stay => (0, 0),
@@ -86,10 +86,10 @@ impl Action {
         }
     }
 
-    /// The action with a given number.
+    /// Returns the action with a given number.
     ///
     /// # Errors
-    /// [`Error::Action`] unless the number is 0 to 4; POGEMA's list indexing would read `-1` as Right.
+    /// [`Error::Action`] unless the number is 0 to 4. POGEMA's list indexing would read `-1` as Right.
     ///
     /// Rule: move/invalid
     pub fn from_number(agent: usize, number: i64) -> Result<Self, Error> {

@@ -1,4 +1,4 @@
-//! What fixes every shape and every rule of an episode.
+//! The config of an episode, which determines its rules and the shape of every array.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,113 +8,139 @@ crate::words! {
     /// How conflicting moves are resolved.
     #[derive(Default)]
     pub enum Collision {
-        /// One agent after another, lowest index first. Rule: collide/priority
+        /// Agents move one after another, lowest index first.
+        ///
+        /// Rule: collide/priority
         #[default]
         Priority = "priority",
-        /// No agent enters a cell that is occupied or wanted by two. Rule: collide/block-both
+        /// No agent enters a cell that is occupied or that another agent also requests.
+        ///
+        /// Rule: collide/block-both
         BlockBoth = "block_both",
-        /// All at once; only impossible moves are taken back. Rule: collide/soft
+        /// All agents move simultaneously, and only impossible moves are reverted.
+        ///
+        /// Rule: collide/soft
         Soft = "soft",
     }
 }
 
 crate::words! {
-    /// What happens when an agent reaches its goal.
+    /// The effect of reaching a goal.
     #[derive(Default)]
     pub enum OnGoal {
-        /// The agent leaves the map. Rule: goal/finish
+        /// The agent leaves the map.
+        ///
+        /// Rule: goal/finish
         #[default]
         Finish = "finish",
-        /// Nothing, until all agents are on their goals at once. Rule: goal/nothing
+        /// Nothing happens until all agents are on their goals in the same step.
+        ///
+        /// Rule: goal/nothing
         Nothing = "nothing",
-        /// The agent gets its next goal. Rule: goal/restart
+        /// The agent gets its next goal.
+        ///
+        /// Rule: goal/restart
         Restart = "restart",
     }
 }
 
 crate::words! {
-    /// What the occupancy grid shows after a step.
+    /// The cells that the occupancy grid marks after a step.
     #[derive(Default)]
     pub enum Occupancy {
-        /// As POGEMA 1.4.0 leaves it, which under `soft` loses agents. Rule: occupancy/as-released
+        /// The cells that POGEMA 1.4.0 marks; under `soft` it loses agents.
+        ///
+        /// Rule: occupancy/as-released
         #[default]
         AsReleased = "as_released",
-        /// Every active agent's cell. Rule: occupancy/exact
+        /// The cell of every active agent.
+        ///
+        /// Rule: occupancy/exact
         Exact = "exact",
     }
 }
 
 crate::words! {
-    /// Which arrays an agent observes.
+    /// The arrays that an agent observes.
     #[derive(Default)]
     pub enum Observation {
-        /// Three windows: obstacles, agents, goal. Rule: observe/default
+        /// Three windows: obstacles, agents, goal.
+        ///
+        /// Rule: observe/default
         #[default]
         Default = "default",
-        /// Two windows and positions relative to the start. Rule: observe/pomapf
+        /// Two windows, and positions relative to the start.
+        ///
+        /// Rule: observe/pomapf
         Pomapf = "POMAPF",
-        /// The same and the whole map. Rule: observe/mapf
+        /// The arrays of POMAPF, and the whole map.
+        ///
+        /// Rule: observe/mapf
         Mapf = "MAPF",
     }
 }
 
 crate::words! {
-    /// Which agents are rewarded for a goal.
+    /// The agents that are rewarded for a goal.
     #[derive(Default)]
     pub enum Reward {
-        /// As POGEMA 1.4.0 pays it. Rule: reward/own
+        /// The rewards of POGEMA 1.4.0.
+        ///
+        /// Rule: reward/own
         #[default]
         Own = "own",
-        /// The share of agents on their goals, to every agent. Rule: reward/shared
+        /// Every agent gets the share of agents on their goals.
+        ///
+        /// Rule: reward/shared
         Shared = "shared",
     }
 }
 
-/// The rules and sizes of an episode; with an [`crate::Instance`] and actions it fixes every array.
+/// The rules and sizes of an episode; together with an [`crate::Instance`] and the actions they determine every array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
     /// Number of agents, at least 1.
     pub num_agents: usize,
-    /// How far an agent sees in each direction, 1 to 128.
+    /// Number of cells that an agent sees in each direction, 1 to 128.
     pub radius: usize,
-    /// Units: steps. The episode is cut off after so many; 0 and less mean after the first.
+    /// Units: steps. The episode is truncated after this many steps; values ≤ 0 mean after the first.
     pub max_steps: i64,
-    /// How conflicts are resolved.
+    /// The collision system.
     pub collision: Collision,
-    /// What reaching a goal does.
+    /// The effect of reaching a goal.
     pub on_goal: OnGoal,
-    /// What agents observe.
+    /// The arrays that an agent observes.
     pub observation: Observation,
-    /// What the occupancy grid shows.
+    /// The cells that the occupancy grid marks.
     #[serde(default)]
     pub occupancy: Occupancy,
-    /// Who is rewarded.
+    /// The agents that are rewarded for a goal.
     #[serde(default)]
     pub reward: Reward,
-    /// Whether steps are kept, so that they can be taken back. Rule: history/step-back
+    /// Whether steps are kept, so that they can be undone. Rule: history/step-back
     #[serde(default)]
     pub persistent: bool,
 }
 
 impl Config {
-    /// Largest radius POGEMA accepts.
+    /// Largest radius that POGEMA accepts.
     pub const LARGEST_RADIUS: usize = 128;
 
-    /// Side of an agent's window.
+    /// Returns the side of an agent's window. Units: cells.
     pub fn side(&self) -> usize {
         2 * self.radius + 1
     }
 
-    /// Number of values in the `default` observation of all agents: `[agents, 3, side, side]`.
+    /// Returns the number of values in the `default` observation of all agents: `[agents, 3, side, side]`.
     pub fn num_observed(&self) -> usize {
         self.num_agents * 3 * self.side() * self.side()
     }
 
-    /// Passes if every field is in its range.
+    /// Checks that every field is in its range.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first field that is not.
+    /// [`Error::Config`] naming the first field that is out of range.
     pub fn check(&self) -> Result<(), Error> {
         if self.num_agents == 0 {
             return Err(Error::config("num_agents", self.num_agents, "at least 1"));

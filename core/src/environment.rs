@@ -1,4 +1,4 @@
-//! The contract of every engine.
+//! The interface that every engine implements.
 
 use std::collections::HashSet;
 
@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 use crate::metrics::Seen;
 use crate::{Action, Cell, Config, Error, Instance};
 
-/// An implementation of the rules: one environment with its whole state.
+/// An engine: an implementation of the rules for one environment, with its whole state.
 ///
-/// The caller owns every buffer. Lengths are checked before anything changes, and an `Err` leaves the state
-/// as it was. A step never resets; stepping on after the end is allowed (rule: end/after). An engine is `Send`, since the
+/// The caller owns every buffer. Every method checks lengths first, and an `Err` leaves the state unchanged.
+/// A step never resets; further steps after the end are allowed (rule: end/after). An engine is `Send`, because the
 /// kit for ports plays cases on several threads.
 ///
-/// [`crate::Episode`] builds everything else on these methods.
+/// [`crate::Episode`] builds measuring, recording and undoing on these methods.
 pub trait Environment: Send {
-    /// The rules and sizes of this environment.
+    /// Returns the rules and sizes of this environment.
     fn config(&self) -> &Config;
 
     /// Starts an episode.
@@ -30,8 +30,10 @@ pub trait Environment: Send {
     /// Before the first reset, or for a buffer or action list of the wrong length.
     fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error>;
 
-    /// Returns to an earlier state of the episode, `step` steps after the reset: cells, goals, active agents, occupancy
-    /// and time. Goal streams and [`State::on_goal`] stay as they are, so playing a step again can lead to other goals.
+    /// Restores the state that the episode had `step` steps after the reset: cells, goals, active agents, occupancy
+    /// and time.
+    ///
+    /// Goal streams and [`State::on_goal`] stay as they are, so repeating a step can lead to other goals.
     ///
     /// # Errors
     /// Before the first reset, or [`Error::ForeignState`] for a state of another episode.
@@ -39,10 +41,10 @@ pub trait Environment: Send {
     /// Rule: history/step-back
     fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error>;
 
-    /// The state of all agents. Before the first reset every list is empty.
+    /// Returns the state of all agents. Before the first reset every list is empty.
     fn state(&self) -> State<'_>;
 
-    /// The cells that the occupancy grid marks, row by row.
+    /// Returns the cells that the occupancy grid marks, row by row.
     fn occupied(&self) -> Vec<Cell>;
 
     /// Writes the `default` observation of all agents.
@@ -85,7 +87,7 @@ pub trait Environment: Send {
         Ok(())
     }
 
-    /// A copy of the visible state.
+    /// Returns a copy of the visible state.
     fn snapshot(&self) -> Snapshot {
         let State { cells, goals, active, on_goal, .. } = self.state();
         Snapshot {
@@ -140,22 +142,28 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
     }
 }
 
-/// Where a step writes its results, one value per agent.
+/// Borrowed buffers for the results of a step, one value per agent.
 #[derive(Debug)]
 pub struct StepOut<'a> {
+    /// The reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub rewards: &'a mut [f32],
+    /// Which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub terminated: &'a mut [bool],
+    /// Which agents are truncated.
+    ///
     /// Rule: end/truncated
     pub truncated: &'a mut [bool],
 }
 
 impl StepOut<'_> {
-    /// Passes if there is one place per agent in every buffer.
+    /// Checks that every buffer has one entry per agent.
     ///
     /// # Errors
-    /// [`Error::Length`] naming the first buffer that does not fit.
+    /// [`Error::Length`] naming the first buffer of the wrong length.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
         Error::check_length("rewards", num_agents, self.rewards.len())?;
         Error::check_length("terminated", num_agents, self.terminated.len())?;
@@ -166,16 +174,22 @@ impl StepOut<'_> {
 /// Owned buffers for the results of a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepResults {
+    /// The reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub rewards: Vec<f32>,
+    /// Which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub terminated: Vec<bool>,
+    /// Which agents are truncated.
+    ///
     /// Rule: end/truncated
     pub truncated: Vec<bool>,
 }
 
 impl StepResults {
-    /// Buffers for this many agents, all environments together.
+    /// Creates buffers for this many agents, counted over all environments.
     pub fn new(num_agents: usize) -> Self {
         Self {
             rewards: vec![0.0; num_agents],
@@ -184,14 +198,14 @@ impl StepResults {
         }
     }
 
-    /// The buffers, for an engine to write to.
+    /// Borrows the buffers for an engine to write to.
     pub fn out(&mut self) -> StepOut<'_> {
         let Self { rewards, terminated, truncated } = self;
         StepOut { rewards, terminated, truncated }
     }
 }
 
-/// The state of all agents between two steps, borrowed from the engine. One value per agent in every list.
+/// The state of all agents between two steps, borrowed from the engine, with one value per agent in every list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State<'a> {
     /// Units: steps since the reset.
@@ -200,13 +214,13 @@ pub struct State<'a> {
     pub cells: &'a [Cell],
     /// Current goals.
     pub goals: &'a [Cell],
-    /// Which agents still take part.
+    /// Which agents are still active.
     pub active: &'a [bool],
     /// Which active agents stood on their goals after the last move, before goals changed.
     pub on_goal: &'a [bool],
 }
 
-/// A copy of the visible state between two steps, as traces keep it. The lists are those of [`State`].
+/// A copy of the visible state between two steps, as traces store it. The lists are those of [`State`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "State describes them")]
 pub struct Snapshot {
@@ -219,12 +233,12 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The state of the agents, `step` steps after the reset.
+    /// Returns the state of the agents, `step` steps after the reset.
     pub fn state(&self, step: u64) -> State<'_> {
         State { step, cells: &self.cells, goals: &self.goals, active: &self.active, on_goal: &self.on_goal }
     }
 
-    /// Passes if `num_agents` agents on a map of `height` rows and `width` columns can be in this state.
+    /// Checks that `num_agents` agents on a map of `height` rows and `width` columns can be in this state.
     ///
     /// # Errors
     /// [`Error::ForeignState`] for a list of the wrong length, a cell outside the map or two active agents on one cell.

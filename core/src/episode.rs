@@ -1,4 +1,4 @@
-//! One episode: the only loop that plays, measures and records.
+//! An episode: the only code that plays, measures and records.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,9 +8,9 @@ use crate::{
     TraceStart, TraceStep,
 };
 
-/// An engine at play: owns the instance, the results of the last step, the meters and, on request, a recording.
+/// An engine with the instance that it plays, the results of the last step, the meters and, on request, a recording.
 ///
-/// Playing on after the end is allowed (rule: end/after). An `Err` leaves the episode as it was.
+/// Further steps after the end are allowed (rule: end/after). An `Err` leaves the episode unchanged.
 ///
 /// ```
 /// # use pogema_core::{Config, Environment, Episode, Error, Instance};
@@ -30,23 +30,23 @@ pub struct Episode<E> {
     num_steps: u64,
     results: StepResults,
     meters: Meters,
-    /// The figures of the episode, if the last step ended it.
-    figures: Option<Metrics>,
-    /// All states since the reset, if the config keeps them.
+    /// The metrics of the episode if the last step ended it.
+    final_metrics: Option<Metrics>,
+    /// All states since the reset if the config keeps them.
     past: Vec<Snapshot>,
     is_recorded: bool,
     recording: Option<Recording>,
     scratch: Scratch,
 }
 
-/// What an episode measures.
+/// The meters of an episode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meters {
-    /// POGEMA's own figures.
+    /// The metrics of POGEMA itself.
     pub episode: EpisodeMeter,
-    /// How crowded agents find it, if that is measured.
+    /// The density of agents, if it is measured.
     pub density: Option<DensityMeter>,
-    /// Prevented moves, if they are counted.
+    /// The prevented moves, if they are counted.
     pub collisions: Option<CollisionMeter>,
 }
 
@@ -55,11 +55,11 @@ pub struct Meters {
 pub struct Recording {
     /// The state after the reset.
     pub start: Snapshot,
-    /// Every step, those that were taken back included.
+    /// Every step, undone steps included.
     pub steps: Vec<TraceStep>,
 }
 
-/// Buffers kept from step to step, so that a step allocates nothing.
+/// Buffers that are reused in every step to avoid allocations.
 #[derive(Clone, Debug, Default)]
 struct Scratch {
     cells: Vec<Cell>,
@@ -80,7 +80,7 @@ impl Meters {
 }
 
 impl<E: Environment> Episode<E> {
-    /// An episode that has not started. It measures POGEMA's own figures alone and records nothing.
+    /// Creates an episode that has not started, measures only POGEMA's own metrics and records nothing.
     pub fn new(engine: E) -> Self {
         let config = *engine.config();
         Self {
@@ -89,7 +89,7 @@ impl<E: Environment> Episode<E> {
             num_steps: 0,
             results: StepResults::new(config.num_agents),
             meters: Meters { episode: EpisodeMeter::new(&config), density: None, collisions: None },
-            figures: None,
+            final_metrics: None,
             past: Vec::new(),
             is_recorded: false,
             recording: None,
@@ -97,7 +97,7 @@ impl<E: Environment> Episode<E> {
         }
     }
 
-    /// Also measures how crowded agents find it.
+    /// Also measures the density of agents.
     ///
     /// Rule: metrics/density
     #[must_use]
@@ -122,7 +122,7 @@ impl<E: Environment> Episode<E> {
         self
     }
 
-    /// Chooses whether episodes are recorded, from the next start on.
+    /// Sets whether episodes are recorded, from the next start on.
     pub fn record(&mut self, is_recorded: bool) {
         self.is_recorded = is_recorded;
     }
@@ -135,7 +135,7 @@ impl<E: Environment> Episode<E> {
         self.engine.reset(&instance)?;
         self.instance = Some(instance);
         self.num_steps = 0;
-        self.figures = None;
+        self.final_metrics = None;
         self.meters.reset();
         self.feed_density()?;
         let is_kept = self.config().persistent;
@@ -145,7 +145,7 @@ impl<E: Environment> Episode<E> {
         Ok(())
     }
 
-    /// Continues an episode whose engine is already in the right state; `past` holds the kept states.
+    /// Continues an episode whose engine is already in the right state. `past` holds the kept states.
     ///
     /// # Errors
     /// [`Error::ForeignState`] if a state does not fit the instance.
@@ -198,7 +198,7 @@ impl<E: Environment> Episode<E> {
             let Scratch { cells, active, .. } = &self.scratch;
             collisions.feed(instance.map(), cells, active, actions, state.cells);
         }
-        self.figures =
+        self.final_metrics =
             self.meters.episode.feed(state.on_goal, &self.results.terminated, &self.results.truncated);
         self.feed_density()
     }
@@ -227,8 +227,9 @@ impl<E: Environment> Episode<E> {
         }
     }
 
-    /// Takes the last step back; returns whether there was one. Needs `persistent` in the config. Metrics and the
-    /// recording keep the step.
+    /// Undoes the last step and returns whether there was one.
+    ///
+    /// Requires `persistent` in the config. The metrics and the recording keep the step.
     ///
     /// # Errors
     /// Before the start, or [`Error::StepsNotKept`].
@@ -250,22 +251,22 @@ impl<E: Environment> Episode<E> {
         Ok(true)
     }
 
-    /// The engine.
+    /// Returns the engine.
     pub fn engine(&self) -> &E {
         &self.engine
     }
 
-    /// The engine, to change its state between steps.
+    /// Returns the engine mutably, to change its state between steps.
     pub fn engine_mut(&mut self) -> &mut E {
         &mut self.engine
     }
 
-    /// The rules and sizes.
+    /// Returns the rules and sizes.
     pub fn config(&self) -> &Config {
         self.engine.config()
     }
 
-    /// The instance being played.
+    /// Returns the instance that is played.
     ///
     /// # Errors
     /// [`Error::NotReset`] before the start.
@@ -273,73 +274,75 @@ impl<E: Environment> Episode<E> {
         self.instance.as_ref().ok_or(Error::NotReset)
     }
 
-    /// Steps since the start, without those taken back.
+    /// Returns the number of steps since the start, undone steps excluded.
     pub fn num_steps(&self) -> u64 {
         self.num_steps
     }
 
-    /// The state of all agents.
+    /// Returns the state of all agents.
     pub fn state(&self) -> State<'_> {
         self.engine.state()
     }
 
-    /// A copy of the visible state.
+    /// Returns a copy of the visible state.
     pub fn snapshot(&self) -> Snapshot {
         self.engine.snapshot()
     }
 
-    /// The rewards of the last step.
+    /// Returns the rewards of the last step.
     pub fn rewards(&self) -> &[f32] {
         &self.results.rewards
     }
 
-    /// Which agents the last step terminated.
+    /// Returns which agents the last step terminated.
     pub fn terminated(&self) -> &[bool] {
         &self.results.terminated
     }
 
-    /// Which agents the last step truncated.
+    /// Returns which agents the last step truncated.
     pub fn truncated(&self) -> &[bool] {
         &self.results.truncated
     }
 
-    /// Whether the last step ended the episode: all agents are terminated, or all are truncated.
+    /// Returns whether the last step ended the episode: all agents are terminated, or all are truncated.
     pub fn is_over(&self) -> bool {
-        self.figures.is_some()
+        self.final_metrics.is_some()
     }
 
-    /// The figures so far. POGEMA's own are present if the last step ended the episode, the others if they are measured.
+    /// Returns the metrics so far.
+    ///
+    /// POGEMA's own metrics are present if the last step ended the episode, the others if they are measured.
     pub fn metrics(&self) -> Metrics {
         let Meters { density, collisions, .. } = &self.meters;
         let counted = collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
         let (a_collisions, o_collisions) = counted.unzip();
         let avg_agents_density = density.as_ref().map(DensityMeter::mean);
-        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.figures.unwrap_or_default() }
+        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.final_metrics.unwrap_or_default() }
     }
 
-    /// The meters.
+    /// Returns the meters.
     pub fn meters(&self) -> &Meters {
         &self.meters
     }
 
-    /// The meters, to change what is measured: from the next start on, or from a saved state.
+    /// Returns the meters mutably, to choose the metrics before the next start or to load a saved state.
     pub fn meters_mut(&mut self) -> &mut Meters {
         &mut self.meters
     }
 
-    /// All states since the start, if the config keeps them.
+    /// Returns all states since the start; the list is empty unless the config keeps them.
     ///
     /// Rule: history/changes
     pub fn past(&self) -> &[Snapshot] {
         &self.past
     }
 
-    /// The recording so far, if there is one.
+    /// Returns the recording so far, if the episode is recorded.
     pub fn recording(&self) -> Option<&Recording> {
         self.recording.as_ref()
     }
 
-    /// The episode so far as a trace.
+    /// Returns the episode so far as a trace.
     ///
     /// # Errors
     /// [`Error::NotRecorded`] unless the episode is recorded.

@@ -1,19 +1,19 @@
-//! The one error type of the workspace.
+//! The error type of the workspace.
 
 use std::sync::Arc;
 
-/// Everything that can be wrong with input, each told in one line.
+/// Any error of the workspace, with a message of one line.
 ///
-/// An error leaves the state that it came from as it was. Whatever the input holds, the text stays on one line. Lines and
-/// columns count from 1.
+/// A call that fails leaves the state unchanged. Control characters in the input are escaped, so the message always
+/// stays on one line. Lines and columns count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the fields are named as in the messages")]
 pub enum Error {
-    /// A config field, by the name the file gives it, holds what it may not hold.
+    /// A config field, under its name in the file, has a wrong value.
     #[error("{}", one_line(format_args!("config: {}", wrong_field(field, value, expected))))]
     Config { field: String, value: String, expected: String },
-    /// An argument of a call, or a flag of the program with its hyphens, holds what it may not hold.
+    /// An argument of a call, or a flag of the program with its hyphens, has a wrong value.
     #[error("{}", one_line(wrong_field(name, value, expected)))]
     Argument { name: String, value: String, expected: String },
     /// A config field names a cell outside the map.
@@ -24,70 +24,70 @@ pub enum Error {
         ))
     )]
     CellOutside { field: String, cell: String, height: usize, width: usize },
-    /// A config could not be read at all. The reason is what the parser says, with its place.
+    /// A config cannot be parsed. The reason is the message of the parser, with line and column.
     #[error("{}", one_line(format_args!("config: {reason}")))]
     Syntax { reason: String },
     /// A map text is wrong.
     #[error("{}", one_line(format_args!("map: line {line}, column {column}: {reason}")))]
     Map { line: usize, column: usize, reason: String },
-    /// A map text holds a character without a meaning.
+    /// A map text contains a character that has no meaning.
     #[error("{}", one_line(format_args!("map: line {line}, column {column}: {}", unknown_letter(*letter))))]
     UnknownLetter { line: usize, column: usize, letter: char },
     /// The instance as a whole cannot be played.
     #[error("{}", one_line(format_args!("instance: {reason}")))]
     Instance { reason: String },
-    /// One agent of an instance, by index, cannot be played.
+    /// One agent of an instance, given by its index, cannot be played.
     #[error("{}", one_line(format_args!("instance: agent {agent}: {reason}")))]
     Agent { agent: usize, reason: String },
-    /// A number that is no action, with the agent where it is known.
+    /// A number is not an action. The agent is given if it is known.
     #[error("action{} is `{number}`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)", of_agent(*.agent))]
     Action { agent: Option<usize>, number: i64 },
     /// A list or buffer has the wrong length.
     #[error("{what} has length {got}, expected {want}")]
     Length { what: &'static str, want: usize, got: usize },
-    /// A call that needs an episode, before the first reset.
+    /// A call requires an episode, but the environment has not been reset.
     #[error("the environment was not reset yet")]
     NotReset,
-    /// A step back where the config keeps no steps.
+    /// A call undoes a step, but the config keeps no steps.
     ///
     /// Rule: history/step-back
     #[error("steps are only kept with persistent: true")]
     StepsNotKept,
-    /// A trace of an episode that is not recorded.
-    #[error("the episode is not recorded: ask for the recording before the reset")]
+    /// A call requires the trace of an episode that is not recorded.
+    #[error("the episode is not recorded: request the recording before the reset")]
     NotRecorded,
-    /// A saved state that does not belong to the instance: wrong lengths, a cell outside the map, or two active agents on
-    /// one cell.
+    /// A saved state does not belong to the instance: a list has the wrong length, a cell lies outside the map, or two
+    /// active agents are on one cell.
     #[error("the state does not fit the map and its agents")]
     ForeignState,
-    /// A request for something that does not exist, such as a frame after the end.
+    /// A call requests something that does not exist, such as a frame after the end.
     #[error("{}", one_line(format_args!("{what} is `{value}`, expected {expected}")))]
     OutOfRange { what: String, value: String, expected: String },
-    /// Saved goals that belong to another episode.
+    /// The saved goals belong to another episode.
     #[error("the saved goals belong to another episode")]
     ForeignGoals,
-    /// A lane of a batch whose first episode has not ended.
-    #[error("no episode of lane {lane} ended yet")]
+    /// A call requires the last ended episode of a lane, but no episode of the lane has ended.
+    #[error("no episode of lane {lane} has ended yet")]
     NotEnded { lane: usize },
-    /// An object, named with its article, that another thread is using.
+    /// Another thread is using an object. `what` names the object with its article.
     #[error("another thread is using {what}, expected one thread at a time")]
     Busy { what: &'static str },
-    /// A policy that sees a state which is not the next one of its episode.
+    /// A policy received a state that is not the next one of its episode.
     #[error("{}", one_line(reason))]
     OutOfStep { reason: String },
-    /// A plan that breaks a rule or does not fit its text format. The reason names the line where there is one.
+    /// A plan breaks a rule or does not follow its text format. The reason names the line if there is one.
     #[error("{}", one_line(reason))]
     Plan { reason: String },
-    /// A request that contradicts itself or has nothing to work on. The reason names flags and keys, and what is accepted.
+    /// A request contradicts itself or has no input. The reason names flags and keys, and what is accepted.
     #[error("{}", one_line(reason))]
     Request { reason: String },
-    /// An answer of a port that is no answer to its question, or a refusal: what the port said or did.
+    /// A port refused a request or gave an answer that does not fit it. The reason is what the port answered or did.
     #[error("{}", one_line(reason))]
     Port { reason: String },
-    /// Data from elsewhere that is not what it should be.
+    /// Data from another source is wrong.
     #[error("{}", one_line(format_args!("{what}: {reason}")))]
     Corrupt { what: String, reason: String },
-    /// A failure of the operating system or of a library.
+    /// The operating system or a library failed.
     #[error("{}", one_line(format_args!("{what}: {cause}")))]
     External {
         what: String,
@@ -101,7 +101,7 @@ pub enum Error {
         #[source]
         cause: Cause,
     },
-    /// A trace that cannot be read.
+    /// A trace cannot be read.
     #[error("{}", one_line(format_args!("trace: line {line}: {reason}")))]
     Trace { line: usize, reason: String },
 }
@@ -109,17 +109,17 @@ pub enum Error {
 /// Any error, or a text.
 pub type BoxedError = Box<dyn std::error::Error + Send + Sync>;
 
-/// The error behind another one. Two are equal if their texts are.
+/// The cause of an error. Two causes are equal if their texts are equal.
 #[derive(Clone)]
 pub struct Cause(Arc<dyn std::error::Error + Send + Sync>);
 
 impl Cause {
-    /// Takes any error, or a text.
+    /// Creates a cause from any error, or from a text.
     pub fn new(cause: impl Into<BoxedError>) -> Self {
         Self(cause.into().into())
     }
 
-    /// The error, to ask for its type.
+    /// Returns the error, for example to downcast it.
     pub fn get(&self) -> &(dyn std::error::Error + Send + Sync + 'static) {
         &*self.0
     }
@@ -158,33 +158,33 @@ fn wrong_field(field: &str, value: &str, expected: &str) -> String {
 }
 
 impl Error {
-    /// So much of a value of the input is quoted. Units: characters.
+    /// Longest part of an input value that a message quotes. Units: characters.
     pub const LONGEST_QUOTE: usize = 60;
 
-    /// An error about one config field.
+    /// Creates an error about one config field.
     pub fn config(field: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::Config { field: field.into(), value, expected: expected.into() }
     }
 
-    /// An error about one argument of a call, or one flag of the program.
+    /// Creates an error about one argument of a call, or one flag of the program.
     pub fn argument(name: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::Argument { name: name.into(), value, expected: expected.into() }
     }
 
-    /// An error about a requested value that does not exist.
+    /// Creates an error about a requested value that does not exist.
     pub fn out_of_range(what: &str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         let value = shorten(&value.to_string(), Self::LONGEST_QUOTE);
         Self::OutOfRange { what: what.into(), value, expected: expected.into() }
     }
 
-    /// An error about a cell of a config field that lies outside the map.
+    /// Creates an error about a cell of a config field that lies outside the map.
     pub fn cell_outside(field: &str, cell: impl std::fmt::Display, (height, width): (usize, usize)) -> Self {
         Self::CellOutside { field: field.into(), cell: cell.to_string(), height, width }
     }
 
-    /// The config field that is wrong, if it is one.
+    /// Returns the name of the wrong config field, if the error is about one.
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Config { field, .. } | Self::CellOutside { field, .. } => Some(field),
@@ -192,7 +192,7 @@ impl Error {
         }
     }
 
-    /// Returns the text of a wrong config without the leading `config:`, for messages that name the config already.
+    /// Returns the message without the leading `config:`, for messages that already name the config.
     pub fn reason(&self) -> String {
         match self {
             Self::Config { field, value, expected } => one_line(wrong_field(field, value, expected)),
@@ -201,17 +201,17 @@ impl Error {
         }
     }
 
-    /// An error about an instance as a whole.
+    /// Creates an error about an instance as a whole.
     pub fn instance(reason: impl Into<String>) -> Self {
         Self::Instance { reason: reason.into() }
     }
 
-    /// An error about one agent of an instance.
+    /// Creates an error about one agent of an instance.
     pub fn agent(agent: usize, reason: impl Into<String>) -> Self {
         Self::Agent { agent, reason: reason.into() }
     }
 
-    /// An error about a cell that lies outside a map.
+    /// Creates an error about a cell that lies outside a map.
     pub fn outside(
         agent: usize,
         what: &str,
@@ -222,33 +222,33 @@ impl Error {
         Self::agent(agent, format!("{what} {cell} is outside the map of {height} rows and {width} columns"))
     }
 
-    /// An error about a file.
+    /// Creates an error about a file.
     pub fn io(path: impl AsRef<std::path::Path>, cause: impl Into<BoxedError>) -> Self {
         Self::Io { path: path.as_ref().display().to_string(), cause: Cause::new(cause) }
     }
 
-    /// A failure of the operating system or of a library.
+    /// Creates an error about a failure of the operating system or of a library.
     pub fn external(what: impl Into<String>, cause: impl Into<BoxedError>) -> Self {
         Self::External { what: what.into(), cause: Cause::new(cause) }
     }
 
-    /// An error about a request.
+    /// Creates an error about a request.
     pub fn request(reason: impl Into<String>) -> Self {
         Self::Request { reason: reason.into() }
     }
 
-    /// Passes if a list or buffer has the length it must have.
+    /// Checks the length of a list or buffer.
     pub fn check_length(what: &'static str, want: usize, got: usize) -> Result<(), Self> {
         if want == got { Ok(()) } else { Err(Self::Length { what, want, got }) }
     }
 }
 
-/// What is wrong with a character that has no meaning in a map text.
+/// Returns the message about a character that has no meaning in a map text.
 pub fn unknown_letter(letter: char) -> String {
     format!("unknown character `{letter}`, expected one of `.#@$!`, a-z or A-Z")
 }
 
-/// The beginning of a text, for a message that quotes it.
+/// Returns the beginning of a text, for a message that quotes it.
 pub fn shorten(text: &str, longest: usize) -> String {
     match text.char_indices().nth(longest) {
         Some((end, _)) => format!("{}…", &text[..end]),
@@ -256,8 +256,7 @@ pub fn shorten(text: &str, longest: usize) -> String {
     }
 }
 
-/// A text with its control characters written out, so that quoted input can neither end the line nor move the
-/// cursor.
+/// Escapes the control characters of a text, so that quoted input can neither end the line nor move the cursor.
 fn one_line(text: impl std::fmt::Display) -> String {
     let is_unfit = |letter: char| letter.is_control() || matches!(letter, '\u{2028}' | '\u{2029}');
     let mut line = String::new();

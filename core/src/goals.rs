@@ -1,4 +1,4 @@
-//! The goals of one agent, one after the other.
+//! The goals of one agent, in order.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -7,31 +7,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Cell, Error};
 
-/// Draws an agent's next goal; the engines know no other randomness.
+/// A source of an agent's next goals, which are the only random draws of an episode.
 ///
-/// It may depend on its own state and on where the agent stands, and on nothing else, so that an episode
-/// stays a function of its instance and actions.
+/// The goals may depend only on the state of the source and on the cell of the agent. An episode therefore stays a
+/// function of its instance and actions.
 ///
 /// Rule: goal/restart/draw
 pub trait GoalSource: Debug + Send + Sync {
-    /// The goal after the one just reached at `at`.
+    /// Returns the goal after the one that was just reached at `at`.
     fn next_goal(&mut self, at: Cell) -> Cell;
 
-    /// Its state as a text, from which [`GoalSource::restore`] goes on; none if it cannot be kept.
+    /// Returns the state as a text for [`GoalSource::restore`], or `None` if it cannot be saved.
     fn save(&self) -> Option<String> {
         None
     }
 
-    /// Takes on the state that a source for the same map and goals was saved in; says whether the text was one.
+    /// Restores the state saved by a source for the same map and goals. Returns false if the text is no such state.
     fn restore(&mut self, _saved: &str) -> bool {
         false
     }
 
-    /// The same source in the same state.
+    /// Clones the source with its state.
     fn boxed_clone(&self) -> Box<dyn GoalSource>;
 }
 
-/// The goals of one agent: a first one, and more as they are reached.
+/// The goals of one agent: a first goal, and a next one each time the agent reaches its goal.
 #[derive(Debug)]
 pub struct GoalStream {
     first: Cell,
@@ -45,27 +45,27 @@ enum Rest {
     Drawn(Box<dyn GoalSource>),
 }
 
-/// How far the goals of one agent are.
+/// The saved position of an agent in its goals.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StreamState {
-    /// There is one goal for ever.
+    /// The goal never changes.
     Same,
-    /// Which goal of a sequence it is, from 0.
+    /// The index of the current goal in a sequence, from 0.
     Turn(usize),
-    /// The state of a source, as it gave it.
+    /// The saved state of a [`GoalSource`].
     Drawn(String),
 }
 
 impl GoalStream {
-    /// One goal for ever; as the next goal it gives itself.
+    /// Creates a stream of a single goal, which is always its own next goal.
     pub fn single(goal: Cell) -> Self {
         Self { first: goal, rest: Rest::Same }
     }
 
-    /// A first goal, then `cells` from their second one on, round and round.
+    /// Creates a stream of a first goal, followed by `cells` from the second one on, repeated cyclically.
     ///
-    /// An empty list stands for the first goal alone.
+    /// If `cells` is empty, the first goal is the only one.
     ///
     /// Rule: goal/restart/sequence
     pub fn sequence(first: Cell, cells: Arc<[Cell]>) -> Self {
@@ -75,19 +75,19 @@ impl GoalStream {
         Self { first, rest: Rest::Cycle { cells, index: 0 } }
     }
 
-    /// A first goal, then what the source draws.
+    /// Creates a stream of a first goal, followed by the goals that the source draws.
     ///
     /// Rule: goal/restart/draw
     pub fn drawn(first: Cell, source: Box<dyn GoalSource>) -> Self {
         Self { first, rest: Rest::Drawn(source) }
     }
 
-    /// The first goal.
+    /// Returns the first goal.
     pub fn first(&self) -> Cell {
         self.first
     }
 
-    /// How many cells the goals go round, if they do, and which of them is the present one, from 0.
+    /// Returns the length of a cyclic sequence and the index of the current goal in it, or `None` for other goals.
     pub fn turn(&self) -> Option<(usize, usize)> {
         match &self.rest {
             Rest::Cycle { cells, index } => Some((cells.len(), *index)),
@@ -95,10 +95,10 @@ impl GoalStream {
         }
     }
 
-    /// How far the stream is, to go on from there later.
+    /// Returns the position in the stream, for [`GoalStream::restore`].
     ///
     /// # Errors
-    /// If its goals come from a source that cannot be kept.
+    /// If the goals come from a source that cannot be saved.
     pub fn save(&self) -> Result<StreamState, Error> {
         let state = match &self.rest {
             Rest::Same => StreamState::Same,
@@ -108,10 +108,10 @@ impl GoalStream {
         Ok(state)
     }
 
-    /// Goes on from where a stream of the same goals was saved.
+    /// Continues at the saved position of a stream of the same goals.
     ///
     /// # Errors
-    /// If the state is none of such a stream.
+    /// If the state belongs to a stream of other goals.
     pub fn restore(&mut self, state: &StreamState) -> Result<(), Error> {
         let fits = match (&mut self.rest, state) {
             (Rest::Same, StreamState::Same) => true,
@@ -125,7 +125,7 @@ impl GoalStream {
         if fits { Ok(()) } else { Err(Error::ForeignGoals) }
     }
 
-    /// The goal that follows the one reached at `at`.
+    /// Moves on to the goal after the one reached at `at`, and returns it.
     pub fn advance(&mut self, at: Cell) -> Cell {
         match &mut self.rest {
             Rest::Same => self.first,
@@ -137,7 +137,7 @@ impl GoalStream {
         }
     }
 
-    /// The first `count` goals, each reached in turn.
+    /// Returns the first `count` goals, as if each were reached in turn.
     pub fn list(&self, count: usize) -> Vec<Cell> {
         let mut stream = self.clone();
         let mut at = self.first;

@@ -1,22 +1,22 @@
-//! An episode told by what changed for each agent, as POGEMA's persistent mode keeps it.
+//! An episode as the list of changes of each agent, as in POGEMA's persistent mode.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Cell, Snapshot};
 
-/// The state of one agent from `step` on.
+/// The state of one agent from `step` on, until its next change.
 ///
 /// Rule: history/changes
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "(u16, u16, u16, u16, u64, bool)", into = "(u16, u16, u16, u16, u64, bool)")]
 pub struct Change {
-    /// Where the agent is.
+    /// The cell of the agent.
     pub cell: Cell,
-    /// Where it wants to go.
+    /// The current goal of the agent.
     pub goal: Cell,
     /// Units: steps since the reset.
     pub step: u64,
-    /// Whether it takes part.
+    /// Whether the agent is active.
     pub active: bool,
 }
 
@@ -33,8 +33,9 @@ impl From<Change> for (u16, u16, u16, u16, u64, bool) {
     }
 }
 
-/// For each agent its first state and each later one that differs from the one before, from the states after the reset
-/// and after each step.
+/// Returns for each agent its first state and each later state that differs from the previous one.
+///
+/// `past` holds the states after the reset and after each step.
 ///
 /// Rule: history/changes
 ///
@@ -63,7 +64,7 @@ pub fn changes(past: &[Snapshot]) -> Vec<Vec<Change>> {
     (0..num_agents).map(of_agent).collect()
 }
 
-/// The state that holds at each of the steps `0..=last_step`, from the changes of one agent.
+/// Returns the state of one agent at each of the steps `0..=last_step`, from its changes.
 ///
 /// Rule: history/changes
 pub fn states_at_every_step(changes: &[Change], last_step: u64) -> Vec<Change> {

@@ -1,4 +1,4 @@
-//! An instance: everything an episode needs besides its actions.
+//! Instances: everything that an episode needs besides its actions.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Cell, Config, Error, GoalStream, Map};
 
-/// What agents see beyond the wall around the map.
+/// The cells that agents see beyond the wall around the map.
 ///
 /// Rule: border/outside
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,15 +15,15 @@ pub enum Outside {
     /// Free cells.
     #[default]
     Free,
-    /// Random obstacles, as a map that is wider by the radius on every side.
+    /// Random obstacles, given as a map that is larger by the radius on every side.
     ///
-    /// Shape: `[height + 2 * radius, width + 2 * radius]`; only its rim is ever seen.
+    /// Shape: `[height + 2 * radius, width + 2 * radius]`; agents only see its rim.
     Noise(Map),
 }
 
-/// A map, what surrounds it, and where each agent starts and wants to go.
+/// A map, its surroundings, and the start and goals of each agent.
 ///
-/// Engines rely on what [`Instance::new`] has checked, so its parts can be read but not changed.
+/// Engines rely on the checks of [`Instance::new`], so the parts of an instance are read-only.
 #[derive(Clone, Debug)]
 pub struct Instance {
     map: Map,
@@ -33,11 +33,11 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An instance, checked as a whole.
+    /// Creates an instance and checks it.
     ///
     /// # Errors
-    /// [`Error::Length`] unless each start has its goals; [`Error::Agent`] for a start or first goal off the
-    /// map, or two agents with one start.
+    /// [`Error::Length`] if there are not as many goal streams as starts. [`Error::Agent`] if a start or first goal
+    /// lies outside the map, or if two agents have the same start.
     ///
     /// Rule: place/explicit
     pub fn new(map: Map, outside: Outside, starts: Vec<Cell>, goals: Vec<GoalStream>) -> Result<Self, Error> {
@@ -53,36 +53,37 @@ impl Instance {
         Ok(Self { map, outside, starts, goals })
     }
 
-    /// The map without its border.
+    /// Returns the map without its border.
     pub fn map(&self) -> &Map {
         &self.map
     }
 
-    /// What lies beyond the wall.
+    /// Returns the area beyond the wall.
     pub fn outside(&self) -> &Outside {
         &self.outside
     }
 
-    /// Where each agent starts.
+    /// Returns the start of each agent.
     pub fn starts(&self) -> &[Cell] {
         &self.starts
     }
 
-    /// The goals of each agent, in order.
+    /// Returns the goals of each agent, in order.
     pub fn goals(&self) -> &[GoalStream] {
         &self.goals
     }
 
-    /// The goals of each agent, and nothing else, without copying them.
+    /// Returns the goals of each agent without copying them, and drops the rest.
     pub fn into_goals(self) -> Vec<GoalStream> {
         self.goals
     }
 
-    /// Passes if the instance can be played with a config: one start and goal per agent, and noise as large as
-    /// the map with the border that the radius asks for.
+    /// Checks that the instance can be played with a config.
+    ///
+    /// Each agent needs a start and a goal, and noise must be as large as the map with its border.
     ///
     /// # Errors
-    /// [`Error::Length`] naming what does not fit.
+    /// [`Error::Length`] naming the part that does not fit.
     pub fn check_fits(&self, config: &Config) -> Result<(), Error> {
         Error::check_length("starts", config.num_agents, self.starts.len())?;
         if let Outside::Noise(noise) = &self.outside {
@@ -93,7 +94,7 @@ impl Instance {
         Ok(())
     }
 
-    /// The first goal of each agent.
+    /// Returns the first goal of each agent.
     pub fn first_goals(&self) -> Vec<Cell> {
         self.goals.iter().map(GoalStream::first).collect()
     }

@@ -1,23 +1,23 @@
-//! The words of pogema-rs: what every other crate speaks and none of the rules.
+//! The shared types of pogema-rs, which every other crate uses. They contain none of the rules.
 //!
 //! An episode of POGEMA is a pure function of an [`Instance`] (map, starts, goals) and the agents' [`Action`]s.
-//! A [`Config`] fixes its rules and the shape of every array; an [`Environment`] plays it; a [`Trace`] is what
-//! happened, step by step; [`metrics`] sum it up. Engines draw no random numbers: where goals are drawn, the
-//! instance brings a [`GoalStream`].
+//! A [`Config`] determines its rules and the shape of every array. An [`Environment`] plays it, a [`Trace`] records
+//! every step, and [`metrics`] evaluate it. Engines draw no random numbers: if goals are random, the instance
+//! supplies them through a [`GoalStream`].
 //!
-//! | module | what it holds |
+//! | module | content |
 //! | --- | --- |
-//! | [`Cell`], [`Action`] | places and moves, row first |
-//! | [`Map`], [`Instance`], [`Outside`], [`GoalStream`] | what is played on |
-//! | [`Config`] | which rules are played by |
-//! | [`Environment`], [`StepOut`], [`State`], [`Snapshot`] | what an engine offers |
-//! | [`Episode`] | an engine at play, measured and recorded |
-//! | [`Trace`] | a recorded episode, as JSON lines |
-//! | [`metrics`] | CSR, ISR, sum of costs, makespan, throughput and the like |
-//! | [`files`] | files that are written whole or not at all |
+//! | [`Cell`], [`Action`] | cells and moves, row first |
+//! | [`Map`], [`Instance`], [`Outside`], [`GoalStream`] | the input of an episode |
+//! | [`Config`] | the rules of an episode |
+//! | [`Environment`], [`StepOut`], [`State`], [`Snapshot`] | the interface of an engine |
+//! | [`Episode`] | an engine with metrics and a recording |
+//! | [`Trace`] | a recorded episode, as JSON Lines |
+//! | [`metrics`] | metrics such as CSR, ISR, sum of costs, makespan and throughput |
+//! | [`files`] | atomic file writes |
 //! | [`picture`] | text pictures of a state |
 //! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
-//! | [`Error`] | the one error type |
+//! | [`Error`] | the error type |
 
 #![forbid(unsafe_code)]
 

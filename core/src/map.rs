@@ -1,4 +1,4 @@
-//! A map: which cells hold an obstacle.
+//! Maps of obstacles.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,13 +16,14 @@ pub struct Map {
 }
 
 impl Map {
-    /// Longest side of a map: what is left of 16 bits after the widest border on both sides.
+    /// Longest side of a map: the largest 16-bit number minus the widest border on both sides.
     pub const LONGEST_SIDE: usize = (u16::MAX as usize) - 2 * crate::Config::LARGEST_RADIUS;
 
-    /// A map from its obstacles in row-major order.
+    /// Creates a map from its obstacles in row-major order.
     ///
     /// # Errors
-    /// [`Error::Instance`] for an empty map, a side over [`Map::LONGEST_SIDE`] or a wrong number of cells.
+    /// [`Error::Instance`] for an empty map or a side over [`Map::LONGEST_SIDE`], [`Error::Length`] for a wrong number
+    /// of cells.
     pub fn new(height: usize, width: usize, obstacles: Vec<bool>) -> Result<Self, Error> {
         if height == 0 || width == 0 {
             return Err(Error::instance("the map has no cells"));
@@ -30,14 +31,14 @@ impl Map {
         if height > Self::LONGEST_SIDE || width > Self::LONGEST_SIDE {
             let longest = Self::LONGEST_SIDE;
             return Err(Error::instance(format!(
-                "a map of {height} x {width} is over {longest} cells a side"
+                "the map has {height} x {width} cells, expected at most {longest} per side"
             )));
         }
         Error::check_length("obstacles", height * width, obstacles.len())?;
         Ok(Self { height, width, obstacles })
     }
 
-    /// A map from lines of `.` (free) and `#` (obstacle).
+    /// Creates a map from lines of `.` (free) and `#` (obstacle).
     ///
     /// # Errors
     /// [`Error::Map`] with line and column for any other character or a line of another length.
@@ -60,32 +61,32 @@ impl Map {
         Self::new(rows.len(), width, obstacles)
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// All cells in row-major order: true where there is an obstacle.
+    /// Returns one flag per cell in row-major order: true for an obstacle.
     pub fn obstacles(&self) -> &[bool] {
         &self.obstacles
     }
 
-    /// Whether a cell lies on the map.
+    /// Returns whether a cell lies on the map.
     pub fn contains(&self, cell: Cell) -> bool {
         usize::from(cell.row) < self.height && usize::from(cell.col) < self.width
     }
 
-    /// Whether a cell holds an obstacle; everything off the map does.
+    /// Returns whether a cell holds an obstacle; every cell outside the map does.
     pub fn is_obstacle(&self, cell: Cell) -> bool {
         !self.contains(cell) || self.obstacles[self.index(cell)]
     }
 
-    /// Takes the obstacle off a cell; says whether there was one.
+    /// Removes the obstacle from a cell and returns whether there was one.
     pub fn clear(&mut self, cell: Cell) -> bool {
         if !self.contains(cell) {
             return false;
@@ -94,32 +95,32 @@ impl Map {
         std::mem::replace(&mut self.obstacles[index], false)
     }
 
-    /// Number of free cells.
+    /// Returns the number of free cells.
     pub fn num_free(&self) -> usize {
         self.obstacles.iter().filter(|&&obstacle| !obstacle).count()
     }
 
-    /// The place of a cell in [`Map::obstacles`].
+    /// Returns the index of a cell in [`Map::obstacles`].
     pub fn index(&self, cell: Cell) -> usize {
         usize::from(cell.row) * self.width + usize::from(cell.col)
     }
 
-    /// The cell at a place of [`Map::obstacles`].
+    /// Returns the cell at an index of [`Map::obstacles`].
     pub fn cell_at(&self, index: usize) -> Cell {
         Cell::new((index / self.width) as u16, (index % self.width) as u16)
     }
 
-    /// The map as lines of `.` and `#`.
+    /// Returns the map as lines of `.` and `#`.
     pub fn rows(&self) -> Vec<String> {
         let line = |row: &[bool]| row.iter().map(|&obstacle| if obstacle { '#' } else { '.' }).collect();
         self.obstacles.chunks(self.width).map(line).collect()
     }
 }
 
-/// Passes if row `index` is as long as the first.
+/// Checks that row `index` is as long as the first row.
 ///
 /// # Errors
-/// [`Error::Map`] at the end of the row.
+/// [`Error::Map`] at the first missing or surplus cell of the row.
 pub fn check_row_length(index: usize, length: usize, width: usize) -> Result<(), Error> {
     if length == width {
         return Ok(());

@@ -1,6 +1,6 @@
-//! The figures that sum an episode up, as accumulators fed step by step.
+//! The metrics of an episode, accumulated step by step.
 //!
-//! They stand here and not in an engine because every engine's episodes are measured by the same formulas.
+//! They are independent of the engines, because the same formulas apply to the episodes of every engine.
 
 mod collisions;
 mod density;
@@ -12,10 +12,10 @@ use crate::{Config, OnGoal};
 pub use collisions::CollisionMeter;
 pub use density::{DensityMeter, Seen, pairwise_mean};
 
-/// Defines the figures, each with POGEMA's name for it.
-macro_rules! figures {
+/// Defines the metrics, each with POGEMA's name for it.
+macro_rules! define_metrics {
     ($(#[doc = $doc:literal] $field:ident = $name:literal,)+) => {
-        /// The figures of one episode, under POGEMA's names; a figure that its mode does not have is absent.
+        /// The metrics of one episode, under POGEMA's names. A metric that does not apply to the mode is absent.
         ///
         /// Rule: metrics/finish, metrics/nothing, metrics/restart
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ macro_rules! figures {
         }
 
         impl Metrics {
-            /// The figures that are there, by name.
+            /// Returns the metrics that are present, with their names.
             pub fn named(&self) -> Vec<(&'static str, f64)> {
                 let all = [$(($name, self.$field)),+];
                 all.into_iter().filter_map(|(name, value)| value.map(|value| (name, value))).collect()
@@ -38,18 +38,18 @@ macro_rules! figures {
     };
 }
 
-figures! {
+define_metrics! {
     /// Share of agents that reached their goals.
     isr = "ISR",
     /// 1 if all agents reached their goals, else 0.
     csr = "CSR",
-    /// Units: steps.
+    /// Episode length. Units: steps.
     ep_length = "ep_length",
     /// Sum of costs. Units: steps.
     soc = "SoC",
-    /// Units: steps.
+    /// Makespan. Units: steps.
     makespan = "makespan",
-    /// Units: goals per step, all agents together.
+    /// Throughput of all agents together. Units: goals per step.
     avg_throughput = "avg_throughput",
     /// Agents per free cell of a window.
     avg_agents_density = "avg_agents_density",
@@ -59,7 +59,7 @@ figures! {
     o_collisions = "o_collisions",
 }
 
-/// Counts goals and steps and gives the figures of the episode when it ends.
+/// Counts goals and steps and computes the metrics of the episode when it ends.
 ///
 /// Rule: metrics/finish, metrics/nothing, metrics/restart
 ///
@@ -71,15 +71,15 @@ pub struct EpisodeMeter {
     max_steps: i64,
     step: u64,
     num_reached: u64,
-    /// Units: steps, 0-based: when each agent came to its goal, or [`NEVER`].
+    /// The 0-based step in which each agent reached its goal, or [`NEVER`].
     arrived: Vec<u64>,
 }
 
-/// Later than any step.
+/// A number larger than any step.
 const NEVER: u64 = u64::MAX;
 
 impl EpisodeMeter {
-    /// A meter for episodes of this config.
+    /// Creates a meter for episodes of this config.
     pub fn new(config: &Config) -> Self {
         Self {
             on_goal_mode: config.on_goal,
@@ -90,35 +90,35 @@ impl EpisodeMeter {
         }
     }
 
-    /// Number of agents that are measured.
+    /// Returns the number of agents that are measured.
     pub fn num_agents(&self) -> usize {
         self.arrived.len()
     }
 
-    /// Chooses the length of an episode over which throughput is measured, and goes on counting. Units: steps.
+    /// Sets the length of an episode over which throughput is measured, without resetting the counters. Units: steps.
     pub fn measure_over(&mut self, max_steps: i64) {
         self.max_steps = max_steps;
     }
 
-    /// Forgets an episode that was left early; POGEMA 1.4.0 would count it into the next one.
+    /// Discards an unfinished episode, which POGEMA 1.4.0 would count into the next one.
     pub fn reset(&mut self) {
         self.step = 0;
         self.num_reached = 0;
         self.arrived.fill(NEVER);
     }
 
-    /// Takes one step in; gives the figures if the episode ended with it.
+    /// Counts one step and returns the metrics if it ended the episode.
     pub fn feed(&mut self, on_goal: &[bool], terminated: &[bool], truncated: &[bool]) -> Option<Metrics> {
         let finished = terminated.iter().all(|&ended| ended) || truncated.iter().all(|&cut| cut);
         self.num_reached += on_goal.iter().filter(|&&reached| reached).count() as u64;
-        // What is no longer reached counts no more, but on the last step an agent that just left its goal keeps its
-        // earlier arrival.
+        // An agent that leaves its goal loses its arrival. On the last step, however, an agent that has just left its
+        // goal keeps its earlier arrival.
         let forgets = self.on_goal_mode == OnGoal::Nothing && !finished;
         for (arrived, &reached) in self.arrived.iter_mut().zip(on_goal) {
             let now = if reached || finished { self.step } else { NEVER };
             *arrived = if forgets && !reached { NEVER } else { now.min(*arrived) };
         }
-        let metrics = finished.then(|| self.figures(on_goal));
+        let metrics = finished.then(|| self.compute_metrics(on_goal));
         self.step += 1;
         if finished {
             self.reset();
@@ -126,7 +126,7 @@ impl EpisodeMeter {
         metrics
     }
 
-    fn figures(&self, on_goal: &[bool]) -> Metrics {
+    fn compute_metrics(&self, on_goal: &[bool]) -> Metrics {
         let num_agents = self.arrived.len() as f64;
         let num_steps = self.step as f64 + 1.0;
         let arrived = || self.arrived.iter().copied();

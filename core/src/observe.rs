@@ -1,8 +1,8 @@
-//! The positions that `POMAPF` and `MAPF` observe, the same for every engine.
+//! The positions in `POMAPF` and `MAPF` observations, shared by all engines.
 
 use crate::Cell;
 
-/// Cells counted from the start of each agent, as (row, col).
+/// Returns cells relative to the start of each agent, as (row, col).
 ///
 /// Shape: `[agents, 2]`
 ///
@@ -16,7 +16,7 @@ pub fn from_starts<'a>(cells: &'a [Cell], starts: &'a [Cell]) -> impl Iterator<I
     })
 }
 
-/// Cells counted from the corner of the border, as (row, col).
+/// Returns cells relative to the top left corner of the border, as (row, col).
 ///
 /// Shape: `[agents, 2]`
 ///

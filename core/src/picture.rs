@@ -2,26 +2,26 @@
 
 use crate::{Cell, Map, Snapshot};
 
-/// The letter of an agent: `a` to `z`, then digits, then `?`.
+/// Returns the letter of an agent: `a` to `z`, then digits, then `?`.
 pub fn agent_letter(agent: usize) -> char {
     const LETTERS: &[u8] = b"abcdefghijklmnopqrstuvwxyz0123456789";
     LETTERS.get(agent).map_or('?', |&letter| letter as char)
 }
 
-/// What a picture shows on one cell.
+/// The content of one cell of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// Nothing.
+    /// No obstacle, agent or goal.
     Free,
     /// An obstacle.
     Obstacle,
-    /// An active agent, by index.
+    /// An active agent, given by its index.
     Agent(usize),
-    /// The goal of an active agent, by index.
+    /// The goal of an active agent, given by the agent's index.
     Goal(usize),
 }
 
-/// What each cell of the map shows, row by row; an agent hides a goal, a lower index a higher one.
+/// Returns the content of each cell of the map, row by row. An agent hides a goal, a lower index hides a higher one.
 pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
     let ground = |&obstacle: &bool| if obstacle { Mark::Obstacle } else { Mark::Free };
     let mut marks: Vec<Mark> = map.obstacles().iter().map(ground).collect();
@@ -37,7 +37,7 @@ pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
     marks
 }
 
-/// A picture of the agents: `.` free, `#` obstacle, `a` the agent 0, `A` its goal, and so on.
+/// Draws the agents: `.` is free, `#` an obstacle, `a` agent 0, `A` its goal, and so on.
 pub fn picture(map: &Map, snapshot: &Snapshot) -> String {
     let letter = |mark: &Mark| match *mark {
         Mark::Free => '.',
@@ -48,7 +48,7 @@ pub fn picture(map: &Map, snapshot: &Snapshot) -> String {
     lines(map, marks(map, snapshot).iter().map(letter))
 }
 
-/// A picture of the occupancy grid: `o` where it marks a cell.
+/// Draws the occupancy grid, with `o` for each marked cell.
 pub fn occupancy_picture(map: &Map, snapshot: &Snapshot) -> String {
     let mut letters: Vec<char> = map.rows().concat().chars().collect();
     for &cell in &snapshot.occupied {

@@ -1,4 +1,4 @@
-//! A recorded episode: the common currency of tests, reports, drawings and replays.
+//! Traces: recorded episodes, the common input of tests, reports, drawings and replays.
 
 use std::io::{BufRead, Write};
 use std::ops::RangeInclusive;
@@ -12,16 +12,16 @@ const FORMAT: &str = "pogema-trace/1";
 /// The spec whose rules the trace follows.
 const SPEC: &str = "pogema-1.4.0/1";
 
-/// An episode as it went.
+/// A recorded episode.
 ///
-/// As a file it is JSON Lines: the header, the start, then one line per step.
+/// Its file format is JSON Lines: the header, the start, then one line per step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
-    /// What was played.
+    /// Versions, rules and instance.
     pub header: TraceHeader,
     /// The state after the reset.
     pub start: TraceStart,
-    /// What each step did.
+    /// Actions and results of each step.
     pub steps: Vec<TraceStep>,
 }
 
@@ -34,10 +34,10 @@ pub struct TraceHeader {
     pub config: Config,
     /// The map without its border.
     pub map: Map,
-    /// What lies beyond the wall.
+    /// The area beyond the wall.
     #[serde(default)]
     pub outside: Outside,
-    /// Where each agent starts.
+    /// The start of each agent.
     pub starts: Vec<Cell>,
     /// The goals of each agent, as many as the episode could use.
     pub goals: Vec<Vec<Cell>>,
@@ -49,26 +49,26 @@ pub struct TraceStart {
     /// The state.
     #[serde(flatten)]
     pub state: Snapshot,
-    /// What the agents see, where it was recorded.
+    /// The observations of the agents, if they were recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observations: Option<Observed>,
 }
 
-/// A further line of a trace: one step.
+/// Each further line of a trace: one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceStep {
-    /// What each agent wanted.
+    /// The action of each agent.
     pub actions: Vec<Action>,
     /// The state after the step.
     #[serde(flatten)]
     pub state: Snapshot,
     /// The reward of each agent.
     pub rewards: Vec<f32>,
-    /// Which agents have ended.
+    /// Which agents were terminated.
     pub terminated: Vec<bool>,
-    /// Which agents were cut off.
+    /// Which agents were truncated.
     pub truncated: Vec<bool>,
-    /// What the agents see, where it was recorded.
+    /// The observations of the agents, if they were recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observations: Option<Observed>,
     /// The metrics, on steps that end an episode.
@@ -76,11 +76,15 @@ pub struct TraceStep {
     pub metrics: Option<Metrics>,
 }
 
-/// All observation arrays of one moment, losslessly: a window of zeros and ones is one string of hex digits,
-/// eight cells to two digits, the first cell in the highest bit.
+/// All observation arrays of one frame, without loss.
+///
+/// A window of zeros and ones is one string of hex digits: two digits encode eight cells, with the first cell in the
+/// highest bit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "type")]
 pub enum Observed {
+    /// The arrays of the `default` observation.
+    ///
     /// Rule: observe/default
     #[serde(rename = "default")]
     Default {
@@ -88,13 +92,17 @@ pub enum Observed {
         dtype: String,
         /// One string per agent, over `[3, side, side]`.
         windows: Vec<String>,
-        /// What does not fit this form, in words.
+        /// Descriptions of the values that do not fit this form.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         odd: Vec<String>,
     },
+    /// The arrays of the `POMAPF` observation.
+    ///
     /// Rule: observe/pomapf
     #[serde(rename = "POMAPF")]
     Pomapf(ObservedPomapf),
+    /// The arrays of the `MAPF` observation.
+    ///
     /// Rule: observe/mapf
     #[serde(rename = "MAPF")]
     Mapf(ObservedMapf),
@@ -109,11 +117,11 @@ pub struct ObservedPomapf {
     pub obstacles: Vec<String>,
     /// One string per agent, over `[side, side]`.
     pub agents: Vec<String>,
-    /// Cell minus start.
+    /// The cell of each agent minus its start.
     pub xy: Vec<[i32; 2]>,
-    /// Goal minus start.
+    /// The goal of each agent minus its start.
     pub target_xy: Vec<[i32; 2]>,
-    /// What does not fit this form, in words.
+    /// Descriptions of the values that do not fit this form.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub odd: Vec<String>,
 }
@@ -121,28 +129,28 @@ pub struct ObservedPomapf {
 /// The arrays of `MAPF`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ObservedMapf {
-    /// What it shares with `POMAPF`.
+    /// The arrays that `POMAPF` also has.
     #[serde(flatten)]
     pub pomapf: ObservedPomapf,
-    /// The map with its border; absent where it is as it was at the start.
+    /// The map with its border; absent if it is the same as at the start.
     pub global_obstacles: Option<Padded>,
-    /// Cells counted from the border's corner.
+    /// The cell of each agent, counted from the border's top left corner.
     pub global_xy: Vec<[i32; 2]>,
-    /// Goals counted from the border's corner.
+    /// The goal of each agent, counted from the border's top left corner.
     pub global_target_xy: Vec<[i32; 2]>,
 }
 
-/// A map with its border, and the element type POGEMA keeps it in.
+/// A map with its border, and the element type that POGEMA stores it in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Padded {
-    /// NumPy's name of the element type: `float64` around free cells, `int64` around noise.
+    /// NumPy's name of the element type: `float64` if the outside is free, `int64` if it is noise.
     pub dtype: String,
     /// Lines of `.` and `#`.
     pub rows: Vec<String>,
 }
 
 impl TraceHeader {
-    /// The header of an episode, with `num_goals` goals listed for each agent.
+    /// Creates the header of an episode, with `num_goals` goals listed for each agent.
     pub fn new(config: Config, instance: &Instance, num_goals: usize) -> Self {
         Self {
             format: FORMAT.into(),
@@ -155,10 +163,10 @@ impl TraceHeader {
         }
     }
 
-    /// The instance to play the trace again; each list of goals goes round.
+    /// Returns the instance for playing the trace again. Each list of goals repeats cyclically.
     ///
     /// # Errors
-    /// If the header describes no playable instance.
+    /// If the instance of the header cannot be played.
     pub fn instance(&self) -> Result<Instance, Error> {
         let mut streams = Vec::with_capacity(self.goals.len());
         for (agent, goals) in self.goals.iter().enumerate() {
@@ -168,7 +176,7 @@ impl TraceHeader {
         Instance::new(self.map.clone(), self.outside.clone(), self.starts.clone(), streams)
     }
 
-    /// Passes if an engine can play what the header describes.
+    /// Checks that an engine can play the config and instance of the header.
     fn check(&self) -> Result<(), Error> {
         self.config.check()?;
         Error::check_length("starts", self.config.num_agents, self.starts.len())?;
@@ -176,7 +184,7 @@ impl TraceHeader {
     }
 }
 
-/// What every version of the format says of itself on the first line, whatever else stands there.
+/// The versions, which are on the first line in every version of the format.
 #[derive(Deserialize)]
 struct Versions {
     format: String,
@@ -185,10 +193,10 @@ struct Versions {
 
 impl Versions {
     fn check(&self) -> Result<(), Error> {
-        for (what, got, want) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
-            if got != want {
+        for (what, got, expected) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
+            if got != expected {
                 let reason =
-                    format!("the {what} is `{}`, expected `{want}`", shorten(got, Error::LONGEST_QUOTE));
+                    format!("the {what} is `{}`, expected `{expected}`", shorten(got, Error::LONGEST_QUOTE));
                 return Err(Error::Trace { line: 1, reason });
             }
         }
@@ -197,7 +205,7 @@ impl Versions {
 }
 
 impl Trace {
-    /// A trace of no steps: the instance before the first one.
+    /// Creates a trace without steps: the instance before the first step.
     pub fn still(config: Config, instance: &Instance) -> Self {
         let num_agents = instance.starts().len();
         let state = Snapshot {
@@ -211,12 +219,12 @@ impl Trace {
         Self { header: TraceHeader::new(config, instance, 1), start, steps: Vec::new() }
     }
 
-    /// The state after the reset and after each step, one more than there are steps.
+    /// Returns the state after the reset and after each step, one more than there are steps.
     pub fn states(&self) -> impl Iterator<Item = &Snapshot> {
         std::iter::once(&self.start.state).chain(self.steps.iter().map(|step| &step.state))
     }
 
-    /// The state at a frame: 0 is after the reset, 1 after the first step.
+    /// Returns the state at a frame: 0 is after the reset, 1 after the first step.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if the episode ends earlier.
@@ -228,7 +236,7 @@ impl Trace {
         state.ok_or_else(|| Error::out_of_range("frame", frame, format!("0 to {}", self.steps.len())))
     }
 
-    /// The part of the episode from one frame to another, both included.
+    /// Returns the part of the episode from one frame to another, both included.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if the range is empty or the episode ends earlier.
@@ -245,7 +253,7 @@ impl Trace {
     /// Reads a trace from JSON Lines.
     ///
     /// # Errors
-    /// [`Error::Trace`] with the line that is wrong.
+    /// [`Error::Trace`] with the number of the wrong line.
     pub fn read(input: impl BufRead) -> Result<Self, Error> {
         let mut lines = (1..).zip(input.lines()).map(|(line, text)| match text {
             Ok(text) => Ok((line, text)),
@@ -309,12 +317,12 @@ fn check_list<T>(line: usize, num_agents: usize, name: &str, list: &[T]) -> Resu
     Err(Error::Trace { line, reason })
 }
 
-/// Parsers quote unknown words in full, however long they are.
+/// Longest part of a parser message that is quoted, since parsers quote unknown words in full. Units: characters.
 const LONGEST_REASON: usize = 240;
 
 fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, Error> {
     serde_json::from_str(text).map_err(|error| {
-        // The parser sees one line at a time, so to it every line is the first.
+        // The parser gets one line at a time, so it reports every line as the first.
         let (column, message) = (error.column(), error.to_string());
         let bare = message.strip_suffix(&format!(" at line 1 column {column}")).unwrap_or(&message);
         let reason = match bare.rsplit_once(", expected ") {
@@ -325,7 +333,7 @@ fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, E
     })
 }
 
-/// What a Rust type is to somebody who writes traces in another language.
+/// Names a Rust type for readers who write traces in another language.
 fn in_words(expected: &str) -> &str {
     match expected {
         "u16" | "i32" | "i64" | "u64" | "usize" => "a whole number",

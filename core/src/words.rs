@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
 
 use crate::Error;
 
-/// A variant, its word and what it stands for.
+/// A variant with its word and its documentation.
 #[derive(Clone, Copy, Debug)]
 pub struct Word<T> {
     /// The variant.
@@ -29,7 +29,7 @@ impl<T> Word<T> {
 
 /// An enum with one word for each variant, defined by [`words!`](crate::words!).
 ///
-/// Serde, config files, flags and Python read this one table.
+/// Serde, config files, flags and Python all use this table.
 pub trait Words: Copy + PartialEq + Send + Sync + 'static {
     /// The variants in the order of their definition.
     const WORDS: &'static [Word<Self>];
@@ -51,7 +51,7 @@ pub trait Words: Copy + PartialEq + Send + Sync + 'static {
         Self::WORDS.iter().find(|known| known.word == word).map(|known| known.value)
     }
 
-    /// Returns the variant of the word that an argument holds.
+    /// Returns the variant of the word in an argument.
     ///
     /// # Errors
     /// [`Error::Argument`] with the argument, the word and all known words.
@@ -69,7 +69,7 @@ pub trait Words: Copy + PartialEq + Send + Sync + 'static {
 /// Writes a variant as its word.
 ///
 /// # Errors
-/// Those of the serializer.
+/// If the serializer fails.
 pub fn serialize_word<T: Words, S: Serializer>(value: T, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(value.word())
 }
@@ -77,7 +77,7 @@ pub fn serialize_word<T: Words, S: Serializer>(value: T, serializer: S) -> Resul
 /// Reads a variant from its word.
 ///
 /// # Errors
-/// Those of the deserializer, and one for an unknown word.
+/// If the deserializer fails or the word is unknown.
 pub fn deserialize_word<'de, T: Words, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     let word = String::deserialize(deserializer)?;
     T::of_word(&word).ok_or_else(|| D::Error::unknown_variant(&word, T::NAMES))
@@ -89,7 +89,7 @@ pub fn deserialize_word<'de, T: Words, D: Deserializer<'de>>(deserializer: D) ->
 ///
 /// ```
 /// pogema_core::words! {
-///     /// The side that a lane keeps to.
+///     /// The side of the road that a car drives on.
 ///     #[derive(Default)]
 ///     pub enum Side {
 ///         /// Left of the centre line.

@@ -1,4 +1,4 @@
-//! What is written is read back as it was: traces and maps.
+//! Round trips: traces and maps that are written and read back stay the same.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -34,12 +34,12 @@ fn config(num_agents: usize) -> impl Strategy<Value = Config> {
     let collision = select(&[Collision::Priority, Collision::BlockBoth, Collision::Soft][..]);
     let on_goal = select(&[OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart][..]);
     let observation = select(&[Observation::Default, Observation::Pomapf, Observation::Mapf][..]);
-    let ours = (any::<bool>(), any::<bool>(), any::<bool>());
+    let extensions = (any::<bool>(), any::<bool>(), any::<bool>());
     let numbers = (1..=Config::LARGEST_RADIUS, any::<i64>());
-    (numbers, collision, on_goal, observation, ours).prop_map(
-        move |(numbers, collision, on_goal, observation, ours)| {
+    (numbers, collision, on_goal, observation, extensions).prop_map(
+        move |(numbers, collision, on_goal, observation, extensions)| {
             let (radius, max_steps) = numbers;
-            let (is_exact, is_shared, persistent) = ours;
+            let (is_exact, is_shared, persistent) = extensions;
             let occupancy = if is_exact { Occupancy::Exact } else { Occupancy::AsReleased };
             let reward = if is_shared { Reward::Shared } else { Reward::Own };
             Config {
@@ -57,7 +57,7 @@ fn config(num_agents: usize) -> impl Strategy<Value = Config> {
     )
 }
 
-/// Goal streams as a header lists them: explicit ones, so that it can list each in full.
+/// Generates headers with explicit sequences of goals, so that the header lists all of them.
 fn header() -> impl Strategy<Value = TraceHeader> {
     any_map().prop_flat_map(|map| {
         let cells: Vec<Cell> = (0..map.obstacles().len()).map(|at| map.cell_at(at)).collect();
@@ -161,7 +161,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
 
     #[test]
-    fn a_trace_is_read_as_it_was_written(trace in trace()) {
+    fn a_written_trace_is_read_back_unchanged(trace in trace()) {
         let mut text = Vec::new();
         trace.write(&mut text).unwrap();
         prop_assert_eq!(text.split_inclusive(|&byte| byte == b'\n').count(), 2 + trace.steps.len());
@@ -169,14 +169,14 @@ proptest! {
     }
 
     #[test]
-    fn a_map_is_its_rows(map in any_map()) {
+    fn a_map_equals_the_map_of_its_rows(map in any_map()) {
         let rows = map.rows();
         prop_assert_eq!((rows.len(), rows[0].len()), (map.height(), map.width()));
         prop_assert_eq!(Map::from_rows(&rows).unwrap(), map);
     }
 
     #[test]
-    fn any_rows_are_a_map_or_refused(rows in vec("[.#]{0,4}|\\PC{0,4}", 0..4)) {
+    fn any_rows_are_accepted_or_rejected(rows in vec("[.#]{0,4}|\\PC{0,4}", 0..4)) {
         match Map::from_rows(&rows) {
             Ok(map) => prop_assert_eq!(map.rows(), rows),
             Err(error) => prop_assert!(!error.to_string().chars().any(char::is_control), "{}", error),

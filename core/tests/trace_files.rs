@@ -1,5 +1,5 @@
-//! Traces as files: whatever stands in one, reading it ends with a trace or with a line that says what is wrong, and
-//! what was written is read back as it was.
+//! Trace files: reading any file returns a trace or a one-line error, and a trace that is written and read back stays
+//! the same.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -22,8 +22,8 @@ const TOKENS: [&str; 16] = [
     "[[0,0]]",
 ];
 
-/// What stands in the valid trace, what takes its place, and the line that this is refused with.
-const REFUSED: [(&str, &str, &str); 18] = [
+/// A part of the valid trace, its replacement, and the message that the result is rejected with.
+const REJECTED: [(&str, &str, &str); 18] = [
     (
         "pogema-trace/1",
         "pogema-trace/2",
@@ -34,7 +34,7 @@ const REFUSED: [(&str, &str, &str); 18] = [
         "pogema-2.0/1",
         "trace: line 1: the spec is `pogema-2.0/1`, expected `pogema-1.4.0/1`",
     ),
-    // The version comes first, for the rest may be wrong because of it.
+    // The version is checked first, because another version may have other fields.
     (
         "\"pogema-1.4.0/1\",\"config\":{",
         "\"pogema-2.0/1\",\"config\":{\"new\":1,",
@@ -99,26 +99,26 @@ fn written(trace: &Trace) -> String {
     String::from_utf8(text).unwrap()
 }
 
-/// Reading ends; what was read is written and read again without a change.
+/// Checks that a text is either a trace that survives a round trip, or rejected with a one-line message.
 fn check(text: &str) -> Result<(), TestCaseError> {
     match read(text) {
         Ok(trace) => prop_assert_eq!(&read(&written(&trace)).unwrap(), &trace),
         Err(message) => {
             assert_one_line(&message);
             prop_assert!(message.starts_with("trace: line "), "{message}");
-            let rusty = ["struct ", "enum ", "u16", "usize", "i32", "i64", "f32", "f64"];
-            let rusty = rusty.map(|word| format!(", expected {word}"));
-            prop_assert!(!rusty.iter().any(|words| message.contains(words)), "{message}");
+            let rust_types = ["struct ", "enum ", "u16", "usize", "i32", "i64", "f32", "f64"];
+            let rust_types = rust_types.map(|word| format!(", expected {word}"));
+            prop_assert!(!rust_types.iter().any(|words| message.contains(words)), "{message}");
         }
     }
     Ok(())
 }
 
 #[test]
-fn wrong_lines_are_refused_with_their_number() {
+fn wrong_lines_are_rejected_with_their_number() {
     let steps = read(VALID).unwrap().steps;
     assert_eq!(steps.len(), 1);
-    for (right, wrong, expected) in REFUSED {
+    for (right, wrong, expected) in REJECTED {
         assert!(VALID.contains(right), "{right}");
         assert_eq!(read(&VALID.replacen(right, wrong, 1)).unwrap_err(), expected);
     }
@@ -138,7 +138,7 @@ fn a_long_word_is_not_quoted_in_full() {
     assert_one_line(&read(&VALID.replacen("\"radius\"", &long, 1)).unwrap_err());
 }
 
-/// Every place within a value, by the keys that lead to it.
+/// Returns the JSON pointers of all parts of a value, itself included.
 fn places(value: &Value, at: &str) -> Vec<String> {
     let mut all = vec![at.to_owned()];
     match value {
@@ -153,7 +153,7 @@ fn places(value: &Value, at: &str) -> Vec<String> {
     all
 }
 
-/// A valid trace with up to three values replaced by odd ones.
+/// Generates traces that are valid except for up to three odd values.
 fn almost_valid() -> impl Strategy<Value = String> {
     let edits = vec((any::<Index>(), any::<Index>(), odd_value()), 1..4);
     edits.prop_map(|edits| {
@@ -171,24 +171,24 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
 
     #[test]
-    fn any_text_is_read_or_refused(text in any::<String>()) {
+    fn any_text_is_accepted_or_rejected(text in any::<String>()) {
         check(&text)?;
     }
 
     #[test]
-    fn any_bytes_are_read_or_refused(bytes in vec(any::<u8>(), 0..200)) {
+    fn any_bytes_are_accepted_or_rejected(bytes in vec(any::<u8>(), 0..200)) {
         if let Err(error) = Trace::read(&bytes[..]) {
             assert_one_line(&error.to_string());
         }
     }
 
     #[test]
-    fn a_mutated_trace_is_read_or_refused(text in mutated(&[VALID], &TOKENS)) {
+    fn a_mutated_trace_is_accepted_or_rejected(text in mutated(&[VALID], &TOKENS)) {
         check(&text)?;
     }
 
     #[test]
-    fn an_almost_valid_trace_is_read_or_refused(text in almost_valid()) {
+    fn an_almost_valid_trace_is_accepted_or_rejected(text in almost_valid()) {
         check(&text)?;
     }
 }

@@ -1,8 +1,9 @@
-//! Who may move: the three collision systems.
+//! Conflicting moves under the three collision systems.
 //!
-//! The reference says what each system means. Here every agent first names the square it aims at; then each
-//! square decides by itself, through a claim that the lowest index wins, so that the order of the agents does not
-//! matter and the work can be shared among threads. Only `priority` is an order by definition, and is played so.
+//! The reference defines the systems. Here every agent first claims the square it requests. Under `soft`, the agent with
+//! the lowest index wins a square; under `block_both`, a square that several agents request goes to none of them. The
+//! order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
+//! processes agents in their order, because its rule requires this.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -11,47 +12,50 @@ use pogema_core::{Action, Cell, Collision, Occupancy};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::grid::{Board, FREE, NOBODY, OBSTACLE};
+use crate::grid::{Board, FREE, NO_AGENT, OBSTACLE};
 use crate::simd::fetch;
 
-/// Agents that one thread takes at a time.
+/// Number of agents that one thread processes at a time.
 pub(crate) const CHUNK: usize = 4096;
-/// A claim of two.
-const CONTESTED: u32 = NOBODY - 1;
-/// Boards of more squares do not stay near the processor.
+/// The claim on a square that several agents request.
+const CONTESTED: u32 = NO_AGENT - 1;
+/// Largest number of squares of a board that stays in the cache.
 const MOST_NEAR: usize = 1 << 16;
-/// So many agents ahead of the present one the squares are asked for.
+/// How many agents ahead of the current one the squares are prefetched.
 const AHEAD: usize = 32;
 
-/// How the agents of a step are gone through.
-trait Way {
-    /// Whether several threads do it at the same time.
+/// The way in which a step processes the agents.
+trait Traversal {
+    /// Whether several threads work at the same time.
     const SHARED: bool;
-    /// Whether squares have to be fetched from far away.
+    /// Whether squares are prefetched, because the board may be larger than the cache.
     const FAR: bool;
 }
 
+/// One thread, with a board that stays in the cache.
 struct Near;
+/// One thread, with a board larger than the cache.
 struct Far;
+/// Several threads.
 struct Shared;
 
-impl Way for Near {
+impl Traversal for Near {
     const SHARED: bool = false;
     const FAR: bool = false;
 }
 
-impl Way for Far {
+impl Traversal for Far {
     const SHARED: bool = false;
     const FAR: bool = true;
 }
 
-impl Way for Shared {
+impl Traversal for Shared {
     const SHARED: bool = true;
     const FAR: bool = true;
 }
 
 impl Engine {
-    /// Moves the active agents as their actions and the collision system allow.
+    /// Moves the active agents by their actions, as far as the collision system allows.
     ///
     /// Rule: move/actions, move/inactive
     pub(crate) fn move_agents(&mut self, actions: &[Action]) {
@@ -62,7 +66,7 @@ impl Engine {
         }
     }
 
-    fn move_in<W: Way>(&mut self, actions: &[Action]) {
+    fn move_in<W: Traversal>(&mut self, actions: &[Action]) {
         match self.config.collision {
             Collision::Priority => self.move_by_priority(actions),
             Collision::BlockBoth => self.move_blocking_both::<W>(actions),
@@ -70,7 +74,7 @@ impl Engine {
         }
     }
 
-    /// One agent after the other, the lowest index first, onto any cell that is free at that moment.
+    /// Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
     ///
     /// Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn move_by_priority(&mut self, actions: &[Action]) {
@@ -92,50 +96,51 @@ impl Engine {
         }
     }
 
-    /// Onto a cell that was empty before the step and that no other agent wants.
+    /// Moves agents onto cells that were unoccupied before the step and that no other agent requests.
     ///
     /// Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
-    fn move_blocking_both<W: Way>(&mut self, actions: &[Action]) {
-        self.aim::<W>(actions, |crowd, agent, target, there| {
+    fn move_blocking_both<W: Traversal>(&mut self, actions: &[Action]) {
+        self.aim::<W>(actions, |requests, agent, target, there| {
             if there == FREE {
-                claim_alone::<W>(&crowd.board.square(target).claim, agent);
+                claim_alone::<W>(&requests.board.square(target).claim, agent);
             }
         });
         self.enter::<W>(actions);
         self.over_agents::<W>(|agents| {
             for agent in agents {
                 if self.ahead[agent] == FREE {
-                    self.board.square(self.targets[agent]).claim.store(NOBODY, Relaxed);
+                    self.board.square(self.targets[agent]).claim.store(NO_AGENT, Relaxed);
                 }
             }
         });
     }
 
-    /// Everybody at once, except where that is impossible.
+    /// Moves all agents simultaneously, and reverts only impossible moves.
     ///
     /// Rule: collide/soft, occupancy/as-released, occupancy/exact
-    fn move_softly<W: Way>(&mut self, actions: &[Action]) {
+    fn move_softly<W: Traversal>(&mut self, actions: &[Action]) {
         self.aim::<W>(actions, claim_unless_swapping::<W>);
         self.over_agents::<W>(|agents| self.withdraw_hindered::<W>(agents));
         self.enter::<W>(actions);
     }
 
-    /// Finds what each agent aims at and what is there, where an agent that is gone finds an obstacle; then claims
-    /// it, which the collision system says how.
+    /// Stores the target of each agent and the content of that square, then claims the square by the rule of the
+    /// collision system.
     ///
-    /// The marks of all agents are wiped on the way, since [`Engine::enter`] sets them again.
-    fn aim<W: Way>(&mut self, actions: &[Action], claim: impl Fn(&Crowd<'_>, u32, u32, u32) + Sync) {
+    /// For an inactive agent, the content counts as an obstacle. The marks of all agents are cleared, since
+    /// [`Engine::enter`] sets them again.
+    fn aim<W: Traversal>(&mut self, actions: &[Action], claim: impl Fn(&Requests<'_>, u32, u32, u32) + Sync) {
         let (board, cells, active) = (&self.board, &self.cells[..], &self.active[..]);
-        let crowd = Crowd { board, cells, actions, offsets: board.offsets() };
+        let requests = Requests { board, cells, actions, offsets: board.offsets() };
         let (occupied, radius) = (&self.occupied, self.config.radius);
         let aim = |(first, targets, ahead): Aims<'_>| {
             for (index, (aim, found)) in targets.iter_mut().zip(ahead).enumerate() {
                 let agent = first + index;
-                fetch_ahead::<W>(board, agent, cells.len(), |later| crowd.target(later));
-                let target = crowd.target(agent);
+                fetch_ahead::<W>(board, agent, cells.len(), |later| requests.target(later));
+                let target = requests.target(agent);
                 let square = board.square(target).agent.load(Relaxed);
                 let there = if active[agent] { square } else { OBSTACLE };
-                claim(&crowd, agent as u32, target, there);
+                claim(&requests, agent as u32, target, there);
                 (*aim, *found) = (target, there);
                 let cell = cells[agent];
                 occupied.blank(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
@@ -149,24 +154,24 @@ impl Engine {
         }
     }
 
-    /// Takes back the claim on the cell of each agent that stays, and so on along the queue behind it.
+    /// Withdraws the claim on the cell of each agent that stays, and likewise along the queue behind it.
     ///
     /// Rule: collide/soft/chain
-    fn withdraw_hindered<W: Way>(&self, agents: Range<usize>) {
+    fn withdraw_hindered<W: Traversal>(&self, agents: Range<usize>) {
         for agent in agents {
             fetch_ahead::<W>(&self.board, agent, self.cells.len(), |later| {
                 self.board.place(self.cells[later])
             });
             let mut place = self.board.place(self.cells[agent]);
-            if self.board.square(place).claim.load(Relaxed) == NOBODY
+            if self.board.square(place).claim.load(Relaxed) == NO_AGENT
                 || !self.active[agent]
                 || self.moves(agent as u32)
             {
                 continue;
             }
             loop {
-                let behind = self.board.square(place).claim.swap(NOBODY, Relaxed);
-                if behind == NOBODY {
+                let behind = self.board.square(place).claim.swap(NO_AGENT, Relaxed);
+                if behind == NO_AGENT {
                     break;
                 }
                 place = self.board.place(self.cells[behind as usize]);
@@ -174,28 +179,30 @@ impl Engine {
         }
     }
 
-    /// Whether an agent holds the claim on its target.
+    /// Returns whether an agent holds the claim on its target.
     fn moves(&self, agent: u32) -> bool {
         self.board.square(self.targets[agent as usize]).claim.load(Relaxed) == agent
     }
 
-    /// Frees a square, unless another agent has come already or it is an obstacle that the agent started on.
+    /// Frees a square, unless another agent has already entered it or it is an obstacle that the agent started on.
     #[inline]
     pub(crate) fn vacate(&self, place: u32, agent: u32, is_shared: bool) {
         let square = &self.board.square(place).agent;
         if is_shared {
-            // Whoever comes may be there before or after this.
+            // Another agent may enter the square before or after this.
             let _ = square.compare_exchange(agent, FREE, Relaxed, Relaxed);
         } else if square.load(Relaxed) == agent {
             square.store(FREE, Relaxed);
         }
     }
 
-    /// Moves the agents that hold claims, and marks all. As released, an agent that enters the cell which an agent
-    /// with a higher index leaves in the same step has its mark wiped by it.
+    /// Moves the agents that hold claims, and marks all active agents.
+    ///
+    /// With `as_released`, an agent loses its mark if it enters a cell that an agent with a higher index leaves in the
+    /// same step.
     ///
     /// Rule: occupancy/as-released, occupancy/exact
-    fn enter<W: Way>(&mut self, actions: &[Action]) {
+    fn enter<W: Traversal>(&mut self, actions: &[Action]) {
         let mut cells = std::mem::take(&mut self.cells);
         let (board, occupied, radius) = (&self.board, &self.occupied, self.config.radius);
         let (targets, ahead, active) = (&self.targets, &self.ahead, &self.active);
@@ -209,7 +216,7 @@ impl Engine {
                 let square = board.square(targets[agent]);
                 let mut is_shown = active[agent];
                 if square.claim.load(Relaxed) == number {
-                    square.claim.store(NOBODY, Relaxed);
+                    square.claim.store(NO_AGENT, Relaxed);
                     square.agent.store(number, Relaxed);
                     self.vacate(board.place(*cell), number, W::SHARED);
                     *cell = moved(*cell, actions[agent]);
@@ -229,8 +236,8 @@ impl Engine {
         self.cells = cells;
     }
 
-    /// Does the same for all agents, in parallel if the way is shared.
-    fn over_agents<W: Way>(&self, work: impl Fn(Range<usize>) + Sync) {
+    /// Does some work for all agents, in parallel if the traversal is shared.
+    fn over_agents<W: Traversal>(&self, work: impl Fn(Range<usize>) + Sync) {
         let num_agents = self.config.num_agents;
         if W::SHARED {
             let firsts = (0..num_agents).into_par_iter().step_by(CHUNK);
@@ -240,8 +247,8 @@ impl Engine {
         }
     }
 
-    /// Puts all active agents on their squares.
-    pub(crate) fn take_squares(&self) {
+    /// Places all active agents on their squares.
+    pub(crate) fn place_agents(&self) {
         for (agent, &cell) in self.cells.iter().enumerate().filter(|&(agent, _)| self.active[agent]) {
             let square = self.board.square(self.board.place(cell));
             if square.agent.load(Relaxed) == FREE {
@@ -251,40 +258,41 @@ impl Engine {
     }
 }
 
-/// Asks for a square that is needed some agents later.
+/// Prefetches a square that is needed some agents later.
 #[inline]
-fn fetch_ahead<W: Way>(board: &Board, agent: usize, num_agents: usize, place: impl Fn(usize) -> u32) {
+fn fetch_ahead<W: Traversal>(board: &Board, agent: usize, num_agents: usize, place: impl Fn(usize) -> u32) {
     let later = agent + AHEAD;
     if W::FAR && later < num_agents {
         fetch(board.square(place(later)));
     }
 }
 
-/// The agents of a step, and what they want.
-struct Crowd<'a> {
+/// The agents of a step and the moves they request.
+struct Requests<'a> {
     board: &'a Board,
     cells: &'a [Cell],
     actions: &'a [Action],
     offsets: [u32; 5],
 }
 
-impl Crowd<'_> {
-    /// The place that an agent aims at.
+impl Requests<'_> {
+    /// Returns the square that an agent requests.
     fn target(&self, agent: usize) -> u32 {
         self.board.place(self.cells[agent]).wrapping_add(self.offsets[self.actions[agent] as usize])
     }
 }
 
-/// Claims a target for the lowest index that wants it, unless the agent faces an obstacle or swaps; and a wait is a
-/// swap with oneself.
+/// Claims a target for the lowest index that requests it, unless the agent moves into an obstacle or swaps.
+///
+/// A waiting agent swaps with itself.
 ///
 /// Rule: collide/soft/stay, collide/soft/swap, collide/soft/contest
-fn claim_unless_swapping<W: Way>(crowd: &Crowd<'_>, agent: u32, target: u32, there: u32) {
+fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, target: u32, there: u32) {
     let other = if there < FREE { there } else { agent };
-    let stays =
-        there == OBSTACLE || crowd.target(other as usize) == crowd.board.place(crowd.cells[agent as usize]);
-    // Where nothing is claimed the corner of the wall takes the number, which nobody aims at.
-    let claim = &crowd.board.square(if stays { 0 } else { target }).claim;
+    let stays = there == OBSTACLE
+        || requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]);
+    // An agent that claims nothing writes its number to the corner of the wall, which no agent requests.
+    let claim = &requests.board.square(if stays { 0 } else { target }).claim;
     if !W::SHARED {
         claim.store(claim.load(Relaxed).min(agent), Relaxed);
     } else if !stays {
@@ -292,20 +300,20 @@ fn claim_unless_swapping<W: Way>(crowd: &Crowd<'_>, agent: u32, target: u32, the
     }
 }
 
-/// Claims an empty square, unless another agent has, and then nobody gets it.
-fn claim_alone<W: Way>(claim: &AtomicU32, agent: u32) {
+/// Claims an empty square. If another agent has already claimed it, no agent gets it.
+fn claim_alone<W: Traversal>(claim: &AtomicU32, agent: u32) {
     if !W::SHARED {
-        let is_first = claim.load(Relaxed) == NOBODY;
+        let is_first = claim.load(Relaxed) == NO_AGENT;
         claim.store(if is_first { agent } else { CONTESTED }, Relaxed);
-    } else if claim.compare_exchange(NOBODY, agent, Relaxed, Relaxed).is_err() {
+    } else if claim.compare_exchange(NO_AGENT, agent, Relaxed, Relaxed).is_err() {
         claim.store(CONTESTED, Relaxed);
     }
 }
 
-/// The first agent of a part, the targets of the part and what stands there.
+/// The first agent of a part, the targets of the part and the content of those squares.
 type Aims<'a> = (usize, &'a mut [u32], &'a mut [u32]);
 
-/// The neighbour of a cell; an agent only goes where there is one.
+/// Returns the neighbour of a cell, which exists because an agent only moves to cells of the map.
 fn moved(cell: Cell, action: Action) -> Cell {
     let (row, col) = cell.toward(action);
     Cell::new(row as u16, col as u16)

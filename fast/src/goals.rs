@@ -1,4 +1,4 @@
-//! What reaching a goal does; rewards and ends.
+//! The effects of reaching a goal: rewards, ends and next goals.
 
 use pogema_core::{OnGoal, Reward};
 
@@ -8,12 +8,12 @@ use crate::Engine;
 use crate::collide::CHUNK;
 
 impl Engine {
-    /// Which active agents stood on their goals after the last move, before goals changed.
+    /// Returns which active agents stood on their goals after the last move, before goals changed.
     pub fn on_goal(&self) -> &[bool] {
         &self.on_goal
     }
 
-    /// Notes which active agents stand on their goals.
+    /// Records which active agents are on their goals.
     ///
     /// Rule: goal/finish, goal/nothing, goal/restart
     pub(crate) fn mark_on_goal(&mut self) {
@@ -41,6 +41,8 @@ impl Engine {
         self.num_on_goal == self.on_goal.len()
     }
 
+    /// Writes the reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub(crate) fn pay(&self, rewards: &mut [f32]) {
         match (self.config.reward, self.config.on_goal) {
@@ -54,6 +56,8 @@ impl Engine {
         }
     }
 
+    /// Writes which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub(crate) fn terminate(&self, terminated: &mut [bool]) {
         match self.config.on_goal {
@@ -67,11 +71,15 @@ impl Engine {
         }
     }
 
+    /// Writes which agents are truncated.
+    ///
     /// Rule: end/truncated, end/after
     pub(crate) fn truncate(&self, truncated: &mut [bool]) {
         truncated.fill(i64::try_from(self.step).is_ok_and(|step| step >= self.config.max_steps));
     }
 
+    /// Lets the agents on their goals leave the map or get their next goals.
+    ///
     /// Rule: goal/finish/leave, goal/nothing, goal/restart/next
     pub(crate) fn change_goals(&mut self) {
         if self.num_on_goal == 0 || self.config.on_goal == OnGoal::Nothing {

@@ -1,28 +1,30 @@
-//! The map with its border, once as bits for the windows and once as squares for the moves.
+//! The map with its border, stored as bits for the windows and as squares for the moves.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use pogema_core::{Cell, Error, Instance, Outside};
 
-/// One bit per cell of a map with its border, cut into vertical strips.
+/// One bit per cell of a map with its border, stored in vertical strips.
 ///
-/// A strip holds one word per row. It begins 32 columns after the one before and is 64 columns wide, so that every
-/// cell is in two strips, and a window of up to 33 columns lies in one: its rows are neighbours in memory, each
-/// a shift away. An empty strip stands before the first, so that every cell really is in two.
+/// A strip holds one word per row. It begins 32 columns after the previous strip and is 64 columns wide. Every cell is
+/// therefore in two strips, and a window of up to 33 columns lies in one strip: its rows are adjacent in memory and
+/// only need to be shifted. An extra strip precedes the first, so that the cells of the first columns are in two
+/// strips, too.
 #[derive(Debug, Default)]
 pub struct Strips {
     words: Vec<AtomicU64>,
     num_rows: usize,
 }
 
-/// Rows that may be read of a window, its own or not; so many words are behind the last strip.
+/// Number of rows that vector loads read for a window, rows beyond the window included. As many words of padding follow
+/// the last strip.
 pub const MOST_ROWS: usize = 12;
 
 /// Columns from one strip to the next.
 pub const STRIDE: usize = 32;
 
 impl Strips {
-    /// Strips without any bit set.
+    /// Creates strips with all bits unset.
     pub fn empty(height: usize, width: usize) -> Result<Self, Error> {
         let num_strips = width.div_ceil(STRIDE) + 2;
         let num_words = num_strips.checked_mul(height).and_then(|words| words.checked_add(MOST_ROWS));
@@ -30,37 +32,39 @@ impl Strips {
         Ok(Self { words, num_rows: height })
     }
 
-    /// Number of rows, border included.
+    /// Returns the number of rows, border included.
     pub fn num_rows(&self) -> usize {
         self.num_rows
     }
 
-    /// Bytes of all strips.
+    /// Returns the number of bytes of all strips.
     pub fn num_bytes(&self) -> usize {
         num_bytes(&self.words)
     }
 
-    /// The words of all strips.
+    /// Returns the words of all strips.
     #[inline]
     pub fn words(&self) -> &[AtomicU64] {
         &self.words
     }
 
-    /// The word of a cell in its first strip, and which of its bits the cell is.
+    /// Returns the index of the word of a cell in its first strip, and the bit of the cell in that word.
     #[inline]
     pub fn locate(&self, row: usize, col: usize) -> (usize, u32) {
         ((col / STRIDE + 1) * self.num_rows + row, (col % STRIDE) as u32)
     }
 
-    /// The words of a window's first strip from its first row on, and the shift that brings its first column to
-    /// bit 0. The strips to the right follow at distances of [`Strips::num_rows`].
+    /// Returns the words of a window's first strip from its first row on, and the shift that moves its first column to
+    /// bit 0.
+    ///
+    /// The strips to the right follow at distances of [`Strips::num_rows`].
     #[inline]
     pub fn window(&self, row: usize, col: usize) -> (&[AtomicU64], u32) {
         let (first, shift) = self.locate(row, col);
         (&self.words[first..], shift)
     }
 
-    /// The two words of a cell, and its bit in the first of them; in the second it is 32 bits higher.
+    /// Returns the two words of a cell, and a mask of its bit in the first; in the second its bit is 32 bits higher.
     fn words_of(&self, row: usize, col: usize) -> (&AtomicU64, &AtomicU64, u64) {
         let (here, bit) = self.locate(row, col);
         (&self.words[here], &self.words[here - self.num_rows], 1 << bit)
@@ -71,7 +75,7 @@ impl Strips {
         word.load(Relaxed) & bit != 0
     }
 
-    /// Sets a bit; `is_shared` if other threads may be setting bits too.
+    /// Sets a bit. `is_shared` states that other threads may set bits at the same time.
     #[inline]
     pub fn set(&self, row: usize, col: usize, is_shared: bool) {
         let (word, other, bit) = self.words_of(row, col);
@@ -91,7 +95,7 @@ impl Strips {
         other.fetch_and(!(bit << STRIDE), Relaxed);
     }
 
-    /// Clears a bit and its neighbours in the same words.
+    /// Clears the two words of a cell, neighbouring cells included.
     pub fn blank(&self, row: usize, col: usize) {
         let (word, other, _) = self.words_of(row, col);
         word.store(0, Relaxed);
@@ -118,7 +122,7 @@ impl Strips {
         }
     }
 
-    /// The obstacles of an instance with its border: what lies outside, then the wall, then the map.
+    /// Writes the obstacles of an instance with its border: first the outside, then the wall, then the map.
     ///
     /// Rule: border/ring, border/outside, border/noise
     pub fn write_obstacles(&mut self, instance: &Instance, radius: usize) {
@@ -144,20 +148,20 @@ fn replace(word: &mut u64, mask: u64, bits: u64) {
     *word = *word & !mask | bits;
 }
 
-/// What the moves need to know of one cell.
+/// The state of one cell that moves depend on.
 #[derive(Debug)]
 pub struct Square {
-    /// The active agent that stands here, or [`FREE`], or [`OBSTACLE`].
+    /// The active agent on this square, or [`FREE`], or [`OBSTACLE`].
     pub agent: AtomicU32,
-    /// While a step is played: the agent that may come here, or [`NOBODY`].
+    /// While a step is played: the agent that may enter this square, or [`NO_AGENT`].
     pub claim: AtomicU32,
 }
 
 pub const FREE: u32 = u32::MAX - 1;
 pub const OBSTACLE: u32 = u32::MAX;
-pub const NOBODY: u32 = u32::MAX;
+pub const NO_AGENT: u32 = u32::MAX;
 
-/// The squares of a map and of the wall around it, so that no move needs a bounds test of its own.
+/// The squares of a map and of the wall around it. The wall makes bounds checks of moves unnecessary.
 #[derive(Debug, Default)]
 pub struct Board {
     squares: Vec<Square>,
@@ -165,34 +169,34 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board of walls.
+    /// Creates a board on which every square is an obstacle.
     pub fn walls(height: usize, width: usize) -> Result<Self, Error> {
-        let wall = || Square { agent: OBSTACLE.into(), claim: NOBODY.into() };
+        let wall = || Square { agent: OBSTACLE.into(), claim: NO_AGENT.into() };
         let squares = reserve((width + 2).checked_mul(height + 2), wall)?;
         Ok(Self { squares, width: width as u32 + 2 })
     }
 
-    /// Number of squares, the wall's among them.
+    /// Returns the number of squares, the wall included.
     pub fn num_squares(&self) -> usize {
         self.squares.len()
     }
 
-    /// Bytes of all squares.
+    /// Returns the number of bytes of all squares.
     pub fn num_bytes(&self) -> usize {
         num_bytes(&self.squares)
     }
 
-    /// Where the square of a cell is.
+    /// Returns the index of the square of a cell.
     pub fn place(&self, cell: Cell) -> u32 {
         (u32::from(cell.row) + 1) * self.width + u32::from(cell.col) + 1
     }
 
-    /// What to add to a place, wrapping, for each action in the order of their numbers.
+    /// Returns the wrapping offset that each action adds to the index of a square, in the order of the action numbers.
     pub fn offsets(&self) -> [u32; 5] {
         [0, self.width.wrapping_neg(), self.width, u32::MAX, 1]
     }
 
-    /// All squares, row after row.
+    /// Returns all squares, row after row.
     pub fn squares(&self) -> &[Square] {
         &self.squares
     }
@@ -201,7 +205,7 @@ impl Board {
         &self.squares[place as usize]
     }
 
-    /// Takes over the obstacles of a map of the board's size, with no agent anywhere.
+    /// Copies the obstacles of a map of the board's size, and removes all agents.
     pub fn write_obstacles(&mut self, obstacles: &[bool]) {
         let width = self.width as usize;
         let rows = self.squares.chunks_mut(width).skip(1);
@@ -213,25 +217,23 @@ impl Board {
     }
 }
 
-/// A list of so many equal entries, or an error where memory does not suffice.
+/// Creates a list of `number` entries, or returns an error if there is not enough memory.
 pub fn reserve<T>(number: Option<usize>, entry: impl FnMut() -> T) -> Result<Vec<T>, Error> {
     let mut list = Vec::new();
-    let is_had = number.is_some_and(|number| list.try_reserve_exact(number).is_ok());
+    let is_reserved = number.is_some_and(|number| list.try_reserve_exact(number).is_ok());
     match number {
-        Some(number) if is_had => list.resize_with(number, entry),
+        Some(number) if is_reserved => list.resize_with(number, entry),
         _ => {
             let bytes = number.and_then(|number| number.checked_mul(size_of::<T>()));
             let bytes =
                 bytes.map_or("more bytes than can be counted".into(), |bytes| format!("{bytes} bytes"));
-            return Err(Error::instance(format!(
-                "the environment needs {bytes} of memory at once, too much"
-            )));
+            return Err(Error::instance(format!("not enough memory: the environment needs {bytes}")));
         }
     }
     Ok(list)
 }
 
-/// Bytes that a list was given for its entries.
+/// Returns the number of bytes allocated for the entries of a list.
 pub fn num_bytes<T>(list: &Vec<T>) -> usize {
     list.capacity() * size_of::<T>()
 }

@@ -1,11 +1,11 @@
-//! Returning to an earlier state, or to one that was saved.
+//! Returning to an earlier state or to a saved state.
 
 use pogema_core::{Environment, Error, GoalStream, Instance, Snapshot};
 
 use crate::Engine;
 
 impl Engine {
-    /// Continues an episode at a saved state, `step` steps after the reset. `streams` are the goals that are left.
+    /// Continues an episode at a saved state, `step` steps after the reset. `streams` holds the saved goal streams.
     ///
     /// # Errors
     /// If the state does not fit the instance, or the instance does not fit the config.
@@ -29,7 +29,7 @@ impl Engine {
         self.return_to(step, state)
     }
 
-    /// Restores cells, goals, active agents, occupancy and time. Goals drawn since stay drawn.
+    /// Restores cells, goals, active agents, occupancy and time, but not the goal streams.
     ///
     /// Rule: history/step-back
     pub(crate) fn return_to(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
@@ -45,7 +45,7 @@ impl Engine {
         self.cells.clone_from(&state.cells);
         self.goals.clone_from(&state.goals);
         self.active.clone_from(&state.active);
-        self.take_squares();
+        self.place_agents();
         Ok(())
     }
 }

@@ -1,22 +1,24 @@
-//! The rules of POGEMA 1.4.0 on bits: the same episodes as the reference's, hundreds of times faster than POGEMA's.
+//! A fast engine for the rules of POGEMA 1.4.0.
 //!
-//! [`Engine`] plays one environment, from a handful of agents to millions. It has the reference's phases, under the
-//! same file names, so that the two open side by side; that they do the same is proven by tests which play them in
-//! lockstep, and by every recording of POGEMA.
+//! It plays the same episodes as the reference, hundreds of times faster than POGEMA.
 //!
-//! [`Batch`] plays many environments by one call, each with its own episodes, on as many threads as it is given.
+//! [`Engine`] plays one environment, from a handful of agents to millions. It has the same phases and file names as the
+//! reference, so that you can compare them side by side. Tests play both in lockstep, and check the fast engine against
+//! every recording of POGEMA.
+//!
+//! [`Batch`] plays many environments by one call, each with its own episodes, on a given number of threads.
 //!
 //! | file | phase |
 //! | --- | --- |
-//! | `grid` | the map with its border as bits, and the board that moves are made on |
-//! | `step` | one step, as a table of contents |
-//! | `collide` | who may move |
-//! | `goals` | what reaching a goal does; rewards and ends |
-//! | `observe` | what agents see |
-//! | `history` | steps kept and taken back |
-//! | `masks` | which actions make sense |
+//! | `grid` | the map with its border as bits, and the board for moves |
+//! | `step` | the order of the phases in a step |
+//! | `collide` | conflicting moves |
+//! | `goals` | the effects of reaching a goal: rewards, ends and next goals |
+//! | `observe` | observations |
+//! | `history` | the return to an earlier or saved state |
+//! | `masks` | action masks |
 //! | `batch` | many environments |
-//! | `simd` | windows to bits to values, plainly and with AVX2 or AVX-512 |
+//! | `simd` | conversion of windows to bits and of bits to values, without intrinsics or with AVX2 or AVX-512 |
 //!
 //! ```
 //! use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, Outside, StepOut};

@@ -1,4 +1,4 @@
-//! Which actions make sense.
+//! Action masks.
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -8,8 +8,10 @@ use crate::Engine;
 use crate::grid::OBSTACLE;
 
 impl Engine {
-    /// Writes 1 for each action that no obstacle forbids, else 0: staying always makes sense, moving if the cell it
-    /// aims at is on the map and free of obstacles, whoever stands there. Agents that take no part may only stay.
+    /// Writes 1 for each action that no obstacle prevents, otherwise 0.
+    ///
+    /// Staying is always allowed. A move is allowed if its target is on the map and free, even if another agent stands
+    /// there. Inactive agents may only stay.
     ///
     /// Shape: `[agents, 5]`
     ///

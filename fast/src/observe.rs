@@ -1,4 +1,4 @@
-//! What agents see.
+//! The observations of agents.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use crate::Engine;
 use crate::simd::{Channels, MOST_WORDS, SimdPath, Value, WindowSource, lead_of, pack, per_line};
 
-/// Words for the bits of some agents; enough for one agent of any radius.
+/// Number of words for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;
-/// So many of them are used where windows are small, so that they stay close to the processor.
+/// Number of these words that are used for small windows, so that they stay in the cache.
 const FEW_WORDS: usize = 400;
-/// Buffers of more bytes are written around the cache.
+/// Buffers of more bytes are written with stores that bypass the cache.
 const BEYOND_CACHE: usize = 8 << 20;
-/// Agents that one thread takes at a time.
+/// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;
 
 impl Engine {
@@ -24,7 +24,7 @@ impl Engine {
     /// Shape: `[agents, 3, side, side]`; channels obstacles, agents, goal; every value 0 or 1.
     ///
     /// # Errors
-    /// Before the first reset, for agents that are not there, or for a buffer of the wrong length.
+    /// Before the first reset, for agents that do not exist, or for a buffer of the wrong length.
     ///
     /// Rule: observe/default
     pub fn observe_agents<V: Value>(&self, agents: Range<usize>, out: &mut [V]) -> Result<(), Error> {
@@ -35,13 +35,15 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the `default` observation of all agents, as part of a larger buffer.
+    /// Writes the `default` observation of all agents into a part of a larger buffer.
     pub(crate) fn observe_all<V: Value>(&self, out: &mut [V], beyond_cache: bool) {
         self.write_values(0..self.config.num_agents, Channels::All, out, beyond_cache);
     }
 
-    /// Writes the `default` observation of some agents as bits, each agent's from a new word on: channel after
-    /// channel, row after row, the first cell in the lowest bit.
+    /// Writes the `default` observation of some agents as bits.
+    ///
+    /// The bits of each agent begin at a new word: channel after channel, row after row, the first cell in the lowest
+    /// bit.
     ///
     /// Shape: `[agents, words]` with [`words_per_agent`] words.
     ///
@@ -53,15 +55,15 @@ impl Engine {
         self.check_agents(&agents)?;
         let per_agent = words_per_agent(self.config.radius);
         Error::check_length("observations", agents.len() * per_agent, out.len())?;
-        let scene = self.scene();
+        let source = self.window_source();
         self.in_parts(agents.start, per_agent, out, |first, out| {
             let agents = first..first + out.len() / per_agent;
-            pack(self.path, &scene, agents, Channels::All, (0, true), out);
+            pack(self.path, &source, agents, Channels::All, (0, true), out);
         });
         Ok(())
     }
 
-    /// Writes a buffer for the agents from `first` on, its parts shared among the threads if there are any.
+    /// Writes a buffer for the agents from `first` on, in parts on the threads of the pool if there is one.
     fn in_parts<T: Send>(
         &self,
         first: usize,
@@ -87,7 +89,7 @@ impl Engine {
         Ok(())
     }
 
-    fn scene(&self) -> WindowSource<'_> {
+    fn window_source(&self) -> WindowSource<'_> {
         WindowSource {
             obstacles: &self.obstacles,
             occupied: &self.occupied,
@@ -105,17 +107,17 @@ impl Engine {
         beyond_cache: bool,
     ) {
         let per_agent = channels.number() * self.config.side() * self.config.side();
-        let scene = self.scene();
+        let source = self.window_source();
         self.in_parts(agents.start, per_agent, out, |first, out| {
             WORDS.with_borrow_mut(|words| {
                 let few = per_agent.div_ceil(64) < FEW_WORDS / 16;
                 let words = if few { &mut words[..FEW_WORDS] } else { &mut words[..] };
-                write_blocks(self.path, &scene, first, channels, out, beyond_cache, words);
+                write_blocks(self.path, &source, first, channels, out, beyond_cache, words);
             });
         });
     }
 
-    /// Writes the windows of the `POMAPF` observation of all agents, obstacles and agents apart.
+    /// Writes the windows of the `POMAPF` observation of all agents into two buffers, for obstacles and agents.
     ///
     /// Shape: both `[agents, side, side]`; every value 0 or 1.
     ///
@@ -134,6 +136,8 @@ impl Engine {
         Ok(())
     }
 
+    /// Writes the map with its border.
+    ///
     /// Rule: observe/mapf
     pub(crate) fn write_map(&self, out: &mut [u8]) -> Result<(), Error> {
         let border = 2 * self.config.radius;
@@ -147,18 +151,20 @@ impl Engine {
         Ok(())
     }
 
+    /// Counts the agents and the free cells in the window of each agent.
+    ///
     /// Rule: metrics/density
     pub(crate) fn count_in_windows(&self, seen: &mut Vec<Seen>) {
         let (area, per_agent) =
             (self.config.side() * self.config.side(), words_per_agent(self.config.radius));
         let (num_agents, per_block) = (self.config.num_agents, NUM_WORDS / per_agent);
-        let scene = self.scene();
+        let source = self.window_source();
         seen.clear();
         WORDS.with_borrow_mut(|words| {
             for first in (0..num_agents).step_by(per_block) {
                 let agents = first..num_agents.min(first + per_block);
                 let words = &mut words[..agents.len() * per_agent];
-                pack(self.path, &scene, agents, Channels::All, (0, true), words);
+                pack(self.path, &source, agents, Channels::All, (0, true), words);
                 seen.extend(words.chunks_exact(per_agent).map(|words| Seen {
                     agents: ones(words, area, 2 * area),
                     free_cells: area as u32 - ones(words, 0, area),
@@ -168,7 +174,7 @@ impl Engine {
     }
 }
 
-/// Number of set bits from `first` to before `end`.
+/// Returns the number of set bits from `first` up to but not including `end`.
 fn ones(words: &[u64], first: usize, end: usize) -> u32 {
     let (head, tail) = (first / 64, end / 64);
     let below = |bit: usize| (1u64 << (bit % 64)) - 1;
@@ -177,42 +183,42 @@ fn ones(words: &[u64], first: usize, end: usize) -> u32 {
     whole + last - (words[head] & below(first)).count_ones()
 }
 
-/// Whether a buffer of so many bytes is better written around the cache.
+/// Returns whether a buffer of this size should be written with stores that bypass the cache.
 pub(crate) fn is_beyond_cache(num_bytes: usize) -> bool {
     num_bytes > BEYOND_CACHE
 }
 
-/// Words that the bits of one agent's `default` observation take.
+/// Returns the number of words for the bits of one agent's `default` observation.
 pub fn words_per_agent(radius: usize) -> usize {
     (3 * (2 * radius + 1) * (2 * radius + 1)).div_ceil(64)
 }
 
 thread_local! {
-    /// Kept from call to call, so that they need not be cleared each time.
+    /// Words that are reused in every call, so that they need not be cleared each time.
     static WORDS: RefCell<[u64; NUM_WORDS]> = const { RefCell::new([0; NUM_WORDS]) };
 }
 
-/// Writes the values of the agents from `first` on, by way of `words`, as many agents at a time as have room there.
+/// Writes the values of the agents from `first` on. `words` holds the bits of as many agents at a time as fit.
 fn write_blocks<V: Value>(
     path: SimdPath,
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     first: usize,
     channels: Channels,
     out: &mut [V],
     beyond_cache: bool,
     words: &mut [u64],
 ) {
-    let per_agent = channels.number() * scene.side() * scene.side();
-    // The first bits may be left out, and an agent may touch more words than it fills.
+    let per_agent = channels.number() * source.side() * source.side();
+    // The first bits may be skipped, and the writes for an agent may touch more words than it fills.
     let room = (words.len() - MOST_WORDS) / per_agent.div_ceil(64);
-    // So many agents end where a line of memory does.
+    // The values of this many agents end at the end of a cache line.
     let whole = room - room % per_line::<V>();
     let per_block = if whole > 0 { whole } else { room };
     for (block, out) in out.chunks_mut(per_block * per_agent).enumerate() {
         let first = first + block * per_block;
         let lead = lead_of(out);
         let agents = first..first + out.len() / per_agent;
-        pack(path, scene, agents, channels, (lead, false), words);
+        pack(path, source, agents, channels, (lead, false), words);
         V::spread(path, words, lead, out, beyond_cache);
     }
 }

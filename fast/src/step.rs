@@ -1,4 +1,4 @@
-//! One environment and one step of it, as a table of contents.
+//! The fast engine, with the order of the phases in a step.
 
 use std::sync::Arc;
 
@@ -9,15 +9,15 @@ use rayon::ThreadPool;
 use crate::grid::{Board, FREE, Strips, num_bytes};
 use crate::simd::SimdPath;
 
-/// One environment that plays by POGEMA 1.4.0's rules, on bits.
+/// The fast engine: one environment with the rules of POGEMA 1.4.0, on bit sets.
 ///
-/// After a reset nothing is allocated.
+/// It allocates no memory after a reset.
 #[derive(Debug)]
 pub struct Engine {
     pub(crate) config: Config,
     pub(crate) path: SimdPath,
     pub(crate) pool: Option<Arc<ThreadPool>>,
-    /// Of the map without its border; 0 before the first reset.
+    /// Height of the map without its border; 0 before the first reset.
     pub(crate) height: usize,
     pub(crate) width: usize,
     pub(crate) obstacles: Strips,
@@ -29,29 +29,29 @@ pub struct Engine {
     pub(crate) active: Vec<bool>,
     pub(crate) on_goal: Vec<bool>,
     pub(crate) num_on_goal: usize,
-    /// While a step is played: the place each agent aims at.
+    /// While a step is played: the square that each agent requests.
     pub(crate) targets: Vec<u32>,
-    /// While a step is played: what stood at that place before.
+    /// While a step is played: the content of that square before the step.
     pub(crate) ahead: Vec<u32>,
     pub(crate) step: u64,
 }
 
 impl Engine {
-    /// Most agents of one environment.
+    /// Largest number of agents of one environment.
     pub const MOST_AGENTS: usize = FREE as usize - 1;
 
-    /// An environment for a config; it wants a reset first.
+    /// Creates an environment for a config. Call `reset` or `start` before `step`.
     ///
     /// # Errors
-    /// If the config is out of range, or `POGEMA_SIMD` names no path that this machine has.
+    /// If the config is out of range, or `POGEMA_SIMD` is not the name of a path that this machine supports.
     pub fn new(config: Config) -> Result<Self, Error> {
         Self::with_path(config, SimdPath::from_environment()?)
     }
 
-    /// An environment that observes by a given path.
+    /// Creates an environment that computes observations with a given path.
     ///
     /// # Errors
-    /// If the config is out of range or this machine does not have the path.
+    /// If the config is out of range or this machine does not support the path.
     pub fn with_path(config: Config, path: SimdPath) -> Result<Self, Error> {
         config.check()?;
         path.check()?;
@@ -80,57 +80,58 @@ impl Engine {
         })
     }
 
-    /// The same environment, its steps and observations spread over the threads of a pool. Worth it from about
-    /// ten thousand agents on; what comes out is the same.
+    /// Spreads steps and observations over the threads of a pool.
+    ///
+    /// The results are the same. A pool pays off from about ten thousand agents on.
     #[must_use]
     pub fn with_pool(mut self, pool: Arc<ThreadPool>) -> Self {
         self.pool = Some(pool);
         self
     }
 
-    /// Begins an episode, taking the instance's goals over instead of copying them.
+    /// Begins an episode like `reset`, but moves the instance's goals instead of copying them.
     ///
     /// # Errors
-    /// If the instance does not fit the config, or memory does not suffice.
+    /// If the instance does not fit the config, or there is not enough memory.
     pub fn start(&mut self, instance: Instance) -> Result<(), Error> {
         instance.check_fits(&self.config)?;
-        self.fit(instance.map().height(), instance.map().width())?;
-        self.lay_out(&instance);
+        self.resize(instance.map().height(), instance.map().width())?;
+        self.load(&instance);
         self.streams = instance.into_goals();
         Ok(())
     }
 
-    /// The size of the map, as rows and columns, without its border; 0 before the first reset.
+    /// Returns the numbers of rows and columns of the map without its border; both are 0 before the first reset.
     pub fn size(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// Where each agent is; a finished agent stays where it finished.
+    /// Returns the cell of each agent; a finished agent stays where it finished.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
-    /// Where each agent wants to go now.
+    /// Returns the current goal of each agent.
     pub fn goals(&self) -> &[Cell] {
         &self.goals
     }
 
-    /// The goals of each agent that are still to come.
+    /// Returns the goal stream of each agent.
     pub fn streams(&self) -> &[GoalStream] {
         &self.streams
     }
 
-    /// Which agents still take part.
+    /// Returns which agents are still active.
     pub fn active(&self) -> &[bool] {
         &self.active
     }
 
-    /// Steps since the reset, less those taken back.
+    /// Returns the number of steps since the reset, undone steps excluded.
     pub fn num_steps(&self) -> u64 {
         self.step
     }
 
-    /// Bytes that the environment holds, apart from what its goal streams hold behind pointers.
+    /// Returns the number of bytes that the environment uses, except data that goal streams hold behind pointers.
     pub fn num_bytes(&self) -> usize {
         let lists = [
             self.obstacles.num_bytes(),
@@ -151,8 +152,8 @@ impl Engine {
         if self.cells.is_empty() { Err(Error::NotReset) } else { Ok(()) }
     }
 
-    /// Makes room for a map of a size; the only place where memory is asked for.
-    fn fit(&mut self, height: usize, width: usize) -> Result<(), Error> {
+    /// Allocates memory for a map of a given size. No other function allocates memory for the map.
+    fn resize(&mut self, height: usize, width: usize) -> Result<(), Error> {
         if (height, width) == (self.height, self.width) {
             return Ok(());
         }
@@ -169,7 +170,7 @@ impl Engine {
     }
 
     /// Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
-    fn lay_out(&mut self, instance: &Instance) {
+    fn load(&mut self, instance: &Instance) {
         let num_agents = self.config.num_agents;
         self.obstacles.write_obstacles(instance, self.config.radius);
         self.board.write_obstacles(instance.map().obstacles());
@@ -183,7 +184,7 @@ impl Engine {
         self.on_goal.resize(num_agents, false);
         self.step = 0;
         self.occupied.clear_all();
-        self.take_squares();
+        self.place_agents();
         for &start in instance.starts() {
             self.mark(start);
         }
@@ -198,8 +199,8 @@ impl Environment for Engine {
 
     fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
         instance.check_fits(&self.config)?;
-        self.fit(instance.map().height(), instance.map().width())?;
-        self.lay_out(instance);
+        self.resize(instance.map().height(), instance.map().width())?;
+        self.load(instance);
         self.streams.clear();
         self.streams.extend_from_slice(instance.goals());
         Ok(())

@@ -1,4 +1,4 @@
-//! After a reset nothing is allocated, and what was is told.
+//! No allocations after a reset, and the reported number of allocated bytes.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,7 +13,7 @@ const NUM_AGENTS: usize = 24;
 const SIDE: usize = 9;
 const NUM_STEPS: usize = 40;
 
-/// Agents in the upper half of a small map, each with one goal or three.
+/// Returns agents in the upper half of a small map, each with one goal or three.
 fn instance(num_goals: usize) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|index| index % 11 == 3).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
@@ -31,7 +31,7 @@ fn instance(num_goals: usize) -> Instance {
     Instance::new(map, Outside::Free, free[..NUM_AGENTS].to_vec(), goals).unwrap()
 }
 
-/// Buffers of a caller.
+/// The buffers of a caller.
 struct Buffers {
     rewards: Vec<f32>,
     terminated: Vec<bool>,
@@ -62,7 +62,7 @@ impl Buffers {
     }
 }
 
-/// Plays some steps, observing in every way; says how many goals were reached.
+/// Plays some steps with every kind of observation, and returns how many goals were reached.
 fn play(engine: &mut Engine, buffers: &mut Buffers) -> f32 {
     let mut num_reached = 0.0;
     for step in 0..NUM_STEPS {
@@ -100,14 +100,18 @@ fn check(config: Config, path: SimdPath) {
         let mut num_reached = 0.0;
         let info = measure(|| num_reached = play(&mut engine, &mut buffers));
         assert_eq!(info.count_total, 0, "{path} {num_goals} goals {config:?}");
-        // Without goals reached, nothing that happens at goals was seen.
+        // If no goal is reached, the test does not cover the effects of reaching goals.
         assert!(config.on_goal == OnGoal::Nothing || num_reached > 0.0, "{config:?}");
     }
 }
 
 #[test]
 fn nothing_is_allocated_after_a_reset() {
-    assert_ne!(measure(|| drop(std::hint::black_box(vec![0u8; 100]))).count_total, 0, "nothing is counted");
+    assert_ne!(
+        measure(|| drop(std::hint::black_box(vec![0u8; 100]))).count_total,
+        0,
+        "the counter misses allocations"
+    );
     for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
         for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
             for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
@@ -136,7 +140,7 @@ fn nothing_is_allocated_after_a_reset() {
 }
 
 #[test]
-fn the_bytes_told_are_the_bytes_held() {
+fn num_bytes_matches_the_allocated_bytes() {
     for (num_agents, radius) in [(1, 1), (2, 1), (NUM_AGENTS, 1), (NUM_AGENTS, 17)] {
         let config = Config { num_agents, radius, ..Config::default() };
         let instance = {
@@ -144,19 +148,19 @@ fn the_bytes_told_are_the_bytes_held() {
             let (starts, goals) = (all.starts()[..num_agents].to_vec(), all.goals()[..num_agents].to_vec());
             Instance::new(all.map().clone(), Outside::Free, starts, goals).unwrap()
         };
-        let mut told = 0;
+        let mut reported = 0;
         let mut engine = None;
         let info = measure(|| {
             let engine = engine.insert(Engine::with_path(config, SimdPath::Scalar).unwrap());
             engine.reset(&instance).unwrap();
-            told = engine.num_bytes();
+            reported = engine.num_bytes();
         });
-        assert_eq!(info.bytes_current, (told - size_of::<Engine>()) as i64, "{num_agents} {radius}");
+        assert_eq!(info.bytes_current, (reported - size_of::<Engine>()) as i64, "{num_agents} {radius}");
     }
 }
 
 #[test]
-fn a_cell_takes_ten_bytes_at_most() {
+fn a_cell_takes_at_most_ten_bytes() {
     let (side, radius) = (700, 17);
     let map = Map::new(side, side, vec![false; side * side]).unwrap();
     let (start, goal) = (map.cell_at(0), map.cell_at(1));

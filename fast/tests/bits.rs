@@ -1,4 +1,4 @@
-//! Windows cut out of strips hold what plain indexing of the map finds.
+//! Comparison of the windows extracted from strips with plain indexing of the map.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -6,15 +6,15 @@ use pogema_core::{Cell, Config, Environment, GoalStream, Instance, Map, Outside}
 use pogema_fast::{Engine, SimdPath, words_per_agent};
 use quickcheck::{Arbitrary, Gen, QuickCheck};
 
-/// Miri, which looks at every access to memory, has time for a few small scenes.
-const NUM_SCENES: u64 = if cfg!(miri) { 50 } else { 400 };
+/// Miri checks every memory access, so it only has time for a few small instances.
+const NUM_INSTANCES: u64 = if cfg!(miri) { 50 } else { 400 };
 const MOST_ROWS: usize = if cfg!(miri) { 3 } else { 12 };
 const MOST_COLS: usize = if cfg!(miri) { 80 } else { 200 };
 const MOST_AGENTS: usize = if cfg!(miri) { 4 } else { 20 };
 
-/// A map, often wide, with some agents on it.
+/// A random map, often wide, with some agents on it.
 #[derive(Clone, Debug)]
-struct WindowSource {
+struct RandomInstance {
     height: usize,
     width: usize,
     radius: usize,
@@ -32,7 +32,7 @@ fn any_cell(g: &mut Gen, height: usize, width: usize) -> Cell {
     Cell::new(below(g, height) as u16, below(g, width) as u16)
 }
 
-impl Arbitrary for WindowSource {
+impl Arbitrary for RandomInstance {
     fn arbitrary(g: &mut Gen) -> Self {
         let (height, width) = (1 + below(g, MOST_ROWS), 1 + below(g, MOST_COLS));
         let radius = match below(g, 8) {
@@ -51,30 +51,30 @@ impl Arbitrary for WindowSource {
     }
 
     fn shrink(&self) -> Box<dyn Iterator<Item = Self>> {
-        let plain = |scene: &Self| Self { has_noise: false, ..scene.clone() };
-        let free = |scene: &Self| Self { obstacles: vec![false; scene.obstacles.len()], ..scene.clone() };
-        let narrow = |scene: &Self| Self { radius: scene.radius.max(2) - 1, ..scene.clone() };
-        let lonely = |agent: usize| Self {
+        let plain = |sample: &Self| Self { has_noise: false, ..sample.clone() };
+        let free = |sample: &Self| Self { obstacles: vec![false; sample.obstacles.len()], ..sample.clone() };
+        let narrow = |sample: &Self| Self { radius: sample.radius.max(2) - 1, ..sample.clone() };
+        let single = |agent: usize| Self {
             starts: vec![self.starts[agent]],
             goals: vec![self.goals[agent]],
             ..self.clone()
         };
         let mut smaller = vec![plain(self), free(self), narrow(self)];
-        smaller.extend((0..self.starts.len()).filter(|_| self.starts.len() > 1).map(lonely));
-        let is_smaller = |scene: &Self| {
-            (scene.has_noise, &scene.obstacles, scene.radius, scene.starts.len())
+        smaller.extend((0..self.starts.len()).filter(|_| self.starts.len() > 1).map(single));
+        let is_smaller = |sample: &Self| {
+            (sample.has_noise, &sample.obstacles, sample.radius, sample.starts.len())
                 != (self.has_noise, &self.obstacles, self.radius, self.starts.len())
         };
         Box::new(smaller.into_iter().filter(is_smaller).collect::<Vec<_>>().into_iter())
     }
 }
 
-impl WindowSource {
+impl RandomInstance {
     fn config(&self) -> Config {
         Config { num_agents: self.starts.len(), radius: self.radius, ..Config::default() }
     }
 
-    /// Whether the noise has an obstacle, counted from the corner of the border.
+    /// Returns whether the noise has an obstacle at a cell counted from the corner of the border.
     fn is_noise(row: usize, col: usize) -> bool {
         (row * 7 + col * 11 + row * col).is_multiple_of(3)
     }
@@ -89,7 +89,7 @@ impl WindowSource {
         Instance::new(map, outside, self.starts.clone(), goals).unwrap()
     }
 
-    /// Whether there is an obstacle at a place counted from the map's corner, on the map, its wall or beyond.
+    /// Returns whether a cell counted from the map's corner is an obstacle, be it on the map, the wall or the outside.
     fn is_obstacle(&self, row: i32, col: i32) -> bool {
         let (height, width, border) = (self.height as i32, self.width as i32, self.radius as i32);
         if (0..height).contains(&row) && (0..width).contains(&col) {
@@ -103,7 +103,7 @@ impl WindowSource {
         self.starts.iter().any(|start| (i32::from(start.row), i32::from(start.col)) == (row, col))
     }
 
-    /// What an agent sees: obstacles, agents, goal.
+    /// Returns the observation of an agent: obstacles, agents, goal.
     fn window(&self, agent: usize) -> Vec<bool> {
         let radius = self.radius as i32;
         let (start, goal) = (self.starts[agent], self.goals[agent]);
@@ -118,41 +118,41 @@ impl WindowSource {
     }
 }
 
-/// Bits in words, from the lowest bit of the first word on.
+/// Packs bits into words, from the lowest bit of the first word on.
 fn pack(bits: &[bool]) -> Vec<u64> {
     let word = |bits: &[bool]| bits.iter().rev().fold(0, |word, &bit| word << 1 | u64::from(bit));
     bits.chunks(64).map(word).collect()
 }
 
-fn bits_are_what_indexing_finds(scene: WindowSource) -> bool {
-    let num_agents = scene.starts.len();
-    let want: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&scene.window(agent))).collect();
+fn bits_match_indexing(sample: RandomInstance) -> bool {
+    let num_agents = sample.starts.len();
+    let expected: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&sample.window(agent))).collect();
     SimdPath::ALL.into_iter().filter(|path| path.is_available()).all(|path| {
-        let mut engine = Engine::with_path(scene.config(), path).unwrap();
-        engine.reset(&scene.instance()).unwrap();
-        let mut got = vec![u64::MAX; num_agents * words_per_agent(scene.radius)];
+        let mut engine = Engine::with_path(sample.config(), path).unwrap();
+        engine.reset(&sample.instance()).unwrap();
+        let mut got = vec![u64::MAX; num_agents * words_per_agent(sample.radius)];
         engine.observe_bits(0..num_agents, &mut got).unwrap();
-        want == got
+        expected == got
     })
 }
 
 #[test]
 fn windows_hold_what_indexing_finds() {
-    QuickCheck::new().tests(NUM_SCENES).quickcheck(bits_are_what_indexing_finds as fn(WindowSource) -> bool);
+    QuickCheck::new().tests(NUM_INSTANCES).quickcheck(bits_match_indexing as fn(RandomInstance) -> bool);
 }
 
-/// Every column of a map in turn, so that windows of every width meet every border between strips.
+/// Tests every column of a map, so that windows of every width cross every boundary between strips.
 #[test]
 fn windows_hold_what_indexing_finds_at_every_column() {
     const WIDTH: usize = 200;
     for radius in [1, 2, 5, 6, 15, 16, 17, 31, 32, 33, 48, 64, 96, 128] {
         let obstacles = (0..2 * WIDTH).map(|index| (index * index / 7) % 3 == 0).collect();
         for first in 0..if radius > 33 { 4 } else { 20 } {
-            // A few agents at a time, so that the windows of agents differ.
+            // Few agents at a time, so that the windows of the agents differ.
             let cols = (first..WIDTH).step_by(if radius > 33 { 37 } else { 20 });
             let starts: Vec<Cell> = cols.map(|col| Cell::new((col % 2) as u16, col as u16)).collect();
             let goals = starts.iter().map(|start| Cell::new(0, 199 - start.col)).collect();
-            let scene = WindowSource {
+            let sample = RandomInstance {
                 height: 2,
                 width: WIDTH,
                 radius,
@@ -161,7 +161,7 @@ fn windows_hold_what_indexing_finds_at_every_column() {
                 goals,
                 has_noise: radius % 2 == 0,
             };
-            assert!(bits_are_what_indexing_finds(scene.clone()), "{scene:?}");
+            assert!(bits_match_indexing(sample.clone()), "{sample:?}");
         }
     }
 }

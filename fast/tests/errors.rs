@@ -1,4 +1,4 @@
-//! Wrong calls are refused with the numbers that do not fit, and change nothing.
+//! Wrong calls are rejected with messages that name the wrong numbers, and change nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -19,7 +19,7 @@ const CONFIG: Config = Config {
     reward: pogema_core::Reward::Own,
     persistent: false,
 };
-/// Values of one agent: three windows of five by five.
+/// Number of values of one agent: three windows of five by five.
 const PER_AGENT: usize = 75;
 
 fn instance(num_agents: usize, outside: Outside) -> Instance {
@@ -42,30 +42,30 @@ fn step(engine: &mut Engine, lengths: [usize; 4]) -> Result<(), Error> {
     let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
     let outcome = engine.step(&vec![Action::Down; num_actions], out);
     if outcome.is_err() {
-        assert!(rewards.iter().all(|&reward| reward == 7.0), "an error wrote rewards");
-        assert!(terminated.iter().chain(&truncated).all(|&flag| flag), "an error wrote flags");
+        assert!(rewards.iter().all(|&reward| reward == 7.0), "a failed call wrote rewards");
+        assert!(terminated.iter().chain(&truncated).all(|&flag| flag), "a failed call wrote flags");
     }
     outcome
 }
 
-/// Passes if the call failed with these words and the engine plays on as if there had been none.
-fn check_refused(engine: &mut Engine, outcome: Result<(), Error>, want: &str) {
-    assert_eq!(outcome.unwrap_err().to_string(), want);
+/// Checks that the call failed with this message, and that the engine continues as if the call had not been made.
+fn check_rejected(engine: &mut Engine, outcome: Result<(), Error>, expected: &str) {
+    assert_eq!(outcome.unwrap_err().to_string(), expected);
     let mut fresh = started();
-    assert_eq!(engine.snapshot(), fresh.snapshot(), "{want}");
+    assert_eq!(engine.snapshot(), fresh.snapshot(), "{expected}");
     let (mut seen, mut seen_fresh) = (vec![7.0; 3 * PER_AGENT], vec![7.0; 3 * PER_AGENT]);
     step(engine, [3; 4]).unwrap();
     step(&mut fresh, [3; 4]).unwrap();
     engine.observe(&mut seen).unwrap();
     fresh.observe(&mut seen_fresh).unwrap();
-    assert_eq!((engine.snapshot(), seen), (fresh.snapshot(), seen_fresh), "{want}");
+    assert_eq!((engine.snapshot(), seen), (fresh.snapshot(), seen_fresh), "{expected}");
     engine.reset(&instance(3, Outside::Free)).unwrap();
 }
 
 #[test]
-fn wrong_steps_are_refused() {
+fn wrong_steps_are_rejected() {
     let mut engine = started();
-    for (lengths, want) in [
+    for (lengths, expected) in [
         ([2, 3, 3, 3], "actions has length 2, expected 3"),
         ([4, 3, 3, 3], "actions has length 4, expected 3"),
         ([3, 5, 3, 3], "rewards has length 5, expected 3"),
@@ -73,17 +73,17 @@ fn wrong_steps_are_refused() {
         ([3, 3, 3, 1], "truncated has length 1, expected 3"),
     ] {
         let outcome = step(&mut engine, lengths);
-        check_refused(&mut engine, outcome, want);
+        check_rejected(&mut engine, outcome, expected);
     }
     let outcome = engine.restore(0, &Snapshot::default());
-    check_refused(&mut engine, outcome, "the state does not fit the map and its agents");
+    check_rejected(&mut engine, outcome, "the state does not fit the map and its agents");
 }
 
 #[test]
-fn wrong_agents_are_refused() {
+fn wrong_agents_are_rejected() {
     let mut engine = started();
     let backwards = std::ops::Range { start: 2, end: 1 };
-    for (agents, want) in [
+    for (agents, expected) in [
         (0..4, "config: `agents` is `0..4`, expected within 0..3"),
         (4..4, "config: `agents` is `4..4`, expected within 0..3"),
         (backwards, "config: `agents` is `2..1`, expected within 0..3"),
@@ -95,22 +95,26 @@ fn wrong_agents_are_refused() {
             engine.observe_agents(agents.clone(), &mut bytes),
             engine.observe_bits(agents, &mut words),
         ];
-        assert_eq!((values, bytes, words), ([7.0; PER_AGENT], [7; PER_AGENT], [7; 2]), "an error wrote");
+        assert_eq!(
+            (values, bytes, words),
+            ([7.0; PER_AGENT], [7; PER_AGENT], [7; 2]),
+            "a failed call wrote values"
+        );
         for outcome in outcomes {
-            check_refused(&mut engine, outcome, want);
+            check_rejected(&mut engine, outcome, expected);
         }
     }
 }
 
 #[test]
-fn wrong_buffers_are_refused() {
+fn wrong_buffers_are_rejected() {
     let mut engine = started();
     let all = 3 * PER_AGENT;
     assert_eq!(words_per_agent(CONFIG.radius), 2);
-    for (got, want) in
+    for (got, expected) in
         [(all - 1, "224, expected 225"), (all + 1, "226, expected 225"), (0, "0, expected 225")]
     {
-        let want = format!("observations has length {want}");
+        let expected = format!("observations has length {expected}");
         let (mut values, mut bytes) = (vec![7.0; got], vec![7u8; got]);
         let outcomes = [
             engine.observe(&mut values),
@@ -119,51 +123,51 @@ fn wrong_buffers_are_refused() {
         ];
         assert!(values.iter().all(|&value| value == 7.0) && bytes.iter().all(|&byte| byte == 7));
         for outcome in outcomes {
-            check_refused(&mut engine, outcome, &want);
+            check_rejected(&mut engine, outcome, &expected);
         }
     }
     let outcome = engine.observe_agents(1..2, &mut [7u8; 74]);
-    check_refused(&mut engine, outcome, "observations has length 74, expected 75");
+    check_rejected(&mut engine, outcome, "observations has length 74, expected 75");
     let outcome = engine.observe_agents(1..1, &mut [7f32; 1]);
-    check_refused(&mut engine, outcome, "observations has length 1, expected 0");
+    check_rejected(&mut engine, outcome, "observations has length 1, expected 0");
     let outcome = engine.observe_bits(0..2, &mut [7; 3]);
-    check_refused(&mut engine, outcome, "observations has length 3, expected 4");
+    check_rejected(&mut engine, outcome, "observations has length 3, expected 4");
 }
 
 #[test]
-fn wrong_arrays_are_refused() {
+fn wrong_arrays_are_rejected() {
     let mut engine = started();
-    for (lengths, want) in
+    for (lengths, expected) in
         [([74, 75], "obstacles has length 74, expected 75"), ([75, 74], "agents has length 74, expected 75")]
     {
         let [mut obstacles, mut agents] = lengths.map(|length| vec![7.0; length]);
         let outcome = engine.observe_windows(&mut obstacles, &mut agents);
-        assert!(obstacles.iter().chain(&agents).all(|&value| value == 7.0), "an error wrote");
-        check_refused(&mut engine, outcome, want);
+        assert!(obstacles.iter().chain(&agents).all(|&value| value == 7.0), "a failed call wrote values");
+        check_rejected(&mut engine, outcome, expected);
     }
     let outcome = engine.observe_map(&mut [7; 57]);
-    check_refused(&mut engine, outcome, "global obstacles has length 57, expected 56");
+    check_rejected(&mut engine, outcome, "global obstacles has length 57, expected 56");
 }
 
 #[test]
-fn wrong_instances_are_refused() {
+fn wrong_instances_are_rejected() {
     let mut engine = started();
     let outcome = engine.reset(&instance(4, Outside::Free));
-    check_refused(&mut engine, outcome, "starts has length 4, expected 3");
+    check_rejected(&mut engine, outcome, "starts has length 4, expected 3");
     let outcome = engine.start(instance(2, Outside::Free));
-    check_refused(&mut engine, outcome, "starts has length 2, expected 3");
+    check_rejected(&mut engine, outcome, "starts has length 2, expected 3");
     // The map has 3 rows and 4 columns; the border adds 4 to each.
     let noise = |height, width| Outside::Noise(Map::new(height, width, vec![false; height * width]).unwrap());
     let outcome = engine.reset(&instance(3, noise(8, 8)));
-    check_refused(&mut engine, outcome, "rows of noise has length 8, expected 7");
+    check_rejected(&mut engine, outcome, "rows of noise has length 8, expected 7");
     let outcome = engine.start(instance(3, noise(7, 5)));
-    check_refused(&mut engine, outcome, "columns of noise has length 5, expected 8");
+    check_rejected(&mut engine, outcome, "columns of noise has length 5, expected 8");
 }
 
 #[test]
-fn nothing_is_played_before_a_reset() {
+fn every_call_fails_before_a_reset() {
     let mut engine = Engine::new(CONFIG).unwrap();
-    let want = "the environment was not reset yet";
+    let expected = "the environment was not reset yet";
     let mut values = [7.0; 3 * PER_AGENT];
     let outcomes = [
         step(&mut engine, [3; 4]),
@@ -176,14 +180,14 @@ fn nothing_is_played_before_a_reset() {
         engine.observe_bits(0..0, &mut []),
     ];
     for outcome in outcomes {
-        assert_eq!(outcome.unwrap_err().to_string(), want);
+        assert_eq!(outcome.unwrap_err().to_string(), expected);
     }
     assert_eq!((engine.snapshot(), engine.size()), (pogema_core::Snapshot::default(), (0, 0)));
 }
 
 #[test]
-fn wrong_configs_are_refused() {
-    for (config, want) in [
+fn wrong_configs_are_rejected() {
+    for (config, expected) in [
         (Config { num_agents: 0, ..CONFIG }, "config: `num_agents` is `0`, expected at least 1"),
         (Config { radius: 0, ..CONFIG }, "config: `radius` is `0`, expected 1 to 128"),
         (Config { radius: 129, ..CONFIG }, "config: `radius` is `129`, expected 1 to 128"),
@@ -193,14 +197,14 @@ fn wrong_configs_are_refused() {
         ),
     ] {
         let error = Engine::with_path(config, SimdPath::Scalar).map(|_| ()).unwrap_err();
-        assert_eq!(error.to_string(), want);
+        assert_eq!(error.to_string(), expected);
     }
     for path in SimdPath::ALL.into_iter().filter(|path| !path.is_available()) {
         let error = Engine::with_path(CONFIG, path).map(|_| ()).unwrap_err();
-        let want = format!(
+        let expected = format!(
             "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
             SimdPath::best()
         );
-        assert_eq!(error.to_string(), want);
+        assert_eq!(error.to_string(), expected);
     }
 }

@@ -1,4 +1,5 @@
-//! Every path of this machine writes what the plain one writes, wherever a buffer begins, and nothing beside it.
+//! Every path of this machine writes the same values as the scalar path, at every alignment of the buffer, and writes
+//! nothing outside the buffer.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,12 +12,12 @@ use pogema_fast::{Engine, SimdPath, Value, words_per_agent};
 const MOST_AGENTS: usize = 70;
 const MOST_OFFSET: usize = 70;
 
-/// Agents all over a map whose columns lie in several strips.
+/// Returns agents spread over a map whose columns lie in several strips.
 fn instance(num_agents: usize) -> Instance {
     let (height, width) = (24, 75);
     let obstacles = (0..height * width).map(|index| index * index % 13 < 4).collect();
     let map = Map::new(height, width, obstacles).unwrap();
-    // 1009 has no divisor in common with the number of cells, so that no cell comes twice.
+    // 1009 has no divisor in common with the number of cells, so no cell occurs twice.
     let cell = |index: usize| map.cell_at(index * 1009 % (height * width));
     let starts: Vec<Cell> = (0..num_agents).map(cell).collect();
     let goals = (0..num_agents).map(|agent| GoalStream::single(cell(agent * 3 + 5))).collect();
@@ -34,42 +35,42 @@ fn available() -> impl Iterator<Item = SimdPath> {
     SimdPath::ALL.into_iter().filter(|path| path.is_available())
 }
 
-/// Writes into a part of a buffer that begins `offset` values after its beginning; checks all of the buffer.
-fn check_part<V: Value + From<u8>>(engine: &Engine, want: &[u8], offset: usize, about: &str) {
+/// Writes into the part of a buffer that begins at index `offset`, and checks the whole buffer.
+fn check_part<V: Value + From<u8>>(engine: &Engine, expected: &[u8], offset: usize, about: &str) {
     let num_agents = engine.config().num_agents;
-    let beside = V::from(9);
-    let mut buffer = vec![beside; offset + want.len() + MOST_OFFSET];
-    engine.observe_agents(0..num_agents, &mut buffer[offset..offset + want.len()]).unwrap();
+    let untouched = V::from(9);
+    let mut buffer = vec![untouched; offset + expected.len() + MOST_OFFSET];
+    engine.observe_agents(0..num_agents, &mut buffer[offset..offset + expected.len()]).unwrap();
     let (before, rest) = buffer.split_at(offset);
-    let (values, after) = rest.split_at(want.len());
-    assert!(before.iter().chain(after).all(|&value| value == beside), "{about}: wrote beside the buffer");
-    let wrong = values.iter().zip(want).position(|(&value, &byte)| value != V::from(byte));
-    assert_eq!(wrong, None, "{about}: the first wrong value");
+    let (values, after) = rest.split_at(expected.len());
+    assert!(before.iter().chain(after).all(|&value| value == untouched), "{about}: wrote outside the buffer");
+    let wrong = values.iter().zip(expected).position(|(&value, &byte)| value != V::from(byte));
+    assert_eq!(wrong, None, "{about}: index of the first wrong value");
 }
 
 fn check_parts(num_agents: usize, radius: usize, offset: usize) {
-    let mut want = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
-    engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut want).unwrap();
+    let mut expected = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
+    engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut expected).unwrap();
     for path in available() {
         let engine = engine(num_agents, radius, path);
         let about = format!("{path}, {num_agents} agents, radius {radius}, offset {offset}");
-        check_part::<u8>(&engine, &want, offset, &about);
-        check_part::<f32>(&engine, &want, offset, &about);
+        check_part::<u8>(&engine, &expected, offset, &about);
+        check_part::<f32>(&engine, &expected, offset, &about);
     }
 }
 
 #[test]
-fn paths_write_the_same_wherever_a_buffer_begins() {
+fn paths_write_the_same_at_every_alignment() {
     for radius in 1..=20 {
         for offset in 0..=MOST_OFFSET {
-            // All numbers of agents come up with every radius.
+            // Every number of agents occurs with every radius.
             check_parts(1 + (offset * 13 + radius) % MOST_AGENTS, radius, offset);
         }
     }
 }
 
 #[test]
-fn paths_write_the_same_windows_of_great_radius() {
+fn paths_write_the_same_windows_of_large_radius() {
     for (radius, most_agents) in [(33, 7), (64, 4), (128, 2)] {
         for offset in 0..=MOST_OFFSET {
             check_parts(1 + offset % most_agents, radius, offset);
@@ -77,7 +78,7 @@ fn paths_write_the_same_windows_of_great_radius() {
     }
 }
 
-/// More agents than fit one block, and buffers larger than any cache, which are written another way.
+/// Tests more agents than fit in one block, and buffers that are written with stores that bypass the cache.
 #[test]
 fn paths_write_the_same_into_buffers_beyond_the_cache() {
     for (num_agents, offset) in [(90, 0), (90, 5), (345, 0), (345, 5)] {
@@ -86,11 +87,11 @@ fn paths_write_the_same_into_buffers_beyond_the_cache() {
 }
 
 #[test]
-fn paths_give_the_same_bits_of_any_agents() {
+fn paths_write_the_same_bits_of_any_agents() {
     for radius in (1..=20).chain([33, 64, 128]) {
         let per_agent = words_per_agent(radius);
-        let mut want = vec![u64::MAX; MOST_AGENTS * per_agent];
-        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut want).unwrap();
+        let mut expected = vec![u64::MAX; MOST_AGENTS * per_agent];
+        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut expected).unwrap();
         for path in available() {
             let engine = engine(MOST_AGENTS, radius, path);
             for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
@@ -98,18 +99,18 @@ fn paths_give_the_same_bits_of_any_agents() {
                 engine.observe_bits(first..last, &mut got[1..=(last - first) * per_agent]).unwrap();
                 let (got, after) = got.split_at((last - first) * per_agent + 1);
                 let about = format!("{path}, agents {first}..{last}, radius {radius}");
-                assert_eq!(got[1..], want[first * per_agent..last * per_agent], "{about}");
+                assert_eq!(got[1..], expected[first * per_agent..last * per_agent], "{about}");
                 assert_eq!((got[0], after), (u64::MAX, [u64::MAX].as_slice()), "{about}");
             }
         }
     }
 }
 
-/// Set in the child processes of the test below, which are told to do something else then.
+/// The environment variable that makes a child process of the test below only print its path.
 const IS_CHILD: &str = "POGEMA_FAST_TEST_CHILD";
 
 #[test]
-fn the_variable_names_a_path_or_is_an_error() {
+fn the_variable_is_a_path_or_an_error() {
     if std::env::var_os(IS_CHILD).is_some() {
         let made = Engine::new(Config::default()).map(|_| ());
         let path = SimdPath::from_environment();
@@ -119,32 +120,32 @@ fn the_variable_names_a_path_or_is_an_error() {
     }
     assert_eq!(child(None), SimdPath::best().to_string());
     for path in SimdPath::ALL {
-        let too_much = format!(
+        let unavailable = format!(
             "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
             SimdPath::best()
         );
-        let want = if path.is_available() { path.to_string() } else { too_much };
-        assert_eq!(child(Some(path.to_string().as_ref())), want);
+        let expected = if path.is_available() { path.to_string() } else { unavailable };
+        assert_eq!(child(Some(path.to_string().as_ref())), expected);
     }
     for name in ["", "AVX2", "sse", "scalar ", "avx512,avx2"] {
-        let want = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
-        assert_eq!(child(Some(name.as_ref())), want);
+        let expected = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
+        assert_eq!(child(Some(name.as_ref())), expected);
     }
 }
 
 #[cfg(unix)]
 #[test]
-fn a_variable_that_is_no_text_is_an_error() {
+fn a_variable_that_is_not_text_is_an_error() {
     use std::os::unix::ffi::OsStringExt;
     let name = OsString::from_vec(vec![b'a', 0xff]);
-    let want = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
-    assert_eq!(child(Some(&name)), want);
+    let expected = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
+    assert_eq!(child(Some(&name)), expected);
 }
 
-/// What another process says of its path, with the variable set there.
+/// Returns the path or error that a child process prints with this value of the variable.
 fn child(variable: Option<&OsStr>) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "the_variable_names_a_path_or_is_an_error", "--nocapture"]);
+    command.args(["--exact", "the_variable_is_a_path_or_an_error", "--nocapture"]);
     command.env(IS_CHILD, "1").env_remove(SimdPath::VARIABLE);
     if let Some(value) = variable {
         command.env(SimdPath::VARIABLE, value);

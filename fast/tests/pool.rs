@@ -1,4 +1,4 @@
-//! An engine that shares its work among threads does the same as one that does not.
+//! An engine on several threads has the same results as an engine on one thread.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,10 +13,10 @@ use pogema_fast::{Engine, words_per_agent};
 const SIDE: usize = 150;
 const NUM_AGENTS: usize = 9000;
 const NUM_STEPS: usize = 20;
-/// Agents that are observed by themselves too, enough for several threads.
+/// Agents that are also observed without the others, enough for several threads.
 const SOME: std::ops::Range<usize> = 1234..8765;
 
-/// Numbers that look random, the same in every run.
+/// Pseudorandom numbers, the same in every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -26,7 +26,7 @@ impl Numbers {
     }
 }
 
-/// A crowd on a map of which a tenth is obstacles, the goals a few cells away.
+/// Returns many agents with near goals, on a map with a tenth of obstacles.
 fn instance(numbers: &mut Numbers) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(10) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
@@ -44,7 +44,7 @@ fn instance(numbers: &mut Numbers) -> Instance {
     Instance::new(map, Outside::Free, starts, goals).unwrap()
 }
 
-/// Everything there is to see after a step.
+/// All results and observations of a step.
 #[derive(PartialEq)]
 struct Seen {
     state: Snapshot,
@@ -94,23 +94,24 @@ fn check(config: Config, seed: u64) {
     let (mut num_moved, mut num_reached) = (0, 0.0);
     let mut cells = instance.starts().to_vec();
     for number in 0..NUM_STEPS {
-        // Most go the same way, so that there are long queues.
+        // Most agents move in the same direction, so that long queues form.
         let along = Action::ALL[1 + number / 3 % 4];
         let any = |numbers: &mut Numbers| Action::ALL.get(numbers.below(12)).copied().unwrap_or(along);
         let actions: Vec<Action> = (0..NUM_AGENTS).map(|_| any(&mut numbers)).collect();
-        let (want, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
-        assert!(want.state == got.state, "state, step {number}, {config:?}");
-        assert!(want == got, "results or observations, step {number}, {config:?}");
-        num_moved += cells.iter().zip(&want.state.cells).filter(|(before, after)| before != after).count();
-        num_reached += want.rewards.iter().sum::<f32>();
-        cells = want.state.cells;
+        let (expected, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
+        assert!(expected.state == got.state, "state, step {number}, {config:?}");
+        assert!(expected == got, "results or observations, step {number}, {config:?}");
+        num_moved +=
+            cells.iter().zip(&expected.state.cells).filter(|(before, after)| before != after).count();
+        num_reached += expected.rewards.iter().sum::<f32>();
+        cells = expected.state.cells;
     }
     assert!(num_moved > NUM_AGENTS, "only {num_moved} moves, {config:?}");
     assert!(num_reached > 500.0, "only {num_reached} goals, {config:?}");
 }
 
 #[test]
-fn threads_change_nothing() {
+fn threads_do_not_change_results() {
     let rules = [
         (Collision::Priority, OnGoal::Restart, Occupancy::AsReleased),
         (Collision::BlockBoth, OnGoal::Restart, Occupancy::AsReleased),

@@ -1,4 +1,4 @@
-//! An engine that is put into the middle of an episode plays on like the one that came there.
+//! An engine that resumes an episode continues like the original engine.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -29,7 +29,7 @@ fn step(engine: &mut Engine, number: usize) -> (Vec<f32>, Vec<bool>, Vec<bool>) 
 }
 
 #[test]
-fn a_resumed_episode_is_the_same() {
+fn a_resumed_episode_continues_like_the_original() {
     for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
         for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
             let config = Config { num_agents: 3, radius: 1, on_goal, collision, ..Config::default() };
@@ -48,7 +48,7 @@ fn a_resumed_episode_is_the_same() {
 }
 
 #[test]
-fn a_state_of_another_episode_is_refused() {
+fn a_state_of_another_episode_is_rejected() {
     let config = Config { num_agents: 3, radius: 1, ..Config::default() };
     let first = engine(config);
     let right = first.snapshot();

@@ -1,4 +1,4 @@
-//! What an engine tells of itself, beside its snapshot and what was played.
+//! Comparison of an engine's getters with its snapshot and the played actions.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,7 +11,7 @@ fn cell(row: u16, col: u16) -> Cell {
     Cell { row, col }
 }
 
-/// Two agents on a map of 2 x 3, each with goals enough.
+/// Returns two agents with three goals each, on a map of 2 x 3.
 fn instance() -> Instance {
     let goals = |cells: [Cell; 3]| GoalStream::sequence(cells[0], cells.into());
     let streams =
@@ -21,7 +21,7 @@ fn instance() -> Instance {
 }
 
 #[test]
-fn an_engine_tells_where_it_stands() {
+fn getters_return_the_current_state() {
     let config = Config {
         num_agents: 2,
         on_goal: OnGoal::Restart,
@@ -61,7 +61,7 @@ fn an_engine_tells_where_it_stands() {
 }
 
 #[test]
-fn an_agent_that_is_done_takes_no_part() {
+fn a_finished_agent_is_inactive() {
     let config = Config { num_agents: 2, on_goal: OnGoal::Finish, ..Config::default() };
     let mut engine = Engine::new(config).unwrap();
     engine.reset(&instance()).unwrap();
@@ -72,8 +72,8 @@ fn an_agent_that_is_done_takes_no_part() {
 }
 
 #[test]
-fn there_may_be_so_many_agents_and_not_one_more() {
-    let of = |num_agents| Engine::with_path(Config { num_agents, ..Config::default() }, SimdPath::Scalar);
-    assert!(of(Engine::MOST_AGENTS).is_ok());
-    assert!(of(Engine::MOST_AGENTS + 1).is_err());
+fn the_number_of_agents_is_limited() {
+    let engine = |num_agents| Engine::with_path(Config { num_agents, ..Config::default() }, SimdPath::Scalar);
+    assert!(engine(Engine::MOST_AGENTS).is_ok());
+    assert!(engine(Engine::MOST_AGENTS + 1).is_err());
 }

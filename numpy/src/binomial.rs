@@ -1,32 +1,32 @@
-//! Single trials: `binomial(1, p)`.
+//! Bernoulli trials: `binomial(1, p)`.
 
 use crate::{Generator, NumpyError};
 
-/// Trials of one probability, with everything that depends only on it worked out once.
+/// Trials with one probability, whose threshold is computed only once.
 ///
 /// Source: NumPy 1.26, `Generator.binomial(1, p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binomial1(Success);
 
-/// Which doubles `u` from 0 to 1 mean success.
+/// The doubles `u` from 0 to 1 that mean success.
 ///
-/// With `q` the larger of `p` and `1 - p`, NumPy's trial has the likelier outcome if `u` is at most `exp(log(q))`.
-/// That is `q` itself, since `q` is at least 0.5: rounding the logarithm moves it by less than half the distance
-/// to the next double, and the exponential rounds back. Comparing with `q` keeps the mathematics library of the
-/// machine out of the result. NumPy would draw again if `u - q` exceeded `(1 - q) * q / q`, but no `u` below 1
-/// does that.
+/// Let `q` be the larger of `p` and `1 - p`. NumPy's trial has the likelier outcome if `u` is at most `exp(log(q))`.
+/// This equals `q`, because `q` is at least 0.5: rounding the logarithm moves it by less than half the distance to
+/// the next double, and the exponential rounds back. Comparing with `q` makes the result independent of the
+/// machine's mathematics library. NumPy would draw again if `u - q` exceeded `(1 - q) * q / q`, but this is
+/// impossible for `u` below 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Success {
-    /// None; nothing is even drawn.
+    /// No double; the trial makes no draw.
     Never,
-    /// Those above a threshold: success is not the likelier outcome.
+    /// Doubles above a threshold: success is not the likelier outcome.
     Above(f64),
-    /// Those up to a threshold: success is the likelier outcome.
+    /// Doubles up to a threshold: success is the likelier outcome.
     UpTo(f64),
 }
 
 impl Binomial1 {
-    /// Trials that succeed with probability `p`.
+    /// Creates trials that succeed with probability `p`.
     ///
     /// # Errors
     /// [`NumpyError::BadProbability`] if `p` is below 0, above 1 or not a number.
@@ -39,12 +39,12 @@ impl Binomial1 {
         } else if p <= 0.5 {
             Success::Above(1.0 - p)
         } else {
-            // NumPy has 1 - (1 - p) here; both differences are exact for such p.
+            // NumPy computes 1 - (1 - p) here; both differences are exact for p above 0.5.
             Success::UpTo(p)
         }))
     }
 
-    /// One trial; one 64-bit draw, but none if `p` is 0.
+    /// Runs one trial, with one 64-bit draw, or with none if `p` is 0.
     #[inline]
     pub fn sample(&self, generator: &mut Generator) -> bool {
         match self.0 {
@@ -56,7 +56,7 @@ impl Binomial1 {
 }
 
 impl Generator {
-    /// One trial that succeeds with probability `p`; one 64-bit draw, but none if `p` is 0.
+    /// Runs one trial that succeeds with probability `p`, with one 64-bit draw, or with none if `p` is 0.
     ///
     /// # Errors
     /// [`NumpyError::BadProbability`] if `p` is below 0, above 1 or not a number.
@@ -67,7 +67,7 @@ impl Generator {
         Ok(Binomial1::new(p)?.sample(self))
     }
 
-    /// The same as `n` calls of [`Generator::binomial1`]; `put` receives the outcomes in order.
+    /// Runs `n` trials like [`Generator::binomial1`], and passes the outcomes to `put` in order.
     ///
     /// # Errors
     /// [`NumpyError::BadProbability`] if `p` is below 0, above 1 or not a number, even if `n` is 0.
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_certain_failure_is_not_drawn() {
+    fn only_probability_zero_makes_no_draw() {
         let mut generator = Generator::seeded(2);
         let mut plain = generator.clone();
         assert_eq!(generator.binomial1(0.0), Ok(false));
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_probability_is_refused() {
+    fn probabilities_out_of_range_are_rejected() {
         for p in [-f64::MIN_POSITIVE, 1.0 + f64::EPSILON, f64::NAN, f64::INFINITY] {
             assert!(Binomial1::new(p).is_err());
         }

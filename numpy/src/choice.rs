@@ -1,12 +1,12 @@
-//! One of several items, with and without weights.
+//! Random choice of one item, with and without weights.
 
 use crate::{Generator, NumpyError};
 
-/// How far from 1 the weights may sum: the square root of the double's epsilon, which is 2⁻²⁶.
+/// Largest accepted distance between the sum of the weights and 1: the square root of the double's epsilon, 2⁻²⁶.
 const SUM_TOLERANCE: f64 = 1.0 / (1_u64 << 26) as f64;
 
 impl Generator {
-    /// The index of one of `n` items, all equally likely; a single item is returned without a draw.
+    /// Draws the index of one of `n` equally likely items. A single item takes no draw.
     ///
     /// # Errors
     /// [`NumpyError::EmptyChoice`] if `n` is 0.
@@ -18,7 +18,7 @@ impl Generator {
         Ok(self.up_to(largest as u64) as usize)
     }
 
-    /// The index of one of several items, likely as their weights say; one 64-bit draw.
+    /// Draws the index of one item with the probabilities given by `weights`, with one 64-bit draw.
     ///
     /// # Errors
     /// [`NumpyError::EmptyChoice`], [`NumpyError::BadWeight`] or [`NumpyError::BadWeightSum`].
@@ -26,7 +26,7 @@ impl Generator {
     /// Source: NumPy 1.26, `Generator.choice(k, p=weights)`.
     pub fn choice_weighted(&mut self, weights: &[f64]) -> Result<usize, NumpyError> {
         check_weights(weights)?;
-        // Left to right, as a running sum goes: another order would round differently.
+        // Added from left to right, as in a running sum: another order would round differently.
         let total = weights.iter().fold(0.0, |sum, weight| sum + weight);
         let draw = self.random();
         let mut sum = 0.0;
@@ -34,7 +34,7 @@ impl Generator {
             sum += weight;
             sum / total > draw
         });
-        // INVARIANT: the last quotient is 1, which is above any draw.
+        // INVARIANT: the last quotient is 1, which is above every draw.
         Ok(index.unwrap_or_default())
     }
 }
@@ -47,18 +47,18 @@ fn check_weights(weights: &[f64]) -> Result<(), NumpyError> {
         return Err(NumpyError::BadWeight { index, weight });
     }
     let sum = compensated_sum(weights);
-    // Infinite weights may make the sum not a number, which is in no range.
+    // Infinite weights may make the sum NaN, for which the comparison is false.
     if (sum - 1.0).abs() <= SUM_TOLERANCE { Ok(()) } else { Err(NumpyError::BadWeightSum { sum }) }
 }
 
-/// The sum that NumPy checks, which keeps what each addition rounds off (Kahan).
+/// Returns the sum that NumPy checks, computed by Kahan summation.
 fn compensated_sum(values: &[f64]) -> f64 {
     let mut sum = 0.0;
-    let mut excess = 0.0;
+    let mut error = 0.0;
     for value in values {
-        let owed = value - excess;
-        let next = sum + owed;
-        excess = (next - sum) - owed;
+        let term = value - error;
+        let next = sum + term;
+        error = (next - sum) - term;
         sum = next;
     }
     sum
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refused_weights_draw_nothing() {
+    fn rejected_weights_make_no_draw() {
         let mut generator = Generator::seeded(9);
         let before = generator.clone();
         assert_eq!(generator.choice_index(0), Err(NumpyError::EmptyChoice));
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_within_the_tolerance_pass() {
+    fn sums_within_the_tolerance_are_accepted() {
         let mut generator = Generator::seeded(9);
         assert!(generator.choice_weighted(&[0.5, 0.5 + 1.4e-8]).is_ok());
         assert!(generator.choice_weighted(&[-0.0, 1.0 - SUM_TOLERANCE]).is_ok());

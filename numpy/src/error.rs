@@ -1,6 +1,6 @@
-//! What NumPy raises for.
+//! Errors for arguments for which NumPy raises.
 
-/// Why a draw is refused. The generator keeps its state.
+/// The reason why a draw is rejected. The generator keeps its state.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {
@@ -9,11 +9,11 @@ pub enum NumpyError {
     EmptyRange {
         /// The lower end.
         lo: i64,
-        /// The upper end, which does not belong to the range.
+        /// The upper end, which is not part of the range.
         hi: i64,
     },
     /// The ends of a range of doubles are in the wrong order, not numbers, or too far apart.
-    #[error("range from `{lo}` to `{hi}`, expected ends in order and a finite width")]
+    #[error("range is `{lo}` to `{hi}`, expected the lower end first and a finite width")]
     BadRange {
         /// The lower end.
         lo: f64,
@@ -24,7 +24,7 @@ pub enum NumpyError {
     #[error("cannot choose from `0` items")]
     EmptyChoice,
     /// A weight is negative or not a number.
-    #[error("weight `{weight}` at index `{index}`, expected 0 or more")]
+    #[error("weight at index `{index}` is `{weight}`, expected 0 or more")]
     BadWeight {
         /// The weight's index.
         index: usize,
@@ -34,7 +34,7 @@ pub enum NumpyError {
     /// The weights do not sum to one.
     #[error("weights sum to `{sum}`, expected 1")]
     BadWeightSum {
-        /// What they sum to.
+        /// The sum.
         sum: f64,
     },
     /// A probability is below zero, above one or not a number.
@@ -43,7 +43,7 @@ pub enum NumpyError {
         /// The probability.
         p: f64,
     },
-    /// The operating system gave no entropy.
+    /// The operating system supplied no entropy.
     #[error("no entropy from the operating system: `{0}`")]
     NoEntropy(#[source] getrandom::Error),
 }
@@ -55,8 +55,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_error_names_its_values_in_one_line() {
-        let told = [
+    fn each_message_names_its_values_in_one_line() {
+        let expected = [
             (NumpyError::EmptyRange { lo: 3, hi: 2 }, &["`3`", "`2`"][..]),
             (NumpyError::BadRange { lo: 0.5, hi: 0.25 }, &["`0.5`", "`0.25`"]),
             (NumpyError::EmptyChoice, &["`0` items"]),
@@ -65,7 +65,7 @@ mod tests {
             (NumpyError::BadProbability { p: 1.5 }, &["`1.5`"]),
             (NumpyError::NoEntropy(getrandom::Error::UNSUPPORTED), &["operating system"]),
         ];
-        for (error, parts) in told {
+        for (error, parts) in expected {
             let line = error.to_string();
             assert!(parts.iter().all(|part| line.contains(part)) && !line.contains('\n'), "{line}");
             assert_eq!(error.source().is_some(), matches!(error, NumpyError::NoEntropy(_)));

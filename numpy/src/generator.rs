@@ -1,4 +1,4 @@
-//! The stream of random numbers, and its doubles.
+//! The stream of random numbers, and draws of doubles.
 
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{NumpyError, SeedSequence};
 
-/// A stream of random numbers, drawn in NumPy's ways.
+/// A stream of random numbers with NumPy's methods for drawing them.
 ///
-/// Two generators are equal if all their further draws are.
+/// Two generators are equal if all their further draws are equal.
 ///
 /// Source: NumPy 1.26, `default_rng` and `Generator` on `PCG64`.
 ///
@@ -17,19 +17,19 @@ use crate::{NumpyError, SeedSequence};
 #[serde(deny_unknown_fields)]
 pub struct Generator {
     pcg: Pcg64,
-    /// The half that the next 32-bit draw takes; draws of 64 bits pass it by.
+    /// The upper half that the next 32-bit draw uses; 64-bit draws ignore it.
     upper_half: Option<u32>,
 }
 
 impl Generator {
-    /// The stream of a seed that fits 64 bits.
+    /// Creates the stream of a seed that fits 64 bits.
     ///
     /// Source: NumPy 1.26, `default_rng(seed)`.
     pub fn seeded(seed: u64) -> Self {
         Self::from_sequence(&SeedSequence::from_u64(seed))
     }
 
-    /// The stream of a seed of any size, or of none.
+    /// Creates the stream of a seed sequence, whose seed may have any size.
     ///
     /// Source: NumPy 1.26, `default_rng(seed_sequence)`.
     pub fn from_sequence(sequence: &SeedSequence) -> Self {
@@ -37,14 +37,14 @@ impl Generator {
         Self::from_pcg64(Pcg64::new(high << 64 | low, stream_high << 64 | stream_low))
     }
 
-    /// The stream that continues a given state.
+    /// Creates the stream that continues a given state.
     ///
     /// Source: NumPy 1.26, `Generator(bit_generator)`.
     pub fn from_pcg64(pcg: Pcg64) -> Self {
         Self { pcg, upper_half: None }
     }
 
-    /// The next 32 bits: a kept upper half, or else the lower half of the next 64 bits.
+    /// Draws 32 bits: the stored upper half if there is one, otherwise the lower half of the next 64 bits.
     #[inline]
     pub fn next_u32(&mut self) -> u32 {
         if let Some(half) = self.upper_half.take() {
@@ -55,13 +55,13 @@ impl Generator {
         whole as u32
     }
 
-    /// The next 64 bits; neither uses nor drops a kept upper half.
+    /// Draws 64 bits, without using or discarding a stored upper half.
     #[inline]
     pub fn next_u64(&mut self) -> u64 {
         self.pcg.next_u64()
     }
 
-    /// A double from 0 up to but not including 1, a multiple of 2⁻⁵³; one 64-bit draw.
+    /// Draws a double from 0 up to but not including 1, a multiple of 2⁻⁵³, with one 64-bit draw.
     ///
     /// Source: NumPy 1.26, `Generator.random`.
     #[inline]
@@ -70,7 +70,7 @@ impl Generator {
         (self.next_u64() >> (u64::BITS - f64::MANTISSA_DIGITS)) as f64 * SPACING
     }
 
-    /// A double from `lo` to `hi`; one 64-bit draw, even if the ends are equal.
+    /// Draws a double from `lo` to `hi`, with one 64-bit draw even if the ends are equal.
     ///
     /// # Errors
     /// [`NumpyError::BadRange`] if `hi - lo` is negative, infinite or not a number.
@@ -79,7 +79,7 @@ impl Generator {
     #[inline]
     pub fn uniform(&mut self, lo: f64, hi: f64) -> Result<f64, NumpyError> {
         let width = hi - lo;
-        // NumPy looks at the sign bit, so it refuses the width -0, which is that of 0 to -0.
+        // NumPy checks the sign bit, so it rejects the width -0 of the range from 0 to -0.
         if !width.is_finite() || width.is_sign_negative() {
             return Err(NumpyError::BadRange { lo, hi });
         }
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_kept_half_survives_draws_of_64_bits() {
+    fn a_stored_half_survives_64_bit_draws() {
         let mut mixed = Generator::seeded(3);
         let mut plain = mixed.clone();
         let first = plain.next_u64();
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_range_draws_nothing() {
+    fn a_rejected_range_makes_no_draw() {
         let mut generator = Generator::seeded(3);
         let before = generator.clone();
         for (lo, hi) in [(1.0, 0.0), (0.0, -0.0), (f64::NAN, 1.0), (-f64::MAX, f64::MAX)] {

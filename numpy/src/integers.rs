@@ -3,9 +3,9 @@
 use crate::{Generator, NumpyError};
 
 impl Generator {
-    /// An integer of at least `lo` and below `hi`.
+    /// Draws an integer that is at least `lo` and below `hi`.
     ///
-    /// A single possible integer is returned without a draw; up to 2³² of them take 32-bit draws, more take
+    /// If only one integer is possible, it takes no draw. Up to 2³² possible integers take 32-bit draws, and more take
     /// 64-bit draws.
     ///
     /// # Errors
@@ -21,7 +21,7 @@ impl Generator {
         Ok(lo.wrapping_add_unsigned(self.up_to(largest)))
     }
 
-    /// The same as `n` calls of [`Generator::integers`]; of no integers, any range will do.
+    /// Draws `n` integers like [`Generator::integers`]. If `n` is 0, every range is accepted.
     ///
     /// # Errors
     /// [`NumpyError::EmptyRange`] if `hi` is not above `lo` and `n` is not 0.
@@ -31,7 +31,7 @@ impl Generator {
         (0..n).map(|_| self.integers(lo, hi)).collect()
     }
 
-    /// An integer from 0 to `largest`, both included.
+    /// Draws an integer from 0 to `largest`, both included.
     #[inline]
     pub(super) fn up_to(&mut self, largest: u64) -> u64 {
         match u32::try_from(largest) {
@@ -43,12 +43,12 @@ impl Generator {
         }
     }
 
-    /// The upper half of `draw * count`; the lower half tells which draws would favour some results.
+    /// Returns the upper half of `draw * count`, and rejects draws whose lower half would favour some results.
     #[inline]
     fn up_to_by_32_bits(&mut self, largest: u32) -> u32 {
         let count = largest + 1;
         let mut product = u64::from(self.next_u32()) * u64::from(count);
-        // The division is slow, and without it most draws are already known to be fair.
+        // The division is slow, and most draws are known to be fair without it.
         if (product as u32) < count {
             let unfair = (u32::MAX - largest) % count;
             while (product as u32) < unfair {
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_single_integer_is_not_drawn() {
+    fn a_single_possible_integer_makes_no_draw() {
         let mut generator = Generator::seeded(5);
         let before = generator.clone();
         assert_eq!(generator.integers(i64::MAX - 1, i64::MAX), Ok(i64::MAX - 1));
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_range_is_refused_but_no_integers_of_it_are_not() {
+    fn an_empty_range_is_rejected_unless_no_integers_are_requested() {
         let mut generator = Generator::seeded(5);
         let before = generator.clone();
         assert_eq!(generator.integers(2, 2), Err(NumpyError::EmptyRange { lo: 2, hi: 2 }));
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_ranges_are_plain_draws() {
+    fn full_ranges_are_raw_draws() {
         let mut generator = Generator::seeded(5);
         let mut plain = generator.clone();
         assert_eq!(generator.up_to(u64::from(u32::MAX)), u64::from(plain.next_u32()));

@@ -1,7 +1,7 @@
 //! NumPy 1.26's random numbers, bit for bit.
 //!
-//! POGEMA draws its maps, starts and goals from `numpy.random.default_rng(seed)`. Whoever wants the same
-//! instance from the same seed must draw the same numbers, in the same order, from the same stream:
+//! POGEMA draws its maps, starts and goals from `numpy.random.default_rng(seed)`. To generate the same instance from
+//! the same seed, draw the same numbers, in the same order, from the same stream:
 //!
 //! ```
 //! use pogema_numpy::{Generator, NumpyError};
@@ -17,22 +17,22 @@
 //! # Ok::<(), NumpyError>(())
 //! ```
 //!
-//! | Here | What NumPy has there |
+//! | Here | In NumPy |
 //! | --- | --- |
-//! | [`SeedSequence`] | `SeedSequence`: a seed of any size becomes the state of a generator |
-//! | [`Generator`] | `default_rng`: PCG64 and the 32-bit half that it keeps for later |
+//! | [`SeedSequence`] | `SeedSequence`: converts a seed of any size to the state of a generator |
+//! | [`Generator`] | `default_rng`: PCG64 and a stored 32-bit half |
 //! | [`Generator::integers`], [`Generator::choice_index`] | multiply-shift with rejection (Lemire) |
 //! | [`Generator::shuffle`] | mask with rejection, for lists and for arrays |
 //! | [`Generator::choice_weighted`] | one double, looked up in the running sums of the weights |
-//! | [`Generator::binomial1`], [`Binomial1`] | one double against one threshold |
+//! | [`Generator::binomial1`], [`Binomial1`] | one double, compared with one threshold |
 //!
-//! Two things make streams drift apart, and every method states its share in them: how many draws a call
-//! makes (a range of one integer and `p = 0` make none), and whether they are of 32 or of 64 bits. The first
-//! 32-bit draw takes a 64-bit number and keeps its upper half for the next 32-bit draw, however many 64-bit
-//! draws come between them.
+//! Two streams diverge if their calls make different numbers of draws, or draws of 32 instead of 64 bits. The docs of
+//! each method therefore state both. For example, a range of one integer and `p = 0` make no draw. The first 32-bit
+//! draw takes a 64-bit number and stores its upper half for the next 32-bit draw, regardless of the 64-bit draws
+//! between them.
 //!
 //! Doubles are only added, subtracted, multiplied, divided and compared, so a result depends neither on the
-//! processor nor on a C library. What NumPy raises for is a [`NumpyError`] here, and draws nothing.
+//! processor nor on a C library. If NumPy raises an exception, the methods return a [`NumpyError`] and make no draw.
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! From a seed of any size to the state of a generator.
+//! Conversion of a seed of any size to the state of a generator.
 
 use crate::NumpyError;
 
@@ -7,9 +7,9 @@ const POOL_WORDS: usize = 4;
 const MIX_LEFT: u32 = 0xCA01_F9DD;
 const MIX_RIGHT: u32 = 0x4973_F715;
 
-/// Spreads a seed's bits over a pool, from which generators take their first state.
+/// A pool of mixed seed bits, from which generators take their first state.
 ///
-/// POGEMA never spawns; spawn keys are here for whoever wants many unlike seeds of one.
+/// POGEMA never spawns sequences. Use spawn keys to derive many independent seeds from one.
 ///
 /// Source: NumPy 1.26, `SeedSequence`, pool of four words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,22 +18,22 @@ pub struct SeedSequence {
 }
 
 impl SeedSequence {
-    /// The sequence of a seed that fits 64 bits.
+    /// Creates the sequence of a seed that fits 64 bits.
     pub fn from_u64(seed: u64) -> Self {
         Self::from_words(&[seed as u32, (seed >> 32) as u32])
     }
 
-    /// The sequence of a seed of any size, given in 32-bit words, lowest first.
+    /// Creates the sequence of a seed of any size, given in 32-bit words, lowest first.
     ///
-    /// The words are taken as they are, as NumPy takes an array of `uint32`. To stand for one integer they must
-    /// not end in a zero word if there are more than four of them. No words at all stand for the seed 0.
+    /// The words are used unchanged, as NumPy uses an array of `uint32`. If there are more than four words, they
+    /// represent an integer only if the last word is not zero. An empty list represents the seed 0.
     pub fn from_words(words: &[u32]) -> Self {
         let mut hash = Hash::absorbing();
         let mut pool = [0; POOL_WORDS];
         for (index, slot) in pool.iter_mut().enumerate() {
             *slot = hash.next(words.get(index).copied().unwrap_or(0));
         }
-        // Every slot reaches every other one, so that the last words affect the first.
+        // Every slot is mixed into every other one, so that the last words affect the first.
         for source in 0..POOL_WORDS {
             for target in (0..POOL_WORDS).filter(|&target| target != source) {
                 pool[target] = mix(pool[target], hash.next(pool[source]));
@@ -47,11 +47,11 @@ impl SeedSequence {
         Self { pool }
     }
 
-    /// A child of the sequence of a seed: unlike the children under other keys, and foretold by its own.
+    /// Creates a child of the sequence of a seed. Each key leads to another child, and the same key to the same child.
     ///
     /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
     pub fn spawned(seed: u64, key: &[u64]) -> Self {
-        // The seed is filled up to the size of the pool, so that no word of it can be taken for one of the key.
+        // The seed is padded to the size of the pool, so that the words of the key are separate from those of the seed.
         let mut words = vec![seed as u32, (seed >> 32) as u32, 0, 0];
         for &part in key {
             words.push(part as u32);
@@ -60,10 +60,10 @@ impl SeedSequence {
         Self::from_words(&words)
     }
 
-    /// A sequence nobody can foresee, of 128 bits from the operating system.
+    /// Creates an unpredictable sequence from 128 random bits of the operating system.
     ///
     /// # Errors
-    /// [`NumpyError::NoEntropy`] if the operating system has none to give.
+    /// [`NumpyError::NoEntropy`] if the operating system supplies none.
     ///
     /// Source: NumPy 1.26, `SeedSequence(None)`.
     pub fn from_os() -> Result<Self, NumpyError> {
@@ -74,12 +74,12 @@ impl SeedSequence {
         Ok(Self::from_words(&words))
     }
 
-    /// The mixed entropy.
+    /// Returns the mixed entropy.
     pub fn pool(&self) -> [u32; POOL_WORDS] {
         self.pool
     }
 
-    /// The first `N` words of state that the pool gives; asking again gives the same.
+    /// Returns the first `N` words of state from the pool, the same in every call.
     ///
     /// Source: NumPy 1.26, `SeedSequence.generate_state(N, uint32)`.
     pub fn generate_state_u32<const N: usize>(&self) -> [u32; N] {
@@ -87,7 +87,7 @@ impl SeedSequence {
         std::array::from_fn(|_| words())
     }
 
-    /// The same state in words of 64 bits, each of two words of 32 bits, the low one first.
+    /// Returns the same state in 64-bit words, each of which joins two 32-bit words, low word first.
     ///
     /// Source: NumPy 1.26, `SeedSequence.generate_state(N, uint64)`.
     pub fn generate_state_u64<const N: usize>(&self) -> [u64; N] {
@@ -98,7 +98,7 @@ impl SeedSequence {
         })
     }
 
-    /// The pool, hashed round and round.
+    /// Returns an endless source of state words, which hashes the slots of the pool cyclically.
     fn state_words(&self) -> impl FnMut() -> u32 {
         let mut hash = Hash::emitting();
         let mut slots = self.pool.into_iter().cycle();
@@ -106,19 +106,19 @@ impl SeedSequence {
     }
 }
 
-/// A hash whose key moves on with every word, so that equal words hash differently.
+/// A hash whose key changes with every word, so that equal words hash differently.
 struct Hash {
     key: u32,
     multiplier: u32,
 }
 
 impl Hash {
-    /// For entropy on its way into the pool.
+    /// Creates the hash for entropy that enters the pool.
     fn absorbing() -> Self {
         Self { key: 0x43B0_D7E5, multiplier: 0x931E_8875 }
     }
 
-    /// For state on its way out of the pool.
+    /// Creates the hash for state that leaves the pool.
     fn emitting() -> Self {
         Self { key: 0x8B51_F9DD, multiplier: 0x58F3_8DED }
     }
@@ -141,19 +141,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_words_stand_for_seed_zero() {
+    fn no_words_represent_seed_zero() {
         assert_eq!(SeedSequence::from_words(&[]), SeedSequence::from_u64(0));
     }
 
     #[test]
-    fn zero_words_on_top_count_only_beyond_the_pool() {
+    fn trailing_zero_words_matter_only_beyond_the_pool() {
         let short = SeedSequence::from_words(&[7]);
         assert_eq!(SeedSequence::from_words(&[7, 0, 0, 0]), short);
         assert_ne!(SeedSequence::from_words(&[7, 0, 0, 0, 0]), short);
     }
 
     #[test]
-    fn children_are_those_of_numpy() {
+    fn children_match_numpy() {
         let state = |seed, key: &[u64]| SeedSequence::spawned(seed, key).generate_state_u64::<1>()[0];
         assert_eq!(state(0, &[0]), 8_668_861_027_912_758_289);
         assert_eq!(state(42, &[3, 1]), 12_600_661_634_385_724_904);
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_operating_system_never_gives_the_same_twice() {
+    fn two_sequences_of_the_operating_system_differ() {
         assert_ne!(SeedSequence::from_os().unwrap(), SeedSequence::from_os().unwrap());
     }
 }

@@ -1,16 +1,15 @@
-//! Random orders.
+//! Random permutations.
 
 use crate::Generator;
 
-/// How many indices are drawn ahead of the exchanges.
+/// Number of indices that are drawn before they are swapped.
 const BATCH: usize = 128;
 
 impl Generator {
-    /// Puts a list into random order, or an array along its first axis: NumPy draws the same for both.
+    /// Shuffles a list, or an array along its first axis: NumPy makes the same draws for both.
     ///
-    /// From the last item to the second: exchange it with itself or with one before it, whose index is drawn by
-    /// mask and rejection, in 32 bits as long as it fits. It is not the index that [`Generator::integers`] would
-    /// draw.
+    /// Each item, from the last to the second, is swapped with itself or an earlier item, whose index is drawn by mask
+    /// with rejection, in 32 bits if it fits. [`Generator::integers`] would draw another index.
     ///
     /// Source: NumPy 1.26, `Generator.shuffle`.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
@@ -20,7 +19,7 @@ impl Generator {
             let other = self.draw_wide(num_left as u64);
             items.swap(num_left, other as usize);
         }
-        // In a long list each exchange waits for memory. Without draws between them they wait together.
+        // In a long list each swap waits for memory. Without draws between them, several swaps wait at the same time.
         let mut others = [0; BATCH];
         while num_left > 1 {
             let batch = &mut others[..BATCH.min(num_left - 1)];
@@ -32,7 +31,7 @@ impl Generator {
         }
     }
 
-    /// One index of at most `last`, which is above 2³²-1.
+    /// Draws one index of at most `last`, which is above 2³²-1.
     fn draw_wide(&mut self, last: u64) -> u64 {
         let mask = u64::MAX >> last.leading_zeros();
         loop {
@@ -43,14 +42,14 @@ impl Generator {
         }
     }
 
-    /// One index of at most `last`, which is below 2³², then one of at most `last - 1`, and so on down to 1.
+    /// Draws one index of at most `last`, which is below 2³², then one of at most `last - 1`, and so on down to 1.
     fn draw_batch(&mut self, last: u64, batch: &mut [u32]) {
         let mut filled = 0;
         while filled < batch.len() {
             let last = (last - filled as u64) as u32;
             let draw = self.next_u32() & u32::MAX >> last.leading_zeros();
             batch[filled] = draw;
-            // A sum, not a branch, because no processor can guess which draws fit.
+            // A sum, not a branch, because a processor cannot predict which draws fit.
             filled += usize::from(draw <= last);
         }
     }
@@ -60,8 +59,8 @@ impl Generator {
 mod tests {
     use super::*;
 
-    /// Expected values: NumPy 1.26.4 with seed 6, given a sequence that claims to have 2³³ + 5 items and notes
-    /// which of them are exchanged.
+    /// Expected values: NumPy 1.26.4 with seed 6, on a sequence that claims to have 2³³ + 5 items and records
+    /// which of them are swapped.
     #[test]
     fn indices_beyond_32_bits_take_64_bit_draws() {
         let mut generator = Generator::seeded(6);
@@ -69,7 +68,7 @@ mod tests {
         assert_eq!(draws, [6_206_423_806, 4_063_638_511, 2_824_942_437]);
     }
 
-    /// As above, for 2³² + 3 items: three wide indices, then narrow ones.
+    /// Expected values as above, for 2³² + 3 items: three wide indices, then narrow ones.
     #[test]
     fn the_last_index_of_32_bits_takes_a_32_bit_draw() {
         let mut generator = Generator::seeded(6);
@@ -81,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_item_is_not_drawn() {
+    fn a_single_item_makes_no_draw() {
         let mut generator = Generator::seeded(6);
         generator.shuffle::<u8>(&mut []);
         generator.shuffle(&mut [1]);

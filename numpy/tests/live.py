@@ -1,8 +1,8 @@
 """Answers calls of a NumPy generator, given as JSON on standard input.
 
-The request has two lists. `runs` holds runs as `calls/mod.rs` describes them; each gets its list of
-answers. `near` holds calls that compare a double with thresholds; each gets runs of it, with answers, whose first
-double is at a threshold or beside it. A double is written as the 16 hexadecimal digits of its bits, an error as null.
+The request has two lists. `runs` holds runs as described in `calls/mod.rs`; the reply has a list of answers for each.
+`near` holds calls that compare a double with thresholds; the reply has runs with answers for each, in which the first
+double is at or next to a threshold. A double is written as the 16 hexadecimal digits of its bits, an error as null.
 """
 
 import itertools
@@ -27,7 +27,7 @@ def to_bits(double):
 
 
 def to_seed(words):
-    """The integer of these words, or the words if no integer has them."""
+    """Returns the integer of these words, or the words as an array if they represent no integer."""
     if words and not words[-1]:
         return np.array(words, dtype=np.uint32)
     return sum(word << 32 * index for index, word in enumerate(words))
@@ -113,7 +113,7 @@ def thresholds(call):
 
 
 def runs_near(call):
-    """Runs of a call whose first double is a threshold, a step or two beside it, or the largest double."""
+    """Yields runs of a call whose first double is a threshold, one or two steps from it, or the largest double."""
     pick = random.Random(json.dumps(call))
     middles = [round(threshold * 2**53) for threshold in thresholds(call) if 0 <= threshold <= 1]
     steps = {middle + shift for middle in middles for shift in range(-2, 3)} | {2**53 - 1}
@@ -124,7 +124,7 @@ def runs_near(call):
 
 
 def start_before(draw, pick):
-    """A start of PCG64 whose first 64-bit draw is the given one."""
+    """Returns an initial state of PCG64 whose first 64-bit draw is `draw`."""
     inverse = pow(MULTIPLIER, -1, STATES)
     stream = pick.getrandbits(127)
     increment = stream << 1 | 1
@@ -132,7 +132,7 @@ def start_before(draw, pick):
     turn = high >> 58
     turned_back = (draw << turn | draw >> (64 - turn)) % (1 << 64)
     state = high << 64 | (turned_back ^ high)
-    # One step leads to the draw, and starting takes one more.
+    # One step leads to the draw, and seeding takes another step.
     initial = ((state - increment) * inverse - increment) * inverse - increment
     return {"pcg": [str(initial % STATES), str(stream)]}
 

@@ -1,4 +1,4 @@
-//! Random calls, put to us and to a live NumPy 1.26.
+//! Comparison of random calls with an installed NumPy 1.26.
 //!
 //! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-numpy --test numpy_live`
 
@@ -18,7 +18,7 @@ use calls::{Bits, Call, Run, Start};
 
 const RUNS: usize = 6_000;
 const CALLS_PER_RUN: usize = 40;
-/// The least number of calls of each kind that NumPy must accept.
+/// Minimum number of calls of each kind that NumPy must accept.
 const CALLS_PER_KIND: usize = 10_000;
 const CALLS_NEAR_THRESHOLDS: usize = 2_000;
 
@@ -36,7 +36,7 @@ struct Reply {
 }
 
 #[test]
-fn random_calls_give_the_answers_of_a_live_numpy() {
+fn random_calls_match_a_live_numpy() {
     let mut source = Source(Generator::seeded(20_240_601));
     let runs: Vec<Run> = (0..RUNS).map(|_| source.run()).collect();
     let reply = ask_numpy(&Request { runs: &runs, near: vec![] });
@@ -54,7 +54,7 @@ fn random_calls_give_the_answers_of_a_live_numpy() {
 }
 
 #[test]
-fn outcomes_turn_at_the_thresholds_of_a_live_numpy() {
+fn outcomes_change_at_the_thresholds_of_a_live_numpy() {
     let mut source = Source(Generator::seeded(20_240_602));
     let mut near = Vec::new();
     for _ in 0..CALLS_NEAR_THRESHOLDS {
@@ -78,7 +78,7 @@ fn ask_numpy(request: &Request) -> Reply {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live.py");
     let child = Command::new(&python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let mut child = child.unwrap_or_else(|error| panic!("cannot run `{python}`: {error}; {hint}"));
-    // The script reads everything before it writes anything, and closes its end if it cannot start.
+    // The script reads all input before it writes, and closes its end of the pipe if it cannot start.
     let written = child.stdin.take().unwrap().write_all(&serde_json::to_vec(request).unwrap());
     let output = child.wait_with_output().unwrap();
     assert!(written.is_ok() && output.status.success(), "`{python}` failed: {}; {hint}", output.status);
@@ -87,7 +87,7 @@ fn ask_numpy(request: &Request) -> Reply {
     reply
 }
 
-/// Random calls. What it draws with is under test as well, but that only decides which calls are made.
+/// A source of random calls. Its generator is under test as well, but only determines which calls are made.
 struct Source(Generator);
 
 impl Source {
@@ -140,7 +140,8 @@ impl Source {
         self.pick(longest)
     }
 
-    /// Ends near zero or anywhere, with a width of any number of bits and often next to a power of two.
+    /// Draws the ends of a range, near zero or anywhere. The width has any number of bits and is often next to a power
+    /// of two.
     fn with_range(&mut self, make: impl FnOnce(i64, i64) -> Call) -> Call {
         let highest = 1_u64 << self.pick(64);
         let width = match self.pick(3) {
@@ -182,7 +183,7 @@ impl Source {
         })
     }
 
-    /// Weights that mostly sum to one, sometimes only nearly, and sometimes hold what is no weight.
+    /// Draws weights that mostly sum to one, sometimes only nearly, and sometimes contain an invalid weight.
     fn weights(&mut self) -> Vec<Bits> {
         const ODD: [f64; 4] = [-1e-9, -1.0, f64::NAN, f64::INFINITY];
         let mut weights: Vec<f64> = (0..self.pick(10)).map(|_| self.0.random()).collect();

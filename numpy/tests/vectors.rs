@@ -1,4 +1,4 @@
-//! Values that NumPy 1.26.4 gave, kept in `data/vectors.json`.
+//! Comparison with the results of NumPy 1.26.4 in `data/vectors.json`.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
@@ -30,7 +30,7 @@ fn vectors() -> Vectors {
 }
 
 #[test]
-fn seeds_of_every_size_give_the_pool_and_state_of_numpy() {
+fn seeds_of_every_size_match_the_pool_and_state_of_numpy() {
     for Seeding { words, pool, state_u32, state_u64 } in vectors().seeding {
         let sequence = SeedSequence::from_words(&words);
         assert_eq!(sequence.pool(), pool, "{words:?}");
@@ -40,7 +40,7 @@ fn seeds_of_every_size_give_the_pool_and_state_of_numpy() {
 }
 
 #[test]
-fn a_seed_of_64_bits_is_a_seed_of_two_words() {
+fn a_64_bit_seed_equals_a_seed_of_two_words() {
     for seed in [0, 1, 42, (1 << 31) - 1, 1 << 32, (1 << 63) - 2, u64::MAX] {
         let words = [seed as u32, (seed >> 32) as u32];
         let sequence = SeedSequence::from_words(&words);
@@ -50,7 +50,7 @@ fn a_seed_of_64_bits_is_a_seed_of_two_words() {
 }
 
 #[test]
-fn every_call_gives_the_answer_of_numpy() {
+fn every_call_matches_numpy() {
     for (topic, runs) in vectors().runs {
         for run in runs {
             run.replay(&topic);

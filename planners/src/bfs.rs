@@ -1,6 +1,6 @@
 //! Breadth-first search from a goal over the whole map.
 //!
-//! A wall of marked places around the map stands for the bounds check, so the search reads no neighbour lists.
+//! A wall of marked places around the map replaces the bounds check, so the search reads no neighbour lists.
 
 use crate::graph::{Graph, Vertex};
 

@@ -19,12 +19,12 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of wall-clock time.
+    /// Creates a budget of wall-clock time.
     pub fn of_time(time: Duration) -> Self {
         Self { time: Some(time), ..Self::default() }
     }
 
-    /// A budget of nodes.
+    /// Creates a budget of nodes.
     pub fn of_nodes(nodes: u64) -> Self {
         Self { nodes: Some(nodes), ..Self::default() }
     }
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn budgets_end() {
+    fn clocks_report_spent_budgets() {
         let mut clock = Budget::of_nodes(2).start();
         assert_eq!([clock.count_node(), clock.count_node(), clock.count_node()], [false, false, true]);
         assert!(Budget::of_nodes(0).start().count_node());

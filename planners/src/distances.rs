@@ -26,7 +26,7 @@ impl Distances {
     /// The default byte budget of the tables.
     pub const DEFAULT_BYTES: usize = 512 << 20;
 
-    /// An empty cache with a byte budget; it has room for at least one table.
+    /// Creates an empty cache with a byte budget; it has room for at least one table.
     pub fn new(graph: Arc<Graph>, num_bytes: usize) -> Self {
         let table = size_of::<u32>() * graph.num_vertices().max(1);
         let (bfs, max_tables) = (Bfs::new(&graph), (num_bytes / table).max(1));
@@ -58,12 +58,12 @@ impl Distances {
         goals.iter().map(|&goal| self.to(goal)).collect()
     }
 
-    /// Number of cached tables.
+    /// Returns the number of cached tables.
     pub fn num_tables(&self) -> usize {
         self.tables.len()
     }
 
-    /// Evicts the least recently used eighth of the tables, so that not every new table scans the whole cache.
+    /// Evicts the least recently used eighth of the tables, because each eviction scans the whole cache.
     fn evict(&mut self) {
         let idle = |entry: &(&Vertex, &(CostToGo, u64))| Arc::strong_count(&entry.1.0) == 1;
         let mut ages: Vec<(u64, Vertex)> =

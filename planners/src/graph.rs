@@ -50,7 +50,7 @@ impl Graph {
         graph
     }
 
-    /// Number of free cells.
+    /// Returns the number of free cells.
     pub fn num_vertices(&self) -> usize {
         self.cells.len()
     }
@@ -84,7 +84,7 @@ impl Graph {
         let vertex_of = |(agent, &cell): (usize, &Cell)| {
             let inside = usize::from(cell.col) < self.width;
             let vertex = self.vertex(cell).filter(|_| inside);
-            vertex.ok_or_else(|| Error::agent(agent, format!("{what} {cell} is no free cell of the map")))
+            vertex.ok_or_else(|| Error::agent(agent, format!("{what} {cell} is not a free cell of the map")))
         };
         cells.iter().enumerate().map(vertex_of).collect()
     }
@@ -97,7 +97,7 @@ pub(crate) fn step_from(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
     map.contains(cell).then_some(cell)
 }
 
-/// Returns the action that leads from one cell to another, if there is one.
+/// Returns the action that leads from one cell to another, if any.
 pub(crate) fn action_between(from: Cell, to: Cell) -> Option<Action> {
     let place = (i32::from(to.row), i32::from(to.col));
     Action::ALL.into_iter().find(|&action| from.toward(action) == place)

@@ -1,8 +1,8 @@
 //! Centralised planners for POGEMA environments, and policies.
 //!
-//! A [`Problem`] is a set of agents on a map, each with a start and a goal. A [`Planner`] solves it within a [`Budget`] and
-//! returns an [`Outcome`]. [`validate()`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that get a
-//! new goal whenever they reach one.
+//! A [`Problem`] is a set of agents on a map, each with a start and a goal. A [`Planner`] solves it within a [`Budget`]
+//! and returns an [`Outcome`]. [`validate()`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that
+//! get a new goal whenever they reach one.
 //!
 //! | planner | folder |
 //! | --- | --- |
@@ -14,10 +14,11 @@
 //! | [`sipp`]: safe interval path planning for one agent | `sipp` |
 //! | [`solvability`]: A* through joint states | `joint` |
 //!
-//! [`PlannerName`] and [`LifelongName`] make a planner by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner control
-//! an environment.
+//! [`PlannerName`] and [`LifelongName`] create planners by name. [`PlannerPolicy`] and [`LifelongPolicy`] let a planner
+//! control an environment.
 //!
-//! [`AStarTeam`] is POGEMA's A* policy, action for action. [`pogema_team`] and [`sample`] draw POGEMA's random numbers.
+//! [`AStarTeam`] reproduces POGEMA's A* policy, action for action. [`pogema_team`] and [`sample`] draw the same random
+//! numbers as POGEMA.
 
 #![forbid(unsafe_code)]
 

@@ -7,8 +7,8 @@ use crate::graph::Vertex;
 
 /// A lifelong planner, which chooses the moves of all agents one step at a time.
 ///
-/// It knows the current goal of each agent; only [`Lifelong::next_with_future_goals`] tells it later ones. Positions and goals
-/// may change arbitrarily between calls; the planner then drops the plans that no longer fit.
+/// It knows the current goal of each agent; only [`Lifelong::next_with_future_goals`] provides later ones. Positions
+/// and goals may change arbitrarily between calls; the planner then drops the plans that no longer fit.
 pub trait Lifelong: Send {
     /// Clears the state of the episode. Afterwards the same calls return the same moves again.
     fn reset(&mut self);
@@ -20,7 +20,7 @@ pub trait Lifelong: Send {
     /// holds two agents.
     fn next(&mut self, now: &[Vertex], goals: &[Vertex], budget: &Budget) -> Result<Vec<Vertex>, Error>;
 
-    /// Whether the planner uses future goals.
+    /// Returns whether the planner uses future goals.
     fn uses_future_goals(&self) -> bool {
         false
     }
@@ -58,17 +58,17 @@ pub(crate) fn check_agents(num_vertices: usize, now: &[Vertex], goals: &[Vertex]
     Error::check_length("goals", now.len(), goals.len())?;
     let mut holder = vec![usize::MAX; num_vertices];
     for (agent, (&at, &goal)) in now.iter().zip(goals).enumerate() {
-        for (what, vertex) in [("place", at), ("goal", goal)] {
+        for (what, vertex) in [("position", at), ("goal", goal)] {
             if vertex as usize >= num_vertices {
                 return Err(Error::agent(
                     agent,
-                    format!("{what} {vertex} is none of {num_vertices} vertices"),
+                    format!("{what} is vertex {vertex}, expected a vertex below {num_vertices}"),
                 ));
             }
         }
         let other = std::mem::replace(&mut holder[at as usize], agent);
         if other != usize::MAX {
-            return Err(Error::agent(agent, format!("it is where agent {other} is, at vertex {at}")));
+            return Err(Error::agent(agent, format!("it shares vertex {at} with agent {other}")));
         }
     }
     Ok(())

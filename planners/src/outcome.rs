@@ -6,8 +6,8 @@ use crate::plan::Plan;
 
 /// The result of one call of a planner.
 ///
-/// `lower_bound` is a lower bound on the sum of costs of any plan. Units: steps, summed over all agents. `best` is the plan
-/// that came closest, if there is one; it is valid, but does not bring all agents to their goals.
+/// `lower_bound` is a lower bound on the sum of costs of any plan. Units: steps, summed over all agents. `best` is the
+/// plan that came closest, if any; it is valid, but does not bring all agents to their goals.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the fields are described above")]
 pub enum Outcome {
@@ -17,7 +17,7 @@ pub enum Outcome {
     TimedOut { best: Option<Plan>, lower_bound: u64 },
     /// The planner gave up within the budget; another planner may find a plan.
     GaveUp { best: Option<Plan>, lower_bound: u64 },
-    /// The planner proved that there is no plan. The reason is the proof, in words.
+    /// The planner proved that no plan exists. The reason states the proof in words.
     Impossible { reason: String },
 }
 

@@ -59,7 +59,7 @@ impl Paths {
         self.costs.iter().map(|&cost| u64::from(cost)).sum()
     }
 
-    /// Number of steps of the longest path.
+    /// Returns the number of steps of the longest path.
     pub(crate) fn num_steps(&self) -> usize {
         self.each.iter().map(|path| path.len().saturating_sub(1)).max().unwrap_or(0)
     }
@@ -90,7 +90,7 @@ impl Paths {
         (at == from_there && there == from).then_some(PathConflict { agents, step, from: Some(from), at })
     }
 
-    /// Whether two agents conflict.
+    /// Returns whether two agents conflict.
     pub(crate) fn collide(&self, one: usize, other: usize) -> bool {
         self.conflict(one, other).is_some()
     }

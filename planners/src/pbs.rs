@@ -37,7 +37,7 @@ pub struct Pbs {
 }
 
 impl Pbs {
-    /// A planner with these parameters.
+    /// Creates a planner with these parameters.
     pub fn new(params: PbsParams) -> Self {
         Self { params }
     }

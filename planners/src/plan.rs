@@ -12,7 +12,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from the cells of all agents at the start and after each step.
+    /// Creates a plan from the cells of all agents at the start and after each step.
     ///
     /// # Errors
     /// [`Error::Instance`] without a start; [`Error::Length`] unless every step has as many agents as the start.
@@ -30,12 +30,12 @@ impl Plan {
         &self.cells
     }
 
-    /// Number of agents.
+    /// Returns the number of agents.
     pub fn num_agents(&self) -> usize {
         self.cells[0].len()
     }
 
-    /// Number of steps. It exceeds the makespan if the last steps are idle.
+    /// Returns the number of steps. It exceeds the makespan if the last steps are idle.
     pub fn num_steps(&self) -> usize {
         self.cells.len() - 1
     }

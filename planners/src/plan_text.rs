@@ -58,7 +58,7 @@ pub fn write_plan(plan: &Plan) -> String {
     text
 }
 
-/// Writes a result file of the LaCAM programs, which their tools can show.
+/// Writes a result file of the LaCAM programs, which their visualisers can read.
 pub fn write_result(map_file: &str, solver: &str, problem: &Problem, outcome: &Outcome) -> String {
     let cells = |cells: Vec<Cell>| -> String {
         let cells: Vec<String> =
@@ -99,7 +99,7 @@ fn read_result(fields: &[(usize, &str)], steps: &[(usize, &str)]) -> Result<Plan
         }
     }
     if steps.is_empty() {
-        return Err(Error::Plan { reason: "the result holds no solution".into() });
+        return Err(Error::Plan { reason: "the result contains no solution".into() });
     }
     let plan = read_steps(steps, Order::XY)?;
     let (map_file, starts, goals) = result;
@@ -111,13 +111,16 @@ fn read_steps(lines: &[(usize, &str)], order: Order) -> Result<Plan, Error> {
     for &(line, text) in lines {
         let cells = match text.split_once(':') {
             Some((number, cells)) if number.trim().parse() == Ok(steps.len()) => cells,
-            Some((number, _)) => return Err(wrong(line, number, &format!("the step {}", steps.len()))),
+            Some((number, _)) => return Err(wrong(line, number, &format!("step {}", steps.len()))),
             None => text,
         };
         let cells = read_cells(line, cells, order)?;
         if let Some(first) = steps.first().filter(|first| first.len() != cells.len()) {
-            let reason =
-                format!("line {line}: {} cells, expected {}, as at the start", cells.len(), first.len());
+            let reason = format!(
+                "line {line}: found {} cells, expected {}, as in the first step",
+                cells.len(),
+                first.len()
+            );
             return Err(Error::Plan { reason });
         }
         steps.push(cells);

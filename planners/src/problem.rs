@@ -28,7 +28,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem without a step limit.
+    /// Creates a problem without a step limit.
     ///
     /// # Errors
     /// [`Error::Length`] unless each start has a goal; [`Error::Agent`] for a cell that is off the map or an
@@ -41,7 +41,7 @@ impl Problem {
         Ok(Self { graph: Arc::new(graph), starts, goals, max_steps: None })
     }
 
-    /// The problem of an instance and its first goals.
+    /// Creates the problem of an instance and its first goals.
     ///
     /// # Errors
     /// As for [`Problem::new`].
@@ -49,21 +49,21 @@ impl Problem {
         Self::new(instance.map(), instance.starts(), &instance.first_goals())
     }
 
-    /// The same problem with a step limit.
+    /// Returns the same problem with a step limit.
     #[must_use]
     pub fn within(mut self, max_steps: usize) -> Self {
         self.max_steps = Some(max_steps);
         self
     }
 
-    /// The problem of a subset of the agents.
+    /// Creates the problem of a subset of the agents.
     pub(crate) fn only(&self, agents: &[usize]) -> Self {
         let pick = |all: &[Vertex]| agents.iter().map(|&agent| all[agent]).collect();
         let (starts, goals) = (pick(&self.starts), pick(&self.goals));
         Self { graph: self.graph.clone(), starts, goals, max_steps: self.max_steps }
     }
 
-    /// Number of agents.
+    /// Returns the number of agents.
     pub fn num_agents(&self) -> usize {
         self.starts.len()
     }
@@ -77,7 +77,7 @@ impl Problem {
         Plan::new(steps.iter().map(cells).collect())
     }
 
-    /// Plans with the costs to go of each agent, unless they prove that there is no plan or the budget runs out.
+    /// Calls `plan` with the costs to go of each agent, unless they prove that no plan exists or the budget runs out.
     pub(crate) fn solve(&self, budget: &Budget, plan: impl FnOnce(&[CostToGo], Clock) -> Outcome) -> Outcome {
         let mut clock = budget.start();
         self.costs_to_go(&mut clock).map_or_else(|outcome| outcome, |costs| plan(&costs, clock))
@@ -89,10 +89,10 @@ impl Problem {
     /// [`Outcome::Impossible`] if two agents share a start or a goal, or if one cannot reach its goal even alone;
     /// [`Outcome::TimedOut`] if the budget runs out.
     fn costs_to_go(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
-        for (what, vertices) in [("start at", &self.starts), ("want to stay at", &self.goals)] {
+        for (what, vertices) in [("start", &self.starts), ("goal", &self.goals)] {
             if let Some((first, second, vertex)) = shared_vertex(vertices) {
                 let cell = self.graph.cell(vertex);
-                let reason = format!("agents {first} and {second} both {what} {cell}");
+                let reason = format!("agents {first} and {second} have the same {what} {cell}");
                 return Err(Outcome::Impossible { reason });
             }
         }
@@ -111,7 +111,7 @@ impl Problem {
         Ok(costs)
     }
 
-    /// Returns why an agent cannot reach its goal even alone.
+    /// Returns the reason if an agent cannot reach its goal even alone.
     fn blocked(&self, agent: usize, costs: &CostToGo) -> Option<String> {
         let cost = costs[self.starts[agent] as usize];
         let (from, to) = (self.graph.cell(self.starts[agent]), self.graph.cell(self.goals[agent]));
@@ -119,7 +119,7 @@ impl Problem {
             return Some(format!("no path leads agent {agent} from {from} to {to}"));
         }
         let limit = self.max_steps.filter(|&limit| cost as usize > limit)?;
-        Some(format!("agent {agent} needs {cost} steps from {from} to {to}, of {limit}"))
+        Some(format!("agent {agent} needs {cost} steps from {from} to {to}, but the step limit is {limit}"))
     }
 
     /// Returns the sum of the shortest distances, a lower bound on the sum of costs.

@@ -1,4 +1,4 @@
-//! Planners by name, as the command line and Python know them.
+//! Planners by name, for the command line and Python.
 
 use std::sync::Arc;
 

@@ -23,7 +23,7 @@ pub struct Reservations {
 }
 
 impl Reservations {
-    /// An empty table for a number of vertices.
+    /// Creates an empty table for a number of vertices.
     pub fn new(num_vertices: usize) -> Self {
         Self { blocks: vec![Vec::new(); num_vertices] }
     }
@@ -78,7 +78,8 @@ impl Reservations {
         Some((since, FOREVER))
     }
 
-    /// Number of edge conflicts: reserved paths that move from `to` to `from` in the step that ends at `step`.
+    /// Returns the number of edge conflicts of a move: reserved paths that move from `to` to `from` in the step that
+    /// ends at `step`.
     pub(crate) fn num_swaps(&self, from: Vertex, to: Vertex, step: u32) -> u32 {
         let leaves = |block: &&Block| block.to.checked_add(1) == Some(step);
         let enters = |block: &Block, agent| block.from == step && block.agent == agent;
@@ -87,7 +88,7 @@ impl Reservations {
         leaving.filter(|left| entering.iter().any(|block| enters(block, left.agent))).count() as u32
     }
 
-    /// Number of reservations of a vertex at a step, and the last step up to which this number holds.
+    /// Returns the number of reservations of a vertex at a step, and the last step up to which this number holds.
     pub(crate) fn count_at(&self, vertex: Vertex, step: u32) -> (u32, u32) {
         let (mut count, mut until) = (0, FOREVER);
         for block in &self.blocks[vertex as usize] {
@@ -102,7 +103,7 @@ impl Reservations {
         (count, until)
     }
 
-    /// Number of reservations of a vertex that end after a step.
+    /// Returns the number of reservations of a vertex that end after a step.
     pub(crate) fn num_after(&self, vertex: Vertex, step: u32) -> u32 {
         self.blocks[vertex as usize].iter().filter(|block| block.to > step).count() as u32
     }

@@ -15,13 +15,13 @@ pub(crate) struct TeamTask<'a> {
 }
 
 impl<'a> TeamTask<'a> {
-    /// The task of a one-shot problem.
+    /// Creates the task of a one-shot problem.
     pub(crate) fn one_shot(problem: &'a Problem, legs: &'a [Vec<Leg>], seed: u64) -> Self {
         let max_steps = problem.max_steps.map_or(u32::MAX, |limit| u32::try_from(limit).unwrap_or(u32::MAX));
         Self { starts: &problem.starts, legs, horizon: Horizon::Stay { max_steps }, salt: seed as u32 }
     }
 
-    /// The task of one agent, without soft constraints and forbidden moves.
+    /// Creates the task of one agent, without soft constraints and forbidden moves.
     pub(crate) fn task<'t>(&'t self, agent: usize, reserved: &'t Reservations) -> Task<'t> {
         Task {
             start: self.starts[agent],
@@ -35,7 +35,7 @@ impl<'a> TeamTask<'a> {
         }
     }
 
-    /// Whether agents stay at the ends of their paths.
+    /// Returns whether agents stay at the ends of their paths.
     pub(crate) fn stays(&self) -> bool {
         matches!(self.horizon, Horizon::Stay { .. })
     }

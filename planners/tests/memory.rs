@@ -1,4 +1,4 @@
-//! A thousand agents in a city take no more memory than is said.
+//! The memory of planners for a thousand agents on a city map stays within the documented budgets.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,16 +14,16 @@ use pogema_planners::{
 const SIDE: usize = 256;
 const NUM_AGENTS: usize = 1000;
 
-/// What is neither a table of costs nor part of a budget: the graph, the plan, and what the search has for each agent.
+/// Memory outside the cost tables and budgets: the graph, the plan, and the search data of each agent. Units: bytes.
 const REST: usize = 32 << 20;
 
-/// Columns two cells wide between walls, with a way across in each seventh row.
+/// Returns a map of corridors two cells wide between walls, with a crossing in every seventh row.
 fn city() -> Map {
     let is_wall = |index: usize| (index % SIDE).is_multiple_of(3) && !(index / SIDE).is_multiple_of(7);
     Map::new(SIDE, SIDE, (0..SIDE * SIDE).map(is_wall).collect()).unwrap()
 }
 
-/// Every so many-th free cell, from some one on.
+/// Returns evenly spaced free cells, one for each agent, beginning with the free cell of index `first`.
 fn some_cells(map: &Map, first: usize) -> Vec<Cell> {
     let free: Vec<Cell> =
         (0..SIDE * SIDE).map(|index| map.cell_at(index)).filter(|&cell| !map.is_obstacle(cell)).collect();
@@ -32,7 +32,7 @@ fn some_cells(map: &Map, first: usize) -> Vec<Cell> {
 }
 
 #[test]
-fn lacam_keeps_to_its_budget() {
+fn lacam_stays_within_its_byte_budget() {
     let map = city();
     let (starts, mut goals) = (some_cells(&map, 0), some_cells(&map, 9));
     goals.rotate_left(NUM_AGENTS / 20);
@@ -44,12 +44,12 @@ fn lacam_keeps_to_its_budget() {
     validate(&map, &starts, Some(&goals), outcome.unwrap().solution().unwrap()).unwrap();
     let tables = 4 * NUM_AGENTS * problem.graph.num_vertices();
     let most = (tables + 2 * max_bytes + REST) as u64;
-    assert!(memory.bytes_max <= most, "{} bytes, expected {most} at most", memory.bytes_max);
-    assert!(memory.bytes_max > tables as u64, "what is measured is what is taken");
+    assert!(memory.bytes_max <= most, "used {} bytes, expected at most {most}", memory.bytes_max);
+    assert!(memory.bytes_max > tables as u64, "the measured memory is less than the cost tables");
 }
 
 #[test]
-fn agents_with_goal_after_goal_keep_only_so_many_tables() {
+fn lifelong_pibt_bounds_its_distance_tables() {
     let map = city();
     let graph = Arc::new(Graph::new(&map));
     let mut cells = graph.vertices_of("start", &some_cells(&map, 0)).unwrap();
@@ -61,8 +61,8 @@ fn agents_with_goal_after_goal_keep_only_so_many_tables() {
         }
     });
     let table = 4 * graph.num_vertices();
-    // The tables of five rounds would be more than there is room for.
+    // The tables of five rounds together exceed the limit.
     assert!(5 * NUM_AGENTS * table > Distances::DEFAULT_BYTES + NUM_AGENTS * table);
     let most = (Distances::DEFAULT_BYTES + REST) as u64;
-    assert!(memory.bytes_max <= most, "{} bytes, expected {most} at most", memory.bytes_max);
+    assert!(memory.bytes_max <= most, "used {} bytes, expected at most {most}", memory.bytes_max);
 }

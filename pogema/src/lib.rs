@@ -64,7 +64,15 @@ pub use pogema_render as render;
 pub use pogema_toolbox as toolbox;
 pub use seeds::Seed;
 
-/// Compiles and runs the code blocks of the guide.
+/// The Rust code of the README and the book, which the tests compile and run.
 #[cfg(doctest)]
-#[doc = include_str!("../../docs/guide/rust.md")]
-struct Guide;
+mod book {
+    #[doc = include_str!("../../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../docs/guide/rust.md")]
+    struct Guide;
+    #[doc = include_str!("../../docs/start/rust.md")]
+    struct Start;
+    #[doc = include_str!("../../docs/tutorials/policy.md")]
+    struct Tutorial;
+}

@@ -1,4 +1,4 @@
-"""Evaluates a policy: mean metrics over seeds, with their spread.
+"""Evaluates policies: prints mean and standard deviation of their metrics over seeds.
 
     python evaluate_policy.py --seeds 100
 """
@@ -10,16 +10,16 @@ import numpy as np
 from pogema_rs import BatchAStarAgent, GridConfig, pogema_v0
 
 
-class Follow:
-    """Any object with `act` and `reset_states` is a policy; this one goes straight for the goal through free cells."""
+class Greedy:
+    """A greedy policy; any object with `act` and `reset_states` is a policy."""
 
     MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 
     def reset_states(self):
-        """Forgets the last episode; there is nothing to forget."""
+        """Forgets the last episode; this policy has no state."""
 
     def act(self, observations):
-        """The move of each agent that brings it nearest to its goal."""
+        """Returns for each agent the move that brings it closest to its goal."""
         return [self._act(seen) for seen in observations]
 
     def _act(self, seen):
@@ -36,7 +36,7 @@ class Follow:
 
 
 def evaluate(policy, config, seeds):
-    """The metrics of an episode for each seed."""
+    """Returns the metrics of one episode per seed, as lists by name."""
     metrics = defaultdict(list)
     env = pogema_v0(GridConfig(**config), semantics="2.0")
     for seed in seeds:
@@ -62,9 +62,9 @@ def main():
         "observation_type": "POMAPF",
         "max_episode_steps": 128,
     }
-    for name, policy in {"follow": Follow(), "A*": BatchAStarAgent()}.items():
+    for name, policy in {"greedy": Greedy(), "A*": BatchAStarAgent()}.items():
         metrics = evaluate(policy, config, range(arguments.seeds))
-        shown = [f"{figure} {np.mean(values):.3f} ± {np.std(values):.3f}" for figure, values in metrics.items()]
+        shown = [f"{metric} {np.mean(values):.3f} ± {np.std(values):.3f}" for metric, values in metrics.items()]
         print(f"{name:8}", "  ".join(shown))
 
 

@@ -1,4 +1,4 @@
-"""Collects what a planner does, to learn from it: python imitation_data.py [--episodes N] [--folder FOLDER]."""
+"""Collects expert episodes of a planner: python imitation_data.py [--episodes N] [--folder FOLDER]."""
 
 import argparse
 

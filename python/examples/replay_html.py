@@ -28,7 +28,7 @@ def main():
     team = BatchAStarAgent()
     while "metrics" not in infos[0]:
         observations, _, _, _, infos = env.step(team.act(observations))
-    env.save_replay(arguments.out, title="Two agents change rooms")
+    env.save_replay(arguments.out, title="Two agents swap rooms")
     print(f"{arguments.out}: {infos[0]['metrics']}")
 
 

@@ -1,11 +1,11 @@
-"""Trains one policy for all agents by PPO, on 8 x 8 maps with 4 agents, and says how good it became.
+"""Trains one policy for all agents with PPO, on 8 x 8 maps with 4 agents, and evaluates it.
 
     pip install torch matplotlib
     python train_ppo.py --plot learning.svg
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
-network for every agent of every environment. An agent that has left takes no part in the loss. The policy is judged on
-seeds that it has never played, beside a random policy and POGEMA's A* agents.
+network for every agent of every environment. Finished agents do not contribute to the loss. The policy is evaluated on
+unseen seeds, next to a random policy and POGEMA's A* agents.
 """
 
 import argparse
@@ -19,13 +19,13 @@ from torch import nn
 from torch.distributions import Categorical
 
 CONFIG = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
-# Seeds are drawn for training; those of the judgement are not among them.
-JUDGED_SEEDS = range(10_000, 10_512)
+# Training derives its 63-bit seeds from a `SeedSequence`, which practically never yields one of these.
+EVALUATION_SEEDS = range(10_000, 10_512)
 
 
 @dataclass
 class Params:
-    """What PPO may be told; the values are those of the run in the documentation."""
+    """The parameters of PPO; the defaults are those of the run in the documentation."""
 
     num_envs: int = 256
     num_steps: int = 32
@@ -42,7 +42,7 @@ class Params:
 
 
 class Policy(nn.Module):
-    """From an agent's window to the odds of its actions and the value of its state."""
+    """Maps an agent's window to a distribution over its actions and the value of its state."""
 
     def __init__(self, num_values: int, hidden: int) -> None:
         super().__init__()
@@ -65,7 +65,7 @@ class Policy(nn.Module):
 
 @dataclass
 class Rollout:
-    """What all agents saw and did: tensors of the shape (steps, agents, ...)."""
+    """The observations, actions and rewards of all agents: tensors of shape (steps, agents, ...)."""
 
     seen: torch.Tensor
     masks: torch.Tensor
@@ -87,7 +87,7 @@ class Rollout:
 
 
 class Trainer:
-    """A policy, the environments that it plays and what it has learnt from."""
+    """A policy, its environments and its rollout."""
 
     def __init__(self, params: Params, seed: int) -> None:
         torch.manual_seed(seed)
@@ -102,7 +102,7 @@ class Trainer:
         self.seconds_in_env = 0.0
 
     def _flat(self, observations: np.ndarray) -> torch.Tensor:
-        """The environments' own memory, one row per agent."""
+        """Returns a view of the environments' memory, one row per agent."""
         return torch.from_numpy(observations).flatten(0, 1)
 
     @torch.no_grad()
@@ -127,32 +127,32 @@ class Trainer:
 
     @torch.no_grad()
     def advantages(self) -> torch.Tensor:
-        """How much better each action was than expected, by GAE."""
+        """Returns the advantage of each action, by GAE."""
         rollout, params = self.rollout, self.params
         masks = torch.from_numpy(self.infos["action_masks"]).flatten(0, 1)
         _, next_value = self.policy(self.seen, masks)
         advantages, last = torch.zeros_like(rollout.values), torch.zeros(self.num_agents)
         for step in reversed(range(params.num_steps)):
-            goes_on = (~rollout.is_over[step]).float()
-            error = rollout.rewards[step] + params.discount * goes_on * next_value - rollout.values[step]
-            last = error + params.discount * params.gae * goes_on * last
+            continues = (~rollout.is_over[step]).float()
+            error = rollout.rewards[step] + params.discount * continues * next_value - rollout.values[step]
+            last = error + params.discount * params.gae * continues * last
             advantages[step], next_value = last, rollout.values[step]
         return advantages
 
     def learn(self, progress: float) -> None:
-        """Improves the policy on the rollout; `progress` is the share of the time that is over."""
+        """Updates the policy on the rollout; `progress` is the elapsed share of the training time."""
         params, rollout = self.params, self.rollout
         for group in self.optimizer.param_groups:
             group["lr"] = params.learning_rate * max(1 - progress, 0.05)
         advantages = self.advantages()
-        taking_part = rollout.is_active.flatten().nonzero().squeeze(-1)
+        active = rollout.is_active.flatten().nonzero().squeeze(-1)
         flat = {name: getattr(rollout, name).flatten(0, 1) for name in ("seen", "masks", "actions", "odds")}
         returns, advantages = (advantages + rollout.values).flatten(), advantages.flatten()
-        # Over the whole rollout: the last part of it may be a single step, which has no spread.
-        spread, mean = torch.std_mean(advantages[taking_part])
+        # Normalized over the whole rollout, because its last minibatch may hold a single sample, which has no spread.
+        spread, mean = torch.std_mean(advantages[active])
         advantages = (advantages - mean) / (spread + 1e-8)
         for _ in range(params.num_epochs):
-            order = taking_part[torch.randperm(len(taking_part))]
+            order = active[torch.randperm(len(active))]
             for part in order.split(params.batch_size):
                 odds, values = self.policy(flat["seen"][part], flat["masks"][part])
                 gain = advantages[part]
@@ -168,8 +168,8 @@ class Trainer:
 
 
 @torch.no_grad()
-def judge(policy: Policy, seeds: range) -> float:
-    """Mean ISR of a policy on the first episodes of some seeds; it draws its actions, as in training."""
+def evaluate(policy: Policy, seeds: range) -> float:
+    """Returns the mean ISR of a policy on one episode per seed; it samples its actions, as in training."""
     env = VecEnv(GridConfig(**CONFIG), len(seeds), semantics="2.0", masks=True, autoreset_mode="Disabled")
     observations, infos = env.reset(seed=list(seeds))
     shares = np.full(len(seeds), np.nan)
@@ -183,8 +183,8 @@ def judge(policy: Policy, seeds: range) -> float:
     return float(shares.mean())
 
 
-def judge_agents(make_team, seeds: range) -> float:
-    """Mean ISR of a team that acts on POGEMA's own lists."""
+def evaluate_agents(make_team, seeds: range) -> float:
+    """Returns the mean ISR of a team that acts on POGEMA's own lists."""
     shares = []
     for seed in seeds:
         env = pogema_v0(GridConfig(**CONFIG, seed=seed, observation_type="POMAPF"), semantics="2.0")
@@ -217,19 +217,19 @@ def plot(curve: list[tuple[float, float]], peers: dict[str, float], path: str) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=5.0, help="how long to train")
+    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
-    parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES")
+    parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
     arguments = parser.parse_args()
 
     peers = {
-        "random": judge_agents(lambda env: lambda _: env.sample_actions(), JUDGED_SEEDS),
-        "A*": judge_agents(lambda _: BatchAStarAgent().act, JUDGED_SEEDS),
+        "random": evaluate_agents(lambda env: lambda _: env.sample_actions(), EVALUATION_SEEDS),
+        "A*": evaluate_agents(lambda _: BatchAStarAgent().act, EVALUATION_SEEDS),
     }
     trainer = Trainer(Params(), arguments.seed)
     began, seconds, num_steps = time.perf_counter(), 0.0, 0
-    curve = [(0.0, judge(trainer.policy, JUDGED_SEEDS))]
+    curve = [(0.0, evaluate(trainer.policy, EVALUATION_SEEDS))]
     while seconds < 60 * arguments.minutes:
         resumed = time.perf_counter()
         trainer.play()
@@ -237,13 +237,13 @@ def main() -> None:
         num_steps += trainer.rollout.actions.numel()
         seconds += time.perf_counter() - resumed
         if seconds / 60 >= curve[-1][0] + arguments.judge_every or seconds >= 60 * arguments.minutes:
-            curve.append((seconds / 60, judge(trainer.policy, JUDGED_SEEDS)))
+            curve.append((seconds / 60, evaluate(trainer.policy, EVALUATION_SEEDS)))
             speed = num_steps / seconds
             print(f"{curve[-1][0]:6.1f} min  {num_steps:>12,} agent steps  {speed:8,.0f}/s  ISR {curve[-1][1]:.3f}")
-    print(f"ISR on {len(JUDGED_SEEDS)} unseen seeds: PPO {curve[-1][1]:.3f}", end="")
+    print(f"ISR on {len(EVALUATION_SEEDS)} unseen seeds: PPO {curve[-1][1]:.3f}", end="")
     print("".join(f", {name} {share:.3f}" for name, share in peers.items()))
     print(f"{100 * trainer.seconds_in_env / seconds:.1f} % of {seconds / 60:.1f} minutes were spent in the environment")
-    print(f"{(time.perf_counter() - began) / 60:.1f} minutes in all")
+    print(f"{(time.perf_counter() - began) / 60:.1f} minutes in total")
     if arguments.plot:
         plot(curve, peers, arguments.plot)
 

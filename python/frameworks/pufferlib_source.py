@@ -1,6 +1,6 @@
 """Fetches the Python sources of PufferLib into a folder: pufferlib_source.py VERSION FOLDER.
 
-Its release is an archive of sources, and building it downloads a graphics library that no test of ours draws with.
+Its release is a source archive. Building it downloads a graphics library that our tests do not use.
 """
 
 import sys
@@ -13,7 +13,7 @@ from distlib.locators import locate
 
 
 def main(version: str, folder: Path) -> None:
-    """Leaves `folder/pufferlib`, its modules without environments of its own."""
+    """Extracts the modules of PufferLib, without its environments, to `folder/pufferlib`."""
     found = locate(f"pufferlib ({version})")
     if found is None:
         sys.exit(f"pufferlib_source: found no release {version} of pufferlib")

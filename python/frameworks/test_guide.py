@@ -1,4 +1,4 @@
-"""The blocks of the guide that need one of the frameworks run."""
+"""Tests that the code blocks of the guide that need a framework run."""
 
 import re
 import subprocess
@@ -12,12 +12,12 @@ BLOCK = re.compile(r"^<!-- framework: (\w+) -->\n```python\n(.*?)^```$", re.MULT
 BLOCKS = dict(BLOCK.findall(GUIDE.read_text()))
 
 
-def test_there_are_blocks():
+def test_guide_has_a_block_for_each_framework():
     assert set(BLOCKS) == {"pufferlib", "torchrl"}
 
 
 @pytest.mark.parametrize("framework", BLOCKS)
-def test_the_block_runs(framework, tmp_path):
+def test_block_runs(framework, tmp_path):
     code = [sys.executable, "-B", "-c", BLOCKS[framework]]
     run = subprocess.run(code, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,4 @@
-"""The adapter for PufferLib, in its buffers and under each of its vectorizations."""
+"""Tests of the adapter for PufferLib, with its buffers and each of its vectorizations."""
 
 import numpy as np
 import pufferlib
@@ -14,7 +14,7 @@ def buffers(env):
     return [env.observations, env.rewards, env.terminals, env.truncations, env.masks]
 
 
-def test_it_plays_the_episodes_of_the_vector_environment_in_its_own_buffers():
+def test_episodes_equal_those_of_vec_env_and_are_written_to_the_buffers():
     env, plain = PogemaPuffer(CONFIG, 3), VecEnv(CONFIG, 3)
     assert isinstance(env, pufferlib.PufferEnv)
     assert (env.num_agents, env.single_action_space.n) == (12, 5)
@@ -28,8 +28,8 @@ def test_it_plays_the_episodes_of_the_vector_environment_in_its_own_buffers():
         assert np.array_equal(observations, expected.reshape(12, *expected.shape[2:]))
         observations, rewards, terminals, truncations, infos = env.step(actions)
         expected, *values, state = plain.step(actions.reshape(3, 4))
-        for got, wanted in zip((rewards, terminals, truncations), values):
-            assert np.array_equal(got, wanted.ravel())
+        for got, value in zip((rewards, terminals, truncations), values):
+            assert np.array_equal(got, value.ravel())
         was_active, is_active = is_active, state["is_active"].ravel()
         assert np.array_equal(env.masks, was_active | is_active)
         ended = np.flatnonzero(state.get("_metrics", []))
@@ -42,7 +42,7 @@ def test_it_plays_the_episodes_of_the_vector_environment_in_its_own_buffers():
     env.close()
 
 
-def test_who_leaves_is_told_once_and_masked_then():
+def test_finished_agents_are_reported_once_and_then_masked():
     config = GridConfig(map="aA..\nb..B", num_agents=2, max_episode_steps=9)
     env = PogemaPuffer(config, dtype="uint8")
     env.reset(seed=0)
@@ -66,14 +66,14 @@ def play(vec, seed, num_steps=50):
     return np.stack(seen)
 
 
-def test_one_environment_plays_the_same_wherever_it_runs():
+def test_native_and_serial_vectorization_play_the_same():
     kwargs = {"grid_config": CONFIG, "num_envs": 2, "num_threads": 1}
     native = play(pufferlib.vector.make(PogemaPuffer, env_kwargs=kwargs), 3)
     serial = play(pufferlib.vector.make(PogemaPuffer, env_kwargs=kwargs, backend=pufferlib.vector.Serial), 3)
     assert np.array_equal(native, serial)
 
 
-def test_processes_play_what_one_process_plays():
+def test_several_processes_play_the_same_as_one():
     kwargs = {"grid_config": CONFIG, "num_envs": 2, "num_threads": 1}
     vec = [
         pufferlib.vector.make(PogemaPuffer, env_kwargs=kwargs, num_envs=2, backend=backend, **options)

@@ -1,4 +1,4 @@
-"""The adapter for RLlib under RLlib's own checker."""
+"""Tests of the adapter for RLlib, including RLlib's own checker."""
 
 import pytest
 from pogema_rs.integrations.rllib import PogemaMultiAgentEnv
@@ -6,11 +6,11 @@ from ray.rllib.utils.pre_checks.env import check_multiagent_environments
 
 
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_the_checker_passes(on_target):
+def test_rllib_checker_passes(on_target):
     check_multiagent_environments(PogemaMultiAgentEnv({"num_agents": 4, "on_target": on_target}))
 
 
-def test_a_whole_episode():
+def test_complete_episode():
     env = PogemaMultiAgentEnv({"map": "aA..\nb..B", "num_agents": 2, "max_episode_steps": 9})
     observations, _ = env.reset(seed=3)
     assert set(observations) == set(env.agents) == {"player_0", "player_1"}

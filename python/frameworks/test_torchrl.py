@@ -1,4 +1,4 @@
-"""The adapter for TorchRL under TorchRL's own checker."""
+"""Tests of the adapter for TorchRL, including TorchRL's own checker."""
 
 import pytest
 import torch
@@ -14,11 +14,11 @@ def make(**fields):
 
 
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_the_checker_passes(on_target):
+def test_torchrl_checker_passes(on_target):
     check_env_specs(make(num_agents=4, on_target=on_target, max_episode_steps=30))
 
 
-def test_random_policies_walk_into_no_obstacle():
+def test_action_masks_keep_random_policies_off_obstacles():
     env = make(num_agents=6, size=10, density=0.4, on_target="nothing", max_episode_steps=64)
     steps = env.rollout(64)["agents"]
     masks, actions = steps["action_mask"], steps["action"]
@@ -29,16 +29,16 @@ def test_random_policies_walk_into_no_obstacle():
     assert len(actions.unique()) == 5
 
 
-def test_agents_leave_and_the_end_brings_the_metrics():
+def test_finished_agents_are_masked_and_the_last_step_has_metrics():
     env = make(map="aA..\nb..B", num_agents=2, max_episode_steps=9)
     state = env.reset()
-    for is_there in ([False, True], [False, True], [False, False]):
+    for is_present in ([False, True], [False, True], [False, False]):
         state["agents", "action"] = torch.tensor([4, 4])
         state = env.step(state)
         state = state["next"]
-        assert state["agents", "mask"].tolist() == is_there
-        assert state["done"].item() == (is_there == [False, False])
-        assert torch.isnan(state["agents", "info", "ISR"][1]) == any(is_there)
+        assert state["agents", "mask"].tolist() == is_present
+        assert state["done"].item() == (is_present == [False, False])
+        assert torch.isnan(state["agents", "info", "ISR"][1]) == any(is_present)
     assert state["agents", "info", "ISR"][1] == 1.0
 
 

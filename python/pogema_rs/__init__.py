@@ -1,27 +1,27 @@
-"""POGEMA, the multi-agent pathfinding environment, bit for bit and hundreds of times faster.
+"""POGEMA, the multi-agent pathfinding environment, with bit-identical results and hundreds of times faster.
 
-Change one import and keep every number:
+Change one import, and all results stay the same:
 
     from pogema_rs import GridConfig, pogema_v0
 
-What is named here is imported at its first use; importing the package imports gymnasium alone, which has to know it.
+Each name is imported at its first use. Importing the package imports only gymnasium, to register the environments.
 
-Modules under POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogema_rs.generator`, `pogema_rs.grid`,
+Modules with POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogema_rs.generator`, `pogema_rs.grid`,
 `pogema_rs.grid_config`, `pogema_rs.grid_registry`, `pogema_rs.utils`, `pogema_rs.svg_animation` with
 `pogema_rs.svg_animation.animation_drawer` and `pogema_rs.svg_animation.animation_wrapper`, and `pogema_rs.wrappers`
 with `pogema_rs.wrappers.metrics` and `pogema_rs.wrappers.persistence`.
 
-Modules of our own: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
+Additional modules: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
 `pogema_rs.errors`, `pogema_rs.install`, `pogema_rs.svg_animation.filmed` and `pogema_rs.wrappers.forwarding`.
 
-Evaluations, under the names of pogema-toolbox, in `pogema_rs.toolbox`, which `python -m` runs:
+Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a command line (`python -m`):
 `pogema_rs.toolbox.evaluator`, `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`,
 `pogema_rs.toolbox.algorithm_config`, `pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder` and
 `pogema_rs.toolbox.views`.
 
-Frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
-`pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib`,
-`pogema_rs.integrations.sample_factory` and `pogema_rs.integrations.torchrl`.
+Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,
+`pogema_rs.integrations.pettingzoo`, `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`,
+`pogema_rs.integrations.rllib`, `pogema_rs.integrations.sample_factory` and `pogema_rs.integrations.torchrl`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ _HOMES = {
     "install_as_pogema": "install",
     "pogema_v0": "integrations.make_pogema",
 }
-# POGEMA's own import brings these with it.
+# `import pogema` imports these modules too.
 _MODULES = (
     *("a_star_policy", "envs", "generator", "grid", "grid_config", "grid_registry", "integrations"),
     *("svg_animation", "utils", "wrappers"),
@@ -94,6 +94,6 @@ def __dir__() -> list[str]:
 
 
 for _id in ("Pogema-v0", "pogema_rs/Pogema-v0"):
-    # With POGEMA itself imported the plain name stays its own.
+    # If POGEMA itself is imported, it keeps the plain name.
     if _id not in gymnasium.registry:
         gymnasium.register(id=_id, entry_point="pogema_rs.integrations.make_pogema:make_single_agent_gym")

@@ -1,4 +1,4 @@
-"""Values of a config as POGEMA 1.4.0 takes them: numbers in texts, whole floats and the like are no mistakes there."""
+"""Coerces the values of a config as POGEMA 1.4.0 does, which accepts for example numbers as strings."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 
 
 def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields with each value as JSON can hold it.
+    """Returns the fields with each value in a form that JSON can hold.
 
-    Errors: `RefusedConfigError` naming the field, its value and what was expected.
+    Errors: `RefusedConfigError` with the field, its value and what was expected; `OutsideMapError` for cells outside
+    any map; `NoCellError` for an empty list of goals.
     """
     result: dict[str, Any] = {}
     for name, value in fields.items():
@@ -91,7 +92,7 @@ def _listed(name: str, value: Any) -> list:
 
 
 def _cell(name: str, value: Any) -> Any:
-    """A pair as it was given, if it is one of whole numbers."""
+    """Returns a pair of integers in the container it was given in."""
     is_pair = isinstance(value, (list, tuple)) and len(value) == 2
     if not is_pair or not all(isinstance(number, numbers.Integral) for number in value):
         raise _refused(name, value, "a pair (row, col) of whole numbers")

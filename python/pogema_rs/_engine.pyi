@@ -1,4 +1,4 @@
-"""The compiled part of the package; what is public of it is named in the other modules."""
+"""The compiled part of the package; the other modules define the public names."""
 
 from collections.abc import Callable
 from typing import Any, Optional, final
@@ -48,7 +48,7 @@ class Engine:
     def on_goal(self) -> list[bool]: ...
     @property
     def size(self) -> tuple[int, int]: ...
-    # Can be written, not read.
+    # Write-only.
     elapsed: int
     def __new__(cls, config: dict[str, Any], registered: Optional[str] = None, exact: bool = False) -> Engine: ...
     def reset(self, /, config: Optional[dict[str, Any]] = None, registered: Optional[str] = None) -> list[str]: ...

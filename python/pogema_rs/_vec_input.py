@@ -1,4 +1,4 @@
-"""What callers hand to a `VecEnv`, checked before anything is played."""
+"""Checks the arguments of a `VecEnv` before it plays."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 
 try:
     from gymnasium.vector import AutoresetMode
-except ImportError:  # Gymnasium before 1.1 has no name for what it does.
+except ImportError:  # Gymnasium before 1.1 does not define the modes.
 
     class AutoresetMode(Enum):  # type: ignore[no-redef]
-        """What follows the end of an episode."""
+        """How the next episode of an environment begins."""
 
         NEXT_STEP = "NextStep"
         SAME_STEP = "SameStep"
         DISABLED = "Disabled"
 
 
-# POGEMA's seeds are below this.
+# Upper bound of POGEMA's seeds, exclusive.
 _SEEDS = 2**63 - 1
 _LARGEST = 2**63 - 1
 
 
 def read_autoreset(mode: Any) -> AutoresetMode:
-    """An autoreset mode, by itself or by name: `SAME_STEP`, `same_step` or `SameStep`."""
+    """Returns an autoreset mode, given as a mode or by name: `SAME_STEP`, `same_step` or `SameStep`."""
     for known in AutoresetMode:
         if mode is known or (isinstance(mode, str) and mode in (known.value, known.name, known.name.lower())):
             return known
@@ -34,17 +34,17 @@ def read_autoreset(mode: Any) -> AutoresetMode:
 
 
 def read_actions(actions: Any, shape: tuple[int, int]) -> np.ndarray:
-    """Actions as an int64 array in one piece; that each is an action is checked where it is read.
+    """Returns actions as a contiguous int64 array; the engine checks the range of each number.
 
-    Errors: TypeError for anything but whole numbers, ValueError for another shape.
+    Errors: TypeError for anything but integers, ValueError for another shape.
     """
     array = _as_array(actions)
     if array.dtype.kind not in "iu":
-        raise TypeError(f"actions are of the type {array.dtype}, expected whole numbers 0 to 4, as of int64")
+        raise TypeError(f"actions have type {array.dtype}, expected whole numbers 0 to 4, for example int64")
     if array.shape != shape:
-        raise ValueError(f"actions have the shape {array.shape}, expected {shape}, one per environment and agent")
+        raise ValueError(f"actions have shape {array.shape}, expected {shape}, one per environment and agent")
     if array.dtype == np.uint64:
-        # Else the largest would turn negative, and the message would name another number.
+        # Otherwise large numbers would become negative, and the message would quote a wrong number.
         array = np.minimum(array, np.uint64(_LARGEST))
     return np.ascontiguousarray(array, dtype=np.int64)
 
@@ -57,34 +57,35 @@ def _as_array(actions: Any) -> np.ndarray:
     try:
         return np.asarray(actions)
     except ValueError as error:
-        raise ValueError(f"actions, expected whole numbers in the shape (envs, agents): {error}") from None
+        reason = f"actions are not an array, expected whole numbers in the shape (envs, agents): {error}"
+        raise ValueError(reason) from None
 
 
 def check_out(out: Any, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
-    """A caller's buffer for observations.
+    """Returns a caller's buffer for observations after checking it.
 
-    Errors: TypeError for anything but an array of the type, ValueError for one that cannot be written whole.
+    Errors: TypeError for anything but an array of `dtype`, ValueError for a wrong shape, layout or write protection.
     """
     if not isinstance(out, np.ndarray):
-        raise TypeError(f"out is a {type(out).__name__}, expected a numpy array of {dtype} and the shape {shape}")
+        raise TypeError(f"out is a {type(out).__name__}, expected a numpy array of {dtype} with shape {shape}")
     if out.dtype != dtype:
-        raise TypeError(f"out is of the type {out.dtype}, expected {dtype}")
+        raise TypeError(f"out has type {out.dtype}, expected {dtype}")
     if out.shape != shape:
-        raise ValueError(f"out has the shape {out.shape}, expected {shape}")
+        raise ValueError(f"out has shape {out.shape}, expected {shape}")
     if not out.flags.c_contiguous or not out.flags.aligned:
-        raise ValueError("out is scattered in memory, expected a C-contiguous array")
+        raise ValueError("out is not contiguous in memory, expected a C-contiguous array")
     if not out.flags.writeable:
         raise ValueError("out is read-only, expected a writeable array")
     return out
 
 
 def read_mask(options: Any, num_envs: int) -> Optional[list[bool]]:
-    """Which environments a reset is for; none if for all."""
+    """Returns which environments to reset, or `None` for all."""
     if not options:
         return None
     for name in options:
         if name != "reset_mask":
-            raise ValueError(f"options has `{name}`, expected `reset_mask` alone")
+            raise ValueError(f"options has `{name}`, expected only `reset_mask`")
     mask = options["reset_mask"]
     if mask is None:
         return None
@@ -92,14 +93,14 @@ def read_mask(options: Any, num_envs: int) -> Optional[list[bool]]:
         kind = f"an array of {mask.dtype}" if isinstance(mask, np.ndarray) else f"a {type(mask).__name__}"
         raise TypeError(f"options['reset_mask'] is {kind}, expected a numpy array of bool")
     if mask.shape != (num_envs,):
-        raise ValueError(f"options['reset_mask'] has the shape {mask.shape}, expected {(num_envs,)}")
+        raise ValueError(f"options['reset_mask'] has shape {mask.shape}, expected {(num_envs,)}")
     if not mask.any():
-        raise ValueError("options['reset_mask'] chooses no environment, expected at least one True")
+        raise ValueError("options['reset_mask'] selects no environment, expected at least one True")
     return mask.tolist()
 
 
 def read_seed(seed: Any, num_envs: int) -> tuple[Optional[int], Optional[list[int]]]:
-    """One seed for all environments, or one for each."""
+    """Returns one seed for all environments, or a list with one seed for each."""
     if seed is None:
         return None, None
     if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim > 0):

@@ -1,4 +1,4 @@
-"""POGEMA's A* policy, action for action."""
+"""POGEMA's A* policy, with identical actions."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["AStarAgent", "BatchAStarAgent"]
 
 
 class AStarAgent:
-    """One agent that walks a shortest path over the obstacles it has seen, blind to other agents.
+    """An agent that follows a shortest path around the obstacles it has seen, and ignores other agents.
 
-    After a step that did not move it, it acts at random until it moves again. Needs observations of the type `POMAPF`
+    After a step that did not move it, it acts at random until it moves again. It needs observations of type `POMAPF`
     or `MAPF`.
 
     Rule: policy/astar
@@ -26,15 +26,16 @@ class AStarAgent:
         self._agent = _engine.AStarAgent(seed)
 
     def act(self, obs: dict[str, Any]) -> Union[int, np.int64]:
-        """The action for an observation; of NumPy's type if it was drawn, as in POGEMA.
+        """Returns the action for an observation; a random action is a NumPy integer, as in POGEMA.
 
-        Errors: `IndexError` if the agent is more than one step from where it was, since `clear_state` was forgotten.
+        Errors: `IndexError` if the agent is more than one step from its last cell; call `clear_state` between
+        episodes.
         """
         action, was_random = self._agent.act(obs["xy"], obs["target_xy"], obs["obstacles"])
         return np.int64(action) if was_random else action
 
     def clear_state(self) -> None:
-        """Forgets the map, for a new episode; its random numbers go on."""
+        """Forgets the map before a new episode; the random generator continues its stream."""
         self._agent.clear_state()
 
 
@@ -45,7 +46,7 @@ class BatchAStarAgent:
         self.astar_agents: dict[int, AStarAgent] = {}
 
     def act(self, observations: list[dict[str, Any]]) -> list:
-        """An action for each agent."""
+        """Returns an action for each agent."""
         actions = []
         for index, seen in enumerate(observations):
             if index not in self.astar_agents:
@@ -54,5 +55,5 @@ class BatchAStarAgent:
         return actions
 
     def reset_states(self) -> None:
-        """Forgets everything, for a new episode."""
+        """Discards all agents before a new episode."""
         self.astar_agents = {}

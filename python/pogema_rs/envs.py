@@ -1,4 +1,4 @@
-"""One environment with POGEMA's interface: lists of arrays in, lists of arrays out."""
+"""Single environments with POGEMA's interface: lists with one entry per agent."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy
 
 
 def _differ(one: Any, other: Any) -> bool:
-    """Whether two values of a field differ; arrays, which NumPy compares cell by cell, count as different."""
+    """Returns whether two values of a field differ; arrays, which NumPy compares by element, count as different."""
     try:
         return bool(one != other)
     except ValueError:
@@ -31,7 +31,7 @@ def _differ(one: Any, other: Any) -> bool:
 
 
 class ActionsSampler:
-    """Draws random actions with a generator of its own.
+    """A source of random actions with its own generator.
 
     Rule: seed/streams
     """
@@ -41,16 +41,19 @@ class ActionsSampler:
         self.update_seed(seed)
 
     def update_seed(self, seed: Optional[int] = None) -> None:
-        """Begins the random numbers of a seed."""
+        """Restarts the generator from a seed."""
         self._rnd = np.random.default_rng(seed)
 
     def sample_actions(self, dim: int = 1) -> np.ndarray:
-        """`dim` actions, int64."""
+        """Returns `dim` random actions.
+
+        Shape: `(dim,)`, int64
+        """
         return self._rnd.integers(self._num_actions, size=dim)
 
 
 class PogemaBase(Filmed, gymnasium.Env):
-    """POGEMA's name for what its environments share."""
+    """The base class of POGEMA's environments."""
 
 
 class Pogema(PogemaBase):
@@ -79,7 +82,7 @@ class Pogema(PogemaBase):
         self.semantics = Semantics(semantics)
         self.grid: Optional[Grid] = None
         self._has_metrics = not self.grid_config.persistent
-        # POGEMA's time limit and its choice of class are those of the config that the environment was made with.
+        # As in POGEMA, the time limit and the class follow from the config that the environment was made with.
         self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
         self._remember_config()
         self._engine = _engine.Engine(
@@ -91,8 +94,8 @@ class Pogema(PogemaBase):
         self.observation_space = _observation_space(self.grid_config)
         self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
-    # The config may be changed or replaced between two resets, which POGEMA's users do; what it held at the last one
-    # is kept, so that an unchanged one need not be read again.
+    # POGEMA's users change or replace the config between two resets. The values of the last reset are kept, so that an
+    # unchanged config is not read again.
 
     def _remember_config(self) -> None:
         fields = self.grid_config.__dict__
@@ -111,20 +114,20 @@ class Pogema(PogemaBase):
         if is_same and all(name == "seed" for name in changed):
             if changed:
                 self._engine.reseed({"seed": self.grid_config.seed})
-            noticed = self._engine.reset()
+            messages = self._engine.reset()
         else:
             fixed: dict[str, Any] = dict(self._fixed)
             pools = self._engine.pools()
             if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
                 fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
-            noticed = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
+            messages = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
         if changed or not is_same:
             self._remember_config()
-        for text in noticed:
+        for text in messages:
             warnings.warn(text, UserWarning, stacklevel=3)
         self.grid = self._grid_class._of(self._engine, self.grid_config)
 
-    # Gymnasium's types are those of one agent; here each is a list with an entry for every agent.
+    # Gymnasium's types describe one agent; here each value is a list with an entry for every agent.
 
     @overload  # type: ignore[override]
     def reset(
@@ -139,10 +142,10 @@ class Pogema(PogemaBase):
     def reset(
         self, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
     ) -> Union[tuple[list, list], list]:
-        """Begins an episode: observations and infos, a list of each.
+        """Begins an episode and returns the lists of observations and infos.
 
-        As POGEMA 1.4.0 does it, `seed` changes nothing; under the semantics "2.0" it becomes the seed of the config,
-        for this reset and those to come.
+        With the default semantics "1.4.0", `seed` has no effect. With "2.0" it becomes the seed of the config, for this
+        reset and all later ones.
 
         Rule: seed/reset
         """
@@ -159,10 +162,10 @@ class Pogema(PogemaBase):
     def step(  # type: ignore[override]
         self, action: Sequence[int]
     ) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
-        """Plays one step: observations, rewards, terminated, truncated, infos, a list of each.
+        """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
-        `infos[0]["metrics"]` holds the figures of the episode in the step that ends it. The actions stay as they are,
-        where POGEMA writes into them under `soft`.
+        In the step that ends an episode `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
+        POGEMA writes into them if `collision_system` is `soft`.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 
@@ -172,24 +175,27 @@ class Pogema(PogemaBase):
 
     @property
     def was_on_goal(self) -> Optional[list[bool]]:
-        """Which agents that take part stood on their goals after the last move; none before the first reset."""
+        """Whether each agent was active and on its goal after the last move; `None` before the first reset."""
         return None if self.grid is None else self._engine.on_goal
 
     def check_reset(self) -> None:
-        """Raises `NotResetError` before the first reset."""
+        """Raises `NotResetError` if the environment was not reset yet."""
         if self.grid is None:
             raise NotResetError("the environment was not reset yet")
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
         return self._started().render(mode=mode)
 
     def sample_actions(self) -> np.ndarray:
-        """A random action for each agent, int64 `(agents,)`, from a generator that begins with the config's seed."""
+        """Returns a random action for each agent, from a generator seeded with the config's seed.
+
+        Shape: `(agents,)`, int64
+        """
         return self._sampler.sample_actions(dim=self.grid_config.num_agents)
 
     def get_num_agents(self) -> int:
-        """Number of agents."""
+        """Returns the number of agents."""
         return self.grid_config.num_agents
 
     def _started(self) -> Grid:
@@ -221,7 +227,7 @@ class Pogema(PogemaBase):
         return self._started().get_state(ignore_borders=ignore_borders, as_dict=as_dict)
 
     def step_back(self) -> bool:
-        """Takes the last step back; says whether there was one. Needs `persistent` in the config.
+        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
 
         Rule: history/step-back
         """
@@ -235,18 +241,18 @@ class Pogema(PogemaBase):
             raise NoHistoryError("the environment was not reset yet")
 
     def set_elapsed_steps(self, elapsed_steps: int) -> None:
-        """Chooses how many steps count towards the time limit so far. Needs `persistent` in the config.
+        """Sets how many steps count towards the time limit so far; needs `persistent` in the config.
 
         Errors: `ValueError` for a config that is not persistent, and for a number below 0.
         """
         if not self._fixed["persistent"]:
-            raise NotKeptError("the time limit can be moved only with persistent=True in the config")
+            raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
         if elapsed_steps < 0:
             raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
         self._engine.elapsed = elapsed_steps
 
     def get_history(self) -> list:
-        """For each agent an `AgentState` after the reset, and one for each later step that changed it.
+        """Returns for each agent its `AgentState` after the reset and after each later step that changed it.
 
         Needs `persistent` in the config.
 
@@ -256,7 +262,7 @@ class Pogema(PogemaBase):
         return persistence.kept(self._engine, self.grid_config.obs_radius)
 
     def get_full_history(self) -> list:
-        """For each agent an `AgentState` at every step so far, that of the reset included."""
+        """Returns for each agent its `AgentState` at every step so far, including the reset."""
         num_steps = self._engine.num_steps
         return [persistence.at_every_step(changes, num_steps) for changes in self.get_history()]
 
@@ -270,7 +276,7 @@ class PogemaLifeLong(Pogema):
     _grid_class = GridLifeLong
 
     def get_lifelong_targets_xy(self, ignore_borders: bool = False) -> list:
-        """The goals that each agent gets if it walks from goal to goal, as POGEMA foretells them.
+        """Returns the goals that each agent gets if it reaches all of them, as POGEMA predicts them.
 
         Rule: goal/restart/foretold
         """

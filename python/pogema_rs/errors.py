@@ -1,7 +1,7 @@
 """The errors of pogema_rs.
 
-POGEMA 1.4.0 and its 2.0 line raise different classes for the same mistake; each class here is all of them, so that
-whatever a program catches catches ours. Every message is one line: what was wrong, and what was expected.
+POGEMA 1.4.0 and its 2.0 line raise different classes for the same mistake. Each class here derives from all of them,
+so that existing `except` clauses work. Every message is one line: what was wrong, and what was expected.
 """
 
 from typing import Optional
@@ -29,78 +29,81 @@ __all__ = [
 
 
 class _Quiet(KeyError):
-    """A KeyError that shows its message, not the quoted message."""
+    """A KeyError that shows its message without quotes."""
 
     def __str__(self) -> str:
         return ValueError.__str__(self)
 
 
 class RefusedConfigError(ValueError):
-    """A field of a config holds what it may not hold; `GridConfig` shows it as pydantic's ValidationError."""
+    """An invalid value in a config field; `GridConfig` raises it as pydantic's ValidationError."""
 
     def __init__(self, message: str, field: Optional[str] = None, reason: Optional[str] = None) -> None:
         super().__init__(message)
-        #: The field, if one field alone is wrong.
+        #: The wrong field, or `None` if the error is not about a single field.
         self.field = field
-        #: The message without the word `config`.
+        #: The message without the prefix `config:`.
         self.reason = message if reason is None else reason
 
 
 class OutsideMapError(IndexError, ValueError):
-    """A start or goal lies outside the map."""
+    """A start or goal outside the map."""
 
 
 class NoCellError(IndexError, ValueError):
-    """An agent's list of goals is empty."""
+    """An empty list of goals for an agent."""
 
 
 class EmptyMapError(ZeroDivisionError, ValueError):
-    """A map has no cells."""
+    """A map without cells."""
 
 
 class MapTextError(_Quiet, ValueError):
-    """A map text holds a character without a meaning, or letters beside other places for agents."""
+    """A map text with an unknown character, or with letters in addition to other starts and goals.
+
+    Also an unknown or duplicate name of a registered map.
+    """
 
 
 class InstanceError(OverflowError, IndexError, ValueError):
-    """No instance can be made of a config: no room, or starts and goals that do not fit each other."""
+    """A config without an instance: the map has no room, or starts and goals do not match."""
 
 
 class ActionCountError(AssertionError, ValueError):
-    """There is not one action for each agent."""
+    """A number of actions that differs from the number of agents."""
 
 
 class ActionError(IndexError, ValueError):
-    """A number is no action."""
+    """A number that is not an action."""
 
 
 class NotResetError(ResetNeeded, AttributeError):
-    """The environment was not reset yet."""
+    """A call before the first reset."""
 
 
 class StateError(ValueError, RuntimeError):
-    """A call that the state does not allow."""
+    """A call that the current state does not allow."""
 
 
 class NoHistoryError(NotResetError, TypeError):
-    """No step was played yet that could be kept or taken back."""
+    """A call that needs the history, before the first reset."""
 
 
 class NotKeptError(StateError, AttributeError):
-    """Steps are kept only with `persistent` in the config."""
+    """A call that needs the history, without `persistent` in the config."""
 
 
 class ElapsedStepsError(AssertionError, ValueError):
-    """There is no such number of steps."""
+    """A negative number of elapsed steps."""
 
 
 class JumpedError(IndexError, ValueError):
-    """An A* agent is told of a place that it cannot have come to in one step."""
+    """An A* agent in a cell that it cannot reach in one step."""
 
 
 class AutoResetError(_Quiet, ValueError):
-    """`auto_reset` with an integration that knows none."""
+    """`auto_reset` with an integration that does not support it."""
 
 
 class UnknownIntegrationError(_Quiet, ValueError):
-    """An integration that there is not."""
+    """An unknown integration."""

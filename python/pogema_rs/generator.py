@@ -1,6 +1,6 @@
-"""How instances are drawn, in the pieces that POGEMA's users call by hand.
+"""POGEMA's functions for drawing instances, for direct use.
 
-An environment does not go through these functions: its engine draws the same numbers by itself.
+Environments do not call these functions: their engine draws the same numbers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ Cell = tuple[int, int]
 
 
 def generate_obstacles(grid_config: GridConfig, rnd: Optional[np.random.Generator] = None) -> np.ndarray:
-    """A random map, int64 `(height, width)`, 1 for an obstacle; `rnd` begins with the config's seed if left out.
+    """Returns a random map, 1 for an obstacle; the default `rnd` is seeded with the config's seed.
+
+    Shape: `(height, width)`, int64
 
     Rule: place/obstacles
     """
@@ -37,10 +39,10 @@ def generate_obstacles(grid_config: GridConfig, rnd: Optional[np.random.Generato
 
 
 def bfs(grid: np.ndarray, moves: Sequence[Sequence[int]], start_id: int, free_cell: int) -> list[int]:
-    """Writes the number of its component into each free cell of `grid`; the number of cells of each component.
+    """Writes the number of its component into each free cell of `grid`, and returns the sizes of the components.
 
-    Components are numbered from `start_id` on in the order of their first cells, row by row; the entries below it
-    are 0.
+    Components are numbered from `start_id` in the order of their first cells, row by row. The returned list is
+    indexed by component number; its entries below `start_id` are 0.
 
     Rule: place/components
     """
@@ -75,7 +77,9 @@ def _labelled(grid_config: GridConfig, obstacles: np.ndarray) -> tuple[np.ndarra
 def generate_positions_and_targets_fast(
     obstacles: np.ndarray, grid_config: GridConfig
 ) -> tuple[list[Cell], list[Cell]]:
-    """Random starts and goals, each pair in one component; fewer starts than goals where there is no room.
+    """Returns random starts and goals, each pair in one component.
+
+    If the map has no room for all agents, returns fewer starts than goals.
 
     Rule: place/pairs
     """
@@ -103,9 +107,9 @@ def generate_positions_and_targets_fast(
 
 
 def generate_from_possible_positions(grid_config: GridConfig) -> tuple[list, list]:
-    """Starts and goals from the pools of the config, whose lists this shuffles.
+    """Returns starts and goals from the pools of the config, and shuffles these lists in place.
 
-    Errors: `InstanceError`, an `OverflowError`, for a pool of fewer cells than agents.
+    Errors: `InstanceError`, an `OverflowError`, for a pool with fewer cells than agents.
 
     Rule: place/pools
     """
@@ -123,9 +127,9 @@ def generate_from_possible_positions(grid_config: GridConfig) -> tuple[list, lis
 def generate_from_possible_targets(
     rnd_generator: np.random.Generator, possible_positions: Sequence, position: Sequence[int]
 ) -> tuple:
-    """A goal from a pool, another one than `position`.
+    """Returns a goal from a pool that differs from `position`.
 
-    Errors: `InstanceError` where there is no other one, and POGEMA would draw for ever.
+    Errors: `InstanceError` if the pool has no other cell; POGEMA loops forever.
 
     Rule: goal/restart/pool
     """
@@ -135,9 +139,9 @@ def generate_from_possible_targets(
 def generate_new_target(
     rnd_generator: np.random.Generator, point_to_component: dict, component_to_points: dict, position: Cell
 ) -> tuple:
-    """A goal that can be reached from `position`, and is another cell.
+    """Returns a goal that is reachable from `position` and differs from it.
 
-    Errors: `InstanceError` where there is none, and POGEMA would draw for ever.
+    Errors: `InstanceError` if no such cell exists; POGEMA loops forever.
 
     Rule: goal/restart/draw
     """
@@ -146,7 +150,7 @@ def generate_new_target(
 
 def _drawn(generator: np.random.Generator, cells: Sequence, position: Any) -> tuple:
     if all(tuple(cell) == position for cell in cells):
-        raise InstanceError(f"no goal can be drawn other than {position}")
+        raise InstanceError(f"no goal can be drawn other than the position {position}")
     while True:
         cell = tuple(generator.choice(cells, 1)[0])
         if cell != position:
@@ -156,7 +160,7 @@ def _drawn(generator: np.random.Generator, cells: Sequence, position: Any) -> tu
 def get_components(
     grid_config: GridConfig, obstacles: np.ndarray, positions_xy: Any = None, target_xy: Any = None
 ) -> tuple[dict[int, list[Cell]], dict[Cell, int]]:
-    """The cells of each component, and the component of each cell; obstacles are one component of their own.
+    """Returns the cells of each component and the component of each cell; obstacles form a component of their own.
 
     Rule: place/components
     """
@@ -164,7 +168,7 @@ def get_components(
     points: dict[int, list[Cell]] = defaultdict(list)
     labels: dict[Cell, int] = {}
     for cell in np.ndindex(*grid.shape):
-        # A number of NumPy's type, as in POGEMA.
+        # A NumPy integer, as in POGEMA.
         label: Any = grid[cell]
         points[label].append(cell)
         labels[cell] = label

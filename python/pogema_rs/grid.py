@@ -1,6 +1,6 @@
-"""What is on the map: a view of an environment's state under POGEMA's names.
+"""The map and its agents: a view of an environment's state with POGEMA's names.
 
-All coordinates are (row, col) and count the border, unless `ignore_borders` is set.
+All coordinates are (row, col) and include the border, unless `ignore_borders` is set.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ __all__ = ["Grid", "GridLifeLong"]
 class Grid:
     """The map and its agents.
 
-    Made by an environment it shows that environment's present state; made from a config it shows what a reset gives.
-    It cannot be written to: what POGEMA's users change by hand raises an error here and changes nothing.
+    A grid of an environment shows that environment's current state; a grid made from a config shows the state after a
+    reset. It is read-only: the methods with which POGEMA's users change a grid raise an error here.
 
     Rule: border/ring, border/outside, grid/coordinates
 
@@ -54,7 +54,7 @@ class Grid:
 
     @property
     def obstacles(self) -> np.ndarray:
-        """The map with its border, 1 for an obstacle: float64 if what lies beyond the wall is free, else int64."""
+        """The map with its border, 1 for an obstacle: float64 if the area beyond the wall is free, otherwise int64."""
         if self._obstacles is None:
             dtype = np.float64 if self._engine.is_free_outside else np.int64
             self._obstacles = self._engine.obstacles().astype(dtype)
@@ -63,7 +63,7 @@ class Grid:
 
     @property
     def positions(self) -> np.ndarray:
-        """The cells that are marked as occupied, float64 of the shape of `obstacles`."""
+        """The occupancy grid, 1 for a marked cell: float64 with the shape of `obstacles`."""
         marked = np.zeros(self.obstacles.shape)
         for cell in self._engine.occupied():
             marked[cell] = 1
@@ -72,41 +72,41 @@ class Grid:
 
     @property
     def positions_xy(self) -> list[tuple[int, int]]:
-        """Where each agent is."""
+        """The cell of each agent."""
         return self._engine.cells(self.config.obs_radius)
 
     @property
     def finishes_xy(self) -> list[tuple[Union[int, np.int64], Union[int, np.int64]]]:
-        """Where each agent wants to go; of NumPy's integers where a goal was drawn since the reset, as in POGEMA."""
+        """The goal of each agent; a goal drawn since the reset consists of NumPy integers, as in POGEMA."""
         goals = self._engine.goals(self.config.obs_radius)
         is_drawn = self._engine.is_drawn
         return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
 
     @property
     def starts_xy(self) -> list[tuple[int, int]]:
-        """Where each agent is: POGEMA's list of starts moves with the agents."""
+        """The cell of each agent: POGEMA's list of starts moves with the agents."""
         return self.positions_xy
 
     @property
     def is_active(self) -> dict[int, bool]:
-        """Which agents take part, by index."""
+        """Whether each agent is active, by index."""
         return dict(enumerate(self._engine.active))
 
     def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
-        """A copy of `obstacles`, with or without the border."""
+        """Returns a copy of `obstacles`, with or without the border."""
         radius = self.config.obs_radius
         inside = slice(radius, -radius)
         return self.obstacles[inside, inside].copy() if ignore_borders else self.obstacles.copy()
 
     def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
-        """Where each agent is: tuples, or lists where the border is not counted.
+        """Returns the cell of each agent, as a tuple, or as a list with `ignore_borders`.
 
-        `only_active` leaves out the agents that are gone; POGEMA's own drops agent 0 or raises.
+        `only_active` omits inactive agents; POGEMA's own flag drops agent 0 or raises.
         """
         return self._prepared(self.positions_xy, only_active, ignore_borders)
 
     def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
-        """Where each agent wants to go: tuples, or lists where the border is not counted."""
+        """Returns the goal of each agent, as a tuple, or as a list with `ignore_borders`."""
         return self._prepared(self.finishes_xy, only_active, ignore_borders)
 
     def _prepared(self, places: list, only_active: bool, ignore_borders: bool) -> list:
@@ -119,15 +119,15 @@ class Grid:
 
     @staticmethod
     def to_relative(coordinates: list, offset: list) -> list:
-        """Each place counted from its own origin."""
+        """Returns each cell relative to its own offset."""
         return [(row - from_row, col - from_col) for (row, col), (from_row, from_col) in zip(coordinates, offset)]
 
     def get_agents_xy_relative(self) -> list[tuple[int, int]]:
-        """Where each agent is, counted from its start."""
+        """Returns the cell of each agent relative to its start."""
         return self.to_relative(self.positions_xy, self._initial_xy)
 
     def get_targets_xy_relative(self) -> list[tuple[int, int]]:
-        """Where each agent wants to go, counted from its start."""
+        """Returns the goal of each agent relative to its start."""
         return self.to_relative(self.finishes_xy, self._initial_xy)
 
     @property
@@ -135,10 +135,10 @@ class Grid:
         return self._engine.starts(self.config.obs_radius)
 
     def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Any:
-        """Agents, goals and the map: a dictionary, or one flat array.
+        """Returns agents, goals and the map, as a dictionary or as one flat array.
 
-        Places are divided by one less than the map's sides; a map of one row or column has none to divide by, and
-        raises `ZeroDivisionError` as POGEMA does.
+        Coordinates are divided by the map's height or width minus 1. A map of one row or column thus raises
+        `ZeroDivisionError`, as in POGEMA.
         """
         radius, height, width = self.config.obs_radius, self.config.height - 1, self.config.width - 1
 
@@ -152,16 +152,16 @@ class Grid:
         return np.concatenate([np.array(part).flatten() for part in (agents_xy, targets_xy, obstacles)])
 
     def get_observation_shape(self) -> tuple[int, int, int]:
-        """POGEMA's figure, which leaves the goal's channel out."""
+        """Returns POGEMA's shape of an observation, which omits the goal's channel."""
         side = 2 * self.config.obs_radius + 1
         return 2, side, side
 
     def get_num_actions(self) -> int:
-        """Number of actions."""
+        """Returns the number of actions."""
         return len(self.config.MOVES)
 
     def get_grid_config(self) -> GridConfig:
-        """A copy of the config."""
+        """Returns a copy of the config."""
         return deepcopy(self.config)
 
     def _window(self, padded: np.ndarray, agent_id: int) -> np.ndarray:
@@ -170,15 +170,15 @@ class Grid:
         return padded[row - radius : row + radius + 1, col - radius : col + radius + 1].astype(np.float32)
 
     def get_obstacles_for_agent(self, agent_id: int) -> np.ndarray:
-        """The obstacles in an agent's window, float32 `(side, side)`."""
+        """Returns the obstacles in an agent's window, float32 `(side, side)`."""
         return self._window(self.obstacles, agent_id)
 
     def get_positions(self, agent_id: int) -> np.ndarray:
-        """The agents in an agent's window, float32 `(side, side)`."""
+        """Returns the agents in an agent's window, float32 `(side, side)`."""
         return self._window(self.positions, agent_id)
 
     def get_target(self, agent_id: int) -> tuple[float, float]:
-        """The direction of an agent's goal, of length 1; zeros on the goal."""
+        """Returns the direction of an agent's goal as a unit vector; zeros on the goal."""
         (row, col), (goal_row, goal_col) = self.positions_xy[agent_id], self.finishes_xy[agent_id]
         if (row, col) == (goal_row, goal_col):
             return 0.0, 0.0
@@ -187,7 +187,7 @@ class Grid:
         return down / distance, right / distance
 
     def get_square_target(self, agent_id: int) -> np.ndarray:
-        """The goal in an agent's window, each coordinate moved inside: float32 `(side, side)`.
+        """Returns the goal in an agent's window, each coordinate clipped to it: float32 `(side, side)`.
 
         Rule: observe/default/goal
         """
@@ -199,19 +199,19 @@ class Grid:
         return window
 
     def has_obstacle(self, x: int, y: int) -> bool:
-        """Whether a cell holds an obstacle."""
+        """Returns whether a cell is an obstacle."""
         return self.obstacles[x, y] == self.config.OBSTACLE
 
     def on_goal(self, agent_id: int) -> bool:
-        """Whether an agent is where it wants to go."""
+        """Returns whether an agent is on its goal."""
         return self.positions_xy[agent_id] == self.finishes_xy[agent_id]
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours; with `mode="ansi"` returns it."""
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
     def _refuse(self, *_: Any, **__: Any) -> None:
-        """Raises `StateError`: a grid is not changed by hand."""
+        """Raises `StateError`, because a grid is read-only."""
         raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
 
     move = move_without_checks = move_agent_to_cell = hide_agent = show_agent = add_artificial_border = _refuse
@@ -222,7 +222,7 @@ class GridLifeLong(Grid):
 
 
 def given_goals(config: GridConfig, ignore_borders: bool) -> Optional[list]:
-    """The goals that a config gives each agent, one after the other; none if it gives none."""
+    """Returns the goal sequence that a config gives each agent, or `None` if it has no goals."""
     if config.targets_xy is None or ignore_borders:
         return config.targets_xy
     radius = config.obs_radius
@@ -230,11 +230,11 @@ def given_goals(config: GridConfig, ignore_borders: bool) -> Optional[list]:
 
 
 def foretold_goals(grid: Grid, ignore_borders: bool) -> list:
-    """The goals that the agents of a grid are going to draw, as POGEMA foretells them."""
+    """Returns the goals that the agents of a grid will draw, as POGEMA predicts them."""
     radius = grid.config.obs_radius
     goals = grid._engine.foretold_goals()
     if goals is None:
-        raise StateError("the list of goals would never end: possible_targets_xy holds one cell alone")
+        raise StateError("the list of goals would never end: possible_targets_xy holds only one cell")
     shift = 0 if ignore_borders else radius
     first = grid.get_targets_xy(ignore_borders=ignore_borders)
     return [

@@ -1,4 +1,4 @@
-"""The config of an environment, under POGEMA's names."""
+"""The config of an environment, with POGEMA's names."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["GridConfig"]
 
 
 class GridConfig(BaseModel):
-    """Everything that fixes an environment.
+    """The complete description of an environment.
 
-    Fields, defaults and derivations are those of POGEMA 1.4.0. A field that there is not is ignored, as there, but with
-    a warning that names the nearest one. Assigning to a field later is not checked until the next reset.
+    Fields, defaults and derivations are those of POGEMA 1.4.0. Unknown fields are ignored, as in POGEMA, but trigger a
+    warning that names the closest known field. A value assigned to a field later is checked at the next reset.
 
     Errors: `pydantic.ValidationError`, which is a ValueError, for a value of the wrong type or range; `IndexError` for
-    a start or goal outside the map; `KeyError` for a character of a map that has no meaning, and for letters beside
-    other places; `ZeroDivisionError` for a map without cells.
+    a start or goal outside the map; `KeyError` for an unknown character in a map, and for letters in addition to other
+    starts and goals; `ZeroDivisionError` for a map without cells.
 
     Rule: config/fields, config/size, config/map, config/agents, config/positions
 
@@ -58,7 +58,7 @@ class GridConfig(BaseModel):
     max_episode_steps: int = 64
     auto_reset: Optional[bool] = None
 
-    # What the engine derives; all other fields stay as they were given.
+    # Fields that the engine derives; all other fields keep the given values.
     _DERIVED: ClassVar[tuple[str, ...]] = ("width", "height", "size", "density", "num_agents")
     _PLACES: ClassVar[tuple[str, ...]] = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
@@ -73,9 +73,9 @@ class GridConfig(BaseModel):
         super().__init__(**{**{name: fields[name] for name in fields if name in known}, **own})
 
     def update_config(self, **fields: Any) -> None:
-        """Sets some fields and derives the others anew; with an error nothing changes.
+        """Sets some fields and derives the others again; after an error the config is unchanged.
 
-        A `size` forgets width and height, and either of these forgets the size.
+        A new `size` discards width and height, and a new width or height discards the size.
         """
         merged = self.dict()
         if "size" in fields:
@@ -87,29 +87,29 @@ class GridConfig(BaseModel):
         for name in GridConfig.model_fields:
             setattr(self, name, getattr(updated, name))
 
-    def dict(self, **kwargs: Any) -> dict[str, Any]:  # noqa: A003 - POGEMA's users call it so
-        """All fields by name, as `model_dump` gives them."""
+    def dict(self, **kwargs: Any) -> dict[str, Any]:  # noqa: A003 - the name in POGEMA
+        """Returns all fields by name, like `model_dump`."""
         return self.model_dump(**kwargs)
 
     def json(self, **kwargs: Any) -> str:
-        """All fields as JSON, as `model_dump_json` gives them."""
+        """Returns all fields as JSON, like `model_dump_json`."""
         return self.model_dump_json(**kwargs)
 
     def copy(self, **kwargs: Any) -> GridConfig:
-        """A copy, as `model_copy` gives it."""
+        """Returns a copy, like `model_copy`."""
         return self.model_copy(**kwargs)
 
 
-# The engine plays the same episode in whatever framework.
+# The engine plays the same episode in every framework.
 _OF_ENGINE = tuple(name for name in GridConfig.model_fields if name not in ("integration", "auto_reset"))
 
 
 def engine_fields(config: GridConfig | Mapping[str, Any], **changes: Any) -> dict[str, Any]:
-    """The fields of a config that the engine reads."""
+    """Returns the fields of a config that the engine reads."""
     if isinstance(config, Mapping):
         own = {name: config[name] for name in _OF_ENGINE if name in config}
     else:
-        # The longer side follows from the two, and may be less than a size that is given.
+        # `size` is derived from width and height, and may be less than the given size.
         own = {name: config.__dict__[name] for name in _OF_ENGINE if name != "size"}
     return {**own, **changes}
 
@@ -119,7 +119,7 @@ def _warn_of_unknown(fields: Mapping[str, Any], known: Mapping[str, Any]) -> Non
         if name not in known:
             nearest = _engine.nearest_name(name, list(known))
             warnings.warn(
-                f"GridConfig has no field `{name}`, which is ignored; the nearest one is `{nearest}`",
+                f"GridConfig has no field `{name}`, which is ignored; did you mean `{nearest}`?",
                 UserWarning,
                 stacklevel=3,
             )
@@ -148,16 +148,16 @@ def _has_letters(text: str) -> bool:
 
 
 def _gives_pools(text: str) -> bool:
-    """Whether a map marks cells, and leaves none of the two pools empty."""
+    """Returns whether a map marks cells and both pools are nonempty."""
     return any(sign in text for sign in "@$!") and all(any(sign in text for sign in pool) for pool in (".@", ".$"))
 
 
 def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
     has_letters = _has_letters(text)
     if has_letters and any(character in "@$!" for character in text):
-        raise MapTextError("config: `map` has letters beside `@`, `$` or `!`, expected one or the other")
+        raise MapTextError("config: `map` has both letters and `@`, `$` or `!`, expected one or the other")
     if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:
-        raise MapTextError("config: `map` has letters beside agents_xy and targets_xy, expected one or the other")
+        raise MapTextError("config: `map` has letters alongside agents_xy and targets_xy, expected one or the other")
 
 
 def _validation_error(title: str, refused: RefusedConfigError, fields: Mapping[str, Any]) -> ValidationError:

@@ -1,4 +1,4 @@
-"""Maps by name: an environment whose config names one plays on it."""
+"""The registry of maps that configs select by `map_name`."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ GRID_STR_REGISTRY: dict[str, RegisteredGrid] = {}
 
 
 class RegisteredGrid:
-    """A map with a name, registered by being made.
+    """A named map; its constructor registers it.
 
-    Errors: `ValueError` for a name that is taken or places given twice; `KeyError` for a character without a meaning.
+    Errors: `ValueError` for a name that is taken, or for letters in addition to positions; `KeyError` for an unknown
+    character.
 
     Rule: grid/named
     """
@@ -38,46 +39,46 @@ class RegisteredGrid:
         self.agents_targets = agents_targets
         read = GridConfig(map=grid_str)
         if agents_positions and read.agents_xy or agents_targets and read.targets_xy:
-            raise StateError(f"the map {name!r} has letters beside positions, expected one or the other")
+            raise StateError(f"the map {name!r} has letters alongside positions, expected one or the other")
         self.obstacles = np.array(read.map, dtype=np.int32)
         self.agents_xy = read.agents_xy or agents_positions
         self.targets_xy = read.targets_xy or agents_targets
         register_grid(self)
 
     def get_obstacles(self) -> np.ndarray:
-        """1 where there is an obstacle, int32 `(height, width)`."""
+        """Returns the map, 1 for an obstacle: int32 `(height, width)`."""
         return self.obstacles
 
     def get_agents_xy(self) -> Optional[list]:
-        """The starts that came with the map."""
+        """Returns the starts given with the map."""
         return self.agents_xy
 
     def get_targets_xy(self) -> Optional[list]:
-        """The goals that came with the map."""
+        """Returns the goals given with the map."""
         return self.targets_xy
 
 
 def in_registry(name: Optional[str]) -> bool:
-    """Whether a map of this name is registered."""
+    """Returns whether a map of this name is registered."""
     return name in GRID_STR_REGISTRY
 
 
 def get_grid(name: str) -> RegisteredGrid:
-    """The map of a name; `KeyError` if there is none."""
+    """Returns the map of a name; raises `KeyError` for an unknown name."""
     if not in_registry(name):
-        raise MapTextError(f"no map is registered as {name!r}")
+        raise MapTextError(f"no map named {name!r} is registered")
     return GRID_STR_REGISTRY[name]
 
 
 def register_grid(rg: RegisteredGrid) -> None:
-    """Registers a map; `KeyError` and `ValueError` if its name is taken."""
+    """Registers a map; raises `MapTextError`, a `KeyError` and `ValueError`, if its name is taken."""
     if in_registry(rg.name):
-        raise MapTextError(f"a map is registered as {rg.name!r} already")
+        raise MapTextError(f"a map named {rg.name!r} is already registered")
     GRID_STR_REGISTRY[rg.name] = rg
 
 
 def map_text(name: Optional[str]) -> Optional[str]:
-    """The obstacles of a registered map as text; none if there is no such map."""
+    """Returns the obstacles of a registered map as text, or `None` if the name is not registered."""
     if name is None or not in_registry(name):
         return None
     rows = GRID_STR_REGISTRY[name].get_obstacles()

@@ -1,4 +1,4 @@
-"""Expert episodes for imitation learning: what agents saw, and what a planner let them do."""
+"""Expert episodes for imitation learning: the observations of agents and the actions of a planner."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ def collect(
     num_workers: int = 2,
     semantics: Union[str, Semantics] = Semantics.DEVELOPED,
 ) -> Iterator[Path]:
-    """Plays episodes by a planner and writes them into a folder, yielding each file once it is there.
+    """Plays episodes with a planner and writes them into a folder; yields the path of each file once it is written.
 
-    File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends on `seed` and
-    its number alone, so that a call which was broken off is taken up by the same call: files that are there stay.
-    With a budget of `nodes` the same call writes the same episodes anywhere; with one of `seconds`, 1 unless nodes
-    are given, plans depend on the machine. Episodes that the planner cannot solve are left out.
+    File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
+    and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. With a
+    budget of `nodes` the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
+    if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out.
 
-    Shape: with s the steps of all episodes of a file one after the other, `observations` `(s, agents, 3, side, side)`,
-    uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where an action is of no agent that
-    takes part; `episode` `(s,)`, int64, the number of the episode; `seeds` `(episodes,)`, int64, those of POGEMA.
+    Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
+    side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;
+    `episode` `(s,)`, int64, the number of the episode; `seeds` `(episodes,)`, int64, POGEMA's seeds.
 
-    Errors: ValueError for numbers below 1, and whatever the config raises.
+    Errors: ValueError for numbers below 1, and the errors of the config.
     """
     for name, value in (
         ("num_episodes", num_episodes),
@@ -53,14 +53,14 @@ def collect(
             raise ValueError(f"{name} is {value}, expected at least 1")
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
-    thinking = {"planner": planner, "seconds": seconds, "nodes": nodes}
+    planning = {"planner": planner, "seconds": seconds, "nodes": nodes}
     starts = range(0, num_episodes, episodes_per_file)
 
     def write(first: int) -> Path:
         path = target / f"episodes-{first // episodes_per_file:06}.npz"
         if not path.exists():
             numbers = range(first, min(first + episodes_per_file, num_episodes))
-            _write(path, [_play(grid_config, seed, number, semantics, thinking) for number in numbers])
+            _write(path, [_play(grid_config, seed, number, semantics, planning) for number in numbers])
         return path
 
     with ThreadPoolExecutor(num_workers) as workers:
@@ -68,22 +68,22 @@ def collect(
 
 
 def episode_seed(seed: int, episode: int) -> int:
-    """POGEMA's seed of an episode of a seed, as `VecEnv` has it for the first episode of an environment."""
+    """Returns POGEMA's seed of an episode, as in `VecEnv` for the first episode of environment `episode`."""
     state = np.random.SeedSequence(seed, spawn_key=(episode, 0)).generate_state(1, np.uint64)
     return int(state[0]) % (2**63 - 1)
 
 
 def _play(
-    grid_config: GridConfig, seed: int, number: int, semantics: Union[str, Semantics], thinking: dict[str, Any]
+    grid_config: GridConfig, seed: int, number: int, semantics: Union[str, Semantics], planning: dict[str, Any]
 ) -> dict[str, Any]:
-    """One episode, its plan followed from the first step to the last."""
+    """Plays one episode by following its plan from the first step to the last."""
     config = grid_config.model_copy(update={"seed": episode_seed(seed, number), "observation_type": "default"})
     env = pogema_v0(config, semantics=semantics)
     observations, infos = env.reset()
     obstacles = env.get_obstacles(ignore_borders=True)
     positions, goals = env.get_agents_xy(ignore_borders=True), env.get_targets_xy(ignore_borders=True)
     found = plan(
-        obstacles, positions, goals, most_steps=config.max_episode_steps, seed=number % 2**63, **thinking
+        obstacles, positions, goals, most_steps=config.max_episode_steps, seed=number % 2**63, **planning
     )
     steps: dict[str, Any] = {"observations": [], "actions": [], "is_active": []}
     if found.is_solved and found.actions is not None:
@@ -98,7 +98,7 @@ def _play(
 
 
 def _write(path: Path, episodes: list[dict[str, Any]]) -> None:
-    """Writes a file as a whole or not at all."""
+    """Writes a file atomically."""
     solved = [episode for episode in episodes if episode["actions"]]
 
     def joined(name: str) -> np.ndarray:

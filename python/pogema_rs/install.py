@@ -1,4 +1,4 @@
-"""`import pogema` made to mean this package, for code that nobody can edit."""
+"""Redirects `import pogema` to this package, for code that cannot be edited."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _THEIRS = "pogema"
 
 
 class _Alias(MetaPathFinder, Loader):
-    """Finds POGEMA's modules here, under the same names."""
+    """Finds POGEMA's modules in this package, under the same names."""
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> Optional[ModuleSpec]:
         if name.partition(".")[0] != _THEIRS:
@@ -37,21 +37,21 @@ class _Alias(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        # The module has run already, and keeps the name it has.
+        # The module has already run, and keeps its name.
         module.__spec__ = self._spec
 
 
 def install_as_pogema() -> None:
-    """Makes `import pogema`, and the import of its modules, give this package in the running process.
+    """Redirects imports of `pogema` and its modules to this package in the running process.
 
-    Gymnasium's wrappers get back what they did before its release 1.0, which code for POGEMA 1.4.0 relies on: unknown
-    attributes are those of the environment inside.
+    Gymnasium's wrappers again forward unknown attributes to the inner environment, as they did before release 1.0.
+    Code for POGEMA 1.4.0 relies on this.
 
-    Errors: `RuntimeError` if POGEMA itself is imported already.
+    Errors: `RuntimeError` if POGEMA itself is already imported.
     """
     imported = sys.modules.get(_THEIRS)
     if imported is not None and imported is not sys.modules[_OURS]:
-        raise RuntimeError("pogema is imported already, expected install_as_pogema() to be called before")
+        raise RuntimeError("pogema is already imported, expected a call of install_as_pogema() before the import")
     if not any(isinstance(finder, _Alias) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Alias())
     if not hasattr(gymnasium.Wrapper, "__getattr__"):

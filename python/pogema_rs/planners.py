@@ -1,9 +1,9 @@
-"""Planners: plans for all agents at once, and agents that follow them.
+"""Planners for all agents, and agents that follow their plans.
 
     from pogema_rs.planners import PlannerAgents, plan
 
-A planner knows the whole map and all goals, where a policy sees windows. Cells are rows and columns, counted from 0
-at the map's corner, without any border.
+A planner knows the whole map and all goals; a policy sees only windows. Cells are (row, col), counted from 0 at the
+map's corner, without the border.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ __all__ = ["Plan", "PlannerAgents", "cost_to_go", "plan", "validate"]
 
 @dataclass(frozen=True)
 class Plan:
-    """What a planner found out.
+    """The outcome of a planner.
 
-    Shape: `cells` is `(steps + 1, agents, 2)`, int32, the start first; `actions` is `(steps, agents)`, int64
+    Shape: `cells` is `(steps + 1, agents, 2)`, int32, starts first; `actions` is `(steps, agents)`, int64
     """
 
     #: "solved", "timed_out", "gave_up" or "impossible"
     outcome: str
-    #: Time that it took. Units: seconds
+    #: Planning time. Units: seconds
     seconds: float
-    #: Where each agent is; where none was found, of the plan that came closest, if there is one.
+    #: The cell of each agent at each step. If no plan was found, those of the closest attempt, if any.
     cells: Optional[NDArray[np.int32]] = None
-    #: What each agent does.
+    #: The action of each agent at each step.
     actions: Optional[NDArray[np.int64]] = None
-    #: Steps until each agent stays where it ends, summed over the agents.
+    #: Steps until an agent stays on its last cell, summed over all agents.
     sum_of_costs: Optional[int] = None
     #: The last step in which an agent moves.
     makespan: Optional[int] = None
-    #: The least that any plan's sum of costs can be, as far as it is known; if it is reached, the plan is optimal.
+    #: A lower bound on the sum of costs of any plan; a plan that reaches it is optimal.
     lower_bound: Optional[int] = None
-    #: Why there is no plan.
+    #: Why the problem is impossible.
     reason: Optional[str] = None
 
     @property
@@ -64,24 +64,24 @@ def plan(
 ) -> Plan:
     """Brings all agents from their starts to their goals, where they stay.
 
-    Thinks for so many seconds at most, 1 unless nodes are given, or so many nodes of its search, which on one thread
-    give the same plan each time; other threads of Python go on meanwhile.
+    The planner stops after `seconds` [default: 1 if `nodes` is not given] or after `nodes` search nodes. With one
+    thread, a budget of `nodes` alone gives the same plan each time. Other Python threads run during planning.
 
     Shape: `obstacles` `(height, width)`, nonzero for an obstacle; `starts` and `goals` `(agents, 2)`
 
-    Errors: ValueError for cells that are not free, wrong shapes, or a planner that there is not. That there is no
-    plan, or that none was found, is no error but an outcome.
+    Errors: ValueError for cells that are not free, wrong shapes, or an unknown planner. An impossible problem or an
+    exhausted budget is an outcome, not an error.
     """
-    told = _engine.make_plan(
+    result = _engine.make_plan(
         obstacles, starts, goals, planner, _budget(seconds, nodes), most_steps, num_threads, seed
     )
-    return Plan(**told)
+    return Plan(**result)
 
 
 def validate(
     obstacles: ArrayLike, starts: ArrayLike, goals: Optional[ArrayLike], cells: ArrayLike
 ) -> Optional[str]:
-    """The first conflict of a plan, in words, or None if it is valid; without goals agents may end anywhere.
+    """Returns the first conflict of a plan as text, or None if it is valid; without goals agents may end anywhere.
 
     Shape: `cells` `(steps + 1, agents, 2)`
 
@@ -91,9 +91,11 @@ def validate(
 
 
 def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
-    """Steps to a goal from every cell, other agents left out; -1 from where no path leads there.
+    """Returns the distance to a goal from every cell, without other agents; -1 where no path leads to it.
 
     Shape: `(height, width)`
+
+    Units: steps
 
     Errors: ValueError for a goal that is not free.
     """
@@ -102,12 +104,12 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
 
 
 class PlannerAgents:
-    """Agents of an environment that follow a planner, made from observations of the type `MAPF`.
+    """Agents of an environment that follow a planner; they need observations of type `MAPF`.
 
-    It plans in the first step of an episode, and again when agents or goals are not where the plan has them. With
-    `lifelong=True`, for episodes in which agents get goal after goal, it is one of the planners `rhcr`, `pibt` and
-    `guided-pibt` that plan as they go, and `seconds` and `nodes` are for each step. Goals that are still to come it
-    is never told. `act` and `reset_states` are what pogema-toolbox asks of an algorithm.
+    The planner runs in the first step of an episode, and again if agents or goals differ from its plan. For lifelong
+    episodes set `lifelong=True` and choose one of the lifelong planners `rhcr`, `pibt` and `guided-pibt`; `seconds` and
+    `nodes` then limit each step. The planner does not know future goals. `act` and `reset_states` are the methods that
+    pogema-toolbox requires of an algorithm.
     """
 
     def __init__(
@@ -121,17 +123,17 @@ class PlannerAgents:
         seed: int = 0,
         lifelong: bool = False,
     ) -> None:
-        """See `plan`; `most_steps` are those of an episode.
+        """Makes the agents; the arguments are those of `plan`, and `most_steps` is the length of an episode.
 
-        Errors: ValueError for a planner that there is not, or not for such episodes.
+        Errors: ValueError for a planner that is unknown or does not support such episodes.
         """
         budget = _budget(seconds, nodes)
         self._follower = _engine.PlanFollower(planner, budget, most_steps, num_threads, seed, lifelong)
 
     def act(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
-        """The actions of all agents.
+        """Returns the actions of all agents.
 
-        Errors: TypeError for observations of another type than `MAPF`.
+        Errors: TypeError for observations of a type other than `MAPF`.
         """
         first = observations[0] if len(observations) else None
         if not isinstance(first, Mapping) or "global_obstacles" not in first:
@@ -141,7 +143,7 @@ class PlannerAgents:
         return self._follower.act(first["global_obstacles"], cells, goals)
 
     def reset_states(self) -> None:
-        """Forgets the last episode; to be called before each."""
+        """Forgets the last episode; call it before each episode."""
         self._follower.reset()
 
 

@@ -1,4 +1,4 @@
-"""What differs between the lines of POGEMA."""
+"""Differences between POGEMA's release lines."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Semantics"]
 
 
 class Semantics(str, Enum):
-    """One of POGEMA's lines; everything that is not named here is equal in both.
+    """One of POGEMA's release lines; they are identical except for the properties here.
 
     Rule: occupancy/as-released, occupancy/exact, seed/reset
     """
@@ -18,7 +18,7 @@ class Semantics(str, Enum):
 
     @property
     def occupancy_is_exact(self) -> bool:
-        """Whether every agent is seen; in 1.4.0 `soft` loses some of them."""
+        """Whether every agent is seen; in 1.4.0 `soft` collisions make some agents invisible."""
         return self is Semantics.DEVELOPED
 
     @property
@@ -28,5 +28,5 @@ class Semantics(str, Enum):
 
     @property
     def reset_clears_metrics(self) -> bool:
-        """Whether an episode that is left early counts no more."""
+        """Whether a reset clears the counters of an episode that did not end."""
         return self is Semantics.DEVELOPED

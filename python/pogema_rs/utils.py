@@ -1,4 +1,4 @@
-"""Text pictures of a map in a terminal's colours."""
+"""Renders maps as text with terminal colours."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NAMES = string.digits + string.ascii_letters + string.punctuation
 
 
 def grid_to_str(grid: Any) -> str:
-    """A map as lines of `.` and `#`."""
+    """Returns a map as lines of `.` and `#`."""
     return "\n".join("".join("#" if cell else "." for cell in row) for row in grid)
 
 
@@ -27,7 +27,7 @@ def render_grid(
 ) -> Optional[str]:
     """Prints a map with its agents and goals, or returns the text with `mode="ansi"`.
 
-    An agent hides a goal, and of two on one cell the later one is shown.
+    An agent hides a goal on the same cell. Of several agents or goals on one cell, the last one is shown.
 
     Source: POGEMA 1.4.0, `utils.py`, `render_grid`
     """

@@ -1,4 +1,4 @@
-"""Many environments behind Gymnasium's interface for vectors of them, stepped by one call on all cores."""
+"""Vectorized environments with Gymnasium's interface; one call steps all of them on all cores."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _Config = tuple[dict[str, Any], Optional[str]]
 
 
 def _engine_config(config: Any) -> _Config:
-    """The fields that the engine reads, and the text of the map that it names."""
+    """Returns the fields that the engine reads, and the text of the map that the config names."""
     if not isinstance(config, GridConfig):
         config = GridConfig(**_fields(config))
     return engine_fields(config), grid_registry.map_text(config.map_name)
@@ -45,35 +45,35 @@ def _fields(config: Any) -> Mapping[str, Any]:
 
 
 class VecEnv(VectorEnv):
-    """`num_envs` environments of `agents` agents each, all stepped by one call.
+    """A batch of `num_envs` environments with `agents` agents each, all stepped by one call.
 
     Every array has the axes `(num_envs, agents, ...)`: observations `(num_envs, agents, 3, side, side)`, rewards as
     float32, `terminated` and `truncated` as bool. An episode of an environment ends when all its agents terminated or
     all were truncated: `terminated.all(axis=1) | truncated.all(axis=1)`. Gymnasium's wrappers that count rewards or
-    ends want one number per environment and have to be given that, or `rewards.sum(axis=1)`.
+    ends expect one number per environment; pass them this expression, or `rewards.sum(axis=1)`.
 
-    The array of observations is made once and overwritten by the next call of `reset` or `step`; copy it to keep it,
-    pass `out=` to have it written elsewhere, or ask for a `double_buffer`, which leaves the last one as it is until
-    the call after the next. All other arrays are new with every call.
+    The next call of `reset` or `step` overwrites the array of observations. To keep it, copy it, pass `out=`, or set
+    `double_buffer`, which preserves it until the call after the next. All other arrays are new with every call.
 
-    Seeds. With `reset(seed=S)`, episode e of environment i (both from 0) is the one that POGEMA makes of the seed
+    Seeds: with `reset(seed=S)`, episode e of environment i (both from 0) is POGEMA's episode of the seed
     `int(SeedSequence(S, spawn_key=(i, e)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
-    `SeedSequence`. With a sequence of seeds, the first episode of environment i is POGEMA's of the i-th seed T itself,
-    and episode e > 0 that of the same formula with `T` and `spawn_key=(e,)`. Without a seed the episodes go on; the
-    first reset then takes the config's seed for S, or one from the system. No episode depends on the number of
-    environments or threads. `episode_seeds` tells the seeds now played.
+    `SeedSequence`. With a sequence of seeds, the first episode of environment i is POGEMA's episode of the i-th seed T
+    itself, and episode e > 0 uses the same formula with `T` and `spawn_key=(e,)`. A reset without a seed begins the
+    next episodes. If the first reset has no seed, S is the config's seed, or a random seed from the system if the
+    config has none. No episode depends on the number of environments or threads. `episode_seeds` returns the seeds of
+    the current episodes.
 
-    Autoreset, as in Gymnasium: under `SAME_STEP` an episode that ends is followed by the next one in the same step,
-    and `infos["final_obs"]` and `infos["final_info"]` hold how it ended; under `NEXT_STEP` the following step ignores
-    that environment's actions and begins the next episode; under `DISABLED` the environment stays as it ended, with
-    rewards of 0 and its last ends, until `reset(options={"reset_mask": ...})`.
+    Autoreset, as in Gymnasium: with `SAME_STEP` the step that ends an episode also begins the next one, and
+    `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `NEXT_STEP` the following step
+    ignores the environment's actions and begins the next episode. With `DISABLED` the environment keeps its final
+    state, with rewards of 0 and the last `terminated` and `truncated`, until `reset(options={"reset_mask": ...})`.
 
-    `infos` holds `is_active`, `(num_envs, agents)`; with `masks` the `action_masks`, `(num_envs, agents, 5)`, int8, 1
-    where no obstacle forbids the move; when episodes ended `metrics`, a dict of float arrays `(num_envs,)` that are NaN
-    where `_metrics` is False.
+    `infos` holds `is_active`, `(num_envs, agents)`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
+    int8, 1 where no obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays
+    `(num_envs,)` that are NaN where `_metrics` is False.
 
-    One thread at a time may call it, and it does not survive a fork; either is a RuntimeError. A config is read once,
-    and changes of it later change nothing; warnings about single instances are not shown.
+    Calls from two threads at the same time, and calls in a forked child, raise a RuntimeError. A config is read once;
+    later changes to it have no effect. Warnings about single instances are not shown.
     """
 
     def __init__(
@@ -88,12 +88,14 @@ class VecEnv(VectorEnv):
         double_buffer: bool = False,
         masks: bool = False,
     ) -> None:
-        """An environment for each of a list of configs, or `num_envs` of one; each is a GridConfig or a dict.
+        """Makes one environment for each config of a list, or `num_envs` of a single config.
 
-        The configs of a list may have different maps, but must agree on agents, radius and rules. With the semantics
-        `2.0` every agent is seen, as in POGEMA's 2.0 line. Without `num_threads` all cores work.
+        A config is a GridConfig or a dict. The configs of a list may have different maps, but must agree on agents,
+        radius and rules. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
+        number of threads [default: one per core, at most one per environment].
 
-        Errors: ValueError or TypeError naming what was expected; `InstanceError` comes with the first reset.
+        Errors: ValueError or TypeError for wrong arguments. A config without an instance raises `InstanceError` only at
+        the first reset.
         """
         self.closed = True
         if semantics not in [known.value for known in Semantics]:
@@ -121,15 +123,15 @@ class VecEnv(VectorEnv):
         self._all.flags.writeable = False
         self.closed = False
 
-    # Gymnasium's is an attribute.
+    # Gymnasium defines an attribute.
     @cached_property
     def observation_space(self) -> spaces.Box:  # type: ignore[override]
-        """The space of all observations; made when it is asked for, since it is larger than what it describes."""
+        """The space of all observations; made at first access, because it takes more memory than the observations."""
         return cast(spaces.Box, batch_space(self.single_observation_space, self.num_envs))
 
     @property
     def episode_seeds(self) -> np.ndarray:
-        """POGEMA's seed of each environment's present episode, `(num_envs,)`, int64."""
+        """POGEMA's seed of each environment's current episode, `(num_envs,)`, int64."""
         return np.array(self._batch.episode_seeds(), dtype=np.int64)
 
     def reset(
@@ -139,13 +141,13 @@ class VecEnv(VectorEnv):
         options: Optional[dict[str, Any]] = None,
         out: Optional[np.ndarray] = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begins the first episodes of a seed, or of one seed per environment, or else the next episodes.
+        """Begins the first episodes of a seed or of one seed per environment; without a seed, the next episodes.
 
-        `options={"reset_mask": mask}` leaves the environments where the mask is False as they are; the observations
-        returned are those of all.
+        `options={"reset_mask": mask}` skips the environments where the mask is False; the returned observations still
+        are those of all environments.
 
-        Errors: ValueError or TypeError naming what was expected; `InstanceError` if an environment has no instance.
-        Nothing changes then.
+        Errors: ValueError or TypeError for wrong arguments; `InstanceError` if an environment has no instance. After an
+        error the state is unchanged.
         """
         chosen = read_mask(options, self.num_envs)
         one, each = read_seed(seed, self.num_envs)
@@ -155,20 +157,20 @@ class VecEnv(VectorEnv):
         if seed is not None:
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
-        self._turn(out)
+        self._swap_buffers(out)
         return observations, self._state_infos(active, masks, self._all)
 
     def step(
         self, actions: Any, *, out: Optional[np.ndarray] = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Plays one step: observations, rewards, terminated, truncated, infos.
+        """Plays one step and returns observations, rewards, terminated, truncated and infos.
 
-        `actions` are whole numbers 0 to 4 of the shape `(num_envs, agents)`: an array, nested lists, or whatever
-        shares its memory with NumPy, as a torch tensor on the CPU. Unlike in a single environment, which reads
-        negative numbers as Python's lists do, -5 to -1 are refused, and so are wrong actions of agents that are gone.
+        `actions` are integers from 0 to 4 of shape `(num_envs, agents)`: an array, nested lists, or any object that
+        shares its memory with NumPy, for example a torch tensor on the CPU. A single environment also accepts -5 to -1,
+        as indices from the end of a list, and wrong actions of inactive agents; this class rejects both.
 
-        Errors: ValueError or TypeError naming what was expected, and nothing is played; `InstanceError` if an
-        environment has no next episode.
+        Errors: ValueError or TypeError for wrong actions, before anything is played; `InstanceError` if an environment
+        has no next episode.
         """
         numbers = read_actions(actions, (self.num_envs, self.num_agents))
         observations = self._observations(out)
@@ -177,17 +179,19 @@ class VecEnv(VectorEnv):
         terminated, truncated = np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)
         active, masks = self._new_state(self.num_envs)
         ended = self._batch.step(numbers, (rewards, terminated, truncated), (observations, active, masks))
-        self._turn(out)
+        self._swap_buffers(out)
         infos = self._state_infos(active, masks, self._all)
         if ended:
             self._add_ends(infos, ended)
         return observations, rewards, terminated, truncated, infos
 
     def action_masks(self) -> np.ndarray:
-        """Which actions make sense now, `(num_envs, agents, 5)`, int8.
+        """Returns the masks of the actions that no obstacle blocks now.
 
-        1 for staying, and for a move whose cell is on the map and free of obstacles, whoever stands there. An agent
-        that takes no part may only stay.
+        A mask is 1 for staying, and for a move to a cell that is on the map and not an obstacle, even if an agent
+        occupies it. An inactive agent can only stay.
+
+        Shape: `(num_envs, agents, 5)`, int8
 
         Errors: `NotResetError` before the first reset.
         """
@@ -196,11 +200,14 @@ class VecEnv(VectorEnv):
         return masks
 
     def sample_actions(self) -> np.ndarray:
-        """Random actions, `(num_envs, agents)`, int64, from `np_random`, which `reset(seed=...)` seeds."""
+        """Returns random actions from `np_random`, which `reset(seed=...)` seeds.
+
+        Shape: `(num_envs, agents)`, int64
+        """
         return self.np_random.integers(NUM_ACTIONS, size=(self.num_envs, self.num_agents))
 
     def close(self, **kwargs: Any) -> None:
-        """Lets go of environments and threads; every later call is a RuntimeError, but for another `close`."""
+        """Frees the environments and threads; later calls except `close` raise a RuntimeError."""
         if not self.closed:
             self._batch.close()
             self.closed = True
@@ -220,7 +227,7 @@ class VecEnv(VectorEnv):
         buffer = self._buffers[self._next_buffer]
         return buffer if out is None else check_out(out, buffer.shape, self._dtype)
 
-    def _turn(self, out: Optional[np.ndarray]) -> None:
+    def _swap_buffers(self, out: Optional[np.ndarray]) -> None:
         if out is None:
             self._next_buffer = (self._next_buffer + 1) % len(self._buffers)
 
@@ -231,12 +238,12 @@ class VecEnv(VectorEnv):
         return infos
 
     def _add_ends(self, infos: dict[str, Any], ended: list[int]) -> None:
-        """Adds how the episodes of some environments ended, in the layout of Gymnasium."""
+        """Adds the ends of the episodes of some environments, in Gymnasium's layout."""
         present = np.zeros(self.num_envs, dtype=np.bool_)
         present[ended] = True
         metrics: dict[str, Any] = {}
-        for env, figures in zip(ended, self._batch.metrics(ended)):
-            for name, value in figures.items():
+        for env, ended_metrics in zip(ended, self._batch.metrics(ended)):
+            for name, value in ended_metrics.items():
                 if name not in metrics:
                     metrics.update({name: np.full(self.num_envs, np.nan), f"_{name}": present})
                 metrics[name][env] = value
@@ -267,7 +274,7 @@ def _read_dtype(dtype: Any) -> np.dtype:
 
 
 def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Config], list[int]]:
-    """The configs that differ, and which one each environment has."""
+    """Returns the distinct configs, and the index of each environment's config."""
     if isinstance(grid_config, (list, tuple)):
         if num_envs not in (None, len(grid_config)):
             raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
@@ -278,7 +285,7 @@ def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Conf
         configs = [_engine_config(grid_config)] * num_envs
     if not configs:
         raise ValueError("num_envs is 0, expected at least 1")
-    # Equal configs are read once; two that only look different are merely read twice.
+    # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
     keys = [pickle.dumps(config) for config in configs]
     places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
     first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}

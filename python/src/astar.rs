@@ -12,10 +12,10 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// One agent that walks shortest paths over the obstacles it has seen, action for action as POGEMA's.
+/// An agent that follows shortest paths around the obstacles it has seen, with the same actions as POGEMA's.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct AStarAgent {
-    /// Never waited for: what it draws with may only not be shared.
+    /// Never locked: the mutex only makes the agent `Sync`, which its random generator is not.
     agent: Mutex<pogema_planners::AStarAgent>,
     was_random: Arc<AtomicBool>,
 }
@@ -36,7 +36,7 @@ impl AStarAgent {
         Self { agent: Mutex::new(agent), was_random }
     }
 
-    /// The action for an observation of the type `POMAPF`, and whether it was drawn.
+    /// Returns the action for an observation of type `POMAPF`, and whether it was drawn at random.
     fn act(
         &mut self,
         py: Python<'_>,
@@ -47,7 +47,7 @@ impl AStarAgent {
         let [rows, side] = [obstacles.shape()[0], obstacles.shape()[1]];
         if rows != side || side % 2 == 0 {
             return Err(PyValueError::new_err(format!(
-                "obstacles have shape ({rows}, {side}), expected a square of an odd side"
+                "obstacles have shape ({rows}, {side}), expected a square with an odd side"
             )));
         }
         let obstacles = obstacles.to_vec()?;
@@ -57,7 +57,7 @@ impl AStarAgent {
         Ok((action.into(), self.was_random.load(Relaxed)))
     }
 
-    /// Forgets all it has seen, for a new episode; what it draws goes on.
+    /// Forgets the seen map before a new episode; the random generator continues its stream.
     fn clear_state(&mut self) {
         self.agent().forget();
     }

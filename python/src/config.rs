@@ -1,4 +1,4 @@
-//! What is derived of a config.
+//! Derived config fields, and the instance source of a config.
 
 use pogema_core::{Cell, Error, Map};
 use pogema_maps::{GridConfig, InstanceSource, nearest, parse_map_text};
@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use crate::errors;
 use crate::fields::Fields;
 
-/// Returns what POGEMA derives of a config.
+/// Returns the fields that POGEMA derives from a config.
 #[pyfunction]
 pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDict>> {
     let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
@@ -33,22 +33,22 @@ pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDic
     Ok(derived)
 }
 
-/// The known name that is most like the one given.
+/// Returns the known name that is closest to `name`.
 #[pyfunction]
 pub fn nearest_name(name: &str, known: Vec<String>) -> String {
     nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned()
 }
 
-/// The source of a config's instances, and the config.
+/// Returns the instance source of a config.
 pub fn source(fields: &Fields, registered: Option<&str>) -> Result<InstanceSource, Error> {
     let (config, map) = read(fields, registered)?;
     InstanceSource::new(config, map)
 }
 
-/// A config, and the map that its `map_name` names.
+/// Returns a config and the map that its `map_name` names.
 pub fn read(fields: &Fields, registered: Option<&str>) -> Result<(GridConfig, Option<Map>), Error> {
     let mut config = GridConfig::from_value(&fields.0)?;
-    // A name that nobody registered means nothing to POGEMA.
+    // POGEMA ignores an unregistered name.
     if registered.is_none() {
         config.map_name = None;
     }

@@ -1,4 +1,4 @@
-//! Errors as the Python classes that POGEMA's users catch.
+//! Converts errors to the Python classes that POGEMA's users catch.
 
 use pogema_core::Error;
 use pyo3::PyErrArguments;
@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-/// An error of a class of `pogema_rs.errors`.
+/// Makes an error of a class of `pogema_rs.errors`.
 fn of_class(py: Python<'_>, class: &str, error: impl std::fmt::Display) -> PyErr {
     made(py, class, (error.to_string(),))
 }
@@ -18,7 +18,7 @@ fn made(py: Python<'_>, class: &str, arguments: impl PyErrArguments + 'static) -
     class.map_or_else(|missing| missing, |class| PyErr::from_type(class, arguments))
 }
 
-/// What a wrong config raises; the Python side makes it the class that POGEMA raises.
+/// Converts an error in a config; the Python side turns it into the class that POGEMA raises.
 pub fn config(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::CellOutside { .. } => of_class(py, "OutsideMapError", error),
@@ -30,12 +30,12 @@ pub fn config(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
-/// What an instance that cannot be made raises.
+/// Converts an error from making an instance.
 pub fn instance(py: Python<'_>, error: &Error) -> PyErr {
     of_class(py, "InstanceError", error)
 }
 
-/// What any other call raises.
+/// Converts an error from any other call.
 pub fn call(py: Python<'_>, error: &Error) -> PyErr {
     let class = match error {
         Error::Length { what: "actions", .. } => "ActionCountError",
@@ -47,17 +47,17 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
     of_class(py, class, error)
 }
 
-/// What a call raises while another thread's is under way.
+/// Returns the error of a call that was made during a call of another thread.
 pub fn busy(py: Python<'_>) -> PyErr {
     of_class(py, "StateError", Error::Busy { what: "this environment" })
 }
 
-/// What an A* agent raises that was not told of a new episode.
+/// Converts an error of an A* agent that was not cleared before a new episode.
 pub fn astar(py: Python<'_>, error: &Error) -> PyErr {
     of_class(py, "JumpedError", error)
 }
 
-/// What a call of many environments raises.
+/// Converts an error from a call of a batch.
 pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Length { .. }
@@ -70,12 +70,12 @@ pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
-/// What a number raises that is no action of one environment of many.
+/// Returns the error for an invalid action in a batch.
 pub fn action(py: Python<'_>, text: String) -> PyErr {
     of_class(py, "ActionError", text)
 }
 
-/// What a planner's caller did wrong.
+/// Converts an error in the arguments of a planner.
 pub fn plan(error: &Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }

@@ -1,4 +1,4 @@
-//! Suites and the results of their episodes, whoever plays them.
+//! Suites and the results of their episodes, both of built-in algorithms and of policies in Python.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -16,13 +16,13 @@ use pogema_toolbox::{
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-/// An algorithm of a suite: the name of its results, its own name, its parameters in JSON, processes, backend.
+/// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
 type Listed = (String, String, String, Option<usize>, String);
 
-/// An episode that was played again in Python: its figures in JSON, its film, and why there is none.
-type Again = (String, String, String);
+/// An episode played again in Python: metrics in JSON, packed recording, and an error message, empty on success.
+type Replayed = (String, String, String);
 
-/// A suite, and the folder with what came of it.
+/// A suite and the folder with its results.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Evaluation {
     suite: Suite,
@@ -34,8 +34,10 @@ pub struct Evaluation {
 
 #[pymethods]
 impl Evaluation {
-    /// Reads a suite and opens its folder; `begin` is `new`, `resume` or `anew`; `maps` are texts by name, and
-    /// `versions` the releases of what plays in Python.
+    /// Reads a suite and opens the folder of its results.
+    ///
+    /// `begin` is `new`, `resume` or `anew`, `maps` are map texts by name, and `versions` are the releases of the
+    /// Python packages that policies use.
     #[new]
     fn new(
         path: PathBuf,
@@ -56,32 +58,32 @@ impl Evaluation {
         };
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
-        let store = Store::open(&folder, &suite, begin).map_err(|error| told(&error))?;
+        let store = Store::open(&folder, &suite, begin).map_err(|error| to_py_error(&error))?;
         let store = Arc::new(store.with(versions));
         Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
     }
 
-    /// Number of episodes of each algorithm.
+    /// Returns the number of episodes of each algorithm.
     fn num_episodes(&self) -> usize {
         self.environments.len()
     }
 
-    /// Whether the environments are others than POGEMA's.
+    /// Returns whether the suite uses environments other than POGEMA's.
     fn is_foreign(&self) -> bool {
         self.suite.is_foreign()
     }
 
-    /// Whether the suite says what to show of its results.
+    /// Returns whether the suite has views of its results.
     fn has_views(&self) -> bool {
         !self.suite.views.is_empty()
     }
 
-    /// The address of a Dask scheduler that the suite names.
+    /// Returns the address of the Dask scheduler that the suite names.
     fn dask(&self) -> Option<String> {
         self.suite.dask.clone()
     }
 
-    /// The algorithms, in the order of the suite.
+    /// Returns the algorithms, in the order of the suite.
     fn algorithms(&self) -> Vec<Listed> {
         let all = self.suite.algorithms.iter().map(|algorithm| {
             let parameters = algorithm.parameters.iter().map(|(key, node)| (key.clone(), node.value()));
@@ -93,66 +95,68 @@ impl Evaluation {
         all.collect()
     }
 
-    /// All fields of an episode's environment, in JSON, its map in the place of the map's name.
+    /// Returns all fields of an episode's environment, in JSON, as the suite has them.
     fn environment(&self, index: usize) -> PyResult<String> {
-        let fields = self.environments.fields(index).map_err(|error| told(&error))?;
+        let fields = self.environments.fields(index).map_err(|error| to_py_error(&error))?;
         Ok(serde_json::Value::Object(fields).to_string())
     }
 
-    /// The name and text of the map that is meant by a name for a seed.
+    /// Returns the name and text of the map that a name or pattern selects for a seed.
     fn map(&self, name: &str, seed: u64) -> PyResult<(String, String)> {
-        self.environments.map(name, seed).map_err(|error| told(&error))
+        self.environments.map(name, seed).map_err(|error| to_py_error(&error))
     }
 
-    /// What was varied for an episode, in JSON.
+    /// Returns the fields varied for an episode, in JSON.
     fn changes(&self, index: usize) -> PyResult<String> {
-        let changes = self.environments.changes(index).map_err(|error| told(&error))?;
+        let changes = self.environments.changes(index).map_err(|error| to_py_error(&error))?;
         serde_json::to_string(&changes).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Begins with an algorithm: the episodes that are to be played, the longest first; none if all are done.
+    /// Begins an algorithm and returns its missing episodes, longest first, or `None` if all are done.
     fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
         let opened = Progress::open(&self.store, key, self.environments.len());
-        let progress = opened.map_err(|error| told(&error))?;
+        let progress = opened.map_err(|error| to_py_error(&error))?;
         let to_do = progress.as_ref().map(|progress| self.environments.by_cost(progress.to_do()));
         *self.progress()? = progress;
         Ok(to_do)
     }
 
-    /// Keeps an episode: its figures in JSON, what the policy took of it in seconds, and the machine that played it.
+    /// Stores an episode: its metrics in JSON, the policy's time in seconds, and the machine that played it.
     fn keep(&self, index: usize, metrics: &str, runtime: f64, machine: String) -> PyResult<()> {
         let metrics: Pairs = read_json(metrics)?;
         let machine = (machine != pogema_toolbox::machine()).then_some(machine);
         self.with(|progress| progress.keep(Done { index, metrics, runtime, machine, ..Done::default() }))
     }
 
-    /// Notes an episode that could not be played.
+    /// Records an episode that failed.
     fn note(&self, index: usize, config: &str, error: String, traceback: String) -> PyResult<()> {
-        let env_grid_search = self.environments.changes(index).map_err(|error| told(&error))?;
+        let env_grid_search = self.environments.changes(index).map_err(|error| to_py_error(&error))?;
         let config = read_json(config)?;
         self.with(|progress| progress.note(&Failed { index, env_grid_search, config, error, traceback }))
     }
 
-    /// Writes the results, if all episodes are done; says whether they are.
+    /// Writes the results if all episodes are done, and returns whether they are.
     fn finish(&self) -> PyResult<bool> {
         let progress = self.progress()?.take();
         let finished = progress.map(|progress| progress.finish(&self.environments));
-        finished.unwrap_or(Ok(true)).map_err(|error| told(&error))
+        finished.unwrap_or(Ok(true)).map_err(|error| to_py_error(&error))
     }
 
-    /// The episodes that a page of the results shows: whose, and their numbers.
+    /// Returns the episodes that a page of the results replays: algorithm and episode number.
     fn picks(&self) -> PyResult<Vec<(String, usize)>> {
         let picks = picks(&self.results()?, SHOWN);
         Ok(picks.into_iter().map(|pick| (pick.algorithm, pick.episode)).collect())
     }
 
-    /// Writes the page of the results, with what came of those episodes of [`Self::picks`] that are not played by
-    /// algorithms that are built in.
-    fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Again>>) -> PyResult<()> {
+    /// Writes the page of the results.
+    ///
+    /// `again` has one entry for each episode of [`Self::picks`]: the outcome of playing it again in Python, or `None`
+    /// if this method has to play it.
+    fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Replayed>>) -> PyResult<()> {
         let results = self.results()?;
         let write = || {
             let picks = picks(&results, SHOWN).into_iter();
-            let replay = |(pick, again): (Pick, Option<Again>)| match again {
+            let replay = |(pick, again): (Pick, Option<Replayed>)| match again {
                 None => Ok(Replay::of(pick, &results, &self.suite, &self.environments)),
                 Some((_, _, error)) if !error.is_empty() => Ok(Replay::failed(pick, error)),
                 Some((metrics, film, _)) => Ok(Replay::played(pick, &results, &from_json(&metrics)?, film)),
@@ -161,18 +165,20 @@ impl Evaluation {
             let page = page(&self.suite, &self.store.manifest(), &results, &replays)?;
             write_whole(&path, page.as_bytes())
         };
-        py.detach(write).map_err(|error| told(&error))
+        py.detach(write).map_err(|error| to_py_error(&error))
     }
 
-    /// Whether an algorithm of the suite is built in, with parameters as they have to be.
+    /// Returns whether an algorithm of the suite is built in.
+    ///
+    /// Errors: `ValueError` for wrong parameters of a built-in algorithm.
     fn is_built_in(&self, key: &str) -> PyResult<bool> {
         Ok(self.built_in(key)?.is_some())
     }
 
-    /// Plays all that is to be played of an algorithm that is built in; none if it is not. Tells `watch` of each
-    /// episode: its number and the error, if it could not be played.
+    /// Plays the missing episodes of a built-in algorithm; returns `None` for any other algorithm.
     ///
-    /// Returns how many episodes were played, how many could not be, and whether all results are there.
+    /// Calls `watch` after each episode, with its number and error if it failed, otherwise with `None`. Returns how
+    /// many episodes were played, how many failed, and whether the results are complete.
     fn run_built_in(
         &self,
         py: Python<'_>,
@@ -183,23 +189,23 @@ impl Evaluation {
         let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
         let stop = AtomicBool::new(false);
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-        let tell = |event: Event<'_>| {
+        let report = |event: Event<'_>| {
             let error = match event {
                 Event::Played => None,
                 Event::Failed(failed) => Some((failed.index, failed.error.clone())),
                 Event::Begin { .. } | Event::End => return,
             };
             Python::attach(|py| {
-                let heard = py.check_signals().and_then(|()| watch.call1(py, (error,)).map(|_| ()));
-                if let (Err(error), Ok(mut raised)) = (heard, raised.lock()) {
+                let outcome = py.check_signals().and_then(|()| watch.call1(py, (error,)).map(|_| ()));
+                if let (Err(error), Ok(mut raised)) = (outcome, raised.lock()) {
                     stop.store(true, std::sync::atomic::Ordering::Relaxed);
                     raised.get_or_insert(error);
                 }
             });
         };
-        let running = Running { threads: threads.max(1), stop: &stop, watch: &tell };
+        let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
         let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);
-        let summary = py.detach(run).map_err(|error| told(&error))?;
+        let summary = py.detach(run).map_err(|error| to_py_error(&error))?;
         match raised.into_inner() {
             Ok(Some(error)) => Err(error),
             _ => Ok(Some((summary.num_played, summary.num_failed, summary.is_whole))),
@@ -209,7 +215,7 @@ impl Evaluation {
 
 impl Evaluation {
     fn results(&self) -> PyResult<Results> {
-        Results::read(std::slice::from_ref(&self.folder)).map_err(|error| told(&error))
+        Results::read(std::slice::from_ref(&self.folder)).map_err(|error| to_py_error(&error))
     }
 
     fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
@@ -218,7 +224,7 @@ impl Evaluation {
         else {
             return Ok(None);
         };
-        let built_in = built_in.map_err(|error| told(&self.suite.in_file(error)))?;
+        let built_in = built_in.map_err(|error| to_py_error(&self.suite.in_file(error)))?;
         Ok(Some((algorithm, built_in)))
     }
 
@@ -231,12 +237,13 @@ impl Evaluation {
     fn with(&self, work: impl FnOnce(&mut Progress) -> Result<(), Error>) -> PyResult<()> {
         let mut progress = self.progress()?;
         let progress = progress.as_mut();
-        let progress = progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm was begun with"))?;
-        work(progress).map_err(|error| told(&error))
+        let progress =
+            progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm has begun, call `begin` first"))?;
+        work(progress).map_err(|error| to_py_error(&error))
     }
 }
 
-/// The environments of a suite, with maps by name beside those of files.
+/// Returns the episode configs of a suite, with maps by name in addition to those in files.
 fn environments(
     suite: &Suite,
     maps: Vec<(String, String)>,
@@ -249,7 +256,7 @@ fn environments(
     EpisodeConfigs::new(suite, library)
 }
 
-/// The maps that a suite may name, those by name among them.
+/// Collects the maps that a suite may name: those in files, and those by name.
 fn library(suite: &Suite, maps: Vec<(String, String)>, files: &[PathBuf]) -> Result<Library, Error> {
     let (mut library, _) = suite.library(files)?;
     let read = |(name, text): (String, String)| {
@@ -261,7 +268,7 @@ fn library(suite: &Suite, maps: Vec<(String, String)>, files: &[PathBuf]) -> Res
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {
-    from_json(text).map_err(|error| told(&error))
+    from_json(text).map_err(|error| to_py_error(&error))
 }
 
 fn from_json<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
@@ -269,21 +276,23 @@ fn from_json<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
         .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
 }
 
-pub fn told(error: &Error) -> PyErr {
+/// Converts an error to `OSError` or `ValueError`.
+pub fn to_py_error(error: &Error) -> PyErr {
     match error {
         Error::Io { .. } => pyo3::exceptions::PyOSError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
 
-/// The processor of this machine and how many threads it has.
+/// Returns the processor of this machine and its number of threads.
 #[pyfunction]
 pub fn machine() -> &'static str {
     pogema_toolbox::machine()
 }
 
-/// Plays one episode of an algorithm that is built in: its figures in JSON, and what it took in seconds. The suite is
-/// of that episode alone, and `maps` are texts by name.
+/// Plays one episode of a built-in algorithm; returns its metrics in JSON and its time in seconds.
+///
+/// `suite` contains that episode alone, and `maps` are map texts by name.
 #[pyfunction]
 pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
     let play = || {
@@ -294,5 +303,5 @@ pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;
         Ok((played, runtime.as_secs_f64()))
     };
-    py.detach(play).map_err(|error: Error| told(&error))
+    py.detach(play).map_err(|error: Error| to_py_error(&error))
 }

@@ -1,4 +1,4 @@
-//! Python values as the fields of a config.
+//! Reads Python values as the fields of a config.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -7,8 +7,8 @@ use serde_json::{Map as Object, Number, Value};
 
 /// The fields of a config, from a dictionary of Python values.
 ///
-/// Errors: `TypeError` for a key that is no text, or a value that is neither number, text nor sequence; `ValueError`
-/// for a list that contains itself.
+/// Errors: `TypeError` for a key that is not a string, or a value that is not a number, a string or a sequence;
+/// `ValueError` for a list that contains itself.
 pub struct Fields(pub Value);
 
 impl<'py> FromPyObject<'_, 'py> for Fields {
@@ -23,12 +23,12 @@ impl<'py> FromPyObject<'_, 'py> for Fields {
     }
 }
 
-/// Lists in a config are at most three deep; what contains itself has no end.
+/// The nesting limit: lists in a config are at most three deep, and a list that contains itself is infinitely deep.
 const DEEPEST: usize = 16;
 
 fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if depth > DEEPEST {
-        return Err(PyValueError::new_err("a field holds lists in lists without end"));
+        return Err(PyValueError::new_err("a field holds lists nested without end"));
     }
     if object.is_none() {
         return Ok(Value::Null);
@@ -45,7 +45,7 @@ fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if let Ok(text) = object.cast::<PyString>() {
         return Ok(text.to_str()?.into());
     }
-    // NumPy's numbers and arrays.
+    // NumPy numbers and arrays.
     if let Ok(plain) = object.call_method0("tolist") {
         return value(&plain, depth + 1);
     }
@@ -53,7 +53,7 @@ fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     Ok(Value::Array(items.collect::<PyResult<_>>()?))
 }
 
-/// A number that no field can hold, as the config's error shows it.
+/// Returns a number that no field can hold as the text that the config's error shows.
 fn shown(object: &Bound<'_, PyAny>) -> Value {
     object.to_string().into()
 }

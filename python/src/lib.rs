@@ -1,4 +1,4 @@
-//! The compiled part of the Python package `pogema_rs`; what is public of it is named in Python.
+//! The compiled part of the Python package `pogema_rs`; the Python modules define the public names.
 
 mod astar;
 mod config;
@@ -38,7 +38,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
 
-/// The words that each argument accepts, by its name in Python.
+/// Returns the words that each argument accepts, keyed by the argument's name in Python.
 fn words(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let words = PyDict::new(py);
     words.set_item("on_target", OnGoal::NAMES)?;

@@ -1,11 +1,13 @@
-//! From buffers to the lists, tuples and dictionaries that POGEMA returns.
+//! Converts between buffers and POGEMA's lists, tuples and dictionaries.
 
 use pogema_core::{Action, Cell};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// Actions as POGEMA reads them: whatever has a length and gives whole numbers, from 0 to 4 or, as Python counts
-/// from the end of a list, from -5 to -1. Those of agents that are gone are not looked at.
+/// Reads actions as POGEMA does, and returns the first agent with an invalid number, if any.
+///
+/// Accepts any sequence of integers from 0 to 4 or, like Python's indices from the end of a list, from -5 to -1.
+/// Ignores the actions of agents that are not active.
 ///
 /// Rule: move/actions, move/inactive
 pub fn read_actions(
@@ -30,7 +32,7 @@ pub fn read_actions(
     Ok(None)
 }
 
-/// Whole numbers too large for 64 bits are no actions either.
+/// Maps an integer that does not fit 64 bits to `i64::MAX`, which is not an action either.
 fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
     if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(item.py()) {
         Ok(i64::MAX)
@@ -39,20 +41,20 @@ fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
     }
 }
 
-/// One place of every agent, (row, col).
+/// One (row, col) pair per agent.
 pub type Pairs = Vec<(i64, i64)>;
 
-/// The cells of agents, shifted by the border.
+/// Returns cells as pairs, with `shift` added to both coordinates.
 pub fn pairs(cells: &[Cell], shift: i64) -> Pairs {
     cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
 }
 
-/// A list of tuples.
+/// Returns pairs as a list of tuples.
 pub fn tuples<'py>(py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {
     PyList::new(py, pairs)
 }
 
-/// A dictionary for each agent that says whether it takes part.
+/// Returns a dictionary for each agent that says whether it is active.
 pub fn infos<'py>(py: Python<'py>, active: &[bool]) -> PyResult<Bound<'py, PyList>> {
     let key = pyo3::intern!(py, "is_active");
     let infos = PyList::empty(py);

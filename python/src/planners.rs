@@ -1,4 +1,4 @@
-//! Plans for all agents at once, and policies that follow them.
+//! Plans for all agents, and policies that follow them.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -19,10 +19,10 @@ use crate::errors;
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
-/// Makes a plan: a dictionary of what was found out.
+/// Runs a planner and returns its outcome as a dictionary.
 #[pyfunction]
 #[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed))]
-#[expect(clippy::too_many_arguments, reason = "the Python side names them")]
+#[expect(clippy::too_many_arguments, reason = "these are the arguments of the Python function")]
 pub fn make_plan<'py>(
     py: Python<'py>,
     obstacles: Obstacles<'_>,
@@ -34,44 +34,44 @@ pub fn make_plan<'py>(
     num_threads: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let asked = || {
+    let arguments = || {
         let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
-        let choice = PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? };
+        let settings = PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? };
         Ok((
             Problem { max_steps: most_steps, ..problem },
-            PlannerName::read("planner", planner)?.make(choice),
+            PlannerName::read("planner", planner)?.make(settings),
             read_budget(budget)?,
         ))
     };
-    let (problem, mut planner, budget) = asked().map_err(|error: Error| errors::plan(&error))?;
+    let (problem, mut planner, budget) = arguments().map_err(|error: Error| errors::plan(&error))?;
     let began = Instant::now();
     let outcome = py.detach(|| planner.plan(&problem, &budget));
-    let told = PyDict::new(py);
-    told.set_item("seconds", began.elapsed().as_secs_f64())?;
+    let result = PyDict::new(py);
+    result.set_item("seconds", began.elapsed().as_secs_f64())?;
     if let Some(lower_bound) = outcome.lower_bound() {
-        told.set_item("lower_bound", lower_bound)?;
+        result.set_item("lower_bound", lower_bound)?;
     }
     match &outcome {
         Outcome::Solved { plan, .. } => {
-            told.set_item("outcome", "solved")?;
-            tell(&told, plan)?;
+            result.set_item("outcome", "solved")?;
+            add_plan(&result, plan)?;
         }
         Outcome::TimedOut { best, .. } | Outcome::GaveUp { best, .. } => {
             let is_late = matches!(&outcome, Outcome::TimedOut { .. });
-            told.set_item("outcome", if is_late { "timed_out" } else { "gave_up" })?;
-            best.as_ref().map_or(Ok(()), |plan| tell(&told, plan))?;
+            result.set_item("outcome", if is_late { "timed_out" } else { "gave_up" })?;
+            best.as_ref().map_or(Ok(()), |plan| add_plan(&result, plan))?;
         }
         Outcome::Impossible { reason } => {
-            told.set_item("outcome", "impossible")?;
-            told.set_item("reason", reason)?;
+            result.set_item("outcome", "impossible")?;
+            result.set_item("reason", reason)?;
         }
     }
-    Ok(told)
+    Ok(result)
 }
 
 /// Adds a plan's cells, actions and costs.
-fn tell(told: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
-    let py = told.py();
+fn add_plan(result: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
+    let py = result.py();
     let (num_steps, num_agents) = (plan.num_steps(), plan.num_agents());
     let places: Vec<i32> =
         plan.cells().iter().flatten().flat_map(|cell| [cell.row.into(), cell.col.into()]).collect();
@@ -81,13 +81,13 @@ fn tell(told: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
         let step = plan.actions(step).map_err(|error| errors::plan(&error))?;
         actions.extend(step.into_iter().map(|action| i64::from(u8::from(action))));
     }
-    told.set_item("cells", places)?;
-    told.set_item("actions", PyArray1::from_vec(py, actions).reshape([num_steps, num_agents])?)?;
-    told.set_item("sum_of_costs", plan.sum_of_costs())?;
-    told.set_item("makespan", plan.makespan())
+    result.set_item("cells", places)?;
+    result.set_item("actions", PyArray1::from_vec(py, actions).reshape([num_steps, num_agents])?)?;
+    result.set_item("sum_of_costs", plan.sum_of_costs())?;
+    result.set_item("makespan", plan.makespan())
 }
 
-/// The first thing wrong with a plan, if there is one.
+/// Returns the first conflict of a plan, or `None` if it is valid.
 #[pyfunction]
 pub fn check_plan(
     py: Python<'_>,
@@ -96,23 +96,23 @@ pub fn check_plan(
     goals: Option<Cells<'_>>,
     steps: PyArrayLike3<'_, i64, AllowTypeChange>,
 ) -> PyResult<Option<String>> {
-    let asked = || {
+    let arguments = || {
         let goals = goals.as_ref().map(|goals| cells("goals", goals)).transpose()?;
         Ok((map(&obstacles)?, cells("starts", &starts)?, goals, read_plan(&steps)?))
     };
-    let (map, starts, goals, plan) = asked().map_err(|error: Error| errors::plan(&error))?;
+    let (map, starts, goals, plan) = arguments().map_err(|error: Error| errors::plan(&error))?;
     let verdict = py.detach(|| pogema_planners::validate(&map, &starts, goals.as_deref(), &plan));
     Ok(verdict.err().map(|conflict| conflict.to_string()))
 }
 
-/// Steps to a goal from every cell, -1 from where no path leads there.
+/// Returns the number of steps to a goal from every cell, -1 where no path leads to it.
 #[pyfunction]
 pub fn cost_to_go<'py>(
     py: Python<'py>,
     obstacles: Obstacles<'_>,
     goal: (i64, i64),
 ) -> PyResult<Bound<'py, PyArray2<i32>>> {
-    let searched = || {
+    let search = || {
         let map = map(&obstacles)?;
         let graph = std::sync::Arc::new(Graph::new(&map));
         let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1])?])?[0];
@@ -123,13 +123,13 @@ pub fn cost_to_go<'py>(
         }
         Ok((map, grid))
     };
-    let (map, grid) = searched().map_err(|error: Error| errors::plan(&error))?;
+    let (map, grid) = search().map_err(|error: Error| errors::plan(&error))?;
     PyArray1::from_vec(py, grid).reshape([map.height(), map.width()])
 }
 
 /// A planner that drives an environment.
 ///
-/// The lock is never waited for: it only makes the planner one thread's at a time.
+/// No thread waits for the lock: a call during a call of another thread raises an error.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct PlanFollower {
     inner: Mutex<Follower>,
@@ -143,7 +143,7 @@ struct Follower {
 enum Policy {
     /// One goal for each agent.
     Once(PlannerPolicy),
-    /// Goal after goal.
+    /// A new goal after each goal reached.
     Lifelong(LifelongPolicy),
 }
 
@@ -175,15 +175,19 @@ impl PlanFollower {
         lifelong: bool,
     ) -> PyResult<Self> {
         let made = || {
-            let (choice, budget) = (
+            let (settings, budget) = (
                 PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? },
                 read_budget(budget)?,
             );
             Ok(if lifelong {
-                Policy::Lifelong(LifelongPolicy::new(LifelongName::read("planner", planner)?, choice, budget))
+                Policy::Lifelong(LifelongPolicy::new(
+                    LifelongName::read("planner", planner)?,
+                    settings,
+                    budget,
+                ))
             } else {
                 Policy::Once(PlannerPolicy::new(
-                    PlannerName::read("planner", planner)?.make(choice),
+                    PlannerName::read("planner", planner)?.make(settings),
                     budget,
                     most_steps,
                 ))
@@ -193,7 +197,7 @@ impl PlanFollower {
         Ok(Self { inner: Mutex::new(Follower { policy, step: 0 }) })
     }
 
-    /// Chooses all actions of a step.
+    /// Chooses the actions of all agents for one step.
     fn act(
         &self,
         py: Python<'_>,
@@ -201,8 +205,8 @@ impl PlanFollower {
         positions: Cells<'_>,
         goals: Cells<'_>,
     ) -> PyResult<Vec<u8>> {
-        let seen = || Ok((map(&obstacles)?, cells("positions", &positions)?, cells("goals", &goals)?));
-        let (map, cells, goals) = seen().map_err(|error: Error| errors::plan(&error))?;
+        let arguments = || Ok((map(&obstacles)?, cells("positions", &positions)?, cells("goals", &goals)?));
+        let (map, cells, goals) = arguments().map_err(|error: Error| errors::plan(&error))?;
         let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
         let active = vec![true; cells.len()];
         let follower = &mut *inner;
@@ -240,8 +244,8 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
     if numbers != 2 {
         return Err(Error::config(
             what,
-            format!("of {numbers} columns"),
-            "rows and columns, of the shape (agents, 2)",
+            format!("an array of {numbers} columns"),
+            "an array of shape (agents, 2)",
         ));
     }
     let rows = places.as_array();
@@ -249,7 +253,7 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
 }
 
 fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
-    let outside = || Error::agent(agent, format!("({row}, {col}) of {what} is not on the map"));
+    let outside = || Error::agent(agent, format!("cell ({row}, {col}) of `{what}` is not on the map"));
     Ok(Cell {
         row: u16::try_from(row).map_err(|_| outside())?,
         col: u16::try_from(col).map_err(|_| outside())?,
@@ -259,8 +263,8 @@ fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
 fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
     let shape = steps.shape();
     if shape[2] != 2 {
-        let found = format!("of the shape ({}, {}, {})", shape[0], shape[1], shape[2]);
-        return Err(Error::argument("cells", found, "the shape (steps + 1, agents, 2)"));
+        let found = format!("an array of shape ({}, {}, {})", shape[0], shape[1], shape[2]);
+        return Err(Error::argument("cells", found, "an array of shape (steps + 1, agents, 2)"));
     }
     let steps = steps.as_array();
     let step = |places: numpy::ndarray::ArrayView2<'_, i64>| {

@@ -1,4 +1,4 @@
-//! Many environments behind `VecEnv`.
+//! The batch of environments behind `VecEnv`.
 
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
@@ -16,26 +16,26 @@ use pyo3::types::PyDict;
 use crate::fields::Fields;
 use crate::{config, errors};
 
-/// Where a step's rewards and ends go: rewards, terminated, truncated.
+/// Output arrays of a step: rewards, terminated, truncated.
 ///
 /// Shape: `(envs, agents)` each
 type Ends<'py> = (PyReadwriteArray2<'py, f32>, PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
-/// Where a state goes: observations, who takes part, and, if wanted, masks of actions.
+/// Output arrays of a state: observations, flags of active agents, and optional action masks.
 ///
 /// Shape: `(envs, agents, 3, side, side)`, `(envs, agents)`, `(envs, agents, 5)`
 type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyReadwriteArray3<'py, i8>>);
 
-/// Many environments, stepped by one call, with buffers that the caller owns.
+/// A batch of environments that writes into buffers of the caller.
 ///
-/// The lock is never waited for: it only tells that another thread is inside.
+/// No thread waits for the lock: a call during a call of another thread raises an error.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Batch {
-    game: Mutex<Option<Game>>,
-    /// The process that has the threads.
+    inner: Mutex<Option<Inner>>,
+    /// Id of the process that owns the threads.
     process: u32,
 }
 
-struct Game {
+struct Inner {
     batch: pogema_fast::Batch,
     source: EnvSource,
     actions: Vec<Action>,
@@ -43,8 +43,10 @@ struct Game {
 
 #[pymethods]
 impl Batch {
-    /// Environments of some configs, each in JSON with the text of the map that its `map_name` names; `of_env` says
-    /// which one each environment has.
+    /// Makes environments from configs.
+    ///
+    /// Each config comes with the text of the map that its `map_name` names. `of_env` holds the index of each
+    /// environment's config.
     #[new]
     fn new(
         py: Python<'_>,
@@ -55,14 +57,15 @@ impl Batch {
         num_threads: usize,
     ) -> PyResult<Self> {
         let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
-        let made = py.detach(|| Game::new(&configs, of_env, exact, num_threads));
-        let mut game = made.map_err(|error| errors::config(py, &error))?;
-        game.batch = game.batch.with_autoreset(autoreset);
-        Ok(Self { game: Mutex::new(Some(game)), process: std::process::id() })
+        let made = py.detach(|| Inner::new(&configs, of_env, exact, num_threads));
+        let mut inner = made.map_err(|error| errors::config(py, &error))?;
+        inner.batch = inner.batch.with_autoreset(autoreset);
+        Ok(Self { inner: Mutex::new(Some(inner)), process: std::process::id() })
     }
 
-    /// Begins the next episodes of all environments, or of those chosen; with `seed`, or with one of `seeds` each,
-    /// their first ones.
+    /// Begins the next episode in all environments, or in the chosen ones.
+    ///
+    /// With `seed`, or with one of `seeds` for each environment, begins their first episodes.
     #[pyo3(signature = (state, chosen=None, seed=None, seeds=None))]
     fn reset(
         &self,
@@ -73,17 +76,18 @@ impl Batch {
         seeds: Option<Vec<u64>>,
     ) -> PyResult<()> {
         let mut guard = self.lock()?;
-        let game = Self::open(&mut guard)?;
-        py.detach(|| game.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
+        let inner = Self::open(&mut guard)?;
+        py.detach(|| inner.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
-        let view = ObservationBuffers { observations: buffer.lent()?, masks: lent(&mut masks)? };
-        let batch = &mut game.batch;
+        let view =
+            ObservationBuffers { observations: buffer.observations_mut()?, masks: masks_mut(&mut masks)? };
+        let batch = &mut inner.batch;
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
         write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
     }
 
-    /// Plays one step; returns the environments of which an episode ended.
+    /// Plays one step and returns the indices of the environments whose episode ended.
     ///
     /// Shape: `actions` is `(envs, agents)`
     fn step(
@@ -94,9 +98,9 @@ impl Batch {
         state: State<'_>,
     ) -> PyResult<Vec<usize>> {
         let mut guard = self.lock()?;
-        let game = Self::open(&mut guard)?;
-        game.read_actions(actions.as_slice()?).map_err(|(index, number)| {
-            let num_agents = game.batch.config().num_agents;
+        let inner = Self::open(&mut guard)?;
+        inner.read_actions(actions.as_slice()?).map_err(|(index, number)| {
+            let num_agents = inner.batch.config().num_agents;
             let (env, agent) = (index / num_agents, index % num_agents);
             let text = Error::Action { agent: Some(agent), number }.to_string();
             let text = text.replacen(" of agent", &format!(" of environment {env}, agent"), 1);
@@ -105,10 +109,11 @@ impl Batch {
         let (mut rewards, mut terminated, mut truncated) = ends;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
-        let view = ObservationBuffers { observations: buffer.lent()?, masks: lent(&mut masks)? };
+        let view =
+            ObservationBuffers { observations: buffer.observations_mut()?, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
-        let (batch, actions) = (&mut game.batch, &game.actions);
+        let (batch, actions) = (&mut inner.batch, &inner.actions);
         let played = py.detach(|| batch.step(actions, out, view));
         let shown = played.and_then(|()| write_active(batch, None, active));
         shown.map_err(|error| errors::batch(py, &error))?;
@@ -116,13 +121,13 @@ impl Batch {
         Ok((0..batch.num_lanes()).filter(has_ended).collect())
     }
 
-    /// Writes the states at the ends of the last episodes of some environments.
+    /// Writes the final states of the last episodes of some environments.
     fn ended(&self, py: Python<'_>, envs: Vec<usize>, state: State<'_>) -> PyResult<()> {
         let mut guard = self.lock()?;
-        let game = Self::open(&mut guard)?;
+        let inner = Self::open(&mut guard)?;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
-        let (batch, observed, masks) = (&game.batch, buffer.lent()?, lent(&mut masks)?);
+        let (batch, observed, masks) = (&inner.batch, buffer.observations_mut()?, masks_mut(&mut masks)?);
         let written = py.detach(|| {
             batch.observe_ended(&envs, observed)?;
             masks.map_or(Ok(()), |masks| write_ended_masks(batch, &envs, masks))
@@ -131,13 +136,13 @@ impl Batch {
         written.map_err(|error| errors::batch(py, &error))
     }
 
-    /// The figures of the last episodes of some environments, by name.
+    /// Returns the metrics of the last episodes of some environments, by name.
     fn metrics<'py>(&self, py: Python<'py>, envs: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut guard = self.lock()?;
-        let game = Self::open(&mut guard)?;
+        let inner = Self::open(&mut guard)?;
         let named = |env| {
             let dict = PyDict::new(py);
-            let ended = game.batch.ended(env).map_err(|error| errors::batch(py, &error))?;
+            let ended = inner.batch.ended(env).map_err(|error| errors::batch(py, &error))?;
             for (name, value) in ended.iter().flat_map(|(_, metrics)| metrics.named()) {
                 dict.set_item(name, value)?;
             }
@@ -146,41 +151,41 @@ impl Batch {
         envs.into_iter().map(named).collect()
     }
 
-    /// Writes which actions make sense now.
+    /// Writes the current action masks.
     fn mask_actions(&self, py: Python<'_>, masks: PyReadwriteArray3<'_, i8>) -> PyResult<()> {
         let mut guard = self.lock()?;
         let batch = &mut Self::open(&mut guard)?.batch;
         let mut masks = Some(masks);
-        let view = ObservationBuffers { observations: Observations::None, masks: lent(&mut masks)? };
+        let view = ObservationBuffers { observations: Observations::None, masks: masks_mut(&mut masks)? };
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))
     }
 
-    /// POGEMA's seed of each environment's present episode.
+    /// Returns POGEMA's seed of each environment's current episode.
     fn episode_seeds(&self, py: Python<'_>) -> PyResult<Vec<u64>> {
         let mut guard = self.lock()?;
-        let game = Self::open(&mut guard)?;
+        let inner = Self::open(&mut guard)?;
         let seed = |(env, seed): (usize, &Seed)| {
-            let episode = game.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
+            let episode = inner.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
             let episode = episode.ok_or_else(|| errors::batch(py, &Error::NotReset))?;
             Ok(seed.of_episode(env, episode))
         };
-        game.source.seeds().iter().enumerate().map(seed).collect()
+        inner.source.seeds().iter().enumerate().map(seed).collect()
     }
 
-    /// Number of agents of each environment, and how far they see.
+    /// Returns the number of agents of each environment, and their radius.
     fn sizes(&self) -> PyResult<(usize, usize)> {
         let mut guard = self.lock()?;
         let config = Self::open(&mut guard)?.batch.config();
         Ok((config.num_agents, config.radius))
     }
 
-    /// Lets go of the environments and of their threads; a forked child leaves both to its parent.
+    /// Frees the environments and their threads; does nothing in a forked child, since the parent owns both.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         if self.is_inherited() {
             return Ok(());
         }
-        let game = self.lock()?.take();
-        py.detach(|| drop(game));
+        let inner = self.lock()?.take();
+        py.detach(|| drop(inner));
         Ok(())
     }
 }
@@ -190,25 +195,27 @@ impl Batch {
         std::process::id() != self.process
     }
 
-    /// The environments, which nobody else may be using.
-    fn lock(&self) -> PyResult<MutexGuard<'_, Option<Game>>> {
+    /// Locks the environments.
+    ///
+    /// Errors: `RuntimeError` in a forked child, and while another thread is inside a call.
+    fn lock(&self) -> PyResult<MutexGuard<'_, Option<Inner>>> {
         if self.is_inherited() {
             return Err(PyRuntimeError::new_err(
                 "this VecEnv was made before the process forked, and its threads stayed in the parent: make a new \
                  VecEnv in the child, or start the child with the method `spawn`",
             ));
         }
-        self.game.try_lock().map_err(|error| match error {
+        self.inner.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => PyRuntimeError::new_err(
                 "another thread is inside a call of this VecEnv: call it from one thread at a time",
             ),
             TryLockError::Poisoned(_) => {
-                PyRuntimeError::new_err("an earlier call of this VecEnv broke off: make a new VecEnv")
+                PyRuntimeError::new_err("an earlier call of this VecEnv failed: make a new VecEnv")
             }
         })
     }
 
-    fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Game>>) -> PyResult<&'a mut Game> {
+    fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Inner>>) -> PyResult<&'a mut Inner> {
         guard.as_mut().ok_or_else(|| PyRuntimeError::new_err("this VecEnv is closed: make a new one"))
     }
 }
@@ -216,13 +223,13 @@ impl Batch {
 impl Drop for Batch {
     fn drop(&mut self) {
         if self.is_inherited() {
-            // There is nobody to wait for: the threads did not come along.
-            std::mem::forget(self.game.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+            // The threads exist in the parent alone, so the child must not wait for them.
+            std::mem::forget(self.inner.get_mut().unwrap_or_else(PoisonError::into_inner).take());
         }
     }
 }
 
-impl Game {
+impl Inner {
     fn new(
         configs: &[(Fields, Option<String>)],
         of_env: Vec<usize>,
@@ -263,10 +270,10 @@ impl Game {
         Ok(())
     }
 
-    /// Takes actions over, or names the first that is none.
+    /// Stores actions, or returns the index and the number of the first invalid one.
     fn read_actions(&mut self, numbers: &[i64]) -> Result<(), (usize, i64)> {
         let is_action = |&number: &i64| (number as u64) < Action::ALL.len() as u64;
-        // Without an early end, so that many are looked at in one instruction.
+        // No early exit, so that the loop is vectorized.
         if !numbers.iter().fold(true, |all, number| all & is_action(number)) {
             let wrong = numbers.iter().position(|number| !is_action(number)).unwrap_or_default();
             return Err((wrong, numbers[wrong]));
@@ -289,11 +296,13 @@ impl<'py> Buffer<'py> {
             return borrow(array).map(Self::F32);
         }
         let array = array.cast::<PyArrayDyn<u8>>();
-        let array = array.map_err(|_| PyTypeError::new_err("observations, expected float32 or uint8"))?;
+        let array = array.map_err(|_| {
+            PyTypeError::new_err("observations are of another type, expected float32 or uint8")
+        })?;
         borrow(array).map(Self::U8)
     }
 
-    fn lent(&mut self) -> PyResult<Observations<'_>> {
+    fn observations_mut(&mut self) -> PyResult<Observations<'_>> {
         match self {
             Self::F32(array) => Ok(Observations::F32(array.as_slice_mut()?)),
             Self::U8(array) => Ok(Observations::U8(array.as_slice_mut()?)),
@@ -303,31 +312,32 @@ impl<'py> Buffer<'py> {
 
 fn borrow<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
     array.try_readwrite().map_err(|error| {
-        PyRuntimeError::new_err(format!("the buffer for observations cannot be written now: {error}"))
+        PyRuntimeError::new_err(format!("the buffer for observations cannot be written: {error}"))
     })
 }
 
-fn lent<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResult<Option<&'a mut [i8]>> {
+fn masks_mut<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResult<Option<&'a mut [i8]>> {
     Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
 }
 
-/// Writes who takes part, in all environments now, or in some at the ends of their episodes.
+/// Writes which agents are active: now in all environments, or at the end of the episode in some.
 fn write_active(
     batch: &pogema_fast::Batch,
     ended: Option<&[usize]>,
     mut active: PyReadwriteArray2<'_, bool>,
 ) -> Result<(), Error> {
-    let no_array = |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
-    let active = active.as_slice_mut().map_err(no_array)?;
+    let not_contiguous =
+        |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
+    let active = active.as_slice_mut().map_err(not_contiguous)?;
     let num_agents = batch.config().num_agents;
-    let want = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
-    Error::check_length("active", want, active.len())?;
+    let expected = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
+    Error::check_length("active", expected, active.len())?;
     for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
         let engine = match ended {
             Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
             None => Some(batch.lane(index)?),
         };
-        // INVARIANT: an end that is not there was refused when it was to be observed.
+        // INVARIANT: `observe_ended` has rejected environments without an ended episode.
         if let Some(engine) = engine {
             part.copy_from_slice(engine.active());
         }
@@ -343,13 +353,13 @@ fn write_ended_masks(batch: &pogema_fast::Batch, envs: &[usize], out: &mut [i8])
         .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }
 
-/// Number of threads that this process may run at once.
+/// Returns the number of threads that this process can run in parallel.
 #[pyfunction]
 pub fn num_cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Gymnasium's names of what follows the end of an episode.
+/// Reads Gymnasium's name of an autoreset mode.
 fn read_autoreset(name: &str) -> Result<Autoreset, Error> {
     match name {
         "SameStep" => Ok(Autoreset::SameStep),

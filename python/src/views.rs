@@ -1,4 +1,4 @@
-//! Tables, plots and pages of results.
+//! Tables and plots of results.
 
 use std::path::PathBuf;
 
@@ -7,13 +7,14 @@ use pogema_toolbox::views::{Format, Gallery, ImageFormat, ShownView};
 use pogema_toolbox::{Results, six::Definition};
 use pyo3::prelude::*;
 
-use crate::evaluation::told;
+use crate::evaluation::to_py_error;
 
-/// A view: its name, its tables, the files of its plots, notes, and why it could not be shown.
+/// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
 
-/// Shows views of the results in folders, by default all of those that are with them; what the results lack is told
-/// first.
+/// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
+///
+/// Without `names` shows all views of `config`, by default of the suite that is stored with the results.
 #[pyfunction]
 pub fn show_views(
     py: Python<'_>,
@@ -43,5 +44,5 @@ pub fn show_views(
         let listed = listed.collect();
         Ok((results.notes, listed))
     };
-    py.detach(show).map_err(|error: Error| told(&error))
+    py.detach(show).map_err(|error: Error| to_py_error(&error))
 }

@@ -1,4 +1,4 @@
-"""The tests are about the wheel, not about the source folder."""
+"""Makes sure that the tests run against the installed wheel, not the source folder."""
 
 from pathlib import Path
 

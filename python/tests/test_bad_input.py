@@ -1,4 +1,4 @@
-"""What one environment does with input that is wrong: a clear error, and nothing has changed."""
+"""Tests that wrong input to an environment raises a clear error and does not change its state."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ ENDLESS.append(ENDLESS)
 
 
 def started(**fields: Any) -> Any:
-    """An environment after its reset."""
+    """Returns an environment after its reset."""
     env = _make_pogema(GridConfig(**{**CONFIG, **fields}))
     env.reset()
     return env
 
 
 def state(env: Any) -> Any:
-    """Where everything is."""
+    """Returns the observable state of an environment."""
     return env.get_agents_xy(), env.get_targets_xy(), env.grid.is_active, env._engine.num_steps
 
 
@@ -56,8 +56,8 @@ def state(env: Any) -> Any:
         (None, (TypeError,), ""),
     ],
 )
-def test_actions_that_are_none(actions: Any, classes: tuple, text: str, system: str) -> None:
-    """Wrong actions are refused before anybody moves."""
+def test_wrong_actions_change_nothing(actions: Any, classes: tuple, text: str, system: str) -> None:
+    """Wrong actions are rejected before any agent moves."""
     env, other = started(collision_system=system), started(collision_system=system)
     before = state(env)
     for kind in classes:
@@ -67,8 +67,8 @@ def test_actions_that_are_none(actions: Any, classes: tuple, text: str, system: 
     assert np.array_equal(env.step([1, 2, 3])[0], other.step([1, 2, 3])[0])
 
 
-def test_the_action_of_an_agent_that_is_gone_is_not_looked_at() -> None:
-    """As in POGEMA, though the count still matters."""
+def test_actions_of_finished_agents_are_ignored() -> None:
+    """As in POGEMA, only their number matters."""
     env = _make_pogema(GridConfig(map="aA.\n.bB", obs_radius=1))
     env.reset()
     assert env.step([4, 0])[4][0] == {"is_active": False}
@@ -76,8 +76,8 @@ def test_the_action_of_an_agent_that_is_gone_is_not_looked_at() -> None:
     env.step([None, 4])
 
 
-def test_before_the_reset() -> None:
-    """Every call that needs an episode says that there is none."""
+def test_calls_before_the_reset_are_rejected() -> None:
+    """Every call that needs an episode says that the environment was not reset."""
     env = _make_pogema(GridConfig(**CONFIG))
     calls = (env.render, env.get_agents_xy, env.get_obstacles, env.get_state, env.get_targets_xy_relative)
     for call in (lambda: env.step([0, 0, 0]), *calls):
@@ -88,15 +88,15 @@ def test_before_the_reset() -> None:
     assert env.get_num_agents() == 3
 
 
-def test_after_the_end_steps_go_on() -> None:
-    """Nothing resets by itself."""
+def test_steps_after_the_end_are_played() -> None:
+    """The environment does not reset automatically."""
     env = started(max_episode_steps=2)
     ends = [env.step([0, 0, 0])[3][0] for _ in range(5)]
     assert ends == [False, True, True, True, True]
 
 
-def test_a_reset_that_fails_changes_nothing() -> None:
-    """The episode before it can be played on."""
+def test_failed_reset_changes_nothing() -> None:
+    """The current episode can be continued."""
     env = started()
     before = state(env)
     env.grid_config.update_config(num_agents=30)
@@ -107,8 +107,8 @@ def test_a_reset_that_fails_changes_nothing() -> None:
     env.step([0, 0, 0])
 
 
-def test_history_needs_to_be_kept() -> None:
-    """Each call says what it needs, as the two classes that POGEMA's users may catch."""
+def test_history_needs_persistent() -> None:
+    """Each call names the missing field, in an error of both classes that POGEMA's users may catch."""
     env = started()
     for call in (env.step_back, env.get_history, env.get_full_history, lambda: env.set_elapsed_steps(1)):
         for kind in (ValueError, AttributeError):
@@ -125,8 +125,8 @@ def test_history_needs_to_be_kept() -> None:
             env.set_elapsed_steps(-1)
 
 
-def test_the_time_limit_can_be_moved() -> None:
-    """A step back sets it to the steps that are left."""
+def test_elapsed_steps_can_be_set() -> None:
+    """A step back sets them to the number of steps that remain in the history."""
     env = started(persistent=True, max_episode_steps=10)
     env.set_elapsed_steps(8)
     assert [env.step([0, 0, 0])[3][0] for _ in range(2)] == [False, True]
@@ -134,8 +134,8 @@ def test_the_time_limit_can_be_moved() -> None:
     assert env.step([0, 0, 0])[3][0] is False
 
 
-def test_a_sequence_that_goes_round_is_warned_of() -> None:
-    """Once each time, and by the name of the agent."""
+def test_sequence_that_wraps_around_triggers_a_warning() -> None:
+    """Each wrap triggers one warning, which names the agent."""
     goals = [[[0, 1], [0, 0]], [[1, 2], [1, 1], [1, 0]]]
     env = _make_pogema(
         GridConfig(map="...\n...", agents_xy=[[0, 0], [1, 2]], targets_xy=goals, on_target="restart", obs_radius=1)
@@ -152,11 +152,11 @@ def test_a_sequence_that_goes_round_is_warned_of() -> None:
     assert caught[0].filename == __file__
 
 
-def test_two_threads_on_one_environment() -> None:
-    """One of them is told; nothing breaks."""
+def test_concurrent_threads_get_an_error() -> None:
+    """A call during a call of another thread raises an error, and the state stays consistent."""
     env = _make_pogema(GridConfig(size=200, num_agents=4000, obs_radius=5, density=0.05, seed=1))
     env.reset()
-    told: list[BaseException] = []
+    errors_raised: list[BaseException] = []
     num_steps = [0, 0, 0]
 
     def play(thread: int) -> None:
@@ -165,24 +165,25 @@ def test_two_threads_on_one_environment() -> None:
                 env.step(np.full(4000, thread + 1))
                 num_steps[thread] += 1
             except Exception as error:  # noqa: BLE001 - the class is what is tested
-                told.append(error)
+                errors_raised.append(error)
 
     threads = [threading.Thread(target=play, args=(number,)) for number in range(3)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert {type(error) for error in told} <= {errors.StateError}
+    assert {type(error) for error in errors_raised} <= {errors.StateError}
     assert all(
-        str(error) == "another thread is using this environment, expected one thread at a time" for error in told
+        str(error) == "another thread is using this environment, expected one thread at a time"
+        for error in errors_raised
     )
-    assert all(isinstance(error, RuntimeError) for error in told)
+    assert all(isinstance(error, RuntimeError) for error in errors_raised)
     assert env._engine.num_steps == sum(num_steps)
     env.step(np.zeros(4000, dtype=int))
 
 
-def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
-    """The step that a warning is about is played in any case."""
+def test_step_completes_if_its_warning_is_an_error() -> None:
+    """The step that triggers a warning is played in any case."""
     fields = {"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[[0, 1], [0, 0]]], "on_target": "restart"}
     env, other = (_make_pogema(GridConfig(**fields, obs_radius=1, max_episode_steps=3)) for _ in range(2))
     for each, action in ((env, "error"), (other, "ignore")):
@@ -191,7 +192,7 @@ def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter(action)
             if action == "error":
-                with pytest.raises(UserWarning, match="goes round"):
+                with pytest.raises(UserWarning, match="wraps around"):
                     each.step([3])
             else:
                 each.step([3])
@@ -199,7 +200,7 @@ def test_a_warning_that_is_an_error_leaves_a_step_behind() -> None:
     assert env.step([4])[4] == other.step([4])[4] == [{"is_active": True, "metrics": {"avg_throughput": 1.0}}]
 
 
-def test_python_accepts_the_words_of_the_engine():
+def test_python_accepts_the_same_words_as_the_engine():
     for field in ("on_target", "collision_system", "observation_type", "integration"):
         annotation = GridConfig.model_fields[field].annotation
         literal = next((part for part in get_args(annotation) if get_args(part)), annotation)
@@ -215,7 +216,7 @@ def test_python_accepts_the_words_of_the_engine():
         ({"map": [[0, 0], [0]]}, ()),
     ],
 )
-def test_a_refused_config_names_its_field(fields, place):
+def test_validation_error_names_the_field(fields, place):
     with pytest.raises(ValidationError) as raised:
         GridConfig(**fields)
     (error,) = raised.value.errors()
@@ -223,7 +224,7 @@ def test_a_refused_config_names_its_field(fields, place):
     assert not error["msg"].startswith("config")
 
 
-def test_an_assigned_field_may_hold_what_numpy_makes():
+def test_assigned_fields_may_hold_numpy_values():
     env = started(num_agents=2)
     env.grid_config.seed = np.int64(5)
     env.grid_config.map = np.zeros((4, 5), dtype=np.uint8)
@@ -243,7 +244,7 @@ def test_an_assigned_field_may_hold_what_numpy_makes():
         ("agents_xy", [ENDLESS], ValueError),
     ],
 )
-def test_an_assigned_field_that_no_config_can_hold_changes_nothing(field, value, error):
+def test_reset_with_an_invalid_assigned_field_changes_nothing(field, value, error):
     env = started()
     before = state(env)
     setattr(env.grid_config, field, value)

@@ -1,6 +1,6 @@
-"""Every Python block of the README and the guide runs, all of a page in one process and in order.
+"""Tests that the Python blocks of the README and the guide run: per page in order, in one process.
 
-Those that a comment marks as a framework's are run by `./check frameworks`.
+`./check frameworks` runs the blocks that a comment assigns to a framework.
 """
 
 import re
@@ -15,12 +15,12 @@ BLOCK = re.compile(r"^(<!-- framework: \w+ -->\n)?```python\n(.*?)^```$", re.MUL
 PAGES = [path for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))] if BLOCK.search(path.read_text())]
 
 
-def test_there_are_pages():
+def test_pages_are_found():
     assert {path.name for path in PAGES} >= {"README.md", "python.md"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
-def test_the_blocks_run(page, tmp_path):
+def test_blocks_run(page, tmp_path):
     code = "\n".join(block for framework, block in BLOCK.findall(page.read_text()) if not framework)
     run = subprocess.run([sys.executable, "-B", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,4 @@
-"""Whatever is public in the package says in its first line, a whole sentence, what it is."""
+"""Tests that all public names have a docstring whose first line is a complete sentence."""
 
 import ast
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 import pogema_rs
 
-# Read as text: a module whose framework is not installed is none the less public.
+# Parsed, not imported: a module is public even if its framework is not installed.
 ROOT = Path(pogema_rs.__file__).resolve().parent
 MODULES = {
     ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__"): path
@@ -21,7 +21,7 @@ def is_overload(node):
 
 
 def public_names(body):
-    """The names that a module or class defines, and for a private function the public names that it is given."""
+    """Returns the public names that a module or class defines, including public aliases of private functions."""
     names = {}
     for node in body:
         if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not is_overload(node):
@@ -32,14 +32,14 @@ def public_names(body):
 
 
 def documented(name, node):
-    """All that is public in a module or class, itself first."""
+    """Yields a module or class and all public names in it."""
     yield name, node
     if not isinstance(node, ast.FunctionDef):
         for inner, child in public_names(node.body).items():
             yield from documented(f"{name}.{inner}", child)
 
 
-def test_the_modules_are_found():
+def test_modules_are_found():
     assert {"pogema_rs", "pogema_rs.envs", "pogema_rs.vec_env", "pogema_rs.integrations.rllib"} <= MODULES.keys()
 
 
@@ -54,12 +54,12 @@ def test_public_names_have_docstrings(module):
     assert wrong == []
 
 
-def test_aliases_of_private_functions_are_looked_at():
+def test_aliases_of_private_functions_are_checked():
     tree = ast.parse("class A:\n    '''A.'''\n    def _b(self): ...\n    c = _b\n")
     assert [name for name, _ in documented("module", tree)] == ["module", "module.A", "module.A.c"]
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_the_package_names_its_modules(module):
-    # The pages of the reference are reached from there.
+def test_package_docstring_lists_all_modules(module):
+    # The start page of the reference links the modules from this docstring.
     assert module == "pogema_rs" or f"`{module}`" in pogema_rs.__doc__

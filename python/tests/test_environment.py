@@ -1,4 +1,4 @@
-"""What code for POGEMA does with one environment; only the import is another."""
+"""Tests of single environments, with code written for POGEMA except for the import."""
 
 import copy
 import pickle
@@ -46,7 +46,7 @@ def test_custom_map_with_letters():
 
 
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_the_astar_agents_play_every_mode(on_target):
+def test_astar_agents_play_every_mode(on_target):
     config = GridConfig(num_agents=4, seed=5, density=0.1, on_target=on_target, observation_type="POMAPF")
     metrics = play(pogema_v0(config), BatchAStarAgent().act)
     assert metrics["avg_throughput" if on_target == "restart" else "ISR"] > 0.3
@@ -74,7 +74,7 @@ def test_reward_and_observation_wrappers_stack():
     assert env.unwrapped.get_num_agents() == 3
 
 
-def test_our_wrapper_passes_on_what_it_does_not_have():
+def test_wrapper_forwards_unknown_attributes():
     env = pogema_rs.Wrapper(pogema_rs.Wrapper(pogema_v0(GridConfig(num_agents=3, seed=1))))
     env.reset()
     assert env.get_num_agents() == 3
@@ -82,7 +82,7 @@ def test_our_wrapper_passes_on_what_it_does_not_have():
     assert not hasattr(env, "nothing_of_this_name")
 
 
-def test_the_config_may_change_between_resets():
+def test_config_may_change_between_resets():
     config = GridConfig(seed=1, num_agents=2)
     env = pogema_v0(config)
     first, _ = env.reset()
@@ -113,8 +113,8 @@ def test_semantics():
         pogema_v0(config, semantics="3.0")
 
 
-def test_metrics_leak_in_1_4_0_alone():
-    # One of two agents reaches its goal and the episode is left; in the next one both do.
+def test_metrics_leak_only_in_1_4_0():
+    # In the first episode, which is not finished, one of two agents reaches its goal; in the next one both do.
     def isr(semantics):
         env = pogema_v0({"map": "aA.\nb.B"}, semantics=semantics)
         env.reset()
@@ -125,7 +125,7 @@ def test_metrics_leak_in_1_4_0_alone():
     assert isr("2.0") == 1.0
 
 
-def test_films(tmp_path):
+def test_animations_are_saved(tmp_path):
     env = AnimationMonitor(
         pogema_v0(GridConfig(num_agents=3, seed=2, map_name=None)),
         AnimationConfig(directory=str(tmp_path / "renders"), save_every_idx_episode=1),
@@ -147,7 +147,7 @@ def test_films(tmp_path):
         inner.render_animation(AnimationConfig(egocentric_idx=3))
 
 
-def test_an_episode_that_is_not_filmed_cannot_be_drawn(tmp_path):
+def test_unrecorded_episode_cannot_be_drawn(tmp_path):
     env = pogema_v0(GridConfig())
     env.reset()
     with pytest.raises(ValueError, match="not recorded"):
@@ -155,7 +155,7 @@ def test_an_episode_that_is_not_filmed_cannot_be_drawn(tmp_path):
     assert not (tmp_path / "one.svg").exists()
 
 
-def test_an_unknown_field_is_ignored_with_one_warning():
+def test_unknown_field_is_ignored_with_one_warning():
     with pytest.warns(UserWarning, match="`num_agents`") as caught:
         config = GridConfig(num_agent=3)
     assert len(caught) == 1
@@ -163,7 +163,7 @@ def test_an_unknown_field_is_ignored_with_one_warning():
 
 
 @pytest.mark.parametrize(
-    ("fields", "theirs"),
+    ("fields", "error"),
     [
         ({"size": 1}, ValidationError),
         ({"width": 3}, ValidationError),
@@ -180,14 +180,14 @@ def test_an_unknown_field_is_ignored_with_one_warning():
         ({"map": ""}, ZeroDivisionError),
     ],
 )
-def test_a_wrong_config_raises_what_pogema_raises(fields, theirs):
-    with pytest.raises(theirs) as caught:
+def test_wrong_config_raises_the_class_of_pogema(fields, error):
+    with pytest.raises(error) as caught:
         GridConfig(**fields)
     assert isinstance(caught.value, ValueError)
     assert "expected" in str(caught.value) or "no cells" in str(caught.value)
 
 
-def test_update_config_changes_all_or_nothing():
+def test_update_config_is_atomic():
     config = GridConfig(size=8, seed=1)
     config.update_config(width=4, height=5)
     assert (config.width, config.height, config.size) == (4, 5, 5)
@@ -199,7 +199,7 @@ def test_update_config_changes_all_or_nothing():
     assert config.dict() == before
 
 
-def test_configs_are_extended_copied_and_pickled():
+def test_configs_can_be_extended_copied_and_pickled():
     class Extended(GridConfig):
         with_animation: bool = False
 
@@ -213,14 +213,14 @@ def test_configs_are_extended_copied_and_pickled():
     assert GridConfig(**plain.dict()) == plain
 
 
-def test_too_many_agents_raise_what_either_line_raises():
+def test_too_many_agents_raise_the_classes_of_both_lines():
     env = pogema_v0(GridConfig(size=3, density=0.0, num_agents=9))
-    for theirs in (OverflowError, ValueError):
-        with pytest.raises(theirs, match="room"):
+    for error in (OverflowError, ValueError):
+        with pytest.raises(error, match="room"):
             env.reset()
 
 
-def test_the_callers_lists_stay_as_they_are():
+def test_lists_of_the_caller_are_unchanged():
     actions, pool = [4, 3, 1], [[0, 0], [0, 1], [2, 2], [1, 1]]
     kept = copy.deepcopy(pool)
     env = pogema_v0(GridConfig(size=3, density=0, num_agents=3, possible_agents_xy=pool, possible_targets_xy=pool,
@@ -231,7 +231,7 @@ def test_the_callers_lists_stay_as_they_are():
     assert (actions, pool) == ([4, 3, 1], kept)
 
 
-def test_warnings_of_the_maker_reach_the_user():
+def test_warnings_about_the_instance_reach_the_user():
     config = GridConfig(map=[[1, 0], [0, 0]], agents_xy=[[0, 0]], targets_xy=[[1, 1]])
     with pytest.warns(UserWarning, match="obstacle"):
         pogema_v0(config).reset()
@@ -240,7 +240,7 @@ def test_warnings_of_the_maker_reach_the_user():
         pogema_v0(GridConfig(seed=1)).reset()
 
 
-def test_a_grid_cannot_be_changed_by_hand():
+def test_grid_is_read_only():
     env = pogema_v0(GridConfig(seed=1))
     env.reset()
     with pytest.raises(ValueError, match="read-only"):

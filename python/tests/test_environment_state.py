@@ -1,4 +1,4 @@
-"""Environments that are pickled or copied in the middle of an episode, and go on as if nothing had been."""
+"""Tests that an environment pickled or copied in the middle of an episode continues identically."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ WAYS = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dum
 
 
 def plain(value: Any) -> Any:
-    """A value in a form that `==` compares as a whole."""
+    """Returns a value in a form that `==` compares completely."""
     if isinstance(value, np.ndarray):
         return (value.dtype.str, value.shape, value.tobytes())
     if isinstance(value, dict):
@@ -49,7 +49,7 @@ def plain(value: Any) -> Any:
 
 
 def future(env: Any, plans: np.ndarray) -> list[Any]:
-    """All that is to be seen of an environment from now on; what a reset draws without a seed is left out."""
+    """Returns everything observable of an environment from now on, except for resets without a seed."""
     seen = []
     for plan in plans:
         seen += [plain(env.step(plan[: env.get_num_agents()])), plain(env.was_on_goal), plain(env.sample_actions())]
@@ -67,8 +67,8 @@ def future(env: Any, plans: np.ndarray) -> list[Any]:
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS)
 @pytest.mark.filterwarnings("ignore:agent")
-def test_the_future_is_the_same(fields: dict[str, Any], way: Any) -> None:
-    """A copy made after some steps plays on like the original, and neither disturbs the other."""
+def test_copy_continues_identically(fields: dict[str, Any], way: Any) -> None:
+    """A copy made after some steps continues like the original, and neither affects the other."""
     plans = np.random.default_rng(3).integers(5, size=(40, 6))
     env = _make_pogema(GridConfig(**fields))
     env.sample_actions()
@@ -85,15 +85,15 @@ def test_the_future_is_the_same(fields: dict[str, Any], way: Any) -> None:
 
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-def test_before_the_reset(way: Any) -> None:
-    """A copy of an environment that was not reset yet is one."""
+def test_copy_before_the_reset(way: Any) -> None:
+    """A copy of an environment that was not reset yet plays the same episode."""
     env = way(_make_pogema(GridConfig(**SMALL, seed=4)))
     other = _make_pogema(GridConfig(**SMALL, seed=4))
     assert plain(env.reset()) == plain(other.reset())
 
 
-def test_a_film_goes_on() -> None:
-    """The film of an episode is copied with it."""
+def test_recording_continues_in_a_copy() -> None:
+    """The recording of an episode is copied with it."""
     env = _make_pogema(GridConfig(**SMALL, seed=4))
     env._engine.film(True)
     env.reset()
@@ -104,7 +104,7 @@ def test_a_film_goes_on() -> None:
     assert other._engine.draw_svg() == env._engine.draw_svg()
 
 
-def test_a_registered_map_goes_on() -> None:
+def test_copy_keeps_its_registered_map() -> None:
     """A copy needs the registry only at the next reset."""
     RegisteredGrid("pickled", "...#\n....")
     try:
@@ -117,8 +117,8 @@ def test_a_registered_map_goes_on() -> None:
         del GRID_STR_REGISTRY["pickled"]
 
 
-def test_a_copied_grid_cannot_be_written_to() -> None:
-    """What an environment's grid returns is a view of it, in a copy too."""
+def test_copied_grid_is_read_only() -> None:
+    """The arrays of a grid are read-only, also in a copy."""
     env = _make_pogema(GridConfig(**SMALL, seed=4))
     env.reset()
     assert not env.grid.obstacles.flags.writeable
@@ -126,38 +126,38 @@ def test_a_copied_grid_cannot_be_written_to() -> None:
 
 
 @pytest.mark.parametrize("change", ["", "{}", "[]", "nonsense", b"\xff", b"[" * 10000])
-def test_foreign_bytes_are_refused(change: Any) -> None:
-    """Only what was saved is restored."""
-    with pytest.raises(ValueError, match="no saved environment"):
+def test_foreign_bytes_are_rejected(change: Any) -> None:
+    """Only bytes saved by an environment are restored."""
+    with pytest.raises(ValueError, match="not a saved environment"):
         _engine.restore_engine(change if isinstance(change, bytes) else change.encode())
 
 
-def test_spoiled_bytes_are_refused() -> None:
-    """A state whose parts do not fit each other is refused, and never ends in anything but a ValueError."""
+def test_corrupt_bytes_are_rejected() -> None:
+    """An inconsistent state raises a ValueError, and no other error."""
     env = _make_pogema(GridConfig(**SMALL, seed=4, on_target="restart"))
     env.reset()
     _, (saved,) = env._engine.__reduce__()
     generator = np.random.default_rng(5)
-    refused = 0
+    num_rejected = 0
     for _ in range(300):
         start = int(generator.integers(len(saved) - 4))
         length = int(generator.integers(1, 4))
-        spoiled = (
+        corrupt = (
             saved[:start] + bytes(generator.integers(32, 127, size=length, dtype=np.uint8)) + saved[start + length :]
         )
         try:
-            engine = _engine.restore_engine(spoiled)
+            engine = _engine.restore_engine(corrupt)
             engine.step([0, 1, 2, 3])
         except ValueError as error:
-            refused += 1
+            num_rejected += 1
             assert "\n" not in str(error)
-    assert refused > 200
+    assert num_rejected > 200
     wrong = saved.replace(b'"version":1', b'"version":2')
     with pytest.raises(ValueError, match="version 1"):
         _engine.restore_engine(wrong)
 
 
-#: Environments that the first release saved after 7 steps, and the digest of what it made of the next 14.
+#: Environments that the first release saved after 7 steps, and the digest of its next 14 steps.
 SAVED = {
     "restart-soft": "a0c1738a7284cc0024874198f582abeeddb29383763934dfe529854aabf215ec",
     "finish-priority": "6c1cad9be923b0f7944ac600f28e4e2f3dc6d946fa5f1bb6c5f565413204ddfc",
@@ -166,7 +166,7 @@ SAVED = {
 
 
 @pytest.mark.parametrize("name", SAVED)
-def test_an_environment_saved_by_the_first_release_goes_on(name):
+def test_environment_saved_by_the_first_release_continues(name):
     env = pickle.loads((Path(__file__).parent / "saved" / f"{name}.pickle").read_bytes())
     rng = np.random.default_rng(1)
     rng.integers(5, size=(7, 10))

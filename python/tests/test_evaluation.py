@@ -1,4 +1,4 @@
-"""Suites with policies in Python: here, in processes, on Dask, broken off and resumed."""
+"""Tests of suites with policies in Python: on all backends, interrupted and resumed."""
 
 import json
 import random
@@ -16,7 +16,7 @@ BACKENDS = ["sequential", "multiprocessing", "balanced_multiprocessing", "dask",
 
 
 def suite(backend="sequential", seconds=0.0, num_seeds=5, **algorithms):
-    """A suite of A* agents, on three maps."""
+    """Returns a suite of A* agents on named maps."""
     return {
         "environment": {
             "name": "Environment",
@@ -46,7 +46,7 @@ def write(folder, content):
 
 
 def play(folder, content, begin="new", *address):
-    """What the script says, and its status."""
+    """Plays a suite with the script, and returns its output and exit status."""
     write(folder, content)
     done = subprocess.run(command(folder, begin, *address), capture_output=True, text=True, timeout=300)
     return done.stdout + done.stderr, done.returncode
@@ -58,20 +58,20 @@ def results(folder, key="A star"):
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
-    """The same suite, played by the built-in A*."""
+    """The results of the same suite with the built-in A*."""
     folder = tmp_path_factory.mktemp("built-in")
     content = suite()
     content["algorithms"]["A star"] = {"name": "astar"}
-    said, status = play(folder, content)
-    assert status == 0, said
+    output, status = play(folder, content)
+    assert status == 0, output
     return results(folder)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_wherever_it_plays_python_gets_what_the_built_in_policy_gets(backend, played, tmp_path):
-    said, status = play(tmp_path, suite(backend))
-    assert status == 0, said
-    assert said.splitlines()[-1] == "20" or said.startswith("20\n"), said
+def test_every_backend_gets_the_results_of_the_built_in_policy(backend, played, tmp_path):
+    output, status = play(tmp_path, suite(backend))
+    assert status == 0, output
+    assert output.splitlines()[-1] == "20" or output.startswith("20\n"), output
     assert results(tmp_path) == played
     rows = json.loads(played)
     assert [row["env_grid_search"]["num_agents"] for row in rows[:4]] == [4, 4, 8, 8]
@@ -81,13 +81,13 @@ def test_wherever_it_plays_python_gets_what_the_built_in_policy_gets(backend, pl
 
 
 @pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing"])
-def test_a_run_killed_anywhere_and_resumed_gives_the_same_bytes(backend, played, tmp_path):
+def test_killed_and_resumed_run_gives_the_same_bytes(backend, played, tmp_path):
     content = suite(backend, seconds=0.002)
     write(tmp_path, content)
     lines, dice, num_killed = tmp_path / "out" / "A star.jsonl", random.Random(1), 0
     while not (tmp_path / "out" / "A star.json").exists() and num_killed < 5:
         begin = "resume" if (tmp_path / "out" / "about.json").exists() else "new"
-        # In a group of its own, so that what it started ends with it.
+        # A separate process group, so that its children are killed with it.
         child = subprocess.Popen(command(tmp_path, begin), stderr=subprocess.DEVNULL, start_new_session=True)
         before = len(lines.read_bytes()) if lines.exists() else 0
         deadline = time.monotonic() + 60
@@ -99,28 +99,28 @@ def test_a_run_killed_anywhere_and_resumed_gives_the_same_bytes(backend, played,
         subprocess.run(["pkill", "-9", "-g", str(child.pid)], check=False)
         num_killed += child.wait() != 0
     assert num_killed >= 2
-    said, status = play(tmp_path, content, "resume")
-    assert status == 0, said
+    output, status = play(tmp_path, content, "resume")
+    assert status == 0, output
     assert results(tmp_path) == played
 
 
-def test_a_process_that_dies_is_replaced_and_nothing_is_lost(played, tmp_path):
+def test_dead_process_is_replaced_and_no_episode_is_lost(played, tmp_path):
     content = suite("balanced_multiprocessing")
     content["algorithms"]["A star"].update(name="Mortal", mark=str(tmp_path / "died"))
-    said, status = play(tmp_path, content)
-    assert status == 0, said
-    assert "a process died" in said and (tmp_path / "died").exists()
+    output, status = play(tmp_path, content)
+    assert status == 0, output
+    assert "a process died" in output and (tmp_path / "died").exists()
     assert results(tmp_path) == played
 
 
 @pytest.mark.parametrize("observations", ["default", "POMAPF", "MAPF"])
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_a_policy_that_stays_has_the_figures_of_the_one_built_in(on_target, observations, tmp_path):
+def test_staying_policy_has_the_metrics_of_the_built_in_one(on_target, observations, tmp_path):
     content = suite(Still={"name": "Crowded", "parallel_backend": "sequential"}, Stay={"name": "stay"})
     del content["algorithms"]["A star"]
     content["environment"].update(on_target=on_target, observation_type=observations, num_agents=6)
-    said, status = play(tmp_path, content)
-    assert status == 0, said
+    output, status = play(tmp_path, content)
+    assert status == 0, output
     still, stay = (json.loads(results(tmp_path, key)) for key in ("Still", "Stay"))
     assert [row["metrics"] for row in still] == [row["metrics"] for row in stay]
     assert len(still) == 10
@@ -128,7 +128,7 @@ def test_a_policy_that_stays_has_the_figures_of_the_one_built_in(on_target, obse
 
 @contextmanager
 def cluster(folder):
-    """A scheduler's address and two workers."""
+    """Starts a scheduler with two workers, and yields its address and the workers."""
     where = folder / "scheduler.json"
     dask = [sys.executable, "-m", "dask"]
     to_file = ["--scheduler-file", str(where)]
@@ -147,20 +147,20 @@ def cluster(folder):
             child.wait()
 
 
-def test_on_a_scheduler_of_which_a_worker_dies_nothing_is_lost(played, tmp_path):
+def test_dead_dask_worker_loses_no_episode(played, tmp_path):
     write(tmp_path, suite("balanced_dask", seconds=0.01))
     with cluster(tmp_path) as (address, workers):
         child = subprocess.Popen(command(tmp_path, "new", address))
         lines = tmp_path / "out" / "A star.jsonl"
         while not lines.exists() or lines.read_bytes().count(b"\n") < 4:
-            assert child.poll() is None, "it ended before a worker could be killed"
+            assert child.poll() is None, "the run ended before a worker could be killed"
             time.sleep(0.01)
         workers[0].kill()
         assert child.wait(timeout=120) == 0
     assert results(tmp_path) == played
 
 
-def test_from_the_command_line_built_in_algorithms_go_to_a_scheduler_too(tmp_path):
+def test_command_line_plays_built_in_algorithms_on_a_scheduler(tmp_path):
     on_dask = {"name": "LaCAM", "nodes": 200, "parallel_backend": "balanced_dask"}
     content = suite(num_seeds=2, **{"On Dask": on_dask, "Here": {"name": "LaCAM", "nodes": 200}})
     content["algorithms"]["A star"]["parallel_backend"] = "balanced_dask"
@@ -178,9 +178,9 @@ def test_from_the_command_line_built_in_algorithms_go_to_a_scheduler_too(tmp_pat
     assert again.stderr.startswith("error: out: has results already"), again.stderr
 
 
-def test_every_episode_says_how_it_was_played(played, tmp_path):
+def test_results_say_how_each_episode_was_played(played, tmp_path):
     content = suite("multiprocessing")
-    # One that is built in begins the run.
+    # A built-in algorithm begins the run.
     content["algorithms"] = {"Stay": {"name": "stay"}, **content["algorithms"]}
     assert play(tmp_path, content)[1] == 0
     about = json.loads((tmp_path / "out" / "about.json").read_text())
@@ -192,20 +192,20 @@ def test_every_episode_says_how_it_was_played(played, tmp_path):
     for number, (episode, row) in enumerate(zip(episodes, rows)):
         assert (episode["episode"], episode["run"]) == (number, 0) and episode["seconds"] > 0
         assert "machine" not in episode
-        wanted = row["env_grid_search"]
-        assert episode["seed"] == episode["config"]["seed"] == wanted["seed"]
-        # A pattern is told with the map that the seed chose.
-        assert episode["config"]["map_name"].startswith(wanted["map_name"].split("[")[0])
+        varied = row["env_grid_search"]
+        assert episode["seed"] == episode["config"]["seed"] == varied["seed"]
+        # The config holds the map that the seed chose, not the pattern.
+        assert episode["config"]["map_name"].startswith(varied["map_name"].split("[")[0])
         assert "[" not in episode["config"]["map_name"]
 
 
 @pytest.mark.parametrize("backend", ["sequential", "multiprocessing", "dask"])
-def test_what_fails_is_told_and_the_rest_goes_on(backend, tmp_path):
+def test_failures_are_reported_and_other_episodes_are_played(backend, tmp_path):
     crowded = {"name": "Crowded", "parallel_backend": backend, "num_process": 2}
-    said, status = play(tmp_path, suite(backend, num_seeds=2, Crowded=crowded, Still={"name": "stay"}))
+    output, status = play(tmp_path, suite(backend, num_seeds=2, Crowded=crowded, Still={"name": "stay"}))
     assert status == 1
-    assert "EvaluationError: 4 episodes could not be played" in said
-    assert "Crowded: episode 2: ValueError: 8 are" in said
+    assert "EvaluationError: 4 episodes could not be played" in output
+    assert "Crowded: episode 2: ValueError: 8 are" in output
     failed = [json.loads(line) for line in (tmp_path / "out" / "Crowded.failed.jsonl").read_text().splitlines()]
     assert sorted(row["index"] for row in failed) == [2, 3, 6, 7]
     for row in failed:
@@ -213,11 +213,11 @@ def test_what_fails_is_told_and_the_rest_goes_on(backend, tmp_path):
         assert row["config"]["num_agents"] == 8
         assert "in act" in row["traceback"] and "too many" in row["traceback"]
     assert len(json.loads(results(tmp_path, "Still"))) == 8
-    # Whoever mends the policy plays only what is missing.
+    # After a fix of the policy, a resumed run plays only the missing episodes.
     assert (tmp_path / "out" / "Crowded.jsonl").read_bytes().count(b"\n") == 4
 
 
-def test_a_suite_or_folder_that_is_wrong_is_told(tmp_path):
+def test_wrong_suites_and_folders_are_reported(tmp_path):
     def said(change, begin="new"):
         content = suite(num_seeds=1)
         change(content)

@@ -1,4 +1,4 @@
-"""Every example but the training runs, in a short mode; `./check training` runs that."""
+"""Tests that every example runs in a short mode, except the training, which `./check training` runs."""
 
 import subprocess
 import sys
@@ -15,12 +15,12 @@ SHORT = {
 }
 
 
-def test_each_example_is_here():
+def test_all_examples_are_listed():
     assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHORT, "train_ppo.py"}
 
 
 @pytest.mark.parametrize("name", SHORT)
-def test_an_example_runs(name, tmp_path):
+def test_example_runs(name, tmp_path):
     arguments, shown = SHORT[name]
     command = [sys.executable, "-B", str(EXAMPLES / name), *arguments]
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""The adapters, each under its framework's own checker where there is one."""
+"""Tests of the adapters, with the frameworks' own checkers where available."""
 
 import subprocess
 import sys
@@ -27,10 +27,10 @@ def test_pettingzoo(on_target):
     parallel_seed_test(lambda: parallel(on_target))
 
 
-def test_agents_leave_in_pettingzoo():
+def test_finished_agents_are_removed_in_pettingzoo():
     env = parallel("finish", map="aA..\nb..B", num_agents=2)
     env.reset()
-    observations, rewards, terminated, _, infos = env.step({"player_0": 4, "player_1": 4, "nobody": 9})
+    observations, rewards, terminated, _, infos = env.step({"player_0": 4, "player_1": 4, "unknown": 9})
     assert set(observations) == set(infos) == {"player_0", "player_1"}
     assert (rewards["player_0"], terminated["player_0"]) == (1.0, True)
     assert env.agents == ["player_1"]
@@ -38,7 +38,7 @@ def test_agents_leave_in_pettingzoo():
     assert env.pogema.get_agents_xy(ignore_borders=True)[1] == [1, 1]
 
 
-def test_pettingzoo_takes_every_type_of_observation():
+def test_pettingzoo_supports_mapf_observations():
     env = parallel("finish", observation_type="MAPF")
     observations, _ = env.reset()
     assert "global_obstacles" in observations["player_5"]
@@ -51,7 +51,7 @@ def test_gymnasium(num_agents):
 
 
 @pytest.mark.parametrize("name", ["Pogema-v0", "pogema_rs/Pogema-v0"])
-def test_gymnasium_makes_it_by_name(name):
+def test_gymnasium_makes_environments_by_name(name):
     env = gymnasium.make(name, grid_config=GridConfig(size=8, seed=1))
     observation, info = env.reset()
     assert env.observation_space.contains(observation)
@@ -90,24 +90,24 @@ def test_pymarl():
 
 
 @pytest.mark.parametrize(
-    ("fields", "theirs"),
+    ("fields", "error"),
     [
         ({"auto_reset": True}, KeyError),
         ({"auto_reset": True, "integration": "PettingZoo"}, KeyError),
         ({"integration": "rllib"}, NotImplementedError),
     ],
 )
-def test_what_no_framework_has_is_refused(fields, theirs):
-    with pytest.raises(theirs, match="expected"):
+def test_unsupported_integrations_are_rejected(fields, error):
+    with pytest.raises(error, match="expected"):
         pogema_v0(GridConfig(**fields))
 
 
-def test_importing_the_package_imports_no_more_than_it_needs():
+def test_importing_the_package_does_not_import_pydantic():
     code = "import sys, pogema_rs; print([name for name in ('gymnasium', 'pydantic') if name in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "['gymnasium']"
 
 
-def test_the_names_of_the_package_import_no_framework():
+def test_names_of_the_package_import_no_framework():
     code = (
         "import sys; from pogema_rs import *; "
         "print([name for name in ('pettingzoo', 'torch', 'ray', 'pufferlib', 'sample_factory', 'matplotlib') "

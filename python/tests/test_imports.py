@@ -1,4 +1,4 @@
-"""No two modules of the package import each other, however far apart."""
+"""Tests that the imports between modules of the package have no cycle."""
 
 import ast
 
@@ -9,24 +9,24 @@ PATHS = {
     for path in sorted(ROOT.rglob("*.py"))
 }
 
-#: The environment that is built in is imported when an evaluation first asks for it, as in pogema-toolbox.
+#: The registry imports the built-in environment on first use, as in pogema-toolbox.
 ACCEPTED = {("pogema_rs.toolbox.registry", "pogema_rs.toolbox.create_env")}
 
 
 def imported(path):
-    """The modules of the package that a file imports, for types alone or inside of functions too."""
+    """Yields the modules of the package that a file imports, including imports for types and inside functions."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             names = [f"{node.module}.{alias.name}" for alias in node.names]
-            # What a package offers of its own is in the package; the rest are its modules.
+            # A name is a module of the package, or an attribute of the package itself.
             yield from (name for name in names if name in PATHS)
             if node.module != "pogema_rs" and not all(name in PATHS for name in names):
                 yield node.module
 
 
-def test_no_two_modules_import_each_other():
+def test_imports_have_no_cycle():
     edges = {
         name: {other for other in imported(path) if other in PATHS and (name, other) not in ACCEPTED}
         for name, path in PATHS.items()

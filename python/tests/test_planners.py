@@ -1,4 +1,4 @@
-"""Planners, the agents that follow them, and the episodes that are collected from them."""
+"""Tests of planners, of agents that follow them, and of episodes collected from them."""
 
 import threading
 
@@ -13,7 +13,7 @@ STARTS, GOALS = [[0, 0], [0, 2]], [[0, 2], [0, 0]]
 
 
 @pytest.mark.parametrize("planner", ["lacam", "pbs", "ecbs", "cbs"])
-def test_a_plan_is_found_and_valid(planner):
+def test_plan_is_found_and_valid(planner):
     found = plan(OBSTACLES, STARTS, GOALS, planner, nodes=2000)
     assert found.is_solved
     assert found.cells.shape == (found.makespan + 1, 2, 2) and found.cells.dtype == np.int32
@@ -24,36 +24,36 @@ def test_a_plan_is_found_and_valid(planner):
     assert np.array_equal(np.diff(found.cells, axis=0), moves[found.actions])
 
 
-def test_pibt_promises_nothing_but_says_so():
+def test_pibt_reports_whether_it_solved_the_problem():
     assert plan(OBSTACLES, STARTS[:1], GOALS[:1], "pibt").sum_of_costs == 2
     found = plan(OBSTACLES, STARTS, GOALS, "pibt", nodes=50)
     assert found.is_solved == (found.cells[-1].tolist() == GOALS)
     assert validate(OBSTACLES, STARTS, None, found.cells) is None
 
 
-def test_the_least_cost_is_found():
+def test_cbs_finds_the_optimal_cost():
     assert plan(OBSTACLES, STARTS, GOALS, "cbs").sum_of_costs == 8
 
 
-def test_the_same_nodes_give_the_same_plan():
+def test_same_node_budget_gives_the_same_plan():
     rng = np.random.default_rng(0)
     free = np.argwhere(rng.random((16, 16)) >= 0.2)
     obstacles = np.ones((16, 16), dtype=bool)
     obstacles[tuple(free.T)] = False
     picks = rng.permutation(len(free))
-    asked = (obstacles, free[picks[:12]], free[picks[-12:]])
-    first, second = (plan(*asked, nodes=500, seed=3) for _ in range(2))
+    problem = (obstacles, free[picks[:12]], free[picks[-12:]])
+    first, second = (plan(*problem, nodes=500, seed=3) for _ in range(2))
     assert first.outcome == second.outcome
     assert first.reason == second.reason
     assert np.array_equal(first.cells, second.cells)
 
 
-def test_what_cannot_be_is_an_outcome():
+def test_impossible_problems_and_timeouts_are_outcomes():
     corridor = [[0, 0, 0]]
     found = plan(corridor, [[0, 0], [0, 2]], [[0, 2], [0, 0]])
     assert found.outcome == "impossible" and found.reason
     assert found.cells is None
-    assert "both want to stay" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
+    assert "have the same goal" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
     assert plan(corridor, [[0, 0]], [[0, 2]], most_steps=1).outcome == "impossible"
     late = plan(OBSTACLES, STARTS, GOALS, nodes=0)
     assert (late.outcome, late.lower_bound) == ("timed_out", 4)
@@ -61,10 +61,10 @@ def test_what_cannot_be_is_an_outcome():
 
 
 @pytest.mark.parametrize(
-    ("asked", "text"),
+    ("arguments", "text"),
     [
         ({"planner": "none"}, "`planner` is `none`, expected one of `lacam`, `pibt`, `pbs`, `ecbs`, `cbs`"),
-        ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is no free cell"),
+        ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is not a free cell"),
         ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "of 3 columns"),
         ({"goals": [[0, -1], [0, 0]]}, "agent 0: .* is not on the map"),
@@ -72,21 +72,21 @@ def test_what_cannot_be_is_an_outcome():
         ({"obstacles": np.empty((0, 3))}, "the map has no cells"),
     ],
 )
-def test_wrong_input_is_one_line(asked, text):
+def test_wrong_input_raises_a_one_line_error(arguments, text):
     with pytest.raises(ValueError, match=text) as raised:
-        plan(**{"obstacles": OBSTACLES, "starts": STARTS, "goals": GOALS, **asked})
+        plan(**{"obstacles": OBSTACLES, "starts": STARTS, "goals": GOALS, **arguments})
     assert "\n" not in str(raised.value)
 
 
-def test_conflicts_are_told():
+def test_conflicts_are_reported():
     cells = [STARTS, [[0, 1], [0, 1]]]
     assert validate(OBSTACLES, STARTS, GOALS, cells) == "step 1: agents 0 and 1 are both at (0, 1)"
     assert validate(OBSTACLES, STARTS, None, [STARTS]) is None
-    with pytest.raises(ValueError, match="expected the shape"):
+    with pytest.raises(ValueError, match="expected an array of shape"):
         validate(OBSTACLES, STARTS, None, [[[0], [1]]])
 
 
-def test_costs_to_go():
+def test_cost_to_go():
     costs = cost_to_go([[0, 0, 1], [1, 0, 1], [0, 1, 0]], (0, 0))
     assert costs.dtype == np.int32
     assert costs.tolist() == [[0, 1, -1], [-1, 2, -1], [-1, -1, -1]]
@@ -94,16 +94,16 @@ def test_costs_to_go():
         cost_to_go(OBSTACLES, (1, 1))
 
 
-def test_python_goes_on_while_a_planner_thinks():
+def test_python_threads_run_during_planning():
     began, done = threading.Event(), []
 
-    def think():
+    def run_planner():
         began.set()
-        # Far too many agents in a small room: it searches until the time is up.
+        # Far too many agents for the room, so that the search uses all its time.
         cells = [[row, col] for row in range(5) for col in range(5)]
         done.append(plan(np.zeros((5, 5)), cells[:24], cells[:24][::-1], "cbs", seconds=1.0))
 
-    thread = threading.Thread(target=think)
+    thread = threading.Thread(target=run_planner)
     thread.start()
     began.wait()
     count = 0
@@ -129,7 +129,7 @@ def test_agents_follow_a_plan_to_their_goals(on_target):
 
 
 @pytest.mark.parametrize("planner", ["rhcr", "pibt", "guided-pibt"])
-def test_agents_go_from_goal_to_goal(planner):
+def test_lifelong_agents_reach_many_goals(planner):
     config = GridConfig(
         num_agents=8, size=12, seed=2, on_target="restart", observation_type="MAPF", collision_system="soft"
     )
@@ -147,21 +147,21 @@ def test_agents_go_from_goal_to_goal(planner):
         PlannerAgents("cbs", lifelong=True)
 
 
-def test_agents_want_to_see_everything():
+def test_agents_need_mapf_observations():
     env = pogema_v0(GridConfig(num_agents=2, seed=1))
     with pytest.raises(TypeError, match="observation_type='MAPF'"):
         PlannerAgents().act(env.reset()[0])
 
 
-def test_episodes_are_collected_and_a_broken_off_call_goes_on(tmp_path):
+def test_interrupted_collection_continues_with_missing_files(tmp_path):
     config = GridConfig(num_agents=4, size=8, density=0.2, on_target="nothing", collision_system="soft")
-    asked = {"num_episodes": 5, "episodes_per_file": 2, "nodes": 200, "seed": 7}
-    paths = list(collect(config, tmp_path / "data", **asked))
+    arguments = {"num_episodes": 5, "episodes_per_file": 2, "nodes": 200, "seed": 7}
+    paths = list(collect(config, tmp_path / "data", **arguments))
     assert [path.name for path in paths] == [f"episodes-00000{number}.npz" for number in range(3)]
     whole = [path.read_bytes() for path in paths]
     paths[1].unlink()
     stamps = [path.stat().st_mtime_ns for path in (paths[0], paths[2])]
-    assert list(collect(config, tmp_path / "data", **asked)) == paths
+    assert list(collect(config, tmp_path / "data", **arguments)) == paths
     assert [path.stat().st_mtime_ns for path in (paths[0], paths[2])] == stamps
     assert np.array_equal(np.load(paths[1])["actions"], np.load(_written(tmp_path, whole[1]))["actions"])
     data = np.load(paths[1])
@@ -185,6 +185,6 @@ def _written(folder, contents):
     return path
 
 
-def test_collecting_wants_whole_numbers(tmp_path):
+def test_collection_needs_positive_numbers(tmp_path):
     with pytest.raises(ValueError, match="num_workers is 0, expected at least 1"):
         list(collect(GridConfig(), tmp_path, 1, num_workers=0))

@@ -1,4 +1,4 @@
-"""The package's types hold, those of its compiled part too, and a caller's type checker reads them."""
+"""Tests the type hints of the package and of its compiled part, and their use by a caller's type checker."""
 
 import subprocess
 import sys
@@ -63,7 +63,7 @@ WRONG = {
 
 @pytest.fixture(scope="module")
 def check(tmp_path_factory):
-    """Runs a type checker away from the source folder, where it would find the package that is not installed."""
+    """Runs a type checker outside the source folder, so that it checks the installed package."""
     folder = tmp_path_factory.mktemp("types")
 
     def run(module, *arguments):
@@ -74,7 +74,7 @@ def check(tmp_path_factory):
 
 
 def lines_with_errors(text):
-    """For each line of a program the codes of its errors."""
+    """Returns the error codes of each line of a program."""
     found = {}
     for line in text.splitlines():
         place, _, what = line.partition(": error: ")
@@ -83,22 +83,22 @@ def lines_with_errors(text):
     return found
 
 
-def test_the_wheel_brings_its_types():
+def test_wheel_contains_type_hints():
     folder = Path(pogema_rs.__file__).parent
     assert (folder / "py.typed").is_file() and (folder / "_engine.pyi").is_file()
 
 
-def test_the_package_checks(check):
+def test_package_type_checks(check):
     run = check("mypy", "--config-file", str(CONFIG), "-p", "pogema_rs")
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-def test_the_types_of_the_compiled_part_are_its_own(check):
+def test_stub_matches_the_compiled_part(check):
     run = check("mypy.stubtest", "--mypy-config-file", str(CONFIG), "pogema_rs._engine")
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-def test_a_program_checks_and_its_mistakes_are_found(check, tmp_path):
+def test_type_errors_of_a_program_are_found(check, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(RIGHT + "\n".join(WRONG) + "\n")
     run = check("mypy", "--config-file", "", "--strict-equality", "--warn-unreachable", str(program))

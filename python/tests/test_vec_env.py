@@ -1,4 +1,4 @@
-"""`VecEnv` beside engines that are reset by hand, and as a vector of environments of Gymnasium's."""
+"""Tests `VecEnv` against single engines that are reset by hand, and with Gymnasium's own helpers."""
 
 import gymnasium
 import numpy as np
@@ -14,7 +14,7 @@ def actions_of(rng, env):
 
 
 def check_episodes(env, plain, num_steps, exact_mode):
-    """Plays both side by side; under DISABLED whatever is over is reset by hand every few steps."""
+    """Compares both step by step; with DISABLED, resets ended episodes by hand every few steps."""
     rng, num_ended = np.random.default_rng(0), 0
     for step in range(num_steps):
         actions = actions_of(rng, env)
@@ -31,7 +31,7 @@ def check_episodes(env, plain, num_steps, exact_mode):
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
 @pytest.mark.parametrize("dtype", ["float32", "uint8"])
-def test_every_autoreset_mode_plays_what_engines_play(mode, on_target, dtype):
+def test_every_autoreset_mode_equals_single_engines(mode, on_target, dtype):
     config = {**CONFIG, "on_target": on_target}
     env = VecEnv(config, 4, autoreset_mode=mode, dtype=dtype, masks=True)
     observations, infos = env.reset(seed=11)
@@ -44,7 +44,7 @@ def test_every_autoreset_mode_plays_what_engines_play(mode, on_target, dtype):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_maps_may_differ_and_each_environment_may_have_its_own_seed(mode):
+def test_environments_may_differ_in_map_and_seed(mode):
     shapes = [{"size": 7}, {"width": 12, "height": 5}, {"map": "\n".join(["....", ".#..", "...."])}, {"size": 40}]
     configs = [{**CONFIG, **shape} for shape in shapes]
     for config, shape in zip(configs, shapes):
@@ -57,7 +57,7 @@ def test_maps_may_differ_and_each_environment_may_have_its_own_seed(mode):
     check_episodes(env, plain, 30, mode)
 
 
-def test_the_config_says_the_seed_until_a_reset_does_and_a_reset_without_one_goes_on():
+def test_seeds_follow_the_config_then_the_last_seeded_reset():
     configs = [{**CONFIG, "seed": 3}, {**CONFIG, "seed": 4}]
     env = VecEnv(configs)
     env.reset()
@@ -73,7 +73,7 @@ def test_the_config_says_the_seed_until_a_reset_does_and_a_reset_without_one_goe
     assert env.episode_seeds.tolist() == [6, 7]
 
 
-def test_without_any_seed_no_two_vectors_play_the_same():
+def test_unseeded_vectors_play_different_episodes():
     one, other = VecEnv(CONFIG, 2), VecEnv(CONFIG, 2)
     for env in (one, other):
         env.reset()
@@ -90,14 +90,14 @@ def play(num_envs, num_threads, seed=21):
     return seen
 
 
-def test_an_environment_depends_on_neither_the_others_nor_the_threads():
+def test_episodes_are_independent_of_other_environments_and_threads():
     expected = play(3, 1)
     for num_envs, num_threads in [(3, 2), (3, 3), (9, 1), (9, 2), (9, 8)]:
         for one, other in zip(expected, play(num_envs, num_threads)):
             np.testing.assert_array_equal(one, other)
 
 
-def test_spaces_hold_what_comes_out():
+def test_spaces_contain_observations_and_actions():
     env = VecEnv(CONFIG, 3, dtype="uint8", autoreset_mode="next_step")
     assert isinstance(env, gymnasium.vector.VectorEnv) and repr(env).startswith("VecEnv(")
     assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -124,10 +124,10 @@ def test_sampled_actions_follow_the_seed():
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
-def test_gymnasiums_own_helpers_take_it(mode):
+def test_gymnasium_helpers_accept_vec_env(mode):
     performance = pytest.importorskip("gymnasium.utils.performance")
     if not hasattr(performance, "benchmark_vector_step"):
-        pytest.skip("this Gymnasium has no benchmark of vectors")
+        pytest.skip("this version of Gymnasium has no benchmark_vector_step")
     env = VecEnv({**CONFIG, "max_episode_steps": 2}, 3, autoreset_mode=mode)
     assert performance.benchmark_vector_step(env, target_duration=0, seed=1) > 0
     listed = gymnasium.wrappers.vector.DictInfoToList(env)
@@ -137,7 +137,7 @@ def test_gymnasiums_own_helpers_take_it(mode):
     assert ("final_obs" in infos[2][0]) == (mode == AutoresetMode.SAME_STEP)
 
 
-def test_the_observations_are_overwritten_unless_there_are_two_buffers():
+def test_observations_are_overwritten_without_double_buffer():
     env = VecEnv(CONFIG, 2)
     first, _ = env.reset(seed=0)
     assert env.step(env.sample_actions())[0] is first
@@ -151,7 +151,7 @@ def test_the_observations_are_overwritten_unless_there_are_two_buffers():
     assert env.step(np.zeros((2, 5), int))[0] is first and (second != kept).any()
 
 
-def test_observations_go_where_the_caller_says():
+def test_observations_are_written_to_the_callers_buffer():
     env, other = VecEnv(CONFIG, 2, double_buffer=True), VecEnv(CONFIG, 2)
     own, _ = env.reset(seed=0)
     kept, out = own.copy(), np.full(own.shape, 7, np.float32)

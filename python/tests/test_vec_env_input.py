@@ -1,4 +1,4 @@
-"""What a `VecEnv` refuses, and that it goes on as if it had not been asked; processes, threads and memory."""
+"""Tests that `VecEnv` rejects wrong input without a change of state; also of processes, threads and memory."""
 
 import copy
 import gc
@@ -33,7 +33,7 @@ def readonly():
 
 
 class Tensor:
-    """Stands for what other libraries call a tensor."""
+    """A stand-in for the tensors of other libraries."""
 
     def __init__(self, array):
         self.array = array
@@ -43,7 +43,7 @@ class Tensor:
 
 
 class Capsule:
-    """Stands for what can only share its memory."""
+    """A stand-in for objects that only support DLPack."""
 
     def __init__(self, array):
         self.array = array
@@ -75,7 +75,7 @@ BAD_ACTIONS = [
 
 
 @pytest.mark.parametrize(("actions", "error", "text"), BAD_ACTIONS)
-def test_wrong_actions_are_told_and_nothing_is_played(env, actions, error, text):
+def test_wrong_actions_raise_and_nothing_is_played(env, actions, error, text):
     observations, _ = env.reset(seed=0)
     kept = observations.copy()
     with pytest.raises(error) as raised:
@@ -88,7 +88,7 @@ def test_wrong_actions_are_told_and_nothing_is_played(env, actions, error, text)
 
 
 @pytest.mark.parametrize("dtype", ["i1", "u1", "i2", "<i4", ">i4", "u4", "i8", "u8", ">i8"])
-def test_actions_may_be_of_any_whole_type_and_layout(env, dtype):
+def test_actions_may_have_any_integer_type_and_layout(env, dtype):
     actions = np.arange(10).reshape(2, 5) % 5
     expected = env.step(actions)[0].copy()
     numbers = actions.astype(dtype)
@@ -101,19 +101,19 @@ def test_actions_may_be_of_any_whole_type_and_layout(env, dtype):
 
 
 BAD_OUT = [
-    ([0], TypeError, f"list, expected a numpy array of float32 and the shape {SHAPE}"),
+    ([0], TypeError, f"list, expected a numpy array of float32 with shape {SHAPE}"),
     (np.zeros(SHAPE), TypeError, "float64, expected float32"),
     (np.zeros(SHAPE, ">f4"), TypeError, ">f4, expected float32"),
     (np.zeros((1, *SHAPE[1:]), np.float32), ValueError, f"expected {SHAPE}"),
     (np.zeros((4, *SHAPE[1:]), np.float32)[::2], ValueError, "expected a C-contiguous array"),
     (np.asfortranarray(np.zeros(SHAPE, np.float32)), ValueError, "expected a C-contiguous array"),
-    (np.zeros(751 * 4, np.uint8)[1:-3].view(np.float32).reshape(SHAPE), ValueError, "scattered"),
+    (np.zeros(751 * 4, np.uint8)[1:-3].view(np.float32).reshape(SHAPE), ValueError, "not contiguous in memory"),
     (readonly(), ValueError, "expected a writeable array"),
 ]
 
 
 @pytest.mark.parametrize(("out", "error", "text"), BAD_OUT)
-def test_wrong_buffers_are_told_and_nothing_is_played(env, out, error, text):
+def test_wrong_buffers_raise_and_nothing_is_played(env, out, error, text):
     seeds = env.episode_seeds.tolist()
     for call in (lambda: env.step(np.zeros((2, 5), int), out=out), lambda: env.reset(seed=1, out=out)):
         with pytest.raises(error) as raised:
@@ -131,16 +131,16 @@ BAD_RESETS = [
     ({"seed": [1]}, ValueError, "seed holds 1 seeds, expected 2, one per environment"),
     ({"seed": [1, None]}, TypeError, "seed[1] is None, expected a whole number"),
     ({"seed": [1, -3]}, ValueError, "seed[1] is -3, expected 0"),
-    ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected `reset_mask` alone"),
+    ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected only `reset_mask`"),
     ({"options": {"reset_mask": [True, False]}}, TypeError, "is a list, expected a numpy array of bool"),
     ({"options": {"reset_mask": np.array([1, 0])}}, TypeError, "is an array of int64, expected a numpy array of bool"),
-    ({"options": {"reset_mask": np.array([True])}}, ValueError, "has the shape (1,), expected (2,)"),
+    ({"options": {"reset_mask": np.array([True])}}, ValueError, "has shape (1,), expected (2,)"),
     ({"options": {"reset_mask": np.zeros(2, bool)}}, ValueError, "expected at least one True"),
 ]
 
 
 @pytest.mark.parametrize(("arguments", "error", "text"), BAD_RESETS)
-def test_wrong_resets_are_told_and_change_nothing(env, arguments, error, text):
+def test_wrong_resets_raise_and_change_nothing(env, arguments, error, text):
     seeds = env.episode_seeds.tolist()
     with pytest.raises(error) as raised:
         env.reset(**arguments)
@@ -169,13 +169,13 @@ BAD_VECTORS = [
 
 
 @pytest.mark.parametrize(("arguments", "error", "text"), BAD_VECTORS)
-def test_wrong_vectors_are_told(arguments, error, text):
+def test_wrong_constructor_arguments_raise(arguments, error, text):
     with pytest.raises(error) as raised:
         VecEnv(**{"grid_config": CONFIG, "num_envs": 2, **arguments})
     assert text in str(raised.value)
 
 
-def test_an_environment_without_room_is_named_by_the_first_reset():
+def test_first_reset_names_an_environment_without_room():
     env = VecEnv([CONFIG, {**CONFIG, "size": 2}])
     with pytest.raises(errors.InstanceError, match="environment 1, episode 0, seed [0-9]+: .*num_agents"):
         env.reset(seed=0)
@@ -183,7 +183,7 @@ def test_an_environment_without_room_is_named_by_the_first_reset():
         env.step(np.zeros((2, 5), int))
 
 
-def test_a_config_may_be_anything_that_knows_its_fields():
+def test_config_may_be_any_object_with_dict():
     class Config:
         def dict(self):
             return {**CONFIG, "integration": "SampleFactory", "auto_reset": True, "map": None}
@@ -193,7 +193,7 @@ def test_a_config_may_be_anything_that_knows_its_fields():
         np.testing.assert_array_equal(VecEnv(config, 2).reset(seed=2)[0], expected)
 
 
-def test_a_config_may_name_a_registered_map():
+def test_config_may_name_a_registered_map():
     rows = [".#.", "...", "#.."]
     config = {"num_agents": 2, "obs_radius": 2, "max_episode_steps": 5}
     RegisteredGrid("three by three", "\n".join(rows))
@@ -205,7 +205,7 @@ def test_a_config_may_name_a_registered_map():
     np.testing.assert_array_equal(named.reset(seed=2)[0], given.reset(seed=2)[0])
 
 
-def test_nothing_can_be_done_before_a_reset_or_after_a_close():
+def test_calls_before_a_reset_or_after_close_are_rejected():
     env = VecEnv(CONFIG, 2)
     actions, some = np.zeros((2, 5), int), {"reset_mask": np.array([True, False])}
     calls = [lambda: env.step(actions), env.action_masks, lambda: env.episode_seeds, lambda: env.reset(options=some)]
@@ -220,14 +220,14 @@ def test_nothing_can_be_done_before_a_reset_or_after_a_close():
             call()
 
 
-def test_it_is_neither_pickled_nor_copied(env):
+def test_pickling_and_copying_are_rejected(env):
     for way in (pickle.dumps, copy.copy, copy.deepcopy):
         with pytest.raises(TypeError, match="make a new one of the same config, in each process"):
             way(env)
 
 
 def wait_for(child):
-    """The exit code of a child that is to end soon."""
+    """Returns the exit code of a child, or "hung" after 60 seconds."""
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         pid, status = os.waitpid(child, os.WNOHANG)
@@ -240,7 +240,7 @@ def wait_for(child):
 
 
 def in_child(env):
-    """0 if a forked child is refused in every call and can use a vector of its own."""
+    """Returns 0 if every call in a forked child raises and a new vector works there."""
     calls = [lambda: env.step(np.zeros((2, 5), int)), env.reset, env.action_masks, lambda: env.episode_seeds]
     for call in calls:
         try:
@@ -259,11 +259,11 @@ def in_child(env):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
 @pytest.mark.parametrize("num_threads", [1, 2])
-def test_a_forked_child_is_refused_and_the_parent_goes_on(num_threads):
+def test_forked_child_is_rejected_and_the_parent_continues(num_threads):
     env = VecEnv(CONFIG, 2, num_threads=num_threads)
     env.reset(seed=0)
     with warnings.catch_warnings():
-        # Python 3.12 warns of what is tested here.
+        # Python 3.12 warns about forks of multi-threaded processes, which this test makes.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
@@ -280,10 +280,10 @@ def test_a_forked_child_is_refused_and_the_parent_goes_on(num_threads):
     env.step(env.sample_actions())
 
 
-def test_two_threads_at_once_are_told():
+def test_concurrent_threads_get_an_error():
     env = VecEnv({**CONFIG, "num_agents": 32, "size": 24, "max_episode_steps": 10_000}, 64, num_threads=1)
     env.reset(seed=0)
-    actions, told, played = np.zeros((64, 32), int), [], []
+    actions, messages, played = np.zeros((64, 32), int), [], []
 
     def step():
         for _ in range(20_000):
@@ -291,8 +291,8 @@ def test_two_threads_at_once_are_told():
                 env.step(actions)
                 played.append(1)
             except RuntimeError as error:
-                told.append(str(error))
-            if told:
+                messages.append(str(error))
+            if messages:
                 return
 
     threads = [threading.Thread(target=step) for _ in range(2)]
@@ -300,20 +300,20 @@ def test_two_threads_at_once_are_told():
         thread.start()
     for thread in threads:
         thread.join()
-    assert told and all("another thread is inside a call of this VecEnv" in text for text in told)
+    assert messages and all("another thread is inside a call of this VecEnv" in text for text in messages)
     env.step(actions)
     assert played
 
 
 def resident():
-    """Bytes of memory of this process; 0 where it cannot be told."""
+    """Returns the resident memory of this process in bytes, or 0 if it is unknown."""
     if not os.path.exists("/proc/self/statm"):
         return 0
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def test_ten_thousand_steps_take_no_more_memory_than_a_hundred():
+def test_memory_does_not_grow_with_steps():
     env = VecEnv({**CONFIG, "on_target": "restart"}, 8, masks=True)
     env.reset(seed=0)
 
@@ -327,14 +327,14 @@ def test_ten_thousand_steps_take_no_more_memory_than_a_hundred():
     play(100)
     traced, held = tracemalloc.get_traced_memory()[0], resident()
     play(10_000)
-    # What Python keeps for reuse comes and goes; one byte per step and environment would be ten times as much.
+    # Python keeps a varying amount of memory; a leak of a byte per step and environment would be ten times the limit.
     assert tracemalloc.get_traced_memory()[0] - traced < 8_000
     tracemalloc.stop()
-    # The allocator keeps pages of its own, per thread, which it fills one after the other.
+    # The allocator reserves pages per thread and fills them gradually.
     assert resident() - held < 4 << 20
 
 
-def test_more_threads_than_cores_or_environments_are_a_note():
+def test_more_threads_than_cores_or_environments_trigger_a_warning():
     with pytest.warns(UserWarning, match="num_threads is 1024, the machine has"):
         many = VecEnv(CONFIG, 2, num_threads=1024)
     one = VecEnv(CONFIG, 2, num_threads=1)

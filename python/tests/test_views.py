@@ -1,4 +1,4 @@
-"""Tables, plots and the page of results, of policies in Python and of those that are built in."""
+"""Tests of tables, plots and the page of results, for policies in Python and built-in ones."""
 
 import json
 import logging
@@ -18,7 +18,7 @@ VIEWS = {
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
-    """A folder with results of two policies in Python, of which one fails in half of the episodes, and of LaCAM."""
+    """A folder with results of LaCAM and of two policies in Python, one of which fails in half of the episodes."""
     folder = tmp_path_factory.mktemp("views")
     more = {
         "Crowd": {"name": "Crowded", "parallel_backend": "sequential"},
@@ -30,17 +30,17 @@ def played(tmp_path_factory):
     return folder, done
 
 
-def test_an_evaluation_prints_its_tables_and_writes_its_plots(played):
+def test_evaluation_prints_tables_and_writes_plots(played):
     folder, done = played
     assert done.stdout.startswith("Means\n")
     assert re.search(r"8 +┆ +LaCAM", done.stdout), done.stdout
     assert (folder / "out" / "views" / "Costs.svg").read_text().startswith("<svg")
 
 
-def test_the_page_has_replays_of_policies_in_python_too(played):
+def test_page_has_replays_of_policies_in_python(played):
     folder, _ = played
     page = (folder / "page.html").read_text()
-    # What failed is missing in the results, and told.
+    # The failed episodes are missing in the results, and the page says so.
     labels = re.findall(r'aria-label="replay episode (\d+) of ([^"]+)"', page)
     assert [name for _, name in labels] == ["A star"] * 6 + ["LaCAM"] * 6, labels
     assert "the replay differs" not in page
@@ -48,7 +48,7 @@ def test_the_page_has_replays_of_policies_in_python_too(played):
     assert "Python 3." in page
 
 
-def test_views_are_shown_as_they_are_asked_for(played, tmp_path, caplog):
+def test_views_respect_their_options(played, tmp_path, caplog):
     folder, _ = played
     logger = logging.getLogger("pogema_rs.toolbox")
     logger.propagate = True
@@ -59,14 +59,14 @@ def test_views_are_shown_as_they_are_asked_for(played, tmp_path, caplog):
     assert head.startswith("Number of Agents,Algorithm,ISR,ISR low,ISR high,ISR n")
     assert len(lines) == 4 and means.files == []
     rows = json.loads((folder / "out" / "LaCAM.json").read_text())
-    wanted = sum(row["metrics"]["SoC"] for row in rows if row["env_grid_search"]["num_agents"] == 8) / 4
+    expected = sum(row["metrics"]["SoC"] for row in rows if row["env_grid_search"]["num_agents"] == 8) / 4
     (line,) = (line.split(",") for line in lines if line.startswith("8,LaCAM"))
-    assert float(line[head.split(",").index("SoC")]) == wanted
+    assert float(line[head.split(",").index("SoC")]) == expected
     (costs,) = show(folder / "out", names=["Costs"], plot_format="png", out=tmp_path)
     assert costs.files == [tmp_path / "Costs.png"] and costs.files[0].read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_is_wrong_is_told(played, tmp_path):
+def test_wrong_options_are_reported(played, tmp_path):
     folder, _ = played
     for wrong, told in [
         ({"names": ["Mean"]}, "no view `Mean`; did you mean `Means`?"),

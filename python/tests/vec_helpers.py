@@ -1,4 +1,4 @@
-"""What a `VecEnv` has to play, one engine for each environment and reset by hand."""
+"""A model of `VecEnv`: one engine for each environment, reset by hand."""
 
 
 import numpy as np
@@ -16,22 +16,22 @@ CONFIG = {
 }
 
 
-def first(seed, key):
-    """The documented rule for seeds."""
+def derived_seed(seed, key):
+    """Returns the seed of an episode by the documented rule."""
     state = np.random.SeedSequence(seed, spawn_key=key).generate_state(1, np.uint64)[0]
     return int(state) % (2**63 - 1)
 
 
 def shared_seed(seed):
-    return lambda env, episode: first(seed, (env, episode))
+    return lambda env, episode: derived_seed(seed, (env, episode))
 
 
 def own_seeds(seeds):
-    return lambda env, episode: seeds[env] if episode == 0 else first(seeds[env], (episode,))
+    return lambda env, episode: seeds[env] if episode == 0 else derived_seed(seeds[env], (episode,))
 
 
 class Plain:
-    """One environment, reset by hand."""
+    """An environment that is reset by hand."""
 
     def __init__(self, config, env, seed_of, exact=False):
         self.config, self.env, self.seed_of, self.exact = config, env, seed_of, exact
@@ -49,7 +49,7 @@ class Plain:
         return np.array(self.engine.observe())
 
     def masks(self):
-        """Cell by cell: which moves no obstacle forbids."""
+        """Returns the action masks, computed cell by cell."""
         walls, masks = self.engine.obstacles(), []
         cells = self.engine.cells(self.config["obs_radius"])
         for (row, col), is_active in zip(cells, self.engine.active):
@@ -58,7 +58,7 @@ class Plain:
         return np.array(masks, dtype=np.int8)
 
     def step(self, mode, actions):
-        """What a step shows: a dict."""
+        """Plays one step and returns what `VecEnv` must return, as a dict."""
         num_agents = self.config["num_agents"]
         rewards, terminated, truncated = np.zeros(num_agents), np.zeros(num_agents, bool), np.zeros(num_agents, bool)
         shown = {}
@@ -79,7 +79,7 @@ class Plain:
 
 
 def check_step(got, plain, mode, actions, seeds):
-    """Compares a step of a `VecEnv` with masks with the same step of engines; returns how many episodes ended."""
+    """Compares a step of a `VecEnv` with masks to the same step of engines; returns the number of ended episodes."""
     obs, rewards, terminated, truncated, infos = got
     shown = [one.step(mode, actions[env]) for env, one in enumerate(plain)]
     for env, one in enumerate(shown):

@@ -1,4 +1,4 @@
-//! Who may move: the three collision systems.
+//! Conflicting moves under the three collision systems.
 
 use std::collections::HashMap;
 
@@ -7,11 +7,11 @@ use pogema_core::{Action, Cell, Collision, Occupancy};
 use crate::Reference;
 use crate::grid::place;
 
-/// Which active agent stands where before the step.
+/// The active agents by their cell before the step.
 type Occupants = HashMap<(i32, i32), usize>;
 
 impl Reference {
-    /// Moves the active agents as their actions and the collision system allow.
+    /// Moves the active agents by their actions, as far as the collision system allows.
     ///
     /// Rule: move/actions, move/inactive
     ///
@@ -27,7 +27,7 @@ impl Reference {
         }
     }
 
-    /// One agent after the other, the lowest index first, onto any cell that is free at that moment.
+    /// Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
     ///
     /// Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn move_by_priority(&mut self, actions: &[Action]) {
@@ -39,7 +39,7 @@ impl Reference {
         }
     }
 
-    /// Onto a cell that was empty before the step and that no other agent wants.
+    /// Moves agents onto cells that were unoccupied before the step and that no other agent requests.
     ///
     /// Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
     fn move_blocking_both(&mut self, actions: &[Action]) {
@@ -56,7 +56,7 @@ impl Reference {
         }
     }
 
-    /// Everybody at once, except where that is impossible.
+    /// Moves all agents simultaneously, and reverts only impossible moves.
     ///
     /// Rule: collide/soft, occupancy/as-released
     fn move_softly(&mut self, actions: &[Action]) {
@@ -78,7 +78,7 @@ impl Reference {
         }
     }
 
-    /// Which agents move if no other move fails: all but those that wait, aim at an obstacle or swap.
+    /// Returns which agents move if no other move fails: all except those that wait, move into an obstacle or swap.
     ///
     /// Rule: collide/soft/stay, collide/soft/swap
     fn moves_possible_alone(&self, actions: &[Action], occupants: &Occupants) -> Vec<bool> {
@@ -88,13 +88,13 @@ impl Reference {
             let swaps = occupants
                 .get(&target)
                 .is_some_and(|&other| self.target(other, actions) == place(self.cells[agent]));
-            // A wait is a swap with oneself.
+            // A waiting agent swaps with itself.
             moves[agent] = !self.obstacles.get(target) && !swaps;
         }
         moves
     }
 
-    /// The moving agents whose cell stays occupied, or goes to a lower index.
+    /// Returns the moving agents whose target stays occupied or goes to an agent with a lower index.
     ///
     /// Rule: collide/soft/contest, collide/soft/chain
     fn find_hindered(&self, moves: &[bool], actions: &[Action], occupants: &Occupants) -> Vec<usize> {
@@ -111,13 +111,15 @@ impl Reference {
         hindered
     }
 
-    /// The cell an agent wants to be on after the step.
+    /// Returns the cell that an agent's action leads to.
     fn target(&self, agent: usize, actions: &[Action]) -> (i32, i32) {
         self.cells[agent].toward(actions[agent])
     }
 
-    /// Moves one agent and its mark. Where a lower index has already entered the cell that this agent leaves,
-    /// its mark is lost: agents vanish this way under `soft`.
+    /// Moves one agent and its mark.
+    ///
+    /// If an agent with a lower index has already entered the cell that this agent leaves, the mark of that other agent
+    /// is erased. Under `soft`, agents vanish this way.
     ///
     /// Rule: occupancy/as-released
     fn put(&mut self, agent: usize, target: (i32, i32)) {

@@ -1,4 +1,4 @@
-//! What reaching a goal does; rewards and ends.
+//! The effects of reaching a goal: rewards, ends and next goals.
 
 use pogema_core::{OnGoal, Reward};
 
@@ -6,7 +6,7 @@ use crate::Reference;
 use crate::grid::place;
 
 impl Reference {
-    /// Notes which active agents stand on their goals.
+    /// Records which active agents are on their goals.
     ///
     /// Rule: goal/finish, goal/nothing, goal/restart
     pub(crate) fn mark_on_goal(&mut self) {
@@ -18,6 +18,8 @@ impl Reference {
         self.on_goal.iter().all(|&reached| reached)
     }
 
+    /// Writes the reward of each agent.
+    ///
     /// Rule: reward/own, reward/shared
     pub(crate) fn pay(&self, rewards: &mut [f32]) {
         let num_reached = self.on_goal.iter().filter(|&&reached| reached).count();
@@ -31,11 +33,13 @@ impl Reference {
         }
     }
 
+    /// Writes which agents are terminated.
+    ///
     /// Rule: end/terminated
     pub(crate) fn terminate(&self, terminated: &mut [bool]) {
         for (agent, ended) in terminated.iter_mut().enumerate() {
             *ended = match self.config.on_goal {
-                // A finished agent stays where it is and so stays terminated.
+                // A finished agent stays on its goal, so it stays terminated.
                 OnGoal::Finish => self.cells[agent] == self.goals[agent],
                 OnGoal::Nothing => self.all_on_goal(),
                 OnGoal::Restart => false,
@@ -43,6 +47,8 @@ impl Reference {
         }
     }
 
+    /// Writes which agents are truncated.
+    ///
     /// Rule: end/truncated, end/after
     ///
     /// Source: POGEMA 1.4.0, `wrappers/multi_time_limit.py`, `MultiTimeLimit.step`
@@ -50,6 +56,8 @@ impl Reference {
         truncated.fill(i64::try_from(self.step).is_ok_and(|step| step >= self.config.max_steps));
     }
 
+    /// Lets the agents on their goals leave the map or get their next goals.
+    ///
     /// Rule: goal/finish/leave, goal/nothing, goal/restart/next
     pub(crate) fn change_goals(&mut self) {
         let reached: Vec<usize> = (0..self.cells.len()).filter(|&agent| self.on_goal[agent]).collect();

@@ -1,10 +1,10 @@
-//! A map with its border.
+//! The grid: a map with its border.
 
 use pogema_core::{Cell, Instance, Outside};
 
-/// One flag per cell of the map and of the border around it, which is as wide as agents see.
+/// One flag per cell of the map and of its border, which is as wide as the radius.
 ///
-/// Places are counted from the map's own corner, so the border has negative rows and columns.
+/// Rows and columns are counted from the corner of the map, so the border has negative ones.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
     border: i32,
@@ -12,34 +12,34 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid without any flag set.
+    /// Creates a grid with all flags unset.
     pub fn empty(height: usize, width: usize, radius: usize) -> Self {
         let rows = vec![vec![false; width + 2 * radius]; height + 2 * radius];
         Self { border: radius as i32, rows }
     }
 
-    /// The flag at a place.
+    /// Returns the flag at (row, col).
     pub fn get(&self, (row, col): (i32, i32)) -> bool {
         self.rows[(row + self.border) as usize][(col + self.border) as usize]
     }
 
-    /// Changes the flag at a place.
+    /// Sets the flag at (row, col).
     pub fn set(&mut self, (row, col): (i32, i32), flag: bool) {
         self.rows[(row + self.border) as usize][(col + self.border) as usize] = flag;
     }
 
-    /// All flags, border included, from the border's corner.
+    /// Returns all flags, border included, from the top left corner of the border.
     pub fn rows(&self) -> &[Vec<bool>] {
         &self.rows
     }
 }
 
-/// The place of a cell.
+/// Returns (row, col) of a cell, signed.
 pub fn place(cell: Cell) -> (i32, i32) {
     (i32::from(cell.row), i32::from(cell.col))
 }
 
-/// The obstacles of an instance with its border: what lies outside, then the wall, then the map.
+/// Returns the obstacles of an instance with its border: first the outside, then the wall, then the map.
 ///
 /// Rule: border/ring, border/outside, border/noise
 ///

@@ -6,7 +6,7 @@ use crate::Reference;
 use crate::grid::place;
 
 impl Reference {
-    /// Restores cells, goals, active agents, occupancy and time. Goals drawn since stay drawn.
+    /// Restores cells, goals, active agents, occupancy and time, but not the goal streams.
     ///
     /// Rule: history/step-back
     ///

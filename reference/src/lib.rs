@@ -1,17 +1,17 @@
-//! The rules of POGEMA 1.4.0, written to be read.
+//! The rules of POGEMA 1.4.0, written for readers.
 //!
-//! [`Reference`] plays one environment with plain vectors, one agent after the other. It draws no random
-//! numbers, starts no threads and is never made fast: what it does *is* the semantics, and every other engine is
-//! measured against it. Each function names the rule of the spec that it states.
+//! [`Reference`] plays one environment with plain vectors, one agent after another. It draws no random numbers,
+//! starts no threads and is never optimized: it defines the semantics, and every other engine is compared with it.
+//! Each function names the rule of the spec that it implements.
 //!
 //! | file | phase |
 //! | --- | --- |
 //! | `grid` | the map with its border, and the occupancy grid |
-//! | `step` | one step, as a table of contents |
-//! | `collide` | who may move |
-//! | `goals` | what reaching a goal does; rewards and ends |
-//! | `observe` | what agents see |
-//! | `history` | steps kept and taken back |
+//! | `step` | the order of the phases in a step |
+//! | `collide` | conflicting moves |
+//! | `goals` | the effects of reaching a goal: rewards, ends and next goals |
+//! | `observe` | observations |
+//! | `history` | the return to an earlier state |
 //!
 //! ```
 //! use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, Outside, StepOut};

@@ -1,4 +1,4 @@
-//! What agents see.
+//! The observations of agents.
 
 use pogema_core::Error;
 
@@ -6,6 +6,8 @@ use crate::Reference;
 use crate::grid::{Grid, place};
 
 impl Reference {
+    /// Writes the `default` observation of all agents.
+    ///
     /// Rule: observe/default, observe/default/agents, observe/default/inactive
     ///
     /// Source: POGEMA 1.4.0, `envs.py`, `PogemaBase._get_agents_obs`
@@ -20,7 +22,7 @@ impl Reference {
         Ok(())
     }
 
-    /// The part of a grid around an agent, the agent in its centre.
+    /// Writes the part of a grid around an agent, with the agent in the centre.
     ///
     /// Rule: observe/default/window
     fn write_window(&self, grid: &Grid, agent: usize, window: &mut [f32]) {
@@ -32,7 +34,7 @@ impl Reference {
         }
     }
 
-    /// A single 1 where the goal is, or on the rim towards it, each axis clamped by itself.
+    /// Writes a single 1 for the goal. A goal outside the window is clamped to its rim, each axis separately.
     ///
     /// Rule: observe/default/goal
     ///
@@ -47,6 +49,8 @@ impl Reference {
         window[down as usize * self.config.side() + right as usize] = 1.0;
     }
 
+    /// Writes the map with its border.
+    ///
     /// Rule: observe/mapf
     ///
     /// Source: POGEMA 1.4.0, `envs.py`, `Pogema._obs`

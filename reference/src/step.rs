@@ -1,11 +1,11 @@
-//! One environment and one step of it, as a table of contents.
+//! The reference engine, with the order of the phases in a step.
 
 use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance};
 use pogema_core::{Snapshot, State, StepOut};
 
 use crate::grid::{Grid, obstacles_with_border, place};
 
-/// One environment that plays by POGEMA 1.4.0's rules.
+/// The reference engine: one environment with the rules of POGEMA 1.4.0.
 #[derive(Clone, Debug)]
 pub struct Reference {
     pub(crate) config: Config,
@@ -20,7 +20,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// An environment for a config; it wants a reset first.
+    /// Creates an environment for a config. Call `reset` before `step`.
     ///
     /// # Errors
     /// If the config is out of range.
@@ -43,7 +43,7 @@ impl Reference {
         if self.cells.is_empty() { Err(Error::NotReset) } else { Ok(()) }
     }
 
-    /// The indices of the agents that take part.
+    /// Returns the indices of the active agents.
     ///
     /// Rule: move/inactive
     pub(crate) fn active_agents(&self) -> Vec<usize> {

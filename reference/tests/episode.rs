@@ -1,4 +1,4 @@
-//! An episode plays, measures, records, goes back and continues.
+//! Playing, measuring, recording, undoing and resuming episodes.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -41,7 +41,7 @@ fn actions(step: usize) -> Vec<Action> {
 }
 
 #[test]
-fn nothing_works_before_the_start() {
+fn every_call_fails_before_the_start() {
     let mut episode = Episode::new(Reference::new(config(OnGoal::Finish)).unwrap());
     assert_eq!(episode.step(&actions(0)), Err(Error::NotReset));
     assert_eq!(episode.step_back(), Err(Error::NotReset));
@@ -51,21 +51,21 @@ fn nothing_works_before_the_start() {
 }
 
 #[test]
-fn a_refused_call_leaves_the_episode_as_it_was() {
+fn a_rejected_call_leaves_the_episode_unchanged() {
     let mut episode = episode(Config { persistent: false, ..config(OnGoal::Nothing) });
     episode.step(&actions(0)).unwrap();
     let before = (episode.snapshot(), episode.metrics(), episode.trace().unwrap(), episode.num_steps());
-    let lonely = Instance::new(instance().map().clone(), Outside::Free, Vec::new(), Vec::new()).unwrap();
+    let no_agents = Instance::new(instance().map().clone(), Outside::Free, Vec::new(), Vec::new()).unwrap();
     assert_eq!(episode.step(&[Action::Stay]), Err(Error::Length { what: "actions", want: 3, got: 1 }));
     assert_eq!(episode.step_back(), Err(Error::StepsNotKept));
-    assert_eq!(episode.start(lonely), Err(Error::Length { what: "starts", want: 3, got: 0 }));
+    assert_eq!(episode.start(no_agents), Err(Error::Length { what: "starts", want: 3, got: 0 }));
     let now = (episode.snapshot(), episode.metrics(), episode.trace().unwrap(), episode.num_steps());
     assert_eq!(now, before);
 }
 
-/// The same episode by hand.
+/// Plays the same episode with an engine and meters alone.
 #[test]
-fn results_figures_and_trace_are_those_of_the_engine_and_the_meters() {
+fn results_metrics_and_trace_match_the_engine_and_the_meters() {
     for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
         for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
             let config = Config { collision, ..config(on_goal) };
@@ -96,18 +96,18 @@ fn results_figures_and_trace_are_those_of_the_engine_and_the_meters() {
                 );
                 engine.count_seen(&mut seen).unwrap();
                 density.feed(&seen);
-                let figures = meter.feed(&after.on_goal, &terminated, &truncated);
+                let metrics = meter.feed(&after.on_goal, &terminated, &truncated);
                 let expected = Metrics {
                     avg_agents_density: Some(density.mean()),
                     a_collisions: Some(collisions.with_agents as f64),
                     o_collisions: Some(collisions.with_obstacles as f64),
-                    ..figures.unwrap_or_default()
+                    ..metrics.unwrap_or_default()
                 };
-                assert_eq!((episode.metrics(), episode.is_over()), (expected, figures.is_some()));
+                assert_eq!((episode.metrics(), episode.is_over()), (expected, metrics.is_some()));
                 let trace = episode.trace().unwrap();
                 let last = &trace.steps[step];
                 assert_eq!((&last.actions, &last.state), (&actions(step), &after));
-                assert_eq!(last.metrics, figures.map(|_| expected));
+                assert_eq!(last.metrics, metrics.map(|_| expected));
                 if episode.is_over() {
                     break;
                 }
@@ -120,7 +120,7 @@ fn results_figures_and_trace_are_those_of_the_engine_and_the_meters() {
 }
 
 #[test]
-fn a_figure_that_is_not_measured_is_absent() {
+fn a_metric_that_is_not_measured_is_absent() {
     let mut episode = Episode::new(Reference::new(config(OnGoal::Restart)).unwrap());
     episode.start(instance()).unwrap();
     while !episode.is_over() {
@@ -131,7 +131,7 @@ fn a_figure_that_is_not_measured_is_absent() {
 }
 
 #[test]
-fn a_second_start_measures_and_records_anew() {
+fn a_second_start_resets_metrics_and_recording() {
     let mut second = episode(config(OnGoal::Nothing));
     (0..5).for_each(|step| second.step(&actions(step)).unwrap());
     second.start(instance()).unwrap();
@@ -143,13 +143,13 @@ fn a_second_start_measures_and_records_anew() {
         assert_eq!((first.metrics(), first.trace()), (second.metrics(), second.trace()));
     }
     second.record(false);
-    assert!(second.trace().is_ok(), "the recording at work goes on");
+    assert!(second.trace().is_ok(), "the current recording continues");
     second.start(instance()).unwrap();
     assert_eq!(second.trace(), Err(Error::NotRecorded));
 }
 
 #[test]
-fn steps_are_taken_back_one_by_one() {
+fn steps_are_undone_one_by_one() {
     let mut episode = episode(config(OnGoal::Finish));
     let mut states = vec![episode.snapshot()];
     for step in 0..12 {
@@ -160,7 +160,7 @@ fn steps_are_taken_back_one_by_one() {
     for (step, state) in states.iter().enumerate().rev().skip(1) {
         assert_eq!(episode.step_back(), Ok(true));
         assert_eq!((episode.num_steps(), episode.state().step), (step as u64, step as u64));
-        // Which agents stood on their goals is not restored.
+        // A step back does not restore `on_goal`.
         let now = Snapshot { on_goal: state.on_goal.clone(), ..episode.snapshot() };
         assert_eq!(&now, state);
     }

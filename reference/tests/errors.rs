@@ -1,4 +1,4 @@
-//! A refused call says why and changes nothing.
+//! A rejected call returns the reason and changes nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -16,7 +16,7 @@ fn instance() -> Instance {
     Instance::new(map, Outside::Free, vec![Cell::new(0, 0), Cell::new(1, 0)], goals).unwrap()
 }
 
-/// Steps with buffers of the given lengths.
+/// Plays a step with buffers of the given lengths.
 fn step(environment: &mut Reference, actions: &[Action], lengths: [usize; 3]) -> Result<(), Error> {
     let (mut rewards, mut terminated, mut truncated) =
         (vec![0.5; lengths[0]], vec![true; lengths[1]], vec![true; lengths[2]]);
@@ -32,32 +32,32 @@ fn step(environment: &mut Reference, actions: &[Action], lengths: [usize; 3]) ->
 }
 
 #[test]
-fn nothing_works_before_the_first_reset() {
+fn every_call_fails_before_the_first_reset() {
     let mut environment = Reference::new(config()).unwrap();
-    let wanted = "the environment was not reset yet";
-    assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), wanted);
-    assert_eq!(environment.observe(&mut [0.0; 54]).unwrap_err().to_string(), wanted);
-    assert_eq!(environment.observe_map(&mut [0; 20]).unwrap_err().to_string(), wanted);
-    assert_eq!(environment.restore(0, &Snapshot::default()).unwrap_err().to_string(), wanted);
+    let expected = "the environment was not reset yet";
+    assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), expected);
+    assert_eq!(environment.observe(&mut [0.0; 54]).unwrap_err().to_string(), expected);
+    assert_eq!(environment.observe_map(&mut [0; 20]).unwrap_err().to_string(), expected);
+    assert_eq!(environment.restore(0, &Snapshot::default()).unwrap_err().to_string(), expected);
     assert!(environment.snapshot().cells.is_empty());
 }
 
 #[test]
-fn a_refused_step_leaves_state_and_buffers_as_they_were() {
+fn a_rejected_step_leaves_state_and_buffers_unchanged() {
     let mut environment = Reference::new(config()).unwrap();
     environment.reset(&instance()).unwrap();
     step(&mut environment, &[Action::Right, Action::Stay], [2; 3]).unwrap();
     let before = environment.snapshot();
-    let refusals = [
+    let wrong_steps = [
         (1, [2, 2, 2], "actions has length 1, expected 2"),
         (3, [2, 2, 2], "actions has length 3, expected 2"),
         (2, [1, 2, 2], "rewards has length 1, expected 2"),
         (2, [2, 3, 2], "terminated has length 3, expected 2"),
         (2, [2, 2, 0], "truncated has length 0, expected 2"),
     ];
-    for (num_actions, lengths, wanted) in refusals {
+    for (num_actions, lengths, expected) in wrong_steps {
         let error = step(&mut environment, &vec![Action::Right; num_actions], lengths).unwrap_err();
-        assert_eq!(error.to_string(), wanted);
+        assert_eq!(error.to_string(), expected);
         assert_eq!(environment.snapshot(), before);
     }
     assert_eq!(environment.restore(0, &Snapshot::default()), Err(Error::ForeignState));
@@ -65,15 +65,15 @@ fn a_refused_step_leaves_state_and_buffers_as_they_were() {
 }
 
 #[test]
-fn a_refused_reset_leaves_the_episode_as_it_was() {
+fn a_rejected_reset_leaves_the_episode_unchanged() {
     let mut environment = Reference::new(config()).unwrap();
     environment.reset(&instance()).unwrap();
     let before = environment.snapshot();
     let first = instance();
     let (map, starts, goals) = (first.map(), first.starts(), first.goals());
-    let lonely =
+    let single =
         Instance::new(map.clone(), Outside::Free, starts[..1].to_vec(), goals[..1].to_vec()).unwrap();
-    assert_eq!(environment.reset(&lonely).unwrap_err().to_string(), "starts has length 1, expected 2");
+    assert_eq!(environment.reset(&single).unwrap_err().to_string(), "starts has length 1, expected 2");
     let noise = Map::from_rows(&["....", "....", "....", "...."]).unwrap();
     let narrow = Instance::new(map.clone(), Outside::Noise(noise), starts.to_vec(), goals.to_vec()).unwrap();
     assert_eq!(
@@ -94,13 +94,13 @@ fn a_buffer_of_the_wrong_length_is_not_written() {
     );
     assert!(short.iter().all(|&value| value == 0.5));
     let mut obstacles = [7; 19];
-    let wanted = "global obstacles has length 19, expected 20";
-    assert_eq!(environment.observe_map(&mut obstacles).unwrap_err().to_string(), wanted);
+    let expected = "global obstacles has length 19, expected 20";
+    assert_eq!(environment.observe_map(&mut obstacles).unwrap_err().to_string(), expected);
     assert_eq!(obstacles, [7; 19]);
 }
 
 #[test]
-fn a_config_out_of_range_makes_no_environment() {
+fn a_config_out_of_range_is_rejected() {
     let no_agents = Config { num_agents: 0, ..config() };
     assert_eq!(
         Reference::new(no_agents).unwrap_err().to_string(),

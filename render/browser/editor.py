@@ -1,4 +1,4 @@
-"""The map editor draws, places agents and tells about the map."""
+"""The map editor draws, places agents and reports on the map."""
 
 from maps import at, drag, pairs, paste, press, resize, rows, save
 from support import equal, pixel, settle, text
@@ -17,7 +17,7 @@ def test_draw_erase_undo_redo(world):
         press(page, 1, 2)
         page.keyboard.up("Shift")
         equal(rows(page)[1], ".#.##.")
-        equal(pixel(page, "ground", *place)[:3], [255, 255, 255], "and taken away")
+        equal(pixel(page, "ground", *place)[:3], [255, 255, 255], "and removed")
         page.click("#undo")
         equal(rows(page), drawn)
         page.keyboard.press("Control+z")
@@ -27,7 +27,7 @@ def test_draw_erase_undo_redo(world):
         settle(page)
         equal(rows(page)[1], ".#.##.")
         assert page.is_disabled("#redo")
-        # A fast stroke has no holes.
+        # A fast stroke has no gaps.
         page.mouse.move(*at(page, 3, 0))
         page.mouse.down()
         page.mouse.move(*at(page, 3, 5))
@@ -70,11 +70,11 @@ def test_agents(world):
         equal(text(page, "message"), "not saved: agent 1 has no goal yet")
         press(page, 1, 1)
         equal(pairs(page), [[[0, 0], [3, 3]], [[0, 2], [1, 1]]])
-        equal(rows(page), ["...."] * 4, "a goal takes the obstacle away")
+        equal(rows(page), ["...."] * 4, "a goal removes the obstacle")
         drag(page, (3, 3), (2, 0))
         drag(page, (0, 0), (0, 2))
         equal(pairs(page)[0][1], [2, 0])
-        assert pairs(page)[0][0] != [0, 2], "two agents do not share a start"
+        assert pairs(page)[0][0] != [0, 2], "two agents cannot share a start"
         page.click("[data-tool=brush]")
         page.click("[data-kind='1']")
         drag(page, (2, 0), (2, 3))
@@ -101,7 +101,7 @@ def test_unreachable_goals_are_flagged(world):
         equal(page.evaluate("editor.issues"), [])
 
 
-def test_keyboard_alone(world):
+def test_keyboard_only(world):
     with world.open("editor") as page:
         resize(page, 4, 4, "new")
         page.focus("#stage")
@@ -129,11 +129,11 @@ def test_resize(world):
         paste(page, "a.A\nb#B\n")
         resize(page, 1, 4)
         equal((rows(page), pairs(page)), (["...."], [[[0, 0], [0, 2]]]))
-        assert "1 agent outside it went" in text(page, "message")
+        assert "removed 1 agent outside it" in text(page, "message")
         page.click("#undo")
         equal((rows(page), len(pairs(page))), (["...", ".#."], 2))
         resize(page, 0, 4)
-        equal(text(page, "message"), "rows and columns are whole numbers from 1 to 4096")
+        equal(text(page, "message"), "rows and columns must be whole numbers from 1 to 4096")
         equal(rows(page), ["...", ".#."])
 
 

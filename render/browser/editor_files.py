@@ -1,13 +1,13 @@
-"""The map editor saves what the Rust side reads unchanged, and tells what is wrong with a file."""
+"""The map editor saves files that the Rust side reads unchanged, and reports errors in files."""
 
 import random
 
 from maps import drag, drop, give, load, pairs, paste, pick, press, rows, save, taken
 from support import equal, text, wait
 
-SETTINGS = """# a comment of somebody
+SETTINGS = """# a comment
 seed: 9007199254740993
-collision_system: soft   # kept, with what stands behind it
+collision_system: soft   # kept with this comment
 on_target: finish
 
 map: |
@@ -16,7 +16,7 @@ map: |
   ....
 obs_radius: 3
 agents_xy: [[0, 0],
-  [2, 3]] # two of them
+  [2, 3]] # two agents
 targets_xy:
   - [2, 0]
   - [0, 3]
@@ -25,7 +25,7 @@ num_agents: 2
 """
 
 
-def test_text_comes_back_unchanged(world):
+def test_text_is_saved_unchanged(world):
     content = "a.#b\nB..A\n.#.."
     with world.open("editor") as page:
         source = load(world, page, "small.txt", content)
@@ -39,7 +39,7 @@ def test_text_comes_back_unchanged(world):
         equal([read["agents"], read["goals"]], [[[0, 0], [0, 3]], [[1, 3], [1, 0]]])
 
 
-def test_yaml_keeps_what_it_does_not_edit(world):
+def test_yaml_keeps_fields_that_are_not_edited(world):
     with world.open("editor") as page:
         source = load(world, page, "settings.yaml", SETTINGS)
         equal(pairs(page), [[[0, 0], [2, 0]], [[2, 3], [0, 3]]])
@@ -62,7 +62,7 @@ def test_yaml_keeps_what_it_does_not_edit(world):
         equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
 
 
-def test_other_ways_to_write_a_config(world):
+def test_all_notations_of_a_config(world):
     same = [
         'map: "a.#\\n..A"\nseed: 1\n',
         "seed: 1\nmap: a.# ..A\n",
@@ -88,20 +88,20 @@ def test_goal_sequences_are_kept(world):
         equal(saved.read_text(), content)
         equal(*world.check(source, saved))
         page.click("#save-text")
-        equal(text(page, "message"), "not saved: text has one goal for each agent; save it as YAML")
+        equal(text(page, "message"), "not saved: text has only one goal for each agent; save it as YAML")
         page.click("[data-tool=agents]")
         paste(page, "on_target: restart\nmap: |\n  a.A\n")
-        equal(page.evaluate("editor.issues"), ["on_target is restart, which needs two goals or more for each agent"])
+        equal(page.evaluate("editor.issues"), ["on_target is restart, expected at least two goals for each agent"])
 
 
-def test_what_text_cannot_say(world):
+def test_maps_that_text_cannot_represent(world):
     shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
     many = "map: |\n" + "  ....\n" * 14 + f"agents_xy: {[[row, 0] for row in range(14)] + [[row, 1] for row in range(13)]}\n"
     many += f"targets_xy: {[[row, 2] for row in range(14)] + [[row, 3] for row in range(13)]}\n"
     with world.open("editor") as page:
         for content, reason in [
-            (shared, "two letters would stand on (0, 3) (agent 1); save it as YAML"),
-            (many, "text has letters for 26 agents, the map has 27; save it as YAML"),
+            (shared, "text has one letter for each cell, but (0, 3) needs two (agent 1); save it as YAML"),
+            (many, "text has letters for 26 agents, but the map has 27; save it as YAML"),
         ]:
             paste(page, content)
             page.click("#save-text")
@@ -110,32 +110,32 @@ def test_what_text_cannot_say(world):
             equal([list(pair) for pair in zip(read["agents"], read["goals"])], pairs(page))
 
 
-def test_errors_are_told_with_line_and_column(world):
-    wrong = [
+def test_errors_are_reported_with_line_and_column(world):
+    cases = [
         ("bad.txt", "..\n.x.\n.%", 'bad.txt: line 2, column 3'),
         ("bad.txt", "...\n.?.", 'bad.txt: line 2, column 2: unknown character "?", expected one of .#@$!, a-z or A-Z'),
         ("bad.txt", "...\n..", "bad.txt: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
         ("bad.txt", "a..\n.A.\n..b", "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
         ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected exact starts and goals or possible ones"),
         ("bad.txt", " \n\n", "bad.txt: line 1, column 1: the map has no cell, expected some of .#@$!, a-z and A-Z"),
-        ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, and this page edits maps"),
+        ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, expected the field map"),
         ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
-        ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: "map" stands twice'),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: agents_xy stands without targets_xy, and this page edits pairs"),
+        ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: duplicate key "map"'),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: found agents_xy without targets_xy, expected both"),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
-        ("bad.yaml", "map: |\n  ..\nwhat is this\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
-        ("bad.json", '{"map": "..", "seed": 9007199254740993}', "bad.json: line 1, column 1: seed has too many digits to be kept from JSON, expected this config as YAML"),
-        ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: a config in braces has to be JSON, and this is none"),
+        ("bad.yaml", "map: |\n  ..\nno field\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
+        ("bad.json", '{"map": "..", "seed": 9007199254740993}', "bad.json: line 1, column 1: seed has too many digits to be read exactly from JSON, expected a config in YAML"),
+        ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: invalid JSON, expected a config in braces to be JSON"),
     ]
     with world.open("editor") as page:
         load(world, page, "good.txt", "a.A\n")
-        for name, content, want in wrong:
+        for name, content, expected in cases:
             load(world, page, name, content)
             got = text(page, "message")
-            assert got == want or (want.endswith("column 3") and got.startswith(want)), (content, got, want)
+            assert got == expected or (expected.endswith("column 3") and got.startswith(expected)), (content, got, expected)
             equal(page.get_attribute("#message", "class"), "bad")
-            equal(rows(page), ["..."], "the map stays as it was")
+            equal(rows(page), ["..."], "the map stays unchanged")
         page.click("#edit-source")
         page.fill("#source-text", "..\n.?")
         page.click("#source-load")
@@ -147,7 +147,7 @@ def test_errors_are_told_with_line_and_column(world):
         equal(rows(page), ["..", ".#"])
 
 
-def test_files_read_slowly_or_not_at_all(world):
+def test_slow_and_unreadable_files(world):
     with world.open("editor") as page:
         page.evaluate(
             """() => {
@@ -164,7 +164,7 @@ def test_files_read_slowly_or_not_at_all(world):
         page.evaluate("window.release()")
         wait(page, "window.numRead === 2")
         taken(page)
-        equal(rows(page), [".."], "the file given last stays")
+        equal(rows(page), [".."], "the file dropped last is loaded")
         drop(page, "gone.txt", "...")
         equal(text(page, "message"), "gone.txt: cannot be read")
         equal(rows(page), [".."])
@@ -181,32 +181,32 @@ def test_drop_and_paste(world):
         equal(rows(page), ["##", ".."])
 
 
-def drawn_map(draw, has_pools):
-    height, width = draw.randint(1, 12), draw.randint(2, 12)
-    lines = [[draw.choice(".#@$!" if has_pools else "..#") for _ in range(width)] for _ in range(height)]
+def random_map(rng, has_pools):
+    height, width = rng.randint(1, 12), rng.randint(2, 12)
+    lines = [[rng.choice(".#@$!" if has_pools else "..#") for _ in range(width)] for _ in range(height)]
     if has_pools:
         lines[0][:2] = "@$"
     else:
         places = [(row, col) for row in range(height) for col in range(width)]
-        for index, (row, col) in enumerate(draw.sample(places, 2 * draw.randint(1, min(26, len(places) // 2)))):
+        for index, (row, col) in enumerate(rng.sample(places, 2 * rng.randint(1, min(26, len(places) // 2)))):
             lines[row][col] = chr((65 if index % 2 else 97) + index // 2)
     return "".join("".join(line) + "\n" for line in lines)
 
 
-def test_drawn_maps_are_read_back_unchanged(world):
-    draw = random.Random(2)
+def test_random_maps_are_read_back_unchanged(world):
+    rng = random.Random(2)
     files = []
-    # The browser stops a page that saves more than ten files in a row.
+    # The browser blocks a page that saves more than ten files in a row.
     for begin in range(0, 12, 4):
         with world.open("editor") as page:
             for number in range(begin, begin + 4):
-                content = drawn_map(draw, number % 3 == 0)
-                source = load(world, page, f"drawn-{number}.txt", content)
+                content = random_map(rng, number % 3 == 0)
+                source = load(world, page, f"random-{number}.txt", content)
                 text_file, yaml_file = save(world, page, "txt"), save(world, page, "yaml")
                 equal(text_file.read_text(), content)
                 files.append((source, text_file, yaml_file))
-    told = iter(world.check(*(path for three in files for path in three)))
-    for source, text_file, yaml_file in zip(told, told, told):
+    read = iter(world.check(*(path for three in files for path in three)))
+    for source, text_file, yaml_file in zip(read, read, read):
         equal(text_file, source)
         equal([yaml_file["rows"], yaml_file["pools"]], [source["rows"], source["pools"]])
         if source["agents"]:

@@ -22,23 +22,23 @@ def tests_of(module):
     return [(name, test) for name, test in vars(module).items() if name.startswith("test_")]
 
 
-def main(folder, *wanted):
+def main(folder, *names):
     failed = 0
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as scratch:
         browser = playwright.chromium.launch(executable_path=os.environ["BROWSER"], args=FLAGS)
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in ((speed,) if wanted == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report))
+            for module in ((speed,) if names == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report))
             for name, test in tests_of(module)
-            if not wanted or any(part in f"{module.__name__}.{name}" for part in wanted)
+            if not names or any(part in f"{module.__name__}.{name}" for part in names)
         ]
         for name, test in chosen:
             began = time.monotonic()
             try:
                 note = test(world)
                 print(f"ok     {name} ({time.monotonic() - began:.1f} s){': ' + note if note else ''}", flush=True)
-            except Exception:  # noqa: BLE001, whatever goes wrong is a failed test
+            except Exception:  # noqa: BLE001, every exception is a failed test
                 failed += 1
                 print(f"FAILED {name}\n{traceback.format_exc(limit=-3)}", flush=True)
         browser.close()

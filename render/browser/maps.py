@@ -1,4 +1,4 @@
-"""What the tests of the editor do again and again."""
+"""Helpers for the tests of the editor."""
 
 import random
 
@@ -63,7 +63,7 @@ def pick(page, path):
 
 
 def taken(page):
-    """Waits until a file that was given is read and drawn."""
+    """Waits until a selected or dropped file is loaded and drawn."""
     wait(page, "!document.body.hasAttribute('aria-busy')")
     settle(page)
 
@@ -86,7 +86,7 @@ def drop(page, name, content):
 
 
 def give(page, name, content):
-    """Drops a file, and does not wait until it is read."""
+    """Drops a file without waiting until it is loaded."""
     page.evaluate(
         """([name, content]) => {
           const data = new DataTransfer();

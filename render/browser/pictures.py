@@ -1,4 +1,4 @@
-"""Pictures of the pages, for the gallery: written into the folder that PICTURES names, if it names one."""
+"""Screenshots of the pages for the gallery. If PICTURES is set, they are written to that folder."""
 
 import os
 from pathlib import Path
@@ -20,7 +20,7 @@ C.#..D#
 
 
 def shoot(world, page, name):
-    """A screenshot, and of more than a blank page."""
+    """Takes a screenshot and checks that it is not blank."""
     folder = Path(os.environ.get("PICTURES", world.scratch))
     folder.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=folder / name)

@@ -1,4 +1,4 @@
-"""The replay page does what it is told, in time, and nothing else."""
+"""The replay page responds to buttons, keys, pointers and addresses, and uses no network."""
 
 import time
 
@@ -30,16 +30,16 @@ def test_play_and_pause(world):
 
 def test_steps_by_button_and_key(world):
     with world.open("restart") as page:
-        for how, want in [("#next", 1), ("#next", 2), ("#back", 1), ("#last", 64), ("#first", 0)]:
+        for how, expected in [("#next", 1), ("#next", 2), ("#back", 1), ("#last", 64), ("#first", 0)]:
             page.click(how)
             settle(page)
-            equal(step(page), want, how)
+            equal(step(page), expected, how)
         keys = [("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10), ("End", 64), ("ArrowRight", 64), ("Home", 0), ("ArrowLeft", 0)]
-        for key, want in keys:
+        for key, expected in keys:
             page.keyboard.press(key)
             settle(page)
-            equal(step(page), want, key)
-            equal(page.input_value("#scrub"), str(want), "slider")
+            equal(step(page), expected, key)
+            equal(page.input_value("#scrub"), str(expected), "slider")
 
 
 def test_scrub(world):
@@ -78,7 +78,7 @@ def test_agents_glide_between_steps(world):
         page.uncheck("#goals")
         settle(page)
         page.click("#play")
-        # However slow the machine is, pictures of one step differ.
+        # On machines of any speed, two pictures of the same step must differ.
         page.evaluate("window.seen = []")
         wait(
             page,
@@ -99,13 +99,13 @@ def test_zoom_pan_and_fit(world):
         settle(page)
         assert page.evaluate("replay.scale") > 1.5 * fitted
         near = on_screen(page, "replay", 3, 4)
-        assert abs(near[0] - x) < 1 and abs(near[1] - y) < 1, "the cell under the pointer stays there"
+        assert abs(near[0] - x) < 1 and abs(near[1] - y) < 1, "the cell under the pointer stays in place"
         page.mouse.down()
         page.mouse.move(x + 60, y + 40, steps=4)
         page.mouse.up()
         moved = on_screen(page, "replay", 3, 4)
         assert abs(moved[0] - x - 60) < 1 and abs(moved[1] - y - 40) < 1, moved
-        assert page.evaluate("replay.agent") is None, "a drag chooses nobody"
+        assert page.evaluate("replay.agent") is None, "a drag selects no agent"
         page.click("#fit")
         equal(page.evaluate("replay.scale"), fitted)
         for how in ("#zoom-in", "#zoom-out"):
@@ -141,7 +141,7 @@ def test_touch(world):
             page.wait_for_timeout(40)
         touch("touchEnd")
         assert page.evaluate("replay.center(0, 0)")[0] < before[0] - 40
-        # A tap this soon after a drag only stops it.
+        # A tap too soon after a drag only stops the drag.
         page.wait_for_timeout(500)
         page.tap("#fit")
         wait(page, f"replay.scale === {fitted}")
@@ -164,7 +164,7 @@ def test_help_and_labels(world):
         page.keyboard.press("?")
         assert page.locator("#help").is_visible()
         page.keyboard.press("ArrowRight")
-        equal(step(page), 0, "the help takes no step")
+        equal(step(page), 0, "keys do not step while the help is open")
         page.keyboard.press("Escape")
         assert page.locator("#help").is_hidden()
         unnamed = page.evaluate("[...document.querySelectorAll('button')].filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length")
@@ -174,18 +174,18 @@ def test_help_and_labels(world):
         equal(page.evaluate("[document.activeElement.id, getComputedStyle(document.activeElement).outlineStyle]"), ["back", "solid"])
 
 
-def test_no_network_and_nothing_foreign(world):
+def test_no_network_and_no_foreign_scripts(world):
     with world.open("finish") as page:
         refused = page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'sent', (error) => error.name)")
         equal(refused, "TypeError")
         page.evaluate("document.body.append(Object.assign(document.createElement('script'), {textContent: 'window.foreign = 1'}))")
         equal(page.evaluate("window.foreign"), None, "a script that is not the page's own")
-        assert len(page.wrong) >= 2 and all("Content Security Policy" in one for one in page.wrong), page.wrong
-        page.wrong.clear()
+        assert len(page.errors) >= 2 and all("Content Security Policy" in one for one in page.errors), page.errors
+        page.errors.clear()
         equal(page.evaluate("(() => { try { 'use strict'; replay.step = 3 } catch {} return replay.step })()"), 0, "read only")
 
 
-def test_damaged_data_is_told(world):
+def test_damaged_data_is_reported(world):
     source = (world.folder / "finish.html").read_text()
     head, rest = source.split('"data":"', 1)
     data, tail = rest.split('"', 1)
@@ -200,7 +200,7 @@ def test_damaged_data_is_told(world):
 
 
 def test_thousand_agents_play(world):
-    """How fast they do is what `render/browser/run speed` tells."""
+    """`render/browser/run speed` measures the speed."""
     size = (world.folder / "large.html").stat().st_size
     assert size < 450_000, size
     with world.open("large") as page:

@@ -1,4 +1,4 @@
-"""The replay page shows what the film holds."""
+"""The replay page shows the recorded episode."""
 
 import random
 
@@ -16,7 +16,7 @@ def rgb(color):
 
 
 def is_reverted(film, at, agent):
-    """Whether an agent wanted to move in a step and did not."""
+    """Returns whether an agent's move in a step was reverted."""
     if at == 0:
         return False
     before, after = film["states"][at - 1], film["states"][at]
@@ -27,30 +27,30 @@ def reverted(film, agent):
     return [at for at in range(len(film["states"])) if is_reverted(film, at, agent)]
 
 
-def told(film, at, agent):
-    """What the page should know of an agent, but for why its move was reverted."""
+def expected_state(film, at, agent):
+    """Returns the state of an agent that the page must show."""
     state, states = film["states"][at], film["states"]
-    paid = [one["rewards"][agent] for one in states[1 : at + 1]]
+    rewards = [one["rewards"][agent] for one in states[1 : at + 1]]
     why = reason(film, at, agent) if is_reverted(film, at, agent) else None
     return {
         "cell": state["cells"][agent], "goal": state["goals"][agent], "isActive": state["active"][agent],
         "isOnGoal": state["on_goal"][agent], "isMarked": state["cells"][agent] in state["occupied"],
-        "action": NAMES[state["actions"][agent]] if at else None, "reward": paid[-1] if paid else 0, "total": sum(paid),
+        "action": NAMES[state["actions"][agent]] if at else None, "reward": rewards[-1] if rewards else 0, "total": sum(rewards),
         "isTerminated": bool(at) and state["terminated"][agent], "isTruncated": bool(at) and state["truncated"][agent],
         "reverted": why,
     }
 
 
 def reason(film, at, agent):
-    """Why a move was reverted, as the program that made the film says."""
-    step_told = next(one for one in film["stays"][at - 1] if one["agent"] == agent)
+    """Returns the recorded reason of a reverted move."""
+    recorded = next(one for one in film["stays"][at - 1] if one["agent"] == agent)
     state = film["states"][at]
     action = state["actions"][agent]
     cell = [here + there for here, there in zip(state["cells"][agent], MOVES[action])]
-    return {"step": at, "action": NAMES[action], "rule": step_told["rule"], "cause": step_told["cause"], "cell": cell, "other": step_told["other"]}
+    return {"step": at, "action": NAMES[action], "rule": recorded["rule"], "cause": recorded["cause"], "cell": cell, "other": recorded["other"]}
 
 
-def test_names_come_from_the_film_and_stay_text(world):
+def test_names_come_from_the_episode_and_are_escaped(world):
     with world.open("finish") as page:
         title = world.film("finish")["title"]
         assert "<script>" in title
@@ -59,17 +59,17 @@ def test_names_come_from_the_film_and_stay_text(world):
         equal(text(page, "facts"), f"8 × 8 · 4 agents · {len(world.film('finish')['states']) - 1} steps · priority · finish · radius 5")
 
 
-def test_states_are_those_of_the_film(world):
-    draw = random.Random(1)
+def test_states_are_those_of_the_episode(world):
+    rng = random.Random(1)
     for name in [*SMALL, "large"]:
         film = world.film(name)
         with world.open(name) as page:
             num_steps, num_agents = len(film["states"]) - 1, film["config"]["num_agents"]
             equal(page.evaluate("[replay.numSteps, replay.numAgents]"), [num_steps, num_agents])
-            asked = [[draw.randrange(num_steps + 1), draw.randrange(num_agents)] for _ in range(60)]
+            asked = [[rng.randrange(num_steps + 1), rng.randrange(num_agents)] for _ in range(60)]
             shown = page.evaluate("(asked) => asked.map(([at, agent]) => replay.state(at, agent))", asked)
             for (at, agent), got in zip(asked, shown):
-                equal(got, told(film, at, agent), f"{name} {at} {agent}")
+                equal(got, expected_state(film, at, agent), f"{name} {at} {agent}")
 
 
 def test_marks_are_the_occupancy_grid(world):
@@ -78,10 +78,10 @@ def test_marks_are_the_occupancy_grid(world):
         width = len(film["map"][0])
         with world.open(name) as page:
             shown = page.evaluate("Array.from({ length: replay.numSteps + 1 }, (_, at) => replay.marks(at))")
-            want = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
-            equal(shown, want, name)
+            expected = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
+            equal(shown, expected, name)
     soft = world.film("soft")["states"]
-    assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), "nobody vanished, so nothing was tested"
+    assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), "no agent vanished, so this tested nothing"
 
 
 def test_windows_are_observations(world):
@@ -101,7 +101,7 @@ def test_windows_are_observations(world):
                 equal(got, film["observations"][at][agent], f"{name} {at} {agent}")
 
 
-def test_choose_an_agent(world):
+def test_select_an_agent(world):
     film = world.film("restart")
     with world.open("restart", "#step=5") as page:
         page.mouse.click(*on_screen(page, "replay", *film["states"][5]["cells"][3]))
@@ -110,9 +110,9 @@ def test_choose_an_agent(world):
         equal(text(page, "agent-cell"), place(film["states"][5]["cells"][3]))
         equal(text(page, "agent-goal"), place(film["states"][5]["goals"][3]))
         equal(text(page, "agent-action"), NAMES[film["states"][5]["actions"][3]])
-        for key, want in [("]", "Agent 4"), ("[", "Agent 3"), ("[", "Agent 2")]:
+        for key, expected in [("]", "Agent 4"), ("[", "Agent 3"), ("[", "Agent 2")]:
             page.keyboard.press(key)
-            equal(text(page, "agent-name"), want)
+            equal(text(page, "agent-name"), expected)
         page.keyboard.press("Escape")
         assert page.locator("#agent").is_hidden()
         page.fill("#search", "6")
@@ -120,7 +120,7 @@ def test_choose_an_agent(world):
         page.keyboard.press("Enter")
         equal(text(page, "agent-name"), "Agent 6")
         page.fill("#search", "99")
-        equal(text(page, "found"), "no agent 99; they are 0 to 7")
+        equal(text(page, "found"), "no agent 99, expected 0 to 7")
         page.fill("#search", "")
         page.click("#agents-1")
         equal(text(page, "agent-name"), "Agent 1")
@@ -141,14 +141,14 @@ def test_reverted_moves_are_listed_and_lead_to_their_steps(world):
             equal(text(page, "moves-title"), f"{len(steps)} reverted moves")
             for index in (0, 2):
                 row = page.locator(f"#moves-{index}")
-                want = reason(film, steps[index], agent)
+                expected = reason(film, steps[index], agent)
                 shown = row.inner_text()
-                assert want["rule"] in shown and str(steps[index]) in shown and want["action"] in shown, (shown, want)
+                assert expected["rule"] in shown and str(steps[index]) in shown and expected["action"] in shown, (shown, expected)
                 row.click()
                 settle(page)
                 equal(step(page), steps[index])
-                equal(text(page, "why-rule"), want["rule"])
-                named = {"agent": f"agent {want['other']}", "wall": "the wall", "obstacle": "obstacle"}[want["cause"]]
+                equal(text(page, "why-rule"), expected["rule"])
+                named = {"agent": f"agent {expected['other']}", "wall": "the wall", "obstacle": "obstacle"}[expected["cause"]]
                 assert named in text(page, "why-text"), text(page, "why-text")
             page.keyboard.press("Home")
             settle(page)
@@ -170,7 +170,7 @@ def test_canvas_shows_agents_goals_and_obstacles(world):
             at = page.evaluate("([row, col]) => replay.center(row, col)", [row, col])
             equal(pixel(page, "ground", *at), [*rgb("#84a1ae" if kind == "#" else "#ffffff"), 255], f"{row} {col}")
             if [row, col] not in state["cells"]:
-                equal(pixel(page, "actors", *at)[3], 0, f"nobody on {row} {col}")
+                equal(pixel(page, "actors", *at)[3], 0, f"no agent on {row} {col}")
         page.check("#goals")
         settle(page)
         free = next(agent for agent in range(4) if state["goals"][agent] not in state["cells"] and state["goals"].count(state["goals"][agent]) == 1)

@@ -1,4 +1,4 @@
-"""The page of an evaluation: tables and plots are there, its replays are those of its episodes, and it fits a phone."""
+"""The report of an evaluation has tables and plots, replays its episodes and fits a phone."""
 
 import base64
 import json
@@ -31,18 +31,18 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobil
 
 
 def report(world):
-    """The page, made once, and the rows behind it."""
+    """Returns the page, which is made once, and its rows."""
     folder = world.scratch / "report"
     if not folder.exists():
         folder.mkdir()
         (folder / "suite.yaml").write_text(SUITE)
         command = [os.environ["POGEMA_PROGRAM"], "evaluate", "suite.yaml", "--out", "out", "--html"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    rows = {path.stem: json.loads(path.read_text()) for path in (folder / "out").glob("*.json") if is_of_rows(path)}
+    rows = {path.stem: json.loads(path.read_text()) for path in (folder / "out").glob("*.json") if has_rows(path)}
     return folder / "out" / "report.html", rows
 
 
-def is_of_rows(path):
+def has_rows(path):
     return path.name != "about.json" and not path.name.endswith(".episodes.json")
 
 
@@ -62,7 +62,7 @@ def test_tables_and_plots(world):
         assert "nearest column" in page.locator("section", has_text="Absent").locator(".note").first.text_content()
 
 
-def test_replays_are_of_their_episodes(world):
+def test_replays_match_their_episodes(world):
     path, rows = report(world)
     with world.open("report", path=path) as page:
         buttons = page.locator("[data-replay]")
@@ -85,7 +85,7 @@ def test_replays_are_of_their_episodes(world):
             wait(page, "document.querySelector('iframe') === null")
 
 
-def test_a_replay_has_a_tab_of_its_own(world):
+def test_a_replay_opens_in_a_new_tab(world):
     path, _ = report(world)
     with world.open("report", path=path) as page:
         page.locator("[data-replay]").first.click()
@@ -95,12 +95,12 @@ def test_a_replay_has_a_tab_of_its_own(world):
         assert opened.value.evaluate("replay.numSteps") > 0
 
 
-def test_it_fits_a_phone(world):
+def test_the_report_fits_a_phone(world):
     path, _ = report(world)
     with world.open("report", path=path, **PHONE) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
         wide = page.locator(".wide").first
-        assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "a table scrolls by itself"
+        assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "a wide table scrolls on its own"
         page.locator("[data-replay]").first.tap()
         page.frame_locator("#player iframe").locator("body.ready").wait_for()
         settle(page)
@@ -112,11 +112,11 @@ def test_it_fits_a_phone(world):
         assert page.locator("#player").is_hidden()
 
 
-def test_nothing_foreign_runs(world):
+def test_no_foreign_scripts_run(world):
     path, _ = report(world)
     with world.open("report", path=path) as page:
-        equal(page.evaluate("document.scripts.length"), 2, "the data and the page's own")
+        equal(page.evaluate("document.scripts.length"), 2, "the data and the page's script")
         refused = page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'sent', (error) => error.name)")
         equal(refused, "TypeError")
-        assert page.wrong and all("Content Security Policy" in one for one in page.wrong), page.wrong
-        page.wrong.clear()
+        assert page.errors and all("Content Security Policy" in one for one in page.errors), page.errors
+        page.errors.clear()

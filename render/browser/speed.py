@@ -1,8 +1,8 @@
-"""How fast the replay page draws; run only when named, and not part of any check: render/browser/run speed."""
+"""Drawing speed of the replay page. Runs only as `render/browser/run speed` and is not part of any check."""
 
 
 def test_thousand_agents(world):
-    """1,000 agents on 256 x 256: 30 frames a second leave 33 ms for a frame."""
+    """Draws 1,000 agents on a map of 256 x 256; 30 frames per second allow 33 ms per frame."""
     with world.open("large") as page:
         page.select_option("#speed", "8")
         page.click("#play")
@@ -10,7 +10,7 @@ def test_thousand_agents(world):
         page.wait_for_timeout(3000)
         last, ended, median = page.evaluate("[replay.numDraws, performance.now(), replay.medianDraw]")
         rate = 1000 * (last - first) / (ended - began)
-        # Canvases are painted late; reading a pixel back makes the browser do it at once.
+        # Browsers defer painting; reading a pixel back forces it immediately.
         painting = page.evaluate(
             """async () => {
               const times = [];

@@ -1,4 +1,4 @@
-"""Opens pages, and fails a test whose page logs an error or asks the network for anything."""
+"""Opens pages, and fails a test if its page logs an error or sends a network request."""
 
 import json
 import subprocess
@@ -13,7 +13,7 @@ FLAGS = (
 
 
 class World:
-    """A browser, the pages, and the program that made them."""
+    """A browser, the pages and the program that made them."""
 
     def __init__(self, browser, folder, program, scratch):
         self.browser, self.folder, self.program, self.scratch = browser, Path(folder), program, Path(scratch)
@@ -26,19 +26,19 @@ class World:
 
     @contextmanager
     def open(self, name, fragment="", path=None, **options):
-        """A page in a context of its own; what it did wrong is told at the end."""
-        wrong = []
+        """Opens a page in a new context; fails on exit if the page caused errors."""
+        errors = []
         options = {"viewport": {"width": 1200, "height": 800}, **options}
         context = self.browser.new_context(accept_downloads=True, **options)
         context.set_default_timeout(10_000)
         page = context.new_page()
         address = (path or self.folder / f"{name}.html").resolve().as_uri()
-        page.wrong = wrong
-        page.on("console", lambda message: is_bad(message) and wrong.append(message.text))
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda request: is_foreign(request.url, address) and wrong.append(request.url))
-        # A map that was changed is asked about before it is left.
-        page.on("dialog", lambda dialog: dialog.accept() if dialog.type == "beforeunload" else wrong.append("dialog"))
+        page.errors = errors
+        page.on("console", lambda message: is_bad(message) and errors.append(message.text))
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("request", lambda request: is_foreign(request.url, address) and errors.append(request.url))
+        # The editor asks for confirmation before it drops a changed map.
+        page.on("dialog", lambda dialog: dialog.accept() if dialog.type == "beforeunload" else errors.append("dialog"))
         page.goto(address + fragment)
         page.wait_for_selector("body.ready")
         settle(page)
@@ -46,17 +46,17 @@ class World:
             yield page
         finally:
             context.close()
-        assert not wrong, wrong
+        assert not errors, errors
 
     def check(self, *paths):
-        """What the Rust side reads in saved maps."""
+        """Returns what the Rust side reads from saved maps."""
         command = [self.program, "check", *map(str, paths)]
-        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        return [json.loads(line) for line in told.splitlines()]
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return [json.loads(line) for line in output.splitlines()]
 
 
 def is_bad(message):
-    # The tests read pixels back, the pages do not.
+    # This warning is caused by the tests, which read pixels back; the pages do not.
     return message.type in ("error", "warning") and "willReadFrequently" not in message.text
 
 
@@ -65,15 +65,15 @@ def is_foreign(url, address):
 
 
 def settle(page):
-    """Waits until what was asked for has been drawn."""
+    """Waits until the requested frame is drawn."""
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def wait(page, expression, seconds=10):
-    """Waits until an expression holds; Playwright's own way needs what the pages' policy forbids."""
+    """Waits until an expression is true. Playwright's own function needs `eval`, which the pages' policy forbids."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression):
-        assert time.monotonic() < end, f"`{expression}` never came true"
+        assert time.monotonic() < end, f"`{expression}` did not become true"
         page.wait_for_timeout(20)
 
 
@@ -90,15 +90,15 @@ def stage(page):
 
 
 def on_screen(page, tool, row, col):
-    """The middle of a cell, in pixels of the page."""
+    """Returns the centre of a cell, in pixels of the page."""
     box = stage(page)
     x, y = page.evaluate(f"([row, col]) => window.{tool}.center(row, col)", [row, col])
-    # The stage has a border, which is not part of its inside.
+    # The box includes the border of the stage, one pixel wide.
     return box["x"] + 1 + x, box["y"] + 1 + y
 
 
 def pixel(page, canvas, x, y):
-    """Red, green, blue and alpha of a canvas at a place of the stage."""
+    """Returns red, green, blue and alpha of a canvas at a position on the stage."""
     return page.evaluate(
         """([id, x, y]) => {
           const canvas = document.getElementById(id);
@@ -109,10 +109,10 @@ def pixel(page, canvas, x, y):
     )
 
 
-def equal(got, want, what=""):
-    assert got == want, f"{what}: got {got!r}, expected {want!r}"
+def equal(got, expected, what=""):
+    assert got == expected, f"{what}: got {got!r}, expected {expected!r}"
 
 
 def step(page):
-    """The step by what the page says."""
+    """Returns the step that the page shows."""
     return int(text(page, "step").split()[1])

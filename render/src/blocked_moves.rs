@@ -1,38 +1,40 @@
-//! Why agents stay: for each reverted move, the rule that reverted it.
+//! The rule that reverted each reverted move.
 
 use std::collections::HashMap;
 
 use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
-/// A move that an active agent wanted and did not get.
+/// A move that an active agent requested and that was reverted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockedMove {
-    /// Whose move it is.
+    /// The index of the agent.
     pub agent: usize,
     /// The id of the rule that reverted it.
     pub rule: &'static str,
-    /// What stood in the way.
+    /// The wall, obstacle or agent that blocked the move.
     pub blocker: Blocker,
 }
 
-/// What a reverted move ran into.
+/// The cause of a reverted move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blocker {
     /// The wall around the map.
     Wall,
     /// The obstacle on a cell.
     Obstacle(Cell),
-    /// Another agent, by index: the one that holds the cell, or that gets it instead.
+    /// Another agent, by index: the one that occupies the cell or moves to it instead.
     Agent(usize),
-    /// Nothing that the rules know: whoever recorded the step played by other rules.
+    /// No cause under the rules of the config: the step was recorded under other rules.
     Unknown,
 }
 
-/// The reverted moves of one step, by ascending agent: active agents that did not stay of their own will and are
-/// where they were. Each has one reason; where several hold, the first of these counts: obstacle or wall, swap,
-/// occupied cell, lost contest.
+/// Returns the reverted moves of one step, by ascending agent.
 ///
-/// The four lists of agents are as long as each other; what goes beyond the shortest is left out.
+/// A move is reverted if an active agent's action is not stay, but its cell does not change. Each reverted move has one
+/// reason. If several apply, the first of these counts: obstacle or wall, swap, occupied cell, lost contest.
+///
+/// Shape: `actions` and the lists of `before` and `after` have one entry per agent; entries beyond the shortest list are
+/// ignored.
 ///
 /// Rule: move/actions, collide/priority, collide/block-both, collide/soft
 pub fn blocked_moves(
@@ -52,18 +54,18 @@ pub fn blocked_moves(
 
 type Reason = (&'static str, Blocker);
 
-/// One step, with the agents that took part sorted by cell.
+/// One step, with its active agents indexed by cell.
 struct Step<'a> {
     num_agents: usize,
     map: &'a Map,
     before: &'a Snapshot,
     actions: &'a [Action],
     after: &'a Snapshot,
-    /// Who was where.
+    /// The agent on each cell before the step.
     occupants: HashMap<Cell, usize>,
-    /// Who came where.
+    /// The agent that moved to each cell.
     arrivals: HashMap<Cell, usize>,
-    /// The two lowest indices that aim at a cell.
+    /// The two lowest indices of the agents that aim at each cell.
     aiming: HashMap<Cell, (usize, Option<usize>)>,
 }
 
@@ -97,7 +99,7 @@ impl<'a> Step<'a> {
         self.before.active[agent] && self.actions[agent] != Action::Stay && !self.has_moved(agent)
     }
 
-    /// The cell an agent aims at, if it is on the map.
+    /// Returns the cell that an agent aims at, if the cell is on the map.
     fn target(&self, agent: usize) -> Option<Cell> {
         let (row, col) = self.before.cells[agent].toward(self.actions[agent]);
         let cell = Cell::new(row.try_into().ok()?, col.try_into().ok()?);
@@ -117,7 +119,8 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Who holds the cell when the agent's turn comes: a lower index that has come, or one that has not left yet.
+    /// Finds the agent that occupies the cell at the agent's turn: a lower index that moved there, or an agent that has
+    /// not left yet.
     ///
     /// Rule: collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn reason_by_priority(&self, agent: usize, target: Cell) -> Reason {
@@ -156,10 +159,10 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Whether each from this agent on aims at the cell of the next, up to one that aims at the agent's own.
+    /// Returns whether the agent is part of a ring, in which each agent aims at the cell of the next.
     fn is_in_ring(&self, agent: usize) -> bool {
         let next = |other: &usize| self.target(*other).and_then(|cell| self.occupants.get(&cell)).copied();
-        // Behind a ring that the agent is not part of, the walk would go on for ever.
+        // If the chain leads into a ring without the agent, it never ends, hence the limit.
         let mut ahead = std::iter::successors(next(&agent), next).take(self.num_agents);
         ahead.any(|other| other == agent)
     }

@@ -1,11 +1,11 @@
-//! What can be drawn.
+//! Checks of traces before drawing.
 
 use pogema_core::{Cell, Error, Trace};
 
-/// Passes if every state has as many agents as the first, all of them and their goals on the map.
+/// Checks that every state has as many agents as the first, and that all agents and goals are on the map.
 ///
 /// # Errors
-/// [`Error::Length`] or [`Error::OutOfRange`] about the first state that cannot be drawn.
+/// [`Error::Length`] or [`Error::OutOfRange`] for the first state that cannot be drawn.
 pub fn check(trace: &Trace) -> Result<(), Error> {
     let (map, num_agents) = (&trace.header.map, trace.start.state.cells.len());
     for (frame, state) in trace.states().enumerate() {
@@ -21,11 +21,11 @@ pub fn check(trace: &Trace) -> Result<(), Error> {
     Ok(())
 }
 
-/// Passes if `agent` is one of `num_agents`.
+/// Checks that `agent` is less than `num_agents`.
 pub(crate) fn check_agent(agent: usize, num_agents: usize) -> Result<(), Error> {
     match num_agents.checked_sub(1) {
         Some(last) if agent <= last => Ok(()),
         Some(last) => Err(Error::out_of_range("agent", agent, format!("0 to {last}"))),
-        None => Err(Error::out_of_range("agent", agent, "none, the episode has no agents")),
+        None => Err(Error::out_of_range("agent", agent, "none, because the episode has no agents")),
     }
 }

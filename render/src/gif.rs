@@ -10,22 +10,22 @@ use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::{Color, Style};
 
-/// Frames of a second, if a step is a quarter of one.
+/// Frame rate if a step takes a quarter of a second. Units: frames per second.
 const RATE: f64 = 20.0;
-/// The shortest delay that browsers keep to. Units: hundredths of a second.
+/// The shortest frame delay that browsers respect. Units: hundredths of a second.
 const SHORTEST: u16 = 2;
-/// The number of a colour that leaves a pixel as it was.
+/// The colour index for unchanged pixels, which are transparent.
 const UNCHANGED: u8 = u8::MAX;
 
 /// Draws an episode as a GIF that repeats forever.
 ///
-/// `progress` is told after each frame how many are done, and how many there are.
+/// `progress` is called after each frame with the number of frames done and the number of all frames.
 ///
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// As for [`crate::svg::draw`], and if there were more frames or pixels than [`crate::MOST_FRAMES`] and
-/// [`crate::MOST_FRAME_PIXELS`].
+/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MOST_FRAMES`] frames or a frame more
+/// than [`crate::MOST_FRAME_PIXELS`] pixels.
 pub fn encode(
     trace: &Trace,
     style: &Style,
@@ -36,7 +36,7 @@ pub fn encode(
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 1)?;
     let first = motion.frame(0);
-    let too_wide = |_| Error::external("GIF", "a picture has at most 65535 pixels a side");
+    let too_wide = |_| Error::external("GIF", "a side of the picture has more than 65535 pixels");
     let width = u16::try_from(first.width()).map_err(too_wide)?;
     let height = u16::try_from(first.height()).map_err(too_wide)?;
     let palette = Palette::of(&scene);
@@ -45,29 +45,30 @@ pub fn encode(
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let delay = 100.0 / motion.rate(style.step_time);
     let mut last = palette.numbers(&first);
-    let mut waiting = Frame::from_indexed_pixels(width, height, last.clone(), None);
+    let mut pending = Frame::from_indexed_pixels(width, height, last.clone(), None);
     for index in 1..=motion.num_frames() {
-        waiting.delay = waiting.delay.saturating_add(delay_at(index, delay));
+        pending.delay = pending.delay.saturating_add(delay_at(index, delay));
         progress(index, motion.num_frames());
         let next =
             if index < motion.num_frames() { palette.numbers(&motion.frame(index)) } else { Vec::new() };
-        // A frame that changes nothing only lengthens the one before.
+        // A frame without changes only lengthens the frame before.
         if next != last {
             let frame = changed(&last, &next, width);
-            encoder.write_frame(&std::mem::replace(&mut waiting, frame)).map_err(failed)?;
+            encoder.write_frame(&std::mem::replace(&mut pending, frame)).map_err(failed)?;
             last = next;
         }
     }
     encoder.into_inner().map_err(|error| Error::external("GIF", error))
 }
 
-/// How long the frame before this one is shown, so that rounding never adds up.
+/// Returns the duration of the frame before this one, rounded so that errors never add up. Units: hundredths of a
+/// second.
 fn delay_at(index: usize, delay: f64) -> u16 {
     let until = |index: usize| (index as f64 * delay).round();
     ((until(index) - until(index - 1)) as u16).max(SHORTEST)
 }
 
-/// The smallest part of a picture that holds all that changed; empty if nothing did.
+/// Returns the smallest rectangle with all changed pixels; empty if no pixel changed.
 fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     let width = usize::from(width);
     let rows = || last.chunks(width).zip(next.chunks(width)).enumerate().filter(|(_, (from, to))| from != to);
@@ -93,15 +94,15 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The colours of a scene, each on its way from white in even steps.
+/// The palette of a scene: even gradients from white to each of its colours.
 struct Palette {
     colors: Vec<[u8; 3]>,
-    /// The nearest colour of each colour of five bits a channel.
+    /// The index of the nearest colour for each colour with five bits per channel.
     nearest: Vec<u8>,
 }
 
 impl Palette {
-    /// Bits of each channel that [`Palette::numbers`] looks at.
+    /// Bits per channel that [`Palette::numbers`] uses.
     const BITS: u32 = 5;
 
     fn of(scene: &Scene<'_>) -> Self {
@@ -131,7 +132,7 @@ impl Palette {
         bytes
     }
 
-    /// The colour of each pixel, by number.
+    /// Returns the colour index of each pixel.
     fn numbers(&self, canvas: &Pixmap) -> Vec<u8> {
         let most = (1 << Self::BITS) - 1;
         let part = |value: u8| (usize::from(value) * most + 127) / 255;
@@ -143,9 +144,9 @@ impl Palette {
     }
 }
 
-fn nearest(colors: &[[u8; 3]], wanted: [u8; 3]) -> u8 {
+fn nearest(colors: &[[u8; 3]], target: [u8; 3]) -> u8 {
     let distance = |color: &[u8; 3]| {
-        color.iter().zip(wanted).map(|(one, other)| u32::from(one.abs_diff(other)).pow(2)).sum::<u32>()
+        color.iter().zip(target).map(|(one, other)| u32::from(one.abs_diff(other)).pow(2)).sum::<u32>()
     };
     let number = (0..colors.len()).min_by_key(|&number| distance(&colors[number]));
     number.unwrap_or_default() as u8

@@ -1,17 +1,17 @@
 //! Pictures of episodes.
 //!
-//! Every picture is drawn from a [`pogema_core::Trace`]; a [`Style`] says how. Frame 0 is the state after the reset, frame
-//! 1 the state after the first step.
+//! Every picture is drawn from a [`pogema_core::Trace`], and a [`Style`] sets its appearance. Frame 0 is the state
+//! after the reset, frame 1 the state after the first step.
 //!
-//! | module | what it makes |
+//! | module | output |
 //! | --- | --- |
-//! | [`svg`] | animations and pictures for browsers and papers |
+//! | [`svg`] | SVG animations and pictures for browsers and papers |
 //! | [`text`] | frames for the terminal |
 //! | [`raster`] | one frame as PNG |
 //! | [`gif`] | GIF animations |
-//! | [`video`] | MP4 and `WebM`, by the program ffmpeg |
-//! | [`html`] | a page that replays an episode, and one that edits maps |
-//! | [`blocked_moves`] | which rule reverted which move |
+//! | [`video`] | MP4 and `WebM` videos, encoded by the program ffmpeg |
+//! | [`html`] | pages that replay episodes, and a map editor |
+//! | [`blocked_moves`] | the rule that reverted each reverted move |
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! The frames of a moving picture.
+//! The frames of an animation.
 
 use pogema_core::Error;
 use tiny_skia::Pixmap;
@@ -6,25 +6,25 @@ use tiny_skia::Pixmap;
 use crate::raster::Painter;
 use crate::scene::Scene;
 
-/// Most frames of a moving picture, those between two steps included.
+/// Maximum number of frames of an animation, including those between two steps.
 pub const MOST_FRAMES: usize = 20_000;
-/// Most pixels of each of its frames.
+/// Maximum number of pixels of a frame of an animation.
 pub const MOST_PIXELS: usize = 1 << 23;
 
 /// A scene cut into evenly spaced frames.
 pub(crate) struct Motion<'a> {
     painter: Painter<'a>,
-    /// How many frames a step takes.
+    /// Number of frames per step.
     per_step: usize,
     num_frames: usize,
 }
 
 impl<'a> Motion<'a> {
     /// # Errors
-    /// If there would be too many frames, or too many pixels to a frame.
+    /// If the animation would have too many frames, or a frame too many pixels.
     pub fn new(scene: &'a Scene<'a>, width: u32, rate: f64, multiple: u32) -> Result<Self, Error> {
         let per_step = (rate * scene.style.step_time).round().max(1.0) as usize;
-        // The first and the last state are held for a step, as in POGEMA's animations.
+        // The first and the last state are shown for one more step, as in POGEMA's animations.
         let num_frames = (scene.states.len() + 1).saturating_mul(per_step);
         if num_frames > MOST_FRAMES {
             let expected = format!("at most {MOST_FRAMES}: draw fewer steps or more steps a second");
@@ -37,12 +37,12 @@ impl<'a> Motion<'a> {
         self.num_frames
     }
 
-    /// How many frames of a second.
+    /// Returns the frame rate. Units: `step_time` in seconds; frames per second.
     pub fn rate(&self, step_time: f64) -> f64 {
         self.per_step as f64 / step_time
     }
 
-    /// Width and height. Units: pixels.
+    /// Returns the width and height. Units: pixels.
     pub fn size(&self) -> [u32; 2] {
         self.painter.size()
     }

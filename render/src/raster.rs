@@ -1,4 +1,4 @@
-//! Pictures of pixels, and the frames of moving ones.
+//! PNG pictures, and the frames of animations.
 
 use pogema_core::{Error, Trace};
 use tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
@@ -7,15 +7,15 @@ use crate::ground::Ground;
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 
-/// Most pixels of a picture. A pixel takes four bytes.
+/// Maximum number of pixels of a picture. A pixel takes four bytes.
 pub const MOST_PIXELS: usize = 1 << 26;
 
-/// Draws one frame as PNG, on white; the first one if the style names none.
+/// Draws the style's static frame as PNG on a white background [default: frame 0].
 ///
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// As for [`crate::svg::draw`], and if the picture had no pixels or more than [`MOST_PIXELS`].
+/// Those of [`crate::svg::draw`], and if the picture would have no pixels or more than [`MOST_PIXELS`].
 pub fn png(trace: &Trace, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: style.static_frame.or(Some(0)), ..style.clone() };
     let scene = Scene::new(trace, &style)?;
@@ -23,8 +23,9 @@ pub fn png(trace: &Trace, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     canvas.encode_png().map_err(|error| Error::external("PNG", error))
 }
 
-/// The width of a picture whose longer side is about `longer`: cells are whole pixels where they can be, so that
-/// all look the same.
+/// Returns the width of a picture whose longer side is about `longer`.
+///
+/// If cells are at least one pixel wide, their width is a whole number of pixels, so that all cells look the same.
 ///
 /// Units: pixels.
 pub fn width_for(trace: &Trace, style: &Style, longer: u32) -> u32 {
@@ -35,19 +36,19 @@ pub fn width_for(trace: &Trace, style: &Style, longer: u32) -> u32 {
     (width as f64 * cell).ceil() as u32
 }
 
-/// Draws the frames of a scene and what is between them; what never changes is drawn but once.
+/// Draws the frames of a scene and intermediate frames; draws the parts that never change only once.
 pub(crate) struct Painter<'a> {
     scene: &'a Scene<'a>,
     transform: Transform,
     background: Pixmap,
-    /// The obstacles that are seen later, each with the frame and its shape.
+    /// The obstacles that become seen after the first frame: that frame and the shape.
     fading: Vec<(usize, Path)>,
     agents: Vec<usize>,
     goals: Vec<usize>,
 }
 
 impl<'a> Painter<'a> {
-    /// A painter of pictures of so many pixels; both sides become multiples of `step`.
+    /// Returns a painter for pictures of at most `most` pixels; rounds both sides up to multiples of `step`.
     pub fn new(scene: &'a Scene<'a>, width: u32, most: usize, step: u32) -> Result<Self, Error> {
         let [left, top, cols, rows] = scene.view_box();
         let scale = f64::from(width) / f64::from(cols);
@@ -77,12 +78,12 @@ impl<'a> Painter<'a> {
         Ok(painter)
     }
 
-    /// Width and height. Units: pixels.
+    /// Returns the width and height. Units: pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.background.width(), self.background.height()]
     }
 
-    /// The picture at a time; whole numbers are frames.
+    /// Draws the picture at a time. Units: frames.
     pub fn paint(&self, time: f64) -> Pixmap {
         let mut canvas = self.background.clone();
         let obstacle = self.scene.style.colors.obstacle;
@@ -104,7 +105,7 @@ impl<'a> Painter<'a> {
         canvas
     }
 
-    /// White, lines, and the obstacles that look the same at every frame.
+    /// Draws the white background, the lines and the obstacles that never change.
     fn paint_background(&mut self) {
         let [red, green, blue] = Color::WHITE.0;
         self.background.fill(tiny_skia::Color::from_rgba8(red, green, blue, u8::MAX));
@@ -137,7 +138,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Where something is between two frames, as (col, row), and how strong; none if it is hidden.
+    /// Returns the (col, row) and the opacity of an agent or goal at a time; none if it is hidden.
     fn place(
         &self,
         agent: usize,
@@ -155,7 +156,7 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// The lines between the cells and around them, half a cell longer at both ends.
+/// Returns the lines between and around the cells, half a cell longer at both ends.
 fn lines(scene: &Scene<'_>) -> Option<Path> {
     let [left, top, width, height] = scene.view_box();
     let mut path = PathBuilder::new();
@@ -176,9 +177,9 @@ fn obstacle(row: i32, col: i32) -> Option<Path> {
     rounded_square(col as f32 - half, row as f32 - half, 2.0 * half, size::CORNER as f32)
 }
 
-/// A square with round corners, begun at the left of its upper edge and drawn clockwise, as SVG begins its own.
+/// Returns a square with round corners. The path starts at the left of the upper edge and goes clockwise, as in SVG.
 fn rounded_square(left: f32, top: f32, side: f32, corner: f32) -> Option<Path> {
-    /// How far the handles of a curve reach that is nearly a quarter of a circle.
+    /// Length of the handles of a Bézier curve that approximates a quarter of the unit circle.
     const HANDLE: f32 = 0.552_285;
     let square = Rect::from_xywh(left, top, side, side)?;
     let (right, bottom) = (square.right(), square.bottom());

@@ -1,4 +1,4 @@
-//! What is to be seen of an episode at each frame, whatever it is drawn with.
+//! The visible parts of an episode at each frame, for every output format.
 
 use std::ops::Range;
 
@@ -8,10 +8,10 @@ use crate::check::{check, check_agent};
 use crate::ground::Ground;
 use crate::style::{Color, Style};
 
-/// How strongly things are drawn that the agent whose view it is does not see.
+/// Opacity of agents and obstacles that the viewing agent does not see.
 pub const SHADED: f64 = 0.2;
 
-/// Sizes in cells, as facts of POGEMA's pictures.
+/// Sizes in POGEMA's pictures. Units: cells.
 ///
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
 pub mod size {
@@ -25,9 +25,9 @@ pub mod size {
     pub const CORNER: f64 = 0.15;
     /// Length of the dashes around the window, and of the gaps between them.
     pub const DASH: f64 = 0.25;
-    /// How far the window's frame is from the centres of the outermost cells seen.
+    /// Distance of the window's frame from the centres of the outermost cells in the window.
     pub const WINDOW: f64 = 0.45;
-    /// How far the picture reaches beyond the outermost cells' centres.
+    /// Distance of the picture's edge from the centres of the outermost cells.
     pub const MARGIN: f64 = 1.0;
 }
 
@@ -39,27 +39,27 @@ pub struct Look {
     pub opacity: f64,
 }
 
-/// Obstacles that are first seen at the same time.
+/// Obstacles that become seen at the same frame.
 pub struct Obstacles {
-    /// The frame at which the agent whose view it is first sees them.
+    /// The frame at which the viewing agent first sees them; none for never.
     pub seen: Option<usize>,
-    /// Each as (row, col), row by row.
+    /// The obstacles as (row, col), row by row.
     pub cells: Vec<(i32, i32)>,
 }
 
-/// A style applied to an episode; both are known to fit.
+/// An episode with a style that was checked to fit it.
 pub struct Scene<'a> {
     pub trace: &'a Trace,
     pub style: &'a Style,
     /// The states that are drawn.
     pub states: Vec<&'a Snapshot>,
-    /// The states up to the first that is drawn, which is among them: what the agent has seen by then.
+    /// The states up to and including the first drawn state, which determine what the viewing agent has seen by then.
     before: Vec<&'a Snapshot>,
 }
 
 impl<'a> Scene<'a> {
     /// # Errors
-    /// If the style names an agent or frame that there is not, or an agent is not on the map.
+    /// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
     pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {
         check(trace)?;
         if style.colors.agents.is_empty() {
@@ -82,13 +82,13 @@ impl<'a> Scene<'a> {
         Ok(Self { trace, style, states: vec![state], before })
     }
 
-    /// The ground, and the rows and columns of it that are drawn.
+    /// Returns the ground and its drawn rows and columns.
     fn ground(&self) -> (Ground<'a>, Range<i32>, Range<i32>) {
         let ground = Ground::of(self.trace);
         (ground, ground.rows(self.style.border), ground.cols(self.style.border))
     }
 
-    /// The left, upper edge of the picture and its width and height. Units: cells, from the centre of (0, 0).
+    /// Returns the left edge, upper edge, width and height of the picture. Units: cells, from the centre of (0, 0).
     pub fn view_box(&self) -> [i32; 4] {
         let (_, rows, cols) = self.ground();
         let margin = size::MARGIN as i32;
@@ -100,8 +100,8 @@ impl<'a> Scene<'a> {
         ]
     }
 
-    /// All obstacles, grouped by when they are first seen; those never seen come last. Without a view all are
-    /// seen at once.
+    /// Returns all obstacles, grouped by the frame at which they are first seen; those never seen come last. Without a
+    /// viewing agent all are seen at frame 0.
     pub fn obstacles(&self) -> Vec<Obstacles> {
         let (ground, rows, cols) = self.ground();
         let num_cols = cols.len();
@@ -120,7 +120,7 @@ impl<'a> Scene<'a> {
         groups.filter(|group| !group.cells.is_empty()).collect()
     }
 
-    /// The frame at which each cell is first seen, row by row; `usize::MAX` for never.
+    /// Returns the frame at which the viewing agent first sees each cell, row by row; `usize::MAX` for never.
     fn first_seen(&self) -> Option<Vec<usize>> {
         let agent = self.style.egocentric?;
         let (ground, rows, cols) = self.ground();
@@ -146,22 +146,22 @@ impl<'a> Scene<'a> {
         Some(first)
     }
 
-    /// The agents that take part at one of the frames.
+    /// Returns the agents that are active at any of the frames.
     pub fn agents(&self) -> Vec<usize> {
         if !self.style.show_agents {
             return Vec::new();
         }
-        let takes_part = |&agent: &usize| self.states.iter().any(|state| state.active[agent]);
-        (0..self.trace.start.state.cells.len()).filter(takes_part).collect()
+        let is_active = |&agent: &usize| self.states.iter().any(|state| state.active[agent]);
+        (0..self.trace.start.state.cells.len()).filter(is_active).collect()
     }
 
-    /// The agents whose goals are drawn: in an agent's view its own alone.
+    /// Returns the agents whose goals are drawn: in an agent's view only that agent.
     pub fn goals(&self) -> Vec<usize> {
         let is_drawn = |agent: &usize| self.style.egocentric.is_none_or(|own| own == *agent);
         self.agents().into_iter().filter(is_drawn).collect()
     }
 
-    /// An agent at a frame.
+    /// Returns the look of an agent at a frame.
     pub fn agent(&self, agent: usize, frame: usize) -> Look {
         let state = self.states[frame];
         let (cell, ground) = (state.cells[agent], Ground::of(self.trace));
@@ -170,18 +170,18 @@ impl<'a> Scene<'a> {
         Look { cell, is_visible: state.active[agent], opacity }
     }
 
-    /// The goal of an agent at a frame.
+    /// Returns the look of an agent's goal at a frame.
     pub fn goal(&self, agent: usize, frame: usize) -> Look {
         let state = self.states[frame];
         Look { cell: state.goals[agent], is_visible: state.active[agent], opacity: 1.0 }
     }
 
-    /// The agent whose window is drawn.
+    /// Returns the agent whose window is drawn.
     pub fn window(&self) -> Option<usize> {
         self.style.egocentric.filter(|_| self.style.show_agents)
     }
 
-    /// The colour of an agent and its goal.
+    /// Returns the colour of an agent and its goal.
     pub fn color(&self, agent: usize) -> Color {
         let colors = &self.style.colors;
         match self.style.egocentric {
@@ -192,7 +192,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// With goals that end an agent's part, its view ends with it.
+/// Returns the number of frames of an agent's view, which ends when the agent finishes.
 fn num_frames_of(config: &Config, agent: usize, states: &[&Snapshot]) -> usize {
     let end = states.iter().position(|state| !state.active[agent]);
     match end {

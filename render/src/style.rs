@@ -1,4 +1,4 @@
-//! How an episode is drawn.
+//! The appearance of drawn episodes.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,10 +12,10 @@ use crate::ground::Border;
 pub struct Color(pub [u8; 3]);
 
 impl Color {
-    /// What raster pictures are drawn on.
+    /// The background of raster pictures.
     pub const WHITE: Self = Self([255; 3]);
 
-    /// The colour of a number such as `0xc1433c`.
+    /// Returns the colour of a number such as `0xc1433c`.
     fn of_rgb(number: u32) -> Self {
         let [_, rgb @ ..] = number.to_be_bytes();
         Self(rgb)
@@ -37,7 +37,7 @@ impl FromStr for Color {
         let number = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok());
         number.filter(|_| !text.contains('+')).map(Self::of_rgb).ok_or_else(|| {
             let found = shorten(text, Error::LONGEST_QUOTE);
-            Error::request(format!("colour is `{found}`, expected one such as `#c1433c`"))
+            Error::request(format!("colour is `{found}`, expected a colour such as `#c1433c`"))
         })
     }
 }
@@ -47,11 +47,11 @@ impl FromStr for Color {
 pub struct Colors {
     /// Obstacles and lines.
     pub obstacle: Color,
-    /// The agents by index, in turn.
+    /// Agents and goals, by agent index; the list repeats.
     pub agents: Vec<Color>,
-    /// In an agent's view, that agent, its goal and its window.
+    /// The viewing agent of an egocentric picture, its goal and its window.
     pub own: Color,
-    /// In an agent's view, all other agents.
+    /// All other agents of an egocentric picture.
     pub others: Color,
 }
 
@@ -72,20 +72,20 @@ impl Default for Colors {
     }
 }
 
-/// How an episode is drawn, in SVG, PNG, GIF and video alike.
+/// The appearance of an episode in SVG, PNG, GIF and video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
-    /// Draw this frame alone, standing still; 0 is the state after the reset.
+    /// Draw only this frame, without animation; 0 is the state after the reset.
     pub static_frame: Option<usize>,
-    /// Draw what this agent sees and has seen; all else is shaded.
+    /// Draw the view of this agent; shade the agents it does not see and the obstacles it has not seen.
     pub egocentric: Option<usize>,
     /// Whether agents and goals are drawn.
     pub show_agents: bool,
     /// Whether lines are drawn between the cells.
     pub show_lines: bool,
-    /// How much of the border is drawn.
+    /// The part of the border that is drawn.
     pub border: Border,
-    /// How long a step takes. Units: seconds.
+    /// Duration of a step. Units: seconds.
     pub step_time: f64,
     /// The colours.
     pub colors: Colors,

@@ -1,4 +1,4 @@
-//! Videos, made by the program `ffmpeg`.
+//! Videos, encoded by the program `ffmpeg`.
 
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -11,16 +11,16 @@ use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::Style;
 
-/// Frames of a second; more if a step is shorter than that.
+/// Frame rate; higher if a step is shorter than a frame. Units: frames per second.
 const RATE: f64 = 30.0;
-/// So much of what ffmpeg says at its end is passed on. Units: characters.
+/// Maximum length of a quoted error message of ffmpeg. Units: characters.
 const LONGEST_REASON: usize = 200;
 
-const MISSING: &str = "videos need the program `ffmpeg`, which is not on the PATH: install it, for example by \
+const MISSING: &str = "videos need the program `ffmpeg`, which is not on the PATH: install it, for example with \
                        `apt install ffmpeg` or `brew install ffmpeg`, or draw a GIF";
 
 words! {
-    /// What a video is packed in, by the ending of its file.
+    /// The container format of a video, named after its file extension.
     pub enum VideoFormat {
         /// H.264 in MP4.
         Mp4 = "mp4",
@@ -30,17 +30,19 @@ words! {
 }
 
 impl VideoFormat {
-    /// The format that a file's name ends in.
+    /// Returns the format for a file's extension.
     ///
     /// # Errors
-    /// [`Error::Io`] for any other ending than `.mp4` and `.webm`.
+    /// [`Error::Io`] for any extension other than `.mp4` and `.webm`.
     pub fn of(path: &Path) -> Result<Self, Error> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let format = ending.and_then(|ending| Self::of_word(&ending));
-        format.ok_or_else(|| Error::io(path, "the name of a video ends in `.mp4` or `.webm`"))
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        let format = extension.and_then(|extension| Self::of_word(&extension));
+        format.ok_or_else(|| {
+            Error::io(path, "unknown video format, expected a name ending in `.mp4` or `.webm`")
+        })
     }
 
-    /// How ffmpeg encodes it.
+    /// Returns the encoding arguments of ffmpeg.
     fn arguments(self) -> &'static str {
         match self {
             Self::Mp4 => "-c:v libx264 -crf 18 -pix_fmt yuv420p -movflags +faststart",
@@ -49,14 +51,14 @@ impl VideoFormat {
     }
 }
 
-/// Draws an episode as a video; the file appears once it is whole.
+/// Draws an episode as a video; the file appears when it is complete.
 ///
-/// `progress` is told after each frame how many are done, and how many there are.
+/// `progress` is called after each frame with the number of frames done and the number of all frames.
 ///
-/// Units: `width` in pixels, made even.
+/// Units: `width` in pixels, rounded up to an even number.
 ///
 /// # Errors
-/// As for [`crate::gif::encode`], and [`Error::Io`] if ffmpeg is missing or fails.
+/// Those of [`crate::gif::encode`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`] if it fails.
 pub fn write(
     trace: &Trace,
     style: &Style,
@@ -70,12 +72,12 @@ pub fn write(
     let motion = Motion::new(&scene, width, RATE, 2)?;
     let failed = |error: std::io::Error| Error::io(path, error);
     let unfinished = temporary_beside(path, &format!(".{format}"))?.into_temp_path();
-    let mut said = tempfile::tempfile().map_err(failed)?;
-    let mut ffmpeg = start(&motion, style.step_time, format, &unfinished, said.try_clone().map_err(failed)?)?;
+    let mut log = tempfile::tempfile().map_err(failed)?;
+    let mut ffmpeg = start(&motion, style.step_time, format, &unfinished, log.try_clone().map_err(failed)?)?;
     let fed = feed(&mut ffmpeg, &motion, progress);
     let status = ffmpeg.wait().map_err(failed)?;
     if !status.success() {
-        return Err(Error::io(path, format!("ffmpeg failed ({status}): {}", last_words(&mut said))));
+        return Err(Error::io(path, format!("ffmpeg failed ({status}): {}", last_line(&mut log))));
     }
     fed.map_err(failed)?;
     if std::fs::metadata(&unfinished).map_err(failed)?.len() == 0 {
@@ -84,7 +86,7 @@ pub fn write(
     unfinished.persist(path).map_err(|error| failed(error.error))
 }
 
-/// Passes if there is an ffmpeg to make videos.
+/// Checks that ffmpeg is installed and starts.
 ///
 /// # Errors
 /// [`Error::Request`] if it is missing, [`Error::Io`] if it cannot be started.
@@ -107,7 +109,7 @@ fn start(
     step_time: f64,
     format: VideoFormat,
     file: &Path,
-    said: std::fs::File,
+    log: std::fs::File,
 ) -> Result<Child, Error> {
     let [width, height] = motion.size();
     let mut command = Command::new("ffmpeg");
@@ -115,11 +117,11 @@ fn start(
     command.args(["-video_size", &format!("{width}x{height}")]);
     command.args(["-framerate", &format!("{:.4}", motion.rate(step_time)), "-i", "-", "-an"]);
     command.args(format.arguments().split(' ')).arg(file);
-    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(said);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(log);
     command.spawn().map_err(not_started)
 }
 
-/// Hands over all frames. If ffmpeg ends early, its exit status tells why.
+/// Writes all frames to ffmpeg. If ffmpeg ends early, its exit status and log hold the reason.
 fn feed(
     ffmpeg: &mut Child,
     motion: &Motion<'_>,
@@ -133,14 +135,14 @@ fn feed(
     Ok(())
 }
 
-/// The last line that is not empty.
-fn last_words(said: &mut std::fs::File) -> String {
+/// Returns the last line of ffmpeg's log that is not empty.
+fn last_line(log: &mut std::fs::File) -> String {
     let mut text = Vec::new();
-    let read = said.seek(SeekFrom::Start(0)).and_then(|_| said.read_to_end(&mut text));
+    let read = log.seek(SeekFrom::Start(0)).and_then(|_| log.read_to_end(&mut text));
     let text = String::from_utf8_lossy(&text);
     let last = text.lines().rfind(|line| !line.trim().is_empty());
     match (read, last) {
         (Ok(_), Some(line)) => shorten(line.trim(), LONGEST_REASON),
-        _ => "it did not say why".to_owned(),
+        _ => "no error message".to_owned(),
     }
 }

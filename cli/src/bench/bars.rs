@@ -1,17 +1,17 @@
-//! What the engine has to reach, each as a ratio of two figures of one run.
+//! Speed targets of the engine, most as a ratio of two figures of one run.
 
 use serde::Serialize;
 
 use super::Row;
 
-/// A bar and where this run stands.
+/// A speed target, and the value that this run reached.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bar {
     pub name: String,
     pub want: f64,
     /// Absent if a figure was not measured.
     pub got: Option<f64>,
-    /// Whether less is better.
+    /// Whether `want` is an upper bound.
     pub is_limit: bool,
 }
 
@@ -21,7 +21,7 @@ impl Bar {
     }
 }
 
-/// All bars.
+/// Returns all speed targets.
 pub fn bars(rows: &[Row]) -> Vec<Bar> {
     let times = |row: &Row| Some(row.speed.step_f32 / row.pogema?.observations);
     let crowd = |row: &Row| is_paper(row) && row.work.num_agents >= 32;
@@ -94,9 +94,13 @@ fn find(rows: &[Row], num_agents: usize, size: usize, threads: usize) -> Option<
     })
 }
 
-/// The smallest figure of some rows, if all of them have it.
-fn worst(rows: &[Row], is_meant: impl Fn(&Row) -> bool, figure: impl Fn(&Row) -> Option<f64>) -> Option<f64> {
-    let figures: Option<Vec<f64>> = rows.iter().filter(|row| is_meant(row)).map(figure).collect();
+/// Returns the smallest figure of the selected rows, if all of them have one.
+fn worst(
+    rows: &[Row],
+    is_selected: impl Fn(&Row) -> bool,
+    figure: impl Fn(&Row) -> Option<f64>,
+) -> Option<f64> {
+    let figures: Option<Vec<f64>> = rows.iter().filter(|row| is_selected(row)).map(figure).collect();
     figures?.into_iter().reduce(f64::min)
 }
 

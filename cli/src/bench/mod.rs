@@ -1,4 +1,4 @@
-//! `pogema bench`: how fast this machine steps and observes, beside the filling of memory and POGEMA.
+//! `pogema bench`: measures steps, observations and resets per second, against filling memory and against POGEMA.
 
 mod bars;
 mod show;
@@ -16,26 +16,26 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::output::{check_writable, progress_bar, say, write_json};
+use crate::output::{check_writable, print_line, progress_bar, write_json};
 
 use bars::{Bar, bars};
 use work::{Speed, Work};
 
 #[derive(Args, Debug)]
 pub struct Bench {
-    /// Time POGEMA 1.4.0 in the same run too; needs Python 3.11
+    /// Also time POGEMA 1.4.0 in the same run; requires Python 3.11
     #[arg(long)]
     peers: bool,
-    /// Where POGEMA 1.4.0 is installed if need be
+    /// Folder in which POGEMA 1.4.0 is installed if it is missing
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
     oracle_folder: PathBuf,
-    /// Only the rows whose names contain this
+    /// Measure only the rows whose names contain this text [default: all rows]
     #[arg(long, value_name = "TEXT", default_value = "")]
     rows: String,
-    /// Time for each figure, in seconds
+    /// Time per figure, in seconds
     #[arg(long, value_name = "S", default_value_t = 0.1)]
     seconds: f64,
-    /// How often everything is measured, the best counting: more on a machine that has other work
+    /// Number of measurements of everything, of which the best counts; use more on a busy machine
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     rounds: u64,
     /// Write all figures to this file as JSON
@@ -60,7 +60,7 @@ impl Row {
         Ok(Self { name: work.name(), speed: work.measure(budget)?, work: work.clone(), pogema })
     }
 
-    /// Takes over whatever is better in another measurement of the same work.
+    /// Takes the better figures from another measurement of the same work.
     fn improve(&mut self, other: &Self) {
         self.speed.improve(&other.speed);
         if let (Some(own), Some(other)) = (&mut self.pogema, other.pogema) {
@@ -70,14 +70,14 @@ impl Row {
     }
 }
 
-/// What POGEMA did in a second.
+/// POGEMA's observations and resets per second.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Peer {
     observations: f64,
     resets: f64,
 }
 
-/// Everything that was measured.
+/// All measurements of a run.
 #[derive(Debug, Serialize)]
 struct Report {
     machine: String,
@@ -86,8 +86,8 @@ struct Report {
     bars: Vec<Bar>,
 }
 
-/// On more agents POGEMA takes minutes for a reset.
-const MOST_AGENTS_OF_POGEMA: usize = 10_000;
+/// The largest number of agents for which POGEMA is timed; with more, its resets take minutes.
+const MAX_POGEMA_AGENTS: usize = 10_000;
 
 impl Bench {
     pub fn run(&self) -> Result<(), Error> {
@@ -115,12 +115,12 @@ impl Bench {
         bar.finish_and_clear();
         let path = pogema_fast::SimdPath::from_environment()?.to_string();
         let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
-        say(&show::tell(&report.machine, &report.path, &report.rows, &report.bars))?;
+        print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))?;
         self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))
     }
 }
 
-/// The paper's table, crowds on large maps, and batches.
+/// Returns the work to measure: the paper's table, many agents on large maps, and batches.
 fn works() -> Vec<Work> {
     let single = |num_agents, size, lifelong| Work { lanes: None, threads: 1, num_agents, size, lifelong };
     let mut works = Vec::new();
@@ -141,13 +141,12 @@ fn works() -> Vec<Work> {
 }
 
 fn has_peer(work: &Work) -> bool {
-    work.lanes.is_none() && work.num_agents <= MOST_AGENTS_OF_POGEMA && work.size <= 256
+    work.lanes.is_none() && work.num_agents <= MAX_POGEMA_AGENTS && work.size <= 256
 }
 
 fn time_pogema(python: &Path, work: &Work) -> Result<Peer, Error> {
     const SCRIPT: &str = include_str!("pogema_speed.py");
-    let failed =
-        |error: &dyn std::fmt::Display| Error::io(python, format!("POGEMA cannot be timed: {error}"));
+    let failed = |error: &dyn std::fmt::Display| Error::io(python, format!("cannot time POGEMA: {error}"));
     let mut child = Command::new(python)
         .args(["-c", SCRIPT])
         .stdin(Stdio::piped())

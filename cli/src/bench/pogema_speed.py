@@ -1,6 +1,6 @@
-"""Times POGEMA 1.4.0: a JSON list of configs on stdin, for each one line with observations and resets per second.
+"""Times POGEMA 1.4.0: reads a JSON list of configs from stdin, prints observations and resets per second of each.
 
-Actions are drawn beforehand, so that only steps are timed; of several stretches the fastest counts.
+Actions are sampled beforehand, so that only steps are timed; the fastest of several stretches counts.
 """
 
 import json
@@ -16,7 +16,7 @@ ACTIONS = 64
 
 
 def fastest(work, seconds=SECONDS):
-    """Calls of `work` per second."""
+    """Return the calls of `work` per second, in the fastest stretch."""
     best = 0.0
     for _ in range(STRETCHES):
         calls, start = 0, time.perf_counter()
@@ -28,7 +28,7 @@ def fastest(work, seconds=SECONDS):
 
 
 def measure(config):
-    """Observations and resets per second."""
+    """Return the observations and resets per second of a config."""
     env = pogema_v0(GridConfig(**config))
     env.reset()
     generator = np.random.default_rng(0)

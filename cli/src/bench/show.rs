@@ -1,4 +1,4 @@
-//! The tables of a run.
+//! Formats the results of `pogema bench` as tables.
 
 use comfy_table::Table;
 
@@ -6,13 +6,13 @@ use crate::output::markdown_table;
 
 use super::{Bar, Row};
 
-/// The tables, as Markdown.
-pub fn tell(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
+/// Returns the table of speeds and the table of targets as Markdown.
+pub fn tables(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
     let speeds = speeds(rows);
     let bars = bar_table(bars);
     format!(
         "{machine}; observations by the {path} path; windows of 11 x 11, density 0.3, random actions\n\n\
-         Millions per second: agent steps, observations, both; observations if they were only zeros\n\n{speeds}\n\n\
+         Millions per second: agent steps, observations, both; buffers filled with zeros\n\n{speeds}\n\n\
          {bars}"
     )
 }
@@ -46,7 +46,7 @@ fn speeds(rows: &[Row]) -> Table {
 }
 
 fn bar_table(bars: &[Bar]) -> Table {
-    let mut table = markdown_table("bar | wanted | measured | met");
+    let mut table = markdown_table("target | required | measured | met");
     for bar in bars {
         let sign = if bar.is_limit { "at most" } else { "at least" };
         let met = match bar.is_met() {

@@ -1,4 +1,4 @@
-//! Timing.
+//! Measures calls per second.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-/// Of so many stretches of time the fastest counts, since whatever else the machine does only ever slows it down.
+/// The number of time stretches, of which the fastest counts: other load on the machine can only slow a stretch down.
 const STRETCHES: u32 = 5;
 
-/// Calls of some work per second.
+/// Returns the calls of `work` per second, in the fastest stretch.
 pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
     work();
     let stretch = budget / STRETCHES;
@@ -27,14 +27,14 @@ pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
                 best = best.max(f64::from(num_calls) / spent.as_secs_f64());
                 break;
             }
-            // Looking at the clock must cost nothing beside the work.
+            // Batches grow, so that reading the clock takes negligible time.
             batch = (2 * batch).min(1 + num_calls / 4);
         }
     }
     best
 }
 
-/// Times the filling of a buffer with zeros, the least that writing observations can cost; calls per second.
+/// Returns how many times per second a buffer can be filled with zeros, an upper bound for writing observations.
 pub fn fills_per_second<T>(budget: Duration, pool: Option<&ThreadPool>, out: &mut [T]) -> f64
 where
     T: Copy + Default + Send,

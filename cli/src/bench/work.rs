@@ -1,4 +1,4 @@
-//! What is measured: single environments and batches.
+//! The work to measure: single environments and batches.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,44 +14,44 @@ use serde_json::{Value, json};
 
 use super::timing::{calls_per_second, fills_per_second};
 
-/// Steps whose actions are drawn beforehand.
+/// The number of steps whose actions are sampled beforehand.
 const NUM_ACTION_LISTS: usize = 16;
 
-/// One line of the table.
+/// The work of one row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// Environments; a batch if there is a number.
+    /// Number of environments in the batch; `None` for a single environment.
     pub lanes: Option<usize>,
     pub threads: usize,
     pub num_agents: usize,
     pub size: usize,
-    /// Whether agents get new goals.
+    /// Whether agents get a new goal after each one they reach.
     pub lifelong: bool,
 }
 
-/// What came out, each per second.
+/// Measured speeds, each per second, and the memory of the engine.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Speed {
     /// Agent steps.
     pub step: f64,
-    /// Observations, nothing else.
+    /// Observations without steps.
     pub f32: f64,
     pub u8: f64,
     pub bits: f64,
-    /// Agent steps, each with its observation.
+    /// Agent steps with observations.
     pub step_f32: f64,
     pub step_u8: f64,
-    /// Observations, if they were nothing but zeros.
+    /// Observation buffers filled with zeros.
     pub fill_f32: f64,
     pub fill_u8: f64,
-    /// Seeded resets: generation, placement and the engine's own.
+    /// Seeded resets: generation and placement of an instance, and the reset of the engine.
     pub reset: f64,
-    /// Of the engine, beside buffers. Units: bytes.
+    /// Memory of the engine, without observation buffers. Units: bytes.
     pub bytes: usize,
 }
 
 impl Speed {
-    /// Takes over whatever is better in another measurement of the same work.
+    /// Takes the better figures from another measurement of the same work.
     pub fn improve(&mut self, other: &Self) {
         let Self { step, f32, u8, bits, step_f32, step_u8, fill_f32, fill_u8, reset, bytes: _ } = self;
         for (own, other) in [
@@ -71,7 +71,7 @@ impl Speed {
 }
 
 impl Work {
-    /// The config in POGEMA's words: the paper's, with a random policy under way.
+    /// Returns the config of the paper, with POGEMA's field names.
     pub fn config(&self) -> Value {
         json!({
             "num_agents": self.num_agents, "size": self.size, "density": 0.3, "obs_radius": 5, "seed": 0,
@@ -157,7 +157,7 @@ impl Work {
         Ok(Speed { reset, bytes, ..self.rates(budget, lanes, pool.as_deref(), act)? })
     }
 
-    /// Times steps and observations, which `act` makes; its flag says whether it steps before it observes.
+    /// Times steps and observations; `act` makes them, and its flag says whether it steps before it observes.
     fn rates(
         &self,
         budget: Duration,
@@ -201,10 +201,10 @@ impl Work {
     }
 }
 
-/// For observations as `f32`, `u8` and bits.
+/// Buffers for observations as `f32`, `u8` and bits.
 type Buffers = (Vec<f32>, Vec<u8>, Vec<u64>);
 
-/// Times work that all agents have part in.
+/// Times work that is done for all agents.
 struct Rate {
     budget: Duration,
     num_agents: usize,

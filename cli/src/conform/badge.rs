@@ -1,4 +1,4 @@
-//! The verdict as a small picture for a README.
+//! The verdict as an SVG badge for a README.
 
 use pogema_conformance::port::PortReport;
 use pogema_core::Error;
@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::summary::{Verdict, fill, name_of, score};
 
-/// The badge of a port, as SVG.
+/// Returns the badge of a port as SVG.
 pub fn badge(report: &PortReport) -> Result<String, Error> {
     let score = score(report);
     let (word, colour) = match score.verdict() {
@@ -18,7 +18,7 @@ pub fn badge(report: &PortReport) -> Result<String, Error> {
     };
     let (label, message) = ("POGEMA 1.4.0", format!("{word} {}/{} rules", score.passed, score.claimed));
     let (left, right) = (width(label), width(&message));
-    let holes = json!({
+    let values = json!({
         "label": label,
         "message": message,
         "port": name_of(report),
@@ -26,11 +26,11 @@ pub fn badge(report: &PortReport) -> Result<String, Error> {
         "left": left,
         "right": right,
     });
-    fill(include_str!("badge.svg"), holes)
+    fill(include_str!("badge.svg"), values)
 }
 
-/// The room that a text needs, with some around it. Units: pixels.
+/// Returns the width of a text with padding. Units: pixels.
 fn width(text: &str) -> usize {
-    // Of the fonts that the badge asks for, Verdana is the widest: 11 pixels high, it takes 7 for a letter.
+    // Verdana is the widest of the badge's fonts: at a font size of 11 pixels, a letter is about 7 pixels wide.
     7 * text.chars().count() + 10
 }

@@ -1,4 +1,4 @@
-//! Drawings of states: obstacles dark, agents as discs, goals as squares, with the letters of the text pictures.
+//! SVG drawings of states: dark obstacles, agents as discs, goals as squares, with the letters of the text pictures.
 
 use std::fmt::Write as _;
 
@@ -6,13 +6,13 @@ use pogema_conformance::panel::{Grid, Sign};
 
 /// Side of a cell. Units: pixels.
 const CELL: usize = 24;
-/// On more cells in a line nothing can be made out.
-const MOST_CELLS: usize = 64;
+/// The longest side of a drawing; on larger ones no cell is recognisable. Units: cells.
+const MAX_CELLS: usize = 64;
 
-/// Draws a picture, in which cells stand out that are not as in `other`. Pictures that are too large are not drawn.
+/// Draws a grid and highlights the cells that differ from `other`; returns `None` if the grid is too large.
 pub fn drawing(title: &str, grid: &Grid, other: &Grid) -> Option<String> {
     let (height, width) = (grid.len(), grid.first()?.len());
-    if height.max(width) > MOST_CELLS {
+    if height.max(width) > MAX_CELLS {
         return None;
     }
     let [right, bottom] = [width, height].map(|cells| cells * CELL);
@@ -64,7 +64,7 @@ fn cell(x: usize, y: usize, sign: Sign, differs: bool) -> String {
     shapes
 }
 
-/// An agent and its goal share a colour; agents that follow each other have colours far apart.
+/// Returns the colour of an agent and its goal; agents with consecutive letters get very different hues.
 fn colour(letter: char) -> String {
     const GOLDEN_ANGLE: usize = 137;
     let hue = letter.to_ascii_lowercase() as usize * GOLDEN_ANGLE % 360;
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn goals_with_digits_for_letters_are_squares() {
+    fn goals_with_digits_are_drawn_as_squares() {
         let grid = vec![vec![Sign::Agent(26), Sign::Goal(26), Sign::Goal(99)]];
         let svg = drawing("got", &grid, &Grid::new()).unwrap_or_default();
         let shapes = ["<circle", "class=\"goal\"", ">0</text>", ">?</text>", "differs"];

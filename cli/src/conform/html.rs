@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing else.
+//! The report as a self-contained HTML page.
 
 use pogema_conformance::panel::{Content, Grid, Limits, Moment, Panel, text_of_panels};
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
@@ -13,12 +13,12 @@ use super::summary::{
     title, verdict,
 };
 
-/// A page can be scrolled, but should open on a phone.
+/// Limits of text pictures: a page can be scrolled, but has to open on a phone.
 const LIMITS: Limits = Limits { rows: 64, columns: 128 };
-/// A longer case is better read in its file. Units: characters.
+/// Maximum length of a case in the page; longer ones are shortened. Units: characters.
 const LONGEST_CASE: usize = 20_000;
 
-/// The report as a page.
+/// Returns the report as an HTML page.
 pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error> {
     let names = names(reports);
     let unclaimed = |what: &str| {
@@ -54,7 +54,7 @@ fn port(report: &PortReport, name: &str) -> Value {
     })
 }
 
-/// A rule with each outcome of each port.
+/// Returns a row of the table of rules: one cell per port and outcome.
 fn row(reports: &[PortReport], rule: &str) -> Value {
     let cells = |report: &PortReport| {
         let is_known = standing(report, rule) == Standing::Known;
@@ -86,8 +86,8 @@ fn shown(cause: &Cause, port: &str) -> Value {
 
 fn difference(example: &Example, port: &str) -> Option<Value> {
     let found = example.divergence.as_ref()?;
-    let case =
-        text_of(example, port).unwrap_or_else(|error| format!("# it cannot be written as YAML: {error}"));
+    let case = text_of(example, port)
+        .unwrap_or_else(|error| format!("# the case cannot be written as YAML: {error}"));
     Some(json!({
         "op": found.op,
         "field": found.field.to_string(),
@@ -99,15 +99,15 @@ fn difference(example: &Example, port: &str) -> Option<Value> {
     }))
 }
 
-/// The states before, as expected and as they came, as far as they can be drawn.
+/// Draws the state before the operation, the expected one and the one that the port sent, as far as possible.
 fn drawings(example: &Example, panels: &[Panel], op: usize) -> Vec<Value> {
     let played = play(&example.request);
     let Some(map) = played.map_at(op) else { return Vec::new() };
     let expected = played.records.get(op).and_then(Record::state);
     let grid = |state: Option<&Snapshot>| state.map_or(Grid::new(), |state| agents_grid(&map, state));
     let [before, expected] = [played.state_before(op), expected].map(grid);
-    let came = |panel: &&Panel| (panel.moment, panel.content) == (Moment::Got, Content::State);
-    let got = panels.iter().find(came).and_then(|panel| panel.grids.first().cloned()).unwrap_or_default();
+    let is_got = |panel: &&Panel| (panel.moment, panel.content) == (Moment::Got, Content::State);
+    let got = panels.iter().find(is_got).and_then(|panel| panel.grids.first().cloned()).unwrap_or_default();
     let drawn = [("before", &before, &Grid::new()), ("expected", &expected, &got), ("got", &got, &expected)];
     let drawn = drawn.into_iter();
     drawn

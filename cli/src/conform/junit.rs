@@ -4,10 +4,10 @@ use pogema_conformance::port::{Cause, PortReport};
 use quick_junit::{NonSuccessKind, Property, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::known::Leftover;
-use super::port_table::tell_cause;
+use super::port_table::cause_text;
 use super::summary::{Standing, causes_of, names, score, standing, times, title, verdict, why_unclaimed};
 
-/// The report as JUnit XML: a suite for each port, a test case for each rule.
+/// Returns the report as JUnit XML: a suite for each port, a test case for each rule.
 pub fn xml(reports: &[PortReport], leftover: &Leftover) -> Result<String, SerializeError> {
     let mut junit = Report::new("pogema conform");
     for (report, name) in reports.iter().zip(names(reports)) {
@@ -29,15 +29,15 @@ fn suite(report: &PortReport, name: &str) -> TestSuite {
         let mut case = TestCase::new(rule.as_str(), status(report, rule, standing, &causes));
         case.set_classname(name);
         if standing == Standing::Known {
-            case.set_system_out(told(&causes));
+            case.set_system_out(causes_text(&causes));
         }
         suite.add_test_case(case);
     }
     if score(report).is_cut_short {
-        // The run fails for this even if each fault is known.
+        // The run fails for this reason even if all faults are known.
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-        status.set_type("misbehaviour").set_message(format!("{} cases were not asked", report.num_not_run));
-        let mut case = TestCase::new("(not asked)", status);
+        status.set_type("misbehaviour").set_message(format!("{} cases were not run", report.num_not_run));
+        let mut case = TestCase::new("(not run)", status);
         case.set_classname(name);
         suite.add_test_case(case);
     }
@@ -48,7 +48,7 @@ fn status(report: &PortReport, rule: &str, standing: Standing, causes: &[&Cause]
     let not_passed = |kind, ty: &str| {
         let mut status = TestCaseStatus::non_success(kind);
         let new: Vec<&Cause> = causes.iter().copied().filter(|cause| cause.known.is_none()).collect();
-        status.set_type(ty).set_message(in_a_line(&new)).set_description(told(causes));
+        status.set_type(ty).set_message(in_one_line(&new)).set_description(causes_text(causes));
         status
     };
     let mut skipped = TestCaseStatus::skipped();
@@ -56,8 +56,8 @@ fn status(report: &PortReport, rule: &str, standing: Standing, causes: &[&Cause]
         Standing::Passed | Standing::Blank => TestCaseStatus::success(),
         Standing::Failed => not_passed(NonSuccessKind::Failure, "divergence"),
         Standing::Error => not_passed(NonSuccessKind::Error, "misbehaviour"),
-        // Skipped, not passed: dashboards count what is skipped and show its message, but leave out what a test that
-        // passed has to say; and the rule does not hold.
+        // Skipped, not passed: the rule does not hold, and dashboards count skipped tests and show their message, but
+        // not the output of passed tests.
         Standing::Known => {
             let reasons: Vec<&str> = causes.iter().filter_map(|cause| cause.known.as_deref()).collect();
             skipped.set_type("known").set_message(format!("known {}", reasons.join("; known ")));
@@ -70,7 +70,7 @@ fn status(report: &PortReport, rule: &str, standing: Standing, causes: &[&Cause]
     }
 }
 
-fn in_a_line(causes: &[&Cause]) -> String {
+fn in_one_line(causes: &[&Cause]) -> String {
     let line = |cause: &&Cause| match &cause.rule {
         Some(rule) => format!("{rule}: {} differs, {}", cause.what, times(cause)),
         None => format!("{}, {}", cause.what, times(cause)),
@@ -78,11 +78,11 @@ fn in_a_line(causes: &[&Cause]) -> String {
     causes.iter().map(line).collect::<Vec<_>>().join("; ")
 }
 
-fn told(causes: &[&Cause]) -> String {
-    causes.iter().map(|cause| tell_cause(cause)).collect::<Vec<_>>().join("\n")
+fn causes_text(causes: &[&Cause]) -> String {
+    causes.iter().map(|cause| cause_text(cause)).collect::<Vec<_>>().join("\n")
 }
 
-/// What is known and stopped occurring fails the run, and must be seen to do so.
+/// Returns a suite with the known deviations that stopped occurring: they fail the run, so dashboards must show them.
 fn stopped(leftover: &Leftover) -> TestSuite {
     let mut suite = TestSuite::new("known deviations");
     for deviation in &leftover.stopped {

@@ -1,4 +1,4 @@
-//! Deviations that somebody knows of and bears for now: which they are, and which of them still occur.
+//! Known deviations: reads them from a file, marks the causes they explain, and finds those that no longer occur.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,10 +12,10 @@ use serde_json::Value;
 
 use super::summary::name_of;
 
-/// What stands in the place of a rule for what breaks the protocol.
+/// The rule of deviations that break the protocol.
 const PROTOCOL: &str = "protocol";
 
-/// The known deviations of a file.
+/// The known deviations listed in a file.
 #[derive(Debug, Default)]
 pub struct Known {
     deviations: Vec<Deviation>,
@@ -25,38 +25,38 @@ pub struct Known {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "fields and values such as `rule: collide/soft`")]
 struct Deviation {
-    /// None for the protocol.
+    /// The rule; `None` for the protocol.
     #[serde(default)]
     rule: Option<String>,
     what: String,
     #[serde(deserialize_with = "text")]
     since: String,
     reason: String,
-    /// The port that deviates; any, if none is named.
+    /// The name of the port; `None` for all ports.
     #[serde(default)]
     port: Option<String>,
 }
 
-/// A number too as a text, to be refused as no date.
+/// Reads any value as text, so that a number is rejected as a date and not for its type.
 fn text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let value = Value::deserialize(deserializer)?;
     Ok(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
 }
 
-/// Deviations that a run did not show, in words.
+/// The titles of known deviations that did not occur in a run.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Leftover {
-    /// Their rules were played.
+    /// Deviations whose rules were played.
     pub stopped: Vec<String>,
-    /// Nothing can be said of them.
+    /// Deviations that the run could not have shown.
     pub not_played: Vec<String>,
 }
 
 impl Known {
-    /// Reads a file.
+    /// Reads a list of known deviations.
     ///
     /// # Errors
-    /// [`Error::Io`] with the entry that is wrong.
+    /// [`Error::Io`] with the number of the first invalid entry.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let failed = |reason: String| {
             let line = reason.lines().next().unwrap_or("unreadable");
@@ -74,30 +74,30 @@ impl Known {
             let failed = |reason: String| failed(format!("entry {}: {reason}", index + 1));
             let deviation = Deviation::new(entry, &rules).map_err(failed)?;
             if let Some(at) = deviations.iter().position(|earlier| earlier.key() == deviation.key()) {
-                return Err(failed(format!("says the same as entry {}", at + 1)));
+                return Err(failed(format!("duplicates entry {}", at + 1)));
             }
             deviations.push(deviation);
         }
         Ok(Self { deviations })
     }
 
-    /// Marks the causes that are known.
+    /// Marks known causes with date and reason.
     pub fn mark(&self, reports: &mut [PortReport]) {
         for report in reports {
             let port = name_of(report).to_owned();
             for cause in &mut report.causes {
                 let deviation =
-                    self.deviations.iter().find(|known| known.is_of(&port) && known.explains(cause));
+                    self.deviations.iter().find(|known| known.applies_to(&port) && known.explains(cause));
                 cause.known = deviation.map(|known| format!("since {}: {}", known.since, known.reason));
             }
         }
     }
 
-    /// The deviations that did not occur.
+    /// Returns the deviations that did not occur.
     pub fn leftover(&self, reports: &[PortReport], plan: &Plan) -> Leftover {
         let mut leftover = Leftover::default();
         for known in &self.deviations {
-            let mut ports = reports.iter().filter(|report| known.is_of(name_of(report)));
+            let mut ports = reports.iter().filter(|report| known.applies_to(name_of(report)));
             if ports.clone().any(|report| report.causes.iter().any(|cause| known.explains(cause))) {
                 continue;
             }
@@ -108,7 +108,7 @@ impl Known {
     }
 }
 
-/// The rules that there are: each has a case.
+/// Returns all rules; each rule has a case.
 fn rules() -> Result<BTreeSet<String>, Error> {
     let paths = golden::files(&cases::folder(), ".yaml")?;
     paths.iter().map(|path| cases::read(path).map(|case| case.rule)).collect()
@@ -121,15 +121,15 @@ impl Deviation {
         if let Some(rule) = deviation.rule.as_ref().filter(|rule| !rules.contains(*rule)) {
             let likeness = |known: &&String| (strsim::jaro_winkler(known, rule) * 1e6) as u64;
             let nearest = rules.iter().max_by_key(likeness).map_or(PROTOCOL, String::as_str);
-            return Err(format!("unknown rule `{rule}`, the nearest known one is `{nearest}`"));
+            return Err(format!("unknown rule `{rule}`; did you mean `{nearest}`?"));
         }
-        // One way to write a date, so that lists can be sorted and searched by it.
+        // Only one date format is accepted, so that lists can be sorted and searched by date.
         let is_date = deviation.since.parse::<Date>().is_ok_and(|date| date.to_string() == deviation.since);
         if !is_date {
             return Err(format!("`since` is `{}`, expected a date such as 2026-11-22", deviation.since));
         }
         for (name, text) in [("what", &mut deviation.what), ("reason", &mut deviation.reason)] {
-            // A line each, however it was folded.
+            // Folded texts become one line.
             *text = text.split_whitespace().collect::<Vec<_>>().join(" ");
             if text.is_empty() {
                 return Err(format!("`{name}` is empty"));
@@ -142,7 +142,7 @@ impl Deviation {
         (&self.rule, &self.what, &self.port)
     }
 
-    fn is_of(&self, port: &str) -> bool {
+    fn applies_to(&self, port: &str) -> bool {
         self.port.as_ref().is_none_or(|name| name == port)
     }
 
@@ -150,14 +150,14 @@ impl Deviation {
         (&self.rule, &self.what) == (&cause.rule, &cause.what)
     }
 
-    /// Whether the deviation would have shown itself if it were still there: not in single cases, nor in a run that
-    /// was cut short, nor where its rule was left out or is not claimed.
+    /// Returns whether the run would have shown the deviation if it still existed. It would not if only single cases or
+    /// parts were played, if the run was cut short, or if the rule was left out or is not claimed.
     fn was_played(&self, report: &PortReport, plan: &Plan) -> bool {
         let is_whole = plan.files.is_empty() && plan.parts.is_empty() && report.num_not_run == 0;
         is_whole
             && match &self.rule {
                 Some(rule) => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),
-                // Any question may break the protocol, so that none may be left out.
+                // Any request may break the protocol, so no rule may be left out.
                 None => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
             }
     }

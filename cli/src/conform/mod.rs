@@ -1,4 +1,4 @@
-//! `pogema conform`: every engine against everything there is to check.
+//! `pogema conform`: checks every engine against recordings, cases and random episodes.
 
 mod badge;
 mod grid_svg;
@@ -19,29 +19,29 @@ use indicatif::ProgressBar;
 use pogema_conformance::{NamedEngine, Report, cases, find_oracle_python, golden};
 use pogema_core::Error;
 
-use crate::output::{check_writable, lined_table, progress_bar, say, write_json};
+use crate::output::{check_writable, lined_table, print_line, progress_bar, write_json};
 
-/// How many divergences are told in full.
-const MOST_TOLD: usize = 5;
+/// The number of divergences that are printed in full.
+const MAX_SHOWN_FAILURES: usize = 5;
 
 #[derive(Args, Debug)]
 pub struct Conform {
-    /// How many cases to draw
+    /// Number of randomly drawn cases
     #[arg(long, value_name = "N", default_value_t = 1000)]
     cases: u64,
     /// Seed of the drawn cases
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// Compare the drawn cases with POGEMA 1.4.0 itself too; needs Python 3.11
+    /// Also compare the drawn cases with POGEMA 1.4.0 itself; requires Python 3.11
     #[arg(long)]
     oracle: bool,
-    /// Where POGEMA 1.4.0 is installed if need be
+    /// Folder in which POGEMA 1.4.0 is installed if it is missing
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
     oracle_folder: PathBuf,
-    /// Write the whole report to this file as JSON
+    /// Write the full report to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Where cases that diverge are kept
+    /// Folder for cases that diverge
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
     #[command(flatten)]
@@ -52,12 +52,12 @@ pub struct Conform {
 const FAST: NamedEngine =
     NamedEngine { name: "fast", make: |config| Ok(Box::new(pogema_fast::Engine::new(config)?)) };
 
-/// Our own engines.
+/// The engines of this project.
 pub const ENGINES: [NamedEngine; 3] = [NamedEngine::REFERENCE, FAST, NamedEngine::LITERAL];
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
-        if self.ports.is_asked() {
+        if self.ports.is_requested() {
             let bar = self.bar("cases");
             let shared = ports::Shared {
                 cases: self.cases,
@@ -89,7 +89,7 @@ impl Conform {
         if let Some(path) = &self.json {
             write_json(path, &report)?;
         }
-        say(&tell(&report))?;
+        print_line(&report_text(&report))?;
         Ok(if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
@@ -98,8 +98,8 @@ impl Conform {
     }
 }
 
-/// The report as tables and words.
-fn tell(report: &Report) -> String {
+/// Formats the report: tables, the first divergences, and the verdict.
+fn report_text(report: &Report) -> String {
     let mut parts = lined_table(&["part", "checked", "failed"]);
     for part in &report.parts {
         parts.add_row([part.name.clone(), part.checked.to_string(), part.failed.to_string()]);
@@ -108,12 +108,12 @@ fn tell(report: &Report) -> String {
     for (rule, count) in &report.tally.rules {
         rules.add_row([rule.clone(), count.checked.to_string(), count.diverged.to_string()]);
     }
-    let mut events = lined_table(&["what happened", "times"]);
+    let mut events = lined_table(&["event", "count"]);
     for (name, count) in report.events.named() {
         events.add_row([name.to_owned(), count.to_string()]);
     }
     let mut text = format!("{rules}\n\n{events}\n\n{parts}\n\n");
-    for fault in report.failures.iter().take(MOST_TOLD) {
+    for fault in report.failures.iter().take(MAX_SHOWN_FAILURES) {
         let _ = writeln!(text, "{}: {}\n{}", fault.part, fault.name, fault.text);
         if let Some(kept) = &fault.kept {
             let _ = writeln!(text, "kept as {}\n", kept.display());

@@ -1,4 +1,4 @@
-//! The forms in which a report on ports is written to files, and what they leave out as known.
+//! The output files of a run on ports, and the list of known deviations.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,30 +17,30 @@ pub struct Outputs {
     /// Write the report to this file as JUnit XML: a suite for each port, a test case for each rule
     #[arg(long, value_name = "FILE", requires = "commands")]
     junit: Option<PathBuf>,
-    /// Write the report to this file as a page that needs no other file
+    /// Write the report to this file as a self-contained HTML page
     #[arg(long, value_name = "FILE", requires = "commands")]
     html: Option<PathBuf>,
-    /// Write the verdict to this file as a small SVG picture; for one port
+    /// Write the verdict to this file as an SVG badge; requires exactly one port
     #[arg(long, value_name = "FILE", requires = "commands")]
     badge: Option<PathBuf>,
-    /// Bear the deviations that this file lists
+    /// Accept the known deviations listed in this file
     ///
-    /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`, with
-    /// `port: name` for one port alone. `rule` and `what` are those of the report's line `FAIL collide/soft: cell
-    /// differs`; for a line `ERROR what` the rule is `protocol`. Causes so listed are reported apart and do not
-    /// change the exit status. An entry that no port shows any more makes it 1, so that the list does not outlive
-    /// its reasons: but only if its rule was compared in this run, thus never under `--case` or `--part`, nor where `--rules` or
-    /// `--profile` or the port's claims leave the rule out, nor where a port broke the protocol too often to be
-    /// asked everything; entries of the rule `protocol` only under neither `--rules` nor `--profile`.
+    /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`; add
+    /// `port: name` to limit an entry to one port. Copy `rule` and `what` from the line `FAIL collide/soft: cell
+    /// differs` of the report; for a line `ERROR what` the rule is `protocol`. Listed causes are reported separately
+    /// and do not change the exit status. If no port shows an entry any longer, the exit status is 1, so that the list
+    /// stays up to date. This applies only if the run compared the rule of the entry: never with `--case` or `--part`,
+    /// nor if `--rules`, `--profile` or the port's claims leave the rule out, nor if a port broke the protocol so
+    /// often that the run was cut short. For the rule `protocol`, it applies only without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }
 
 impl Outputs {
-    /// Passes if everything can be written in the end; gives what is known.
+    /// Checks that all files can be written, and reads the known deviations.
     ///
     /// # Errors
-    /// With the first file or combination that cannot be.
+    /// For the first file that cannot be written or read, and for `--badge` with several ports.
     pub fn check(&self, num_ports: usize, json: Option<&Path>) -> Result<Known, Error> {
         if self.badge.is_some() && num_ports != 1 {
             return Err(Error::request("`--badge` needs exactly one port"));
@@ -48,10 +48,10 @@ impl Outputs {
         let mut taken = BTreeSet::new();
         for path in self.paths().chain(json) {
             check_writable(path)?;
-            // `x` and `./x` are one file.
+            // `x` and `./x` are the same file.
             let place = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
             if !taken.insert(place) {
-                return Err(Error::io(path, "is to hold two reports"));
+                return Err(Error::io(path, "two reports would be written to this file"));
             }
         }
         self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)
@@ -61,10 +61,10 @@ impl Outputs {
         [&self.junit, &self.html, &self.badge].into_iter().flatten().map(PathBuf::as_path)
     }
 
-    /// Writes what is asked for.
+    /// Writes the requested reports.
     ///
     /// # Errors
-    /// With the first file that cannot be written.
+    /// For the first file that cannot be written.
     pub fn write(&self, reports: &[PortReport], leftover: &Leftover) -> Result<(), Error> {
         write(self.junit.as_deref(), || junit::xml(reports, leftover))?;
         write(self.html.as_deref(), || html::page(reports, leftover))?;

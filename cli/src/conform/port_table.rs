@@ -1,4 +1,4 @@
-//! What a run shows of ports, for the terminal.
+//! The report on ports as text for the terminal.
 
 use std::fmt::Write as _;
 
@@ -9,13 +9,13 @@ use super::known::Leftover;
 use super::summary::{self, OUTCOMES, counts, names, printable, shortened, times, title, verdict};
 use crate::output::lined_table;
 
-/// What to do about a known deviation that is gone.
+/// The note on a known deviation that no longer occurs.
 const STOPPED: &str = "it stopped occurring and can be removed from the list";
-/// So much of a picture fits on a screen.
+/// Limits of text pictures, so that they fit on a screen.
 const LIMITS: Limits = Limits { rows: 12, columns: 120 };
 
-/// The reports as tables and words: what can be laid side by side, then each port by itself.
-pub fn tell(reports: &[PortReport], leftover: &Leftover) -> String {
+/// Formats the reports: tables that compare all ports, then the causes and the verdict of each port.
+pub fn report_text(reports: &[PortReport], leftover: &Leftover) -> String {
     let mut text = String::new();
     if let [report] = reports {
         let _ = writeln!(text, "{}\n", title(report));
@@ -27,7 +27,7 @@ pub fn tell(reports: &[PortReport], leftover: &Leftover) -> String {
         if reports.len() > 1 {
             let _ = writeln!(text, "=== {name}: {}\n", title(report));
         }
-        text.push_str(&tell_port(report));
+        text.push_str(&port_text(report));
     }
     let stopped = leftover.stopped.iter().map(|known| format!("STOPPED {known}\n  {STOPPED}\n"));
     let not_played = leftover.not_played.iter().map(|known| format!("not played: {known}\n"));
@@ -35,7 +35,7 @@ pub fn tell(reports: &[PortReport], leftover: &Leftover) -> String {
     printable(text.trim_end())
 }
 
-/// Columns for each port; of several ports, only those that hold something.
+/// Returns the table of rules with columns for each port; with several ports, without empty columns.
 fn rules(reports: &[PortReport]) -> String {
     let rows = summary::rows(reports);
     let holds = |report: &PortReport, at: usize| rows.iter().any(|rule| !counts(report, rule)[at].is_empty());
@@ -80,29 +80,29 @@ fn unclaimed(reports: &[PortReport]) -> String {
     table.to_string()
 }
 
-fn tell_port(report: &PortReport) -> String {
+fn port_text(report: &PortReport) -> String {
     let mut text = String::new();
     let (known, new): (Vec<&Cause>, Vec<&Cause>) =
         report.causes.iter().partition(|cause| cause.known.is_some());
     for cause in new {
-        let _ = writeln!(text, "{}", tell_cause(cause));
+        let _ = writeln!(text, "{}", cause_text(cause));
     }
     for cause in known {
         let (rule, reason) =
             (cause.rule.as_deref().unwrap_or("protocol"), cause.known.as_deref().unwrap_or_default());
         let _ = writeln!(text, "KNOWN {rule}: {}, {}\n  {reason}", cause.what, times(cause));
-        text.push_str(&tell_replay(cause));
+        text.push_str(&replay_text(cause));
         text.push('\n');
     }
     if report.num_not_run > 0 {
-        let _ = writeln!(text, "{} cases were not asked\n", report.num_not_run);
+        let _ = writeln!(text, "{} cases were not run\n", report.num_not_run);
     }
     let _ = writeln!(text, "{}\n", verdict(report));
     text
 }
 
-/// One cause, with its smallest occasion.
-pub fn tell_cause(cause: &Cause) -> String {
+/// Formats a cause with its smallest example.
+pub fn cause_text(cause: &Cause) -> String {
     let mut text = match &cause.rule {
         Some(rule) => format!("FAIL {rule}: {} differs, {}\n", cause.what, times(cause)),
         None => format!("ERROR {}, {}\n", cause.what, times(cause)),
@@ -124,9 +124,9 @@ pub fn tell_cause(cause: &Cause) -> String {
     if let Some(fault) = &cause.example.fault {
         let _ = writeln!(text, "  {fault}");
     }
-    text + &tell_replay(cause)
+    text + &replay_text(cause)
 }
 
-fn tell_replay(cause: &Cause) -> String {
+fn replay_text(cause: &Cause) -> String {
     cause.replay.as_ref().map_or(String::new(), |replay| format!("  play it again: {replay}\n"))
 }

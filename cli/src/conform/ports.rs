@@ -1,4 +1,4 @@
-//! `pogema conform --port`: anyone's implementation against everything it claims.
+//! `pogema conform --port`: checks ports against everything they claim.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -16,37 +16,37 @@ use super::known::Leftover;
 use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, score};
-use crate::output::{check_writable, say, write_json};
+use crate::output::{check_writable, print_line, write_json};
 use crate::words::word;
 
-/// The exit status for a port that breaks the protocol.
-const MISBEHAVED: u8 = 3;
+/// The exit status if a port breaks the protocol.
+const MISBEHAVES: u8 = 3;
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Ports")]
 pub struct Ports {
-    /// Check the port that this command line starts, instead of our own engines; may be given several times
+    /// Check the port that this command line starts, instead of the built-in engines; may be given several times
     #[arg(long = "port", value_name = "COMMAND")]
     commands: Vec<String>,
-    /// Check only rules that match, such as `collide/soft*`
+    /// Check only the rules that match a pattern, such as `collide/soft*` [default: all rules]
     #[arg(long, value_name = "PATTERN", requires = "commands", value_parser = glob::Pattern::new)]
     rules: Option<glob::Pattern>,
-    /// Check only this profile; may be given several times
+    /// Check only this profile; may be given several times [default: all profiles that the port claims]
     #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = word::<Profile>())]
     profiles: Vec<Profile>,
-    /// Play only this part; may be given several times
+    /// Play only this part; may be given several times [default: all parts]
     #[arg(long = "part", value_name = "PART", requires = "commands", value_parser = word::<Part>())]
     parts: Vec<Part>,
-    /// Seconds that a port may take for one answer
+    /// Time limit for one answer of a port, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     timeout: f64,
-    /// Play only this case; may be given several times
+    /// Play only the case in this file; may be given several times
     #[arg(long = "case", value_name = "FILE", requires = "commands")]
     files: Vec<PathBuf>,
-    /// How many cases are played side by side, each in a process of its own; one for each processor by default
+    /// Number of cases played in parallel, each in its own process [default: the number of processors]
     #[arg(long, value_name = "N", requires = "commands", value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: Option<u16>,
-    /// Check traces that a port wrote itself, in place of asking a port
+    /// Check traces that a port wrote, instead of running a port
     #[arg(long = "trace", value_name = "FILE", num_args = 1.., conflicts_with = "commands")]
     traces: Vec<PathBuf>,
     #[command(flatten)]
@@ -58,7 +58,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "expected seconds, 0.001 to 86400".to_owned())
 }
 
-/// What the port run shares with the run of our own engines.
+/// The settings that runs on ports share with runs on the built-in engines.
 pub struct Shared<'a> {
     pub cases: u64,
     pub seed: u64,
@@ -68,8 +68,8 @@ pub struct Shared<'a> {
 }
 
 impl Ports {
-    /// Whether ports, or what they wrote, are to be checked.
-    pub fn is_asked(&self) -> bool {
+    /// Returns whether ports or their traces are to be checked.
+    pub fn is_requested(&self) -> bool {
         !self.commands.is_empty() || !self.traces.is_empty()
     }
 
@@ -82,7 +82,7 @@ impl Ports {
         let reports = [check_traces(&self.traces)?];
         let leftover = Leftover::default();
         shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
-        say(&port_table::tell(&reports, &leftover))?;
+        print_line(&port_table::report_text(&reports, &leftover))?;
         Ok(exit_code(&reports, &leftover))
     }
 
@@ -98,10 +98,10 @@ impl Ports {
         let num_causes =
             reports.iter().flat_map(|report| &report.causes).filter(|cause| cause.rule.is_some()).count();
         shared.bar.reset();
-        shared.bar.set_message("counterexamples made smaller");
+        shared.bar.set_message("shrinking counterexamples");
         shared.bar.set_length(num_causes as u64);
         for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
-            // Several ports fail in the same rules, and must not overwrite each other's cases.
+            // Ports that fail the same rules must not overwrite each other's cases.
             let folder = if subjects.len() == 1 {
                 shared.keep.clone()
             } else {
@@ -114,7 +114,7 @@ impl Ports {
         let leftover = known.leftover(&reports, &plan);
         shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
         self.outputs.write(&reports, &leftover)?;
-        say(&port_table::tell(&reports, &leftover))?;
+        print_line(&port_table::report_text(&reports, &leftover))?;
         Ok(exit_code(&reports, &leftover))
     }
 
@@ -140,7 +140,7 @@ fn subject(command: &Command) -> Subject<'_> {
 
 fn exit_code(reports: &[PortReport], leftover: &Leftover) -> ExitCode {
     if reports.iter().any(|report| score(report).verdict() == Verdict::Misbehaves) {
-        ExitCode::from(MISBEHAVED)
+        ExitCode::from(MISBEHAVES)
     } else if reports.iter().any(PortReport::diverges) || !leftover.stopped.is_empty() {
         ExitCode::FAILURE
     } else {

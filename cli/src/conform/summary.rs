@@ -1,4 +1,4 @@
-//! What a run shows of each rule and of each port, in the words that all forms of the report share.
+//! Outcomes of rules and ports, and the wording that all output formats share.
 
 use std::collections::BTreeSet;
 
@@ -6,24 +6,24 @@ use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Verdicts, needed
 use pogema_core::{Error, shorten, words};
 use serde_json::Value;
 
-/// How a rule came out for a port, all its cases together.
+/// The outcome of a rule for a port, over all its cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// As the spec says, wherever it was asked.
+    /// All comparisons hold.
     Passed,
-    /// Otherwise, and nobody knew.
+    /// A comparison differs for a cause that is not known.
     Failed,
-    /// Otherwise or without an answer, and all of it known.
+    /// Comparisons differ or answers are missing, and all causes are known.
     Known,
-    /// Without an answer.
+    /// An answer is missing or invalid for a cause that is not known.
     Error,
-    /// Not asked, since the port does not claim it.
+    /// Not played, since the port does not claim the rule.
     NotClaimed,
-    /// Nothing happened, as in the row of the protocol in a good run.
+    /// No outcome, such as in the row of the protocol if the port kept to it.
     Blank,
 }
 
-/// How a rule came out for a port.
+/// Returns the outcome of a rule for a port.
 pub fn standing(report: &PortReport, rule: &str) -> Standing {
     let row = report.rules.get(rule).copied().unwrap_or_default();
     let is_new = |is_fault: bool| {
@@ -40,7 +40,7 @@ pub fn standing(report: &PortReport, rule: &str) -> Standing {
     }
 }
 
-/// What the failures and errors of a rule come from: its own causes, and those that its cases show.
+/// Returns the causes of the failures and errors of a rule: its own, and those of other rules that its cases show.
 pub fn causes_of<'a>(report: &'a PortReport, rule: &'a str) -> impl Iterator<Item = &'a Cause> {
     report.causes.iter().filter(move |cause| match &cause.rule {
         Some(broken) => broken == rule || cause.cases.contains_key(rule),
@@ -48,38 +48,38 @@ pub fn causes_of<'a>(report: &'a PortReport, rule: &'a str) -> impl Iterator<Ite
     })
 }
 
-/// What is counted of each rule.
+/// The titles of the counts of each rule.
 pub const OUTCOMES: [&str; 4] = ["pass", "fail", "not claimed", "error"];
 
-/// How often each outcome of a rule came, in words: nothing for never.
+/// Formats how often each outcome of a rule occurred; zero is an empty text.
 pub fn counts(report: &PortReport, rule: &str) -> [String; 4] {
     let Verdicts { passed, failed, not_claimed, errors } =
         report.rules.get(rule).copied().unwrap_or_default();
     let is_known = standing(report, rule) == Standing::Known;
-    let told = |count: u64, is_bad: bool| match count {
+    let shown = |count: u64, is_bad: bool| match count {
         0 => String::new(),
         count if is_bad && is_known => format!("{count} known"),
         count => count.to_string(),
     };
-    [told(passed, false), told(failed, true), told(not_claimed, false), told(errors, true)]
+    [shown(passed, false), shown(failed, true), shown(not_claimed, false), shown(errors, true)]
 }
 
-/// Whether a row is about a rule, and not about the protocol.
+/// Returns whether a row is about a rule, and not about the protocol.
 pub fn is_rule(row: &str) -> bool {
     row != PROTOCOL_ROW
 }
 
-/// Every rule that any of the ports was asked for or did not claim.
+/// Returns every rule that was played with any of the ports, or that one of them does not claim.
 pub fn rows(reports: &[PortReport]) -> BTreeSet<&str> {
     reports.iter().flat_map(|report| report.rules.keys()).map(String::as_str).collect()
 }
 
-/// Everything that any of the ports did not claim.
+/// Returns everything that any of the ports does not claim.
 pub fn unclaimed(reports: &[PortReport]) -> BTreeSet<&str> {
     reports.iter().flat_map(|report| report.not_claimed.keys()).map(String::as_str).collect()
 }
 
-/// Why a rule was not asked of a port.
+/// Returns the reason why a rule was not played with a port.
 pub fn why_unclaimed(report: &PortReport, rule: &str) -> String {
     if let Some(unclaimed) = report.hello.as_ref().and_then(|hello| needed_by(hello, rule)) {
         return format!("not claimed: {}", unclaimed.what);
@@ -88,12 +88,12 @@ pub fn why_unclaimed(report: &PortReport, rule: &str) -> String {
     format!("not claimed; the port leaves out {}", all.join(", "))
 }
 
-/// What a port is called: the name that it gave, or its command line if it gave none.
+/// Returns the name that a port gave itself, or its command line if it gave none.
 pub fn name_of(report: &PortReport) -> &str {
     report.hello.as_ref().map_or(&report.command, |hello| &hello.name)
 }
 
-/// What the ports are called, with a number where a name comes again.
+/// Returns the names of the ports; a repeated name gets a number.
 pub fn names(reports: &[PortReport]) -> Vec<String> {
     let earlier =
         |until: usize, name: &str| reports[..until].iter().filter(|report| name_of(report) == name).count();
@@ -104,7 +104,7 @@ pub fn names(reports: &[PortReport]) -> Vec<String> {
     numbered.collect()
 }
 
-/// Who the port is.
+/// Returns name, version and command line of a port.
 pub fn title(report: &PortReport) -> String {
     match &report.hello {
         Some(hello) => format!("{} {} ({})", hello.name, hello.version, report.command),
@@ -112,32 +112,32 @@ pub fn title(report: &PortReport) -> String {
     }
 }
 
-/// How many rules of a port came out how.
+/// Counts of the outcomes and causes of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Score {
-    /// Those that hold.
+    /// Rules that hold.
     pub passed: usize,
-    /// Those that were asked at all.
+    /// Rules that were played.
     pub claimed: usize,
-    /// Causes that are known.
+    /// Known causes.
     pub known: usize,
-    /// Rules broken that nobody knew of.
+    /// Causes that break a rule and are not known.
     pub diverging: usize,
-    /// Faults that nobody knew of.
+    /// Causes that break the protocol and are not known.
     pub misbehaving: usize,
     /// Whether too many faults, known or not, ended the run.
     pub is_cut_short: bool,
 }
 
-/// How many rules of a port came out how.
+/// Counts the outcomes and causes of a port.
 pub fn score(report: &PortReport) -> Score {
     let standings = report.rules.keys().filter(|rule| is_rule(rule)).map(|rule| standing(report, rule));
-    let asked: Vec<Standing> =
+    let played: Vec<Standing> =
         standings.filter(|standing| !matches!(standing, Standing::NotClaimed | Standing::Blank)).collect();
     let count = |pick: fn(&Cause) -> bool| report.causes.iter().filter(|cause| pick(cause)).count();
     Score {
-        passed: asked.iter().filter(|standing| **standing == Standing::Passed).count(),
-        claimed: asked.len(),
+        passed: played.iter().filter(|standing| **standing == Standing::Passed).count(),
+        claimed: played.len(),
         known: count(|cause| cause.known.is_some()),
         diverging: count(|cause| cause.rule.is_some() && cause.known.is_none()),
         misbehaving: count(|cause| cause.rule.is_none() && cause.known.is_none()),
@@ -146,26 +146,26 @@ pub fn score(report: &PortReport) -> Score {
 }
 
 words! {
-    /// What a run says of a port, in short; the style sheet of the page knows the words.
+    /// The verdict on a port; its words are also class names in the style sheet of the page.
     pub enum Verdict {
-        /// It does all that it claims.
+        /// All that the port claims holds.
         Conforms = "conforms",
-        /// It does, but for what is known.
+        /// All that the port claims holds, except for known causes.
         Known = "known",
-        /// It breaks a rule.
+        /// The port breaks a rule.
         Diverges = "diverges",
-        /// It breaks the protocol, and perhaps rules.
+        /// The port breaks the protocol, and possibly rules.
         Misbehaves = "misbehaves",
-        /// It claims nothing that was asked.
+        /// Nothing that the port claims was played.
         Unchecked = "nothing",
     }
 }
 
 impl Score {
-    /// What it comes to.
+    /// Returns the verdict that follows from the counts.
     pub fn verdict(self) -> Verdict {
         match self {
-            // What is known of a port does not excuse the cases that it was not asked for that reason.
+            // Known faults do not excuse the cases that were not run because of them.
             Self { misbehaving: 1.., .. } | Self { is_cut_short: true, .. } => Verdict::Misbehaves,
             Self { diverging: 1.., .. } => Verdict::Diverges,
             Self { claimed: 0, .. } => Verdict::Unchecked,
@@ -175,54 +175,54 @@ impl Score {
     }
 }
 
-/// One line that says it all.
+/// Returns the verdict on a port in one line.
 pub fn verdict(report: &PortReport) -> String {
     let score = score(report);
     let Score { known, diverging, misbehaving, .. } = score;
     let played = format!("{} cases, {} steps", report.num_played, report.num_steps);
     let causes = |number: usize| format!("{number} cause{}", if number == 1 { "" } else { "s" });
-    let but = if known == 0 { String::new() } else { format!(", but for {known} known") };
+    let exception = if known == 0 { String::new() } else { format!(", except for {known} known") };
     match (diverging, misbehaving) {
         (0, 0) if score.is_cut_short => {
-            format!("misbehaves as is known, too often to be asked everything: {played}")
+            format!("misbehaves only in known ways, but too often to finish the run: {played}")
         }
         (0, 0) if score.verdict() == Verdict::Unchecked => format!("nothing was checked: {played}"),
-        (0, 0) => format!("conforms to all it claims{but}: {played}"),
+        (0, 0) => format!("conforms to all it claims{exception}: {played}"),
         (1.., 0) => format!("diverges: {} in {played}", causes(diverging)),
         (0, _) => format!("misbehaves: {} in {played}", causes(misbehaving)),
         (..) => format!("diverges and misbehaves: {} in {played}", causes(diverging + misbehaving)),
     }
 }
 
-/// How often something was seen.
+/// Formats how often a cause occurred.
 pub fn times(cause: &Cause) -> String {
     if cause.times == 1 { "once".into() } else { format!("{} times", cause.times) }
 }
 
-/// A rule's place in the published spec.
+/// Returns the address of a rule in the published spec.
 pub fn spec_url(rule: &str) -> Option<String> {
     let (owner, repository) =
         env!("CARGO_PKG_REPOSITORY").strip_prefix("https://github.com/")?.split_once('/')?;
     let chapter = rule.split('/').next().filter(|_| is_rule(rule))?;
-    // As mdBook makes an anchor of a heading.
+    // mdBook turns a heading into an anchor this way.
     let letters = rule.chars().filter(|letter| letter.is_alphanumeric() || "-_".contains(*letter));
     let anchor = if rule == chapter { String::new() } else { format!("#{}", letters.collect::<String>()) };
     Some(format!("https://{owner}.github.io/{repository}/spec/{chapter}.html{anchor}"))
 }
 
-/// A long value as far as it helps a reader.
+/// Shortens a long value to a readable length.
 pub fn shortened(text: &str) -> String {
     shorten(text, 200)
 }
 
-/// A text without what only terminals understand, since ports may say anything.
+/// Removes control characters, since ports may send anything.
 pub fn printable(text: &str) -> String {
     text.chars().filter(|letter| !letter.is_control() || "\n\t".contains(*letter)).collect()
 }
 
-/// Fills in a template of HTML or SVG, in which everything is escaped.
-pub fn fill(template: &str, holes: Value) -> Result<String, Error> {
-    Ok(printable(&pogema_render::html::fill(template, holes)?))
+/// Fills in an HTML or SVG template; all values are escaped.
+pub fn fill(template: &str, values: Value) -> Result<String, Error> {
+    Ok(printable(&pogema_render::html::fill(template, values)?))
 }
 
 #[cfg(test)]
@@ -240,7 +240,7 @@ mod tests {
             assert_eq!(spec_url(rule), Some(format!("https://pogema-rs.github.io/pogema-rs/spec/{page}")));
             count += 1;
         }
-        assert!(count > 50, "{count} links were found");
+        assert!(count > 50, "found only {count} links");
         assert_eq!(spec_url(PROTOCOL_ROW), None);
     }
 }

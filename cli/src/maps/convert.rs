@@ -11,22 +11,22 @@ use pogema_maps::formats::{
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
-use super::{Sources, not_one, write_out};
+use super::{Sources, ambiguous_map, write_out};
 use crate::output::check_writable;
 use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Import {
-    /// Maps (.map), archives of maps (.zip), map texts (.txt), sets and configs (.yaml), or folders of those
+    /// MovingAI maps (.map), zip archives (.zip), map texts (.txt), map sets and configs (.yaml), or folders of those
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Whether agents may enter MovingAI's water
     #[arg(long, default_value_t, value_parser = word::<Water>())]
     water: Water,
-    /// Take off the outermost rows and columns of MovingAI maps, as the toolbox does
+    /// Remove the outermost rows and columns of MovingAI maps, as pogema-toolbox does
     #[arg(long)]
     strip_border: bool,
-    /// Write to this file in place of standard output
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -49,53 +49,53 @@ impl Import {
 
 #[derive(Args, Debug)]
 pub struct Export {
-    /// A name, a pattern of names, a file or a folder
+    /// Map to export: a name, a pattern of names, a file or a folder
     map: String,
     #[command(flatten)]
     sources: Sources,
-    /// The format
+    /// Output format
     #[arg(long, value_enum)]
     to: Format,
-    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy`
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// The first agents of the scenario alone
+    /// Export only the first N agents of the scenario [default: all]
     #[arg(long, value_name = "N", requires = "scenario")]
     num_agents: Option<usize>,
-    /// Write to this file in place of standard output
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// A map set
+    /// Map set in YAML
     Set,
-    /// A map text
+    /// Map text
     Text,
-    /// A MovingAI .map file; starts and goals go into `scen`
+    /// MovingAI .map file, without starts and goals; `scen` writes those
     Map,
-    /// A MovingAI .scen file: starts and goals alone
+    /// MovingAI .scen file: starts and goals only
     Scen,
-    /// A config of `pogema run` and POGEMA
+    /// Config for `pogema run` and POGEMA
     Config,
-    /// A zip archive of .map files
+    /// Zip archive of .map files
     Zip,
 }
 
 impl Export {
     pub fn run(&self) -> Result<(), Error> {
-        let mut maps = self.sources.meant_by(&self.map)?;
+        let mut maps = self.sources.resolve(&self.map)?;
         if let Some(path) = &self.scenario {
             let [map] = maps.as_mut_slice() else {
-                return Err(not_one(&self.map, maps.len(), "a scenario is of"));
+                return Err(ambiguous_map(&self.map, maps.len(), "for a scenario"));
             };
             let scenario = read_scenario(path, &map.text.map)?;
             let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
             let scenario = scenario.truncated(num_agents)?;
             if matches!(scenario.goals, Targets::Sequences(_)) && self.to != Format::Config {
                 return Err(Error::request(
-                    "the scenario has sequences of goals, which only `--to config` can hold",
+                    "the scenario has goal sequences, which only `--to config` supports",
                 ));
             }
             if self.to == Format::Config {
@@ -118,20 +118,20 @@ impl Export {
             (Format::Map, [map]) => write_movingai(&map.text.map),
             (Format::Scen, [map]) => write_scen(&tasks(&map.name, &map.text)?)?,
             (Format::Config, [map]) => config(&map.text, None),
-            _ => return Err(not_one(&self.map, maps.len(), "this format holds")),
+            _ => return Err(ambiguous_map(&self.map, maps.len(), "for this format")),
         };
         Ok(written.into_bytes())
     }
 }
 
-/// The tasks of a map with starts and goals.
+/// Converts the starts and goals of a map to tasks of a .scen file.
 fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
     let task = |(agent, (&start, &goal))| {
         let steps = distances_to(&text.map, goal)[text.map.index(start)];
         if steps == u32::MAX {
             return Err(Error::agent(
                 agent,
-                "has no way to its goal, and a .scen file holds the length of one",
+                "has no path to its goal, but a .scen file requires the path length",
             ));
         }
         Ok(Task {
@@ -147,11 +147,11 @@ fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
     text.starts.iter().zip(&text.goals).enumerate().map(task).collect()
 }
 
-/// A config as YAML, the map as people draw it.
+/// Formats a config as YAML, the map drawn row by row.
 fn config(text: &MapText, scenario: Option<&Scenario>) -> String {
     let mut lines = vec!["map: |-".to_owned()];
     let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
-    // Pools always have characters; without starts and goals nothing can be missing.
+    // Without starts and goals no letter can be missing, and pools always have characters.
     let rows = plain.rows().unwrap_or_else(|_| plain.map.rows());
     lines.extend(rows.iter().map(|row| format!("  {row}")));
     let own = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };
@@ -162,7 +162,7 @@ fn config(text: &MapText, scenario: Option<&Scenario>) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A value as JSON, which is YAML, with a blank after each comma.
+/// Formats a value as JSON, which is valid YAML, with a space after each comma.
 fn one_line(value: &Value) -> String {
     match value {
         Value::Array(items) => format!("[{}]", items.iter().map(one_line).collect::<Vec<_>>().join(", ")),
@@ -172,14 +172,14 @@ fn one_line(value: &Value) -> String {
 
 #[derive(Args, Debug)]
 pub struct Tiles {
-    /// A name, a pattern of names, a file or a folder
+    /// Map to cut: a name, a pattern of names, a file or a folder
     map: String,
     #[command(flatten)]
     sources: Sources,
-    /// Side of the tiles
+    /// Side length of the tiles
     #[arg(long, value_name = "N", default_value_t = PUBLISHED_TILE)]
     side: usize,
-    /// Write to this file in place of standard output
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -195,7 +195,7 @@ impl Tiles {
             tiles(&map.name, &map.text.map, self.side)
         };
         let mut all = Vec::new();
-        for map in self.sources.meant_by(&self.map)? {
+        for map in self.sources.resolve(&self.map)? {
             all.extend(cut(map)?);
         }
         write_out(self.out.as_deref().map(Path::new), write_set(&all)?.as_bytes())

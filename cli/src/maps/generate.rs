@@ -1,4 +1,4 @@
-//! `pogema maps generate`.
+//! `pogema maps generate`: generates maps with the generators of the POGEMA paper.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -14,73 +14,86 @@ use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Generate {
-    /// A set of the paper (validation-random, training-random, validation-mazes, training-mazes, warehouse) or a
+    /// Map set of the paper (validation-random, training-random, validation-mazes, training-mazes, warehouse), or
     /// generator (random, mazes, shelves)
     what: String,
-    /// The seeds of `random` and `mazes`, the last one not included
+    /// Range of seeds for `random` and `mazes`; the end is excluded
     #[arg(long, value_name = "A..B", value_parser = seeds, default_value = "0..1")]
     seeds: Range<u64>,
-    /// What the names begin with
+    /// Prefix of the names for `random` and `mazes`, name of the map for `shelves` [default: the generator's name]
     #[arg(long)]
     name: Option<String>,
     #[command(flatten)]
     ranges: Ranges,
     #[command(flatten)]
     shelves: Shelves,
-    /// Write to this file in place of standard output
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// The settings of random maps and mazes, by the toolbox's names.
+/// The settings of random maps and mazes, under the names of pogema-toolbox.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Random maps and mazes")]
 struct Ranges {
+    /// Smallest width [default: 17; mazes: 5]
     #[arg(long, value_name = "N")]
     width_min: Option<i64>,
+    /// Largest width [default: 21; mazes: 9]
     #[arg(long, value_name = "N")]
     width_max: Option<i64>,
+    /// Smallest height [default: 17; mazes: 5]
     #[arg(long, value_name = "N")]
     height_min: Option<i64>,
+    /// Largest height [default: 21; mazes: 9]
     #[arg(long, value_name = "N")]
     height_max: Option<i64>,
+    /// Smallest share of obstacles [default: 0.1; mazes: 0]
     #[arg(long, value_name = "P")]
     obstacle_density_min: Option<f64>,
+    /// Largest share of obstacles [default: 0.3; mazes: 1]
     #[arg(long, value_name = "P")]
     obstacle_density_max: Option<f64>,
-    /// Mazes alone
+    /// Smallest number of wall components, mazes only [default: 1]
     #[arg(long, value_name = "N")]
     wall_components_min: Option<i64>,
-    /// Mazes alone
+    /// Largest number of wall components, mazes only [default: 8]
     #[arg(long, value_name = "N")]
     wall_components_max: Option<i64>,
-    /// Mazes alone
+    /// Smallest weight of extending a wall straight on, mazes only [default: 0.75]
     #[arg(long, value_name = "P")]
     go_straight_min: Option<f64>,
-    /// Mazes alone
+    /// Largest weight of extending a wall straight on, mazes only [default: 0.85]
     #[arg(long, value_name = "P")]
     go_straight_max: Option<f64>,
 }
 
-/// The settings of warehouses, by the toolbox's names.
+/// The settings of warehouses, under the names of pogema-toolbox.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Shelves")]
 struct Shelves {
+    /// Columns of a shelf [default: 5]
     #[arg(long, value_name = "N")]
     wall_width: Option<usize>,
+    /// Rows of a shelf [default: 2]
     #[arg(long, value_name = "N")]
     wall_height: Option<usize>,
+    /// Shelves side by side [default: 5]
     #[arg(long, value_name = "N")]
     walls_in_row: Option<usize>,
+    /// Shelves one below the other [default: 5]
     #[arg(long, value_name = "N")]
     walls_rows: Option<usize>,
+    /// Columns to the left and right of all shelves [default: 5]
     #[arg(long, value_name = "N")]
     bottom_gap: Option<usize>,
+    /// Columns between shelves [default: 1]
     #[arg(long, value_name = "N")]
     horizontal_gap: Option<usize>,
+    /// Rows between, above and below shelves [default: 3]
     #[arg(long, value_name = "N")]
     vertical_gap: Option<usize>,
-    /// Where agents may start and have their goals
+    /// Cells in which agents may start and have their goals
     #[arg(long, default_value_t, value_parser = word::<Bays>())]
     bays: Bays,
 }
@@ -92,7 +105,7 @@ fn seeds(text: &str) -> Result<Range<u64>, String> {
     if seeds.is_empty() { Err(wrong()) } else { Ok(seeds) }
 }
 
-/// The defaults of a type, with the settings whose flags are given.
+/// Creates settings from the flags that are given and the type's defaults.
 macro_rules! given {
     ($flags:expr => $Settings:ident: $($name:ident)+) => {{
         let mut settings = $Settings::default();

@@ -1,4 +1,4 @@
-//! `pogema maps`: maps to look at, to make, to convert and to judge.
+//! `pogema maps`: lists, shows, generates, converts and analyses maps.
 
 mod convert;
 mod generate;
@@ -13,7 +13,7 @@ use pogema_maps::Library;
 use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::NamedMap;
 
-use crate::output::{check_writable, said};
+use crate::output::{check_printed, check_writable};
 
 #[derive(Args, Debug)]
 pub struct Maps {
@@ -23,21 +23,21 @@ pub struct Maps {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// The names of all maps, or of those that a pattern matches
+    /// List all maps, or those whose names match a pattern
     List(show::List),
-    /// A picture of a map
+    /// Draw a map
     Show(show::Show),
-    /// Maps as the paper's generators make them
+    /// Generate maps with the generators of the POGEMA paper
     Generate(Box<generate::Generate>),
-    /// Maps of other formats as a map set
+    /// Convert maps of other formats to a map set
     Import(convert::Import),
-    /// Maps in other formats
+    /// Convert maps to other formats
     Export(convert::Export),
-    /// A large map cut into tiles
+    /// Cut a large map into tiles
     Tiles(convert::Tiles),
-    /// A page to draw maps on, for any browser
+    /// Write an HTML page in which maps can be drawn
     Editor(show::Editor),
-    /// Figures of maps, and of a scenario: who cannot reach their goals, and what cannot be solved
+    /// Show statistics of maps and of a scenario: lower bounds, and proofs that it is unsolvable
     Stats(stats::Stats),
 }
 
@@ -56,36 +56,33 @@ impl Maps {
     }
 }
 
-/// Where further maps are.
+/// Files and folders with additional maps.
 #[derive(Args, Debug, Default)]
 pub struct Sources {
-    /// A map set, a map file, a zip archive, or a folder of those; may be given several times
+    /// Additional maps: a map set, a map file, a zip archive, or a folder of those; may be given several times
     #[arg(long = "maps", value_name = "PATH")]
     paths: Vec<PathBuf>,
 }
 
 impl Sources {
-    /// The files and folders that are named.
+    /// Returns the given files and folders.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
 
-    /// The maps that come with the program and those of the files.
+    /// Returns the built-in maps and those of the files.
     pub fn library(&self) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {
             for name in library.register(read_maps(path, Reading::default())?) {
-                eprintln!(
-                    "warning: {}: a second map named `{name}` takes the place of the first",
-                    path.display()
-                );
+                eprintln!("warning: {}: a second map named `{name}` replaces the first", path.display());
             }
         }
         Ok(library)
     }
 
-    /// The maps that a word means: those of a file or folder, or those whose names match.
-    pub fn meant_by(&self, word: &str) -> Result<Vec<NamedMap>, Error> {
+    /// Returns the maps that a word selects: the one of that name, those of a file or folder, or all whose names match.
+    pub fn resolve(&self, word: &str) -> Result<Vec<NamedMap>, Error> {
         let library = self.library()?;
         if let Ok(text) = library.map(word) {
             return Ok(vec![NamedMap { name: word.into(), text: text.clone() }]);
@@ -99,12 +96,12 @@ impl Sources {
     }
 }
 
-/// An error about a word that means several maps where there has to be one.
-fn not_one(word: &str, found: usize, what: &str) -> Error {
-    Error::request(format!("`{word}` means {found} maps, {what} one"))
+/// Returns an error about a word that does not select exactly one map; `purpose` says what requires one.
+fn ambiguous_map(word: &str, found: usize, purpose: &str) -> Error {
+    Error::request(format!("`{word}` matches {found} maps, expected one {purpose}"))
 }
 
-/// Writes what was asked for, to a file or to standard output.
+/// Writes bytes to a file, or to standard output if there is no path.
 fn write_out(path: Option<&Path>, bytes: &[u8]) -> Result<(), Error> {
     use std::io::Write;
     if let Some(path) = path {
@@ -112,5 +109,5 @@ fn write_out(path: Option<&Path>, bytes: &[u8]) -> Result<(), Error> {
         return pogema_conformance::files::write(path, bytes);
     }
     let mut output = std::io::stdout().lock();
-    said(output.write_all(bytes).and_then(|()| output.flush()))
+    check_printed(output.write_all(bytes).and_then(|()| output.flush()))
 }

@@ -1,4 +1,4 @@
-//! `pogema maps list` and `show`.
+//! `pogema maps list`, `show` and `editor`.
 
 use std::path::PathBuf;
 
@@ -9,12 +9,12 @@ use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
 use pogema_render::{Style, html, raster, svg};
 
-use super::{Sources, not_one, write_out};
-use crate::output::{markdown_table, say};
+use super::{Sources, ambiguous_map, write_out};
+use crate::output::{markdown_table, print_line};
 
 #[derive(Args, Debug)]
 pub struct List {
-    /// A pattern that the names have to match, as the toolbox matches `map_name`
+    /// Pattern that the names have to match, as pogema-toolbox matches `map_name` [default: all maps]
     pattern: Option<String>,
     #[command(flatten)]
     sources: Sources,
@@ -27,8 +27,7 @@ impl List {
             Some(pattern) => library.matching(pattern)?,
             None => library.names().collect(),
         };
-        let mut table =
-            markdown_table("map | rows | columns | free | agents | least cost | what has to be done");
+        let mut table = markdown_table("map | rows | columns | free | agents | least cost | task");
         for name in names {
             let text = library.map(name)?;
             let puzzle = PUZZLES.iter().find(|puzzle| puzzle.name == name);
@@ -43,38 +42,38 @@ impl List {
                 puzzle.map_or_else(String::new, |puzzle| puzzle.says.to_owned()),
             ]);
         }
-        if let Some(says) = table.column_mut(6) {
-            says.set_cell_alignment(CellAlignment::Left);
+        if let Some(task) = table.column_mut(6) {
+            task.set_cell_alignment(CellAlignment::Left);
         }
-        say(&table.to_string())
+        print_line(&table.to_string())
     }
 }
 
 #[derive(Args, Debug)]
 pub struct Show {
-    /// A name, a pattern of names, a file or a folder
+    /// Map to draw: a name, a pattern of names, a file or a folder
     map: String,
     #[command(flatten)]
     sources: Sources,
-    /// Widest picture; a map of more columns is drawn smaller
+    /// Maximum width of the picture in characters; wider maps are scaled down [default: the width of the terminal]
     #[arg(long, value_name = "COLUMNS")]
     width: Option<usize>,
-    /// Write a picture of the map to this file too
+    /// Also write an SVG picture of the map to this file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// The same as PNG
+    /// Also write a PNG picture of the map to this file
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }
 
 impl Show {
     pub fn run(&self) -> Result<(), Error> {
-        let room = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
-        let maps = self.sources.meant_by(&self.map)?;
+        let max_width = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
+        let maps = self.sources.resolve(&self.map)?;
         self.draw(&maps)?;
         for NamedMap { name, text } in maps {
             let figures = MapStats::of(&text.map);
-            say(&format!(
+            print_line(&format!(
                 "{name}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
                 figures.height,
                 figures.width,
@@ -83,7 +82,7 @@ impl Show {
                 figures.components.len(),
                 if figures.components.len() == 1 { "" } else { "s" },
             ))?;
-            say(&picture(&text, room))?;
+            print_line(&picture(&text, max_width))?;
         }
         Ok(())
     }
@@ -93,7 +92,7 @@ impl Show {
             return Ok(());
         }
         let [NamedMap { text, .. }] = maps else {
-            return Err(not_one(&self.map, maps.len(), "a picture is of"));
+            return Err(ambiguous_map(&self.map, maps.len(), "for a picture"));
         };
         let (trace, style) = (still(text)?, Style { static_frame: Some(0), ..Style::default() });
         if let Some(path) = &self.svg {
@@ -110,7 +109,7 @@ impl Show {
 /// The longer side of a PNG. Units: pixels.
 const LONGER_SIDE: u32 = 1024;
 
-/// The map and its agents before the first step.
+/// Returns a trace without steps: the map and its agents.
 fn still(text: &MapText) -> Result<Trace, Error> {
     let goals = text.goals.iter().map(|&goal| GoalStream::single(goal)).collect();
     let instance = Instance::new(text.map.clone(), Outside::Free, text.starts.clone(), goals)?;
@@ -120,7 +119,7 @@ fn still(text: &MapText) -> Result<Trace, Error> {
 
 #[derive(Args, Debug)]
 pub struct Editor {
-    /// The page to write
+    /// HTML file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -131,11 +130,11 @@ impl Editor {
     }
 }
 
-/// The map text; starts and goals side by side where they share cells; or, where there is no room or are no letters
-/// for it, dots of two by four cells or more.
-fn picture(text: &MapText, room: usize) -> String {
-    if text.map.width() > room {
-        return braille(&text.map, room);
+/// Draws a map as text. If starts and goals share cells, draws two maps side by side. If the map is too wide or cannot
+/// be written as text, draws dots instead, see [`braille`].
+fn picture(text: &MapText, max_width: usize) -> String {
+    if text.map.width() > max_width {
+        return braille(&text.map, max_width);
     }
     let starts = MapText { goals: Vec::new(), ..text.clone() };
     let goals = MapText { starts: Vec::new(), ..text.clone() };
@@ -145,15 +144,15 @@ fn picture(text: &MapText, room: usize) -> String {
             let rows = starts.iter().zip(&goals).map(|(start, goal)| format!("{start}  {goal}"));
             rows.collect::<Vec<_>>().join("\n")
         }
-        _ => braille(&text.map, room),
+        _ => braille(&text.map, max_width),
     }
 }
 
-/// Each character stands for two columns and four rows of dots, each dot for a square of cells; a dot is set where
-/// at least half of them are obstacles.
-fn braille(map: &Map, room: usize) -> String {
+/// Draws a map in braille characters. Each has two columns and four rows of dots, each dot covers a square of cells
+/// and is set if at least half of them are obstacles.
+fn braille(map: &Map, max_width: usize) -> String {
     const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
-    let scale = map.width().div_ceil(2 * room).max(1);
+    let scale = map.width().div_ceil(2 * max_width).max(1);
     let is_dark = |top: usize, left: usize| {
         let (bottom, right) = ((top + scale).min(map.height()), (left + scale).min(map.width()));
         if top >= bottom || left >= right {

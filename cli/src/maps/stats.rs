@@ -1,4 +1,4 @@
-//! `pogema maps stats`.
+//! `pogema maps stats`: statistics of maps, and solvability of scenarios.
 
 use std::path::PathBuf;
 
@@ -11,26 +11,26 @@ use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioS
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
-use super::{Sources, not_one};
-use crate::output::{markdown_table, say};
+use super::{Sources, ambiguous_map};
+use crate::output::{markdown_table, print_line};
 use crate::words::word_of;
 
 #[derive(Args, Debug)]
 pub struct Stats {
-    /// A name, a pattern of names, a file or a folder
+    /// Map to analyse: a name, a pattern of names, a file or a folder
     map: String,
     #[command(flatten)]
     sources: Sources,
-    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy` [default: those of the map]
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     scenario: Option<PathBuf>,
-    /// So many agents: the first ones of the scenario, or, with `--seed`, as POGEMA places them
+    /// Number of agents: the first N of the scenario [default: all], or with `--seed`, the number that POGEMA places
     #[arg(long, value_name = "N")]
     num_agents: Option<usize>,
-    /// Place agents as POGEMA does with this seed
+    /// Place agents as POGEMA does with this seed; requires `--num-agents`
     #[arg(long, value_name = "S", requires = "num_agents")]
     seed: Option<u64>,
-    /// Whether agents leave the map on their goals or have to be there all at once
+    /// Effect of reaching a goal: agents leave the map, or have to be on their goals at the same time
     #[arg(long, default_value_t = OnGoal::Nothing, value_parser = word_of(&OnGoal::WORDS[..2]))]
     on_target: OnGoal,
     /// Print everything as JSON
@@ -40,40 +40,42 @@ pub struct Stats {
 
 impl Stats {
     pub fn run(&self) -> Result<(), Error> {
-        let maps = self.sources.meant_by(&self.map)?;
+        let maps = self.sources.resolve(&self.map)?;
         if self.scenario.is_some() && maps.len() != 1 {
-            return Err(not_one(&self.map, maps.len(), "a scenario is of"));
+            return Err(ambiguous_map(&self.map, maps.len(), "for a scenario"));
         }
-        let judged = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
-        let judged: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
-            judged.collect::<Result<_, Error>>()?;
+        let analysed = maps.iter().map(|map| Ok((map, MapStats::of(&map.text.map), self.scenario_of(map)?)));
+        let analysed: Vec<(&NamedMap, MapStats, Option<ScenarioStats>)> =
+            analysed.collect::<Result<_, Error>>()?;
         if self.json {
-            let all: Vec<Value> =
-                judged.iter().map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref())).collect();
-            return say(&json!(all).to_string());
+            let all: Vec<Value> = analysed
+                .iter()
+                .map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref()))
+                .collect();
+            return print_line(&json!(all).to_string());
         }
-        say(&table(&judged).to_string())?;
-        for (map, _, scenario) in &judged {
+        print_line(&table(&analysed).to_string())?;
+        for (map, _, scenario) in &analysed {
             if let Some(scenario) = scenario {
-                say(&format!("{}: {}", map.name, in_words(scenario)))?;
+                print_line(&format!("{}: {}", map.name, scenario_text(scenario)))?;
             }
         }
         Ok(())
     }
 
-    /// The scenario that was asked for, or that the map brings itself.
+    /// Analyses the requested scenario, or the starts and goals of the map.
     fn scenario_of(&self, map: &NamedMap) -> Result<Option<ScenarioStats>, Error> {
         let on_goal = self.on_target;
-        let ground = &map.text.map;
+        let plain_map = &map.text.map;
         if let Some(path) = &self.scenario {
-            let scenario = read_scenario(path, ground)?;
+            let scenario = read_scenario(path, plain_map)?;
             let scenario = scenario.truncated(self.num_agents.unwrap_or(scenario.starts.len()))?;
-            return Ok(Some(judged(ground, &scenario.starts, &scenario.goals.first(), on_goal)));
+            return Ok(Some(analyse(plain_map, &scenario.starts, &scenario.goals.first(), on_goal)));
         }
         if let (Some(seed), Some(num_agents)) = (self.seed, self.num_agents) {
             let pools = map.text.pools.clone().unzip();
             let config = GridConfig {
-                map: Some(ground.clone()),
+                map: Some(plain_map.clone()),
                 seed: Some(seed),
                 num_agents,
                 possible_agents_xy: pools.0,
@@ -82,16 +84,16 @@ impl Stats {
             };
             let instance = InstanceSource::new(config, None)?.generate()?.instance;
             let goals = instance.first_goals();
-            return Ok(Some(judged(ground, instance.starts(), &goals, on_goal)));
+            return Ok(Some(analyse(plain_map, instance.starts(), &goals, on_goal)));
         }
-        let own =
-            (!map.text.starts.is_empty()).then(|| judged(ground, &map.text.starts, &map.text.goals, on_goal));
+        let own = (!map.text.starts.is_empty())
+            .then(|| analyse(plain_map, &map.text.starts, &map.text.goals, on_goal));
         Ok(own)
     }
 }
 
-/// Returns the figures of a scenario; joint A* decides its small components.
-fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
+/// Analyses a scenario; joint A* decides its small components.
+fn analyse(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
     ScenarioStats::of(map, starts, goals, on_goal, |part| {
         let max_states = ScenarioStats::MAX_STATES;
         let found = solvability(&part.map, &part.starts, &part.goals, on_goal, max_states);
@@ -99,11 +101,11 @@ fn judged(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> Scenar
     })
 }
 
-fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
+fn table(analysed: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
     let mut table = markdown_table(
         "map | rows | columns | free | density | components | largest | dead ends | corridor | unreachable pairs",
     );
-    for (map, stats, _) in judged {
+    for (map, stats, _) in analysed {
         table.add_row([
             map.name.clone(),
             stats.height.to_string(),
@@ -120,17 +122,17 @@ fn table(judged: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
     table
 }
 
-fn in_words(scenario: &ScenarioStats) -> String {
+fn scenario_text(scenario: &ScenarioStats) -> String {
     let ScenarioStats { num_agents, sum_of_distances, longest_distance, .. } = scenario;
     let bounds = format!(
-        "{num_agents} agents, no sum of costs below {sum_of_distances}, no makespan below {longest_distance}"
+        "{num_agents} agents, sum of costs at least {sum_of_distances}, makespan at least {longest_distance}"
     );
     let verdict = match scenario.infeasibilities.as_slice() {
         [] if scenario.is_proven_solvable => "solvable".to_owned(),
-        [] => "nothing proves it unsolvable".to_owned(),
+        [] => "not proven unsolvable".to_owned(),
         infeasibilities => {
-            let told: Vec<String> = infeasibilities.iter().map(infeasibility).collect();
-            format!("unsolvable: {}", told.join("; "))
+            let proofs: Vec<String> = infeasibilities.iter().map(infeasibility).collect();
+            format!("unsolvable: {}", proofs.join("; "))
         }
     };
     format!("{bounds}; {verdict}")
@@ -139,17 +141,19 @@ fn in_words(scenario: &ScenarioStats) -> String {
 fn infeasibility(infeasibility: &Infeasibility) -> String {
     let listed = |agents: &[usize]| agents.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     match infeasibility {
-        Infeasibility::NoPath(agent) => format!("agent {agent} has no way to its goal"),
+        Infeasibility::NoPath(agent) => format!("agent {agent} has no path to its goal"),
         Infeasibility::SameGoal(agents, cell) => {
-            format!("agents {} all want to stay on cell {cell}", listed(agents))
+            format!("agents {} have the same goal, cell {cell}", listed(agents))
         }
         Infeasibility::Locked(agents) => {
             let agents = listed(agents);
-            format!("agents {agents} share a component in which nothing they can do brings them all home")
+            format!(
+                "agents {agents} share a component, and no sequence of actions brings all of them to their goals"
+            )
         }
         Infeasibility::WrongOrder(agents) => {
             let agents = listed(agents);
-            format!("agents {agents} share a corridor along which their goals stand in another order")
+            format!("agents {agents} share a corridor, and their goals along it are in a different order")
         }
     }
 }

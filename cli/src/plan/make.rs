@@ -1,4 +1,4 @@
-//! `pogema plan`: makes a plan for all agents of an instance.
+//! `pogema plan`: plans paths for all agents of an instance.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use pogema_planners::{Outcome, Plan, PlannerName, Problem, validate, write_plan,
 use pogema_reference::Reference;
 use serde_json::json;
 
-use crate::output::{check_writable, say, write_trace};
+use crate::output::{check_writable, print_line, write_trace};
 use crate::render::Pictures;
 use crate::run::Settings;
 use crate::words::word;
@@ -23,21 +23,21 @@ use super::planner_args::PlannerArgs;
 pub struct MakePlan {
     #[command(flatten)]
     settings: Settings,
-    /// Who plans
+    /// Planner
     #[arg(long, value_name = "NAME", default_value_t = PlannerName::Lacam, value_parser = word::<PlannerName>())]
     planner: PlannerName,
     #[command(flatten)]
     planner_args: PlannerArgs,
-    /// Write the plan to this file, a line of cells for each step
+    /// Write the plan to this file, one line of cells per step
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write a result file as the LaCAM programs do
+    /// Write a result file in the format of the LaCAM programs
     #[arg(long, value_name = "FILE")]
     result: Option<PathBuf>,
-    /// Write the episode to this file, as JSON lines; compressed if it ends in `.zst`
+    /// Write the trace of the episode to this file as JSON lines; compressed if its name ends in `.zst`
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Print what was found out as JSON
+    /// Print the outcome as JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -45,7 +45,7 @@ pub struct MakePlan {
 }
 
 impl MakePlan {
-    /// The exit status is 0 for a plan that solves the instance, 1 if there is none or none was found.
+    /// Plans and writes the results; exit status 0 if a plan solves the instance, 1 if none exists or none was found.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
         for path in [&self.out, &self.result, &self.trace].into_iter().flatten() {
@@ -55,8 +55,8 @@ impl MakePlan {
         let budget = self.planner_args.budget()?;
         let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
-        let problem = match self.settings.most_steps()?.map(usize::try_from) {
-            Some(Ok(most)) => problem.within(most),
+        let problem = match self.settings.max_steps()?.map(usize::try_from) {
+            Some(Ok(max_steps)) => problem.within(max_steps),
             _ => problem,
         };
         let began = Instant::now();
@@ -66,37 +66,41 @@ impl MakePlan {
             let goals = instance.first_goals();
             validate(instance.map(), instance.starts(), Some(&goals), plan)
                 .map_err(|conflict| Error::Plan { reason: format!("the plan is wrong: {conflict}") })?;
-            self.keep(&config, &instance, plan)?;
+            self.write(&config, &instance, plan)?;
         }
         if let Some(path) = &self.result {
-            let map = self.settings.map_word().unwrap_or_default();
+            let map = self.settings.map_argument().unwrap_or_default();
             let text = write_result(&map, self.planner.word(), &problem, &outcome);
             files::write(path, text.as_bytes())?;
         }
-        say(&if self.json { as_json(&outcome, seconds) } else { format!("{outcome}; {seconds:.3} s") })?;
+        print_line(&if self.json {
+            as_json(&outcome, seconds)
+        } else {
+            format!("{outcome}; {seconds:.3} s")
+        })?;
         Ok(if outcome.solution().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
-    fn keep(&self, config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<(), Error> {
+    fn write(&self, config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<(), Error> {
         if let Some(path) = &self.out {
             files::write(path, write_plan(plan).as_bytes())?;
         }
-        if self.trace.is_none() && !self.pictures.are_wanted() {
+        if self.trace.is_none() && !self.pictures.are_requested() {
             return Ok(());
         }
         let trace = replay(config, instance, plan)?;
         if let Some(path) = &self.trace {
             write_trace(path, &trace)?;
         }
-        if !self.pictures.are_wanted() {
+        if !self.pictures.are_requested() {
             return Ok(());
         }
-        let what = self.settings.what().unwrap_or_else(|| "a drawn map".into());
-        self.pictures.draw(&trace, &format!("{what}, planned by {}", self.planner))
+        let title = self.settings.title().unwrap_or_else(|| "a random map".into());
+        self.pictures.draw(&trace, &format!("{title}, planned by {}", self.planner))
     }
 }
 
-/// The episode in which the reference engine plays a plan.
+/// Plays a plan on the reference engine and returns the trace.
 fn replay(config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<Trace, Error> {
     let rules = pogema_core::Config {
         collision: pogema_core::Collision::Soft,

@@ -1,4 +1,4 @@
-//! The budget, threads and seed of a planner.
+//! Flags for the budget, threads and seed of a planner.
 
 use std::time::Duration;
 
@@ -8,16 +8,17 @@ use pogema_planners::{Budget, PlannerSettings, PolicySettings};
 
 use crate::threads::{note_threads, number_of_threads};
 
-/// Time, nodes and threads of a planner, and its seed.
+/// Budget, threads and seed of a planner.
 #[derive(Args, Clone, Debug)]
 pub struct PlannerArgs {
-    /// Most time for a plan, in seconds; 1 if `--nodes` is not given either
+    /// Time budget of one plan, in seconds [default: 1, or no limit if `--nodes` is given]
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Most nodes that the search may look at: the same number gives the same plan on one thread
+    /// Node budget of one plan: the most nodes that the search may expand; on one thread, the same budget gives the
+    /// same plan [default: no limit]
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
-    /// Most threads of the planner; LaCAM refines plans on as many
+    /// Maximum number of threads of the planner; LaCAM refines plans on that many
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = number_of_threads())]
     threads: usize,
     /// Seed of the planner
@@ -35,7 +36,7 @@ impl PlannerArgs {
         Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
     }
 
-    /// The budget for one plan.
+    /// Returns the budget of one plan.
     pub fn budget(&self) -> Result<Budget, Error> {
         note_threads(self.threads);
         let seconds = self.seconds.or(self.nodes.is_none().then_some(1.0));

@@ -1,4 +1,4 @@
-//! `pogema validate`: is anyone's plan valid?
+//! `pogema validate`: checks whether a plan is valid.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use pogema_maps::files::{Reading, read_maps, read_text};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
 use serde_json::json;
 
-use crate::output::say;
+use crate::output::print_line;
 use crate::run::Settings;
 
 /// Rows and columns drawn around a conflict.
@@ -18,11 +18,11 @@ const DRAWN: (usize, usize) = (13, 31);
 
 #[derive(Args, Debug)]
 pub struct Validate {
-    /// A line of cells such as `(row,col)` for each step, or a result file of LaCAM
+    /// Plan to validate: a file with one line of cells `(row,col)` per step, or a result file of LaCAM
     plan: PathBuf,
     #[command(flatten)]
     settings: Settings,
-    /// Let agents end anywhere
+    /// Do not require that agents end on their goals
     #[arg(long)]
     any_end: bool,
     /// Print the verdict as JSON
@@ -30,7 +30,7 @@ pub struct Validate {
     json: bool,
 }
 
-/// A plan and what it is a plan for.
+/// A plan and the instance that it solves.
 struct Task {
     map: Map,
     starts: Vec<Cell>,
@@ -39,16 +39,16 @@ struct Task {
 }
 
 impl Validate {
-    /// The exit status is 1 for a plan that is not valid.
+    /// Validates the plan and prints the verdict; exit status 1 if the plan is not valid.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let task = self.task()?;
         let goals = (!self.any_end).then_some(task.goals.as_slice());
         let verdict = validate(&task.map, &task.starts, goals, &task.plan);
-        say(&if self.json { as_json(&task.plan, &verdict) } else { as_text(&task, &verdict) })?;
+        print_line(&if self.json { as_json(&task.plan, &verdict) } else { as_text(&task, &verdict) })?;
         Ok(if verdict.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
-    /// What the file holds, and where it says nothing, what the config and the flags say.
+    /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |error| Error::io(&self.plan, error);
         let text = PlanText::read(&read_text(&self.plan)?).map_err(in_file)?;
@@ -69,14 +69,13 @@ impl Validate {
         Ok(self.settings.generate(&config)?.instance)
     }
 
-    /// The map that a result names, looked for where the result is and here.
+    /// Reads the map that a result file names; searches the folder of the result, then the current folder.
     fn map_beside(&self, name: &str) -> Result<Map, Error> {
         let folder = self.plan.parent().unwrap_or(Path::new(""));
         let file = Path::new(name).file_name().map(PathBuf::from).unwrap_or_default();
         let places = [folder.join(name), folder.join(&file), PathBuf::from(name)];
         let Some(place) = places.into_iter().find(|place| place.is_file()) else {
-            let reason =
-                format!("its map `{name}` is not there, expected it beside the plan, or `--map FILE`");
+            let reason = format!("map `{name}` not found, expected it next to the plan, or `--map FILE`");
             return Err(Error::io(&self.plan, reason));
         };
         let mut maps = read_maps(&place, Reading::default())?;
@@ -92,7 +91,7 @@ fn as_text(task: &Task, verdict: &Result<(), Conflict>) -> String {
             let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
             format!("valid: {agents} agents, {steps} steps; sum of costs {cost}, makespan {makespan}")
         }
-        Err(conflict) => format!("not valid: {conflict}\n\n{}", drawn(task, conflict)),
+        Err(conflict) => format!("not valid: {conflict}\n\n{}", drawing(task, conflict)),
     }
 }
 
@@ -113,8 +112,8 @@ fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> String {
     .to_string()
 }
 
-/// The neighbourhood of a conflict before and after its step.
-fn drawn(task: &Task, conflict: &Conflict) -> String {
+/// Draws the neighbourhood of a conflict before and after its step.
+fn drawing(task: &Task, conflict: &Conflict) -> String {
     let before = conflict.step.saturating_sub(1);
     let corner = |at: u16, shown: usize, all: usize| {
         usize::from(at).saturating_sub(shown / 2).min(all.saturating_sub(shown))
@@ -135,7 +134,7 @@ fn drawn(task: &Task, conflict: &Conflict) -> String {
     format!("{head}\nbefore step {}:\n{}\nafter it:\n{}", conflict.step, show(before), show(conflict.step))
 }
 
-/// Part of the map after a step: the conflict's agents are `a` and `b`, or `X` in one cell, others `o`.
+/// Draws part of the map after a step: the conflicting agents as `a` and `b`, or `X` in one cell, others as `o`.
 fn picture(
     task: &Task,
     conflict: &Conflict,
@@ -145,9 +144,9 @@ fn picture(
     let letter = |row: usize, col: usize| {
         let cell = Cell { row: row as u16, col: col as u16 };
         let here = |agent: &usize| task.plan.cells()[step][*agent] == cell;
-        let taking_part: Vec<usize> =
+        let conflicting: Vec<usize> =
             (0..conflict.agents.len()).filter(|&at| here(&conflict.agents[at])).collect();
-        match taking_part.as_slice() {
+        match conflicting.as_slice() {
             [0] => 'a',
             [_] => 'b',
             [_, ..] => 'X',

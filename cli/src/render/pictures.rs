@@ -1,4 +1,4 @@
-//! Which pictures are drawn of an episode, and how: the flags that `run` and `render` share.
+//! The flags that select the pictures of an episode and their style.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::screen::Screen;
 use crate::output::{check_writable, flagged, progress_bar};
 use crate::words::word;
 
-/// The longer side of pictures. Units: pixels.
+/// Default length of the longer side of pictures. Units: pixels.
 const LONGER_SIDE_OF_PNG: u32 = 1024;
 const LONGER_SIDE_OF_GIF: u32 = 512;
 const LONGER_SIDE_OF_VIDEO: u32 = 720;
@@ -21,25 +21,25 @@ const TERMINAL_FPS: f64 = 8.0;
 
 #[derive(Args, Debug)]
 pub struct Pictures {
-    /// Write an SVG: an animation, or with `--frame` a picture
+    /// Write an SVG animation; with `--frame`, a still SVG picture
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     svg: Option<PathBuf>,
-    /// Write one frame as PNG, the first unless `--frame` says otherwise
+    /// Write one frame as PNG; `--frame` selects it
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     png: Option<PathBuf>,
     /// Write an animated GIF
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     gif: Option<PathBuf>,
-    /// Write a video, `.mp4` or `.webm`; needs the program ffmpeg
+    /// Write a video, `.mp4` or `.webm`; requires the program ffmpeg
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     video: Option<PathBuf>,
-    /// Write a page that replays the episode, for any browser
+    /// Write an HTML page that replays the episode
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     html: Option<PathBuf>,
-    /// The frame of pictures that stand still: 0 after the reset, 1 after the first step
+    /// Frame of still pictures: 0 after the reset, 1 after the first step [default: 0 in PNG; SVG is animated]
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     frame: Option<usize>,
-    /// Draw what this agent sees
+    /// Draw the episode as this agent observes it
     #[arg(long, value_name = "AGENT", visible_alias = "view", help_heading = "Pictures")]
     egocentric: Option<usize>,
     /// Leave out the lines between cells
@@ -48,32 +48,33 @@ pub struct Pictures {
     /// Leave out agents and goals
     #[arg(long, help_heading = "Pictures")]
     no_agents: bool,
-    /// How much of the border is drawn
+    /// Part of the border that is drawn
     #[arg(long, default_value_t, value_parser = word::<Border>(), help_heading = "Pictures")]
     border: Border,
-    /// Colours of the agents in turn, such as `#c1433c,#2e6f9e`
+    /// Colours of the agents, repeated in turn, such as `#c1433c,#2e6f9e`
     #[arg(long, value_name = "COLORS", value_delimiter = ',', help_heading = "Pictures")]
     colors: Vec<Color>,
-    /// Pixels from left to right of PNG, GIF and video
+    /// Width of PNG, GIF and video, in pixels [default: such that the longer side is 1024 in PNG, 512 in GIF and 720
+    /// in video]
     #[arg(long, value_name = "PX", help_heading = "Pictures")]
     width: Option<u32>,
-    /// Steps per second: 4 unless told otherwise, and 8 in the terminal
+    /// Steps per second [default: 4, in the terminal 8]
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     fps: Option<f64>,
 }
 
 impl Pictures {
-    /// Whether a file is asked for.
-    pub fn are_wanted(&self) -> bool {
+    /// Returns whether a picture is requested.
+    pub fn are_requested(&self) -> bool {
         self.files().next().is_some()
     }
 
-    /// The frame that was asked for.
+    /// Returns the requested frame.
     pub fn frame(&self) -> Option<usize> {
         self.frame
     }
 
-    /// The files that are asked for, each with its flag.
+    /// Returns the requested files, each with its flag.
     fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         let files = [
             ("--svg", &self.svg),
@@ -85,14 +86,14 @@ impl Pictures {
         files.into_iter().filter_map(|(flag, path)| Some((flag, path.as_deref()?)))
     }
 
-    /// Passes if all that was asked for can be drawn and written, as far as that can be told before the episode.
+    /// Checks that the requested pictures can be drawn and written, as far as this is known before the episode.
     ///
     /// # Errors
     /// For the first file that cannot be written, or the first value that is out of range.
     pub fn check(&self, num_agents: usize) -> Result<(), Error> {
         for (at, (flag, path)) in self.files().enumerate() {
             if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
-                let reason = format!("`{other}` and `{flag}` name one file, `{}`", path.display());
+                let reason = format!("`{other}` and `{flag}` name the same file, `{}`", path.display());
                 return Err(Error::request(reason));
             }
             check_writable(path)?;
@@ -108,7 +109,7 @@ impl Pictures {
                 format!("0 to {}", num_agents.saturating_sub(1)),
             ));
         }
-        if let Some(fps) = self.fps.filter(|fps| self.are_wanted() && !(*fps > 0.0 && fps.is_finite())) {
+        if let Some(fps) = self.fps.filter(|fps| self.are_requested() && !(*fps > 0.0 && fps.is_finite())) {
             return Err(Error::argument("--fps", fps, "more than 0"));
         }
         match self.width {
@@ -117,7 +118,7 @@ impl Pictures {
         }
     }
 
-    /// Draws and writes all that is asked for; the page of a replay has a title.
+    /// Draws and writes the requested pictures; the replay page shows `title`.
     pub fn draw(&self, trace: &Trace, title: &str) -> Result<(), Error> {
         if let Some(frame) = self.frame {
             trace.state(frame).map_err(flagged("--frame"))?;
@@ -143,14 +144,14 @@ impl Pictures {
         Ok(())
     }
 
-    /// A screen for the same episode.
+    /// Returns a screen for the same episode.
     pub fn screen(&self) -> Screen {
         let style = text::Style { view: self.egocentric, border: self.border, ..text::Style::default() };
         Screen::new(style, self.fps.unwrap_or(TERMINAL_FPS))
     }
 
     fn style(&self) -> Style {
-        let usual = Style::default();
+        let default = Style::default();
         let mut colors = Colors::default();
         if !self.colors.is_empty() {
             colors.agents.clone_from(&self.colors);
@@ -161,13 +162,13 @@ impl Pictures {
             show_agents: !self.no_agents,
             show_lines: !self.no_lines,
             border: self.border,
-            step_time: self.fps.map_or(usual.step_time, f64::recip),
+            step_time: self.fps.map_or(default.step_time, f64::recip),
             colors,
         }
     }
 }
 
-/// A bar on the terminal, told how many frames are done, and how many there are.
+/// Returns a callback that shows a progress bar; it takes the number of frames done and the total.
 fn progress(what: &'static str) -> impl FnMut(usize, usize) {
     let bar = progress_bar("{msg} {wide_bar} {pos}/{len} frames", 0).with_message(what);
     move |done, all| {

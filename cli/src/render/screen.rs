@@ -1,4 +1,4 @@
-//! Frames in the terminal.
+//! Draws frames in the terminal.
 
 use std::time::Duration;
 
@@ -6,9 +6,9 @@ use console::Term;
 use pogema_core::{Error, Snapshot};
 use pogema_render::{Ground, text};
 
-use crate::output::{said, say};
+use crate::output::{check_printed, print_line};
 
-/// A terminal that shows one frame over the other, or any other output that gets them one after the other.
+/// Standard output for frames: a terminal overwrites the previous frame, other outputs receive one after another.
 pub struct Screen {
     terminal: Term,
     style: text::Style,
@@ -17,7 +17,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// A screen of so many frames per second; of 0 and less, without a pause between them.
+    /// Returns a screen that shows `fps` frames per second; if `fps` is 0 or less, without pauses.
     pub fn new(style: text::Style, fps: f64) -> Self {
         let pause = if fps > 0.0 {
             Duration::try_from_secs_f64(1.0 / fps).unwrap_or_default()
@@ -30,16 +30,16 @@ impl Screen {
 
     pub fn draw(&mut self, ground: Ground<'_>, step: usize, state: &Snapshot) -> Result<(), Error> {
         if !self.terminal.is_term() {
-            return say(&text::frame(ground, step, state, &self.style)?);
+            return print_line(&text::frame(ground, step, state, &self.style)?);
         }
-        // The cursor waits on a line of its own. A frame is as large as the terminal is now.
+        // The last line is left to the cursor. The size is read anew, since the user may resize the terminal.
         let size = self.terminal.size_checked();
         let most =
             size.map(|(rows, cols)| (usize::from(rows).saturating_sub(1).max(1), usize::from(cols).max(1)));
         let frame = text::frame(ground, step, state, &text::Style { most, ..self.style })?;
-        said(self.terminal.clear_last_lines(self.num_lines))?;
+        check_printed(self.terminal.clear_last_lines(self.num_lines))?;
         self.num_lines = frame.lines().count();
-        said(self.terminal.write_line(&frame))?;
+        check_printed(self.terminal.write_line(&frame))?;
         std::thread::sleep(self.pause);
         Ok(())
     }

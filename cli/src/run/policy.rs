@@ -1,4 +1,4 @@
-//! Who chooses the actions.
+//! The policy or file that chooses the actions.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -10,23 +10,23 @@ use pogema_maps::GridConfig;
 use pogema_numpy::{Generator, SeedSequence};
 use pogema_planners::{NamedPolicy, PolicySettings};
 
-/// The name for actions from a file.
+/// The name of the policy that reads actions from a file.
 pub const FILE: &str = "file";
 
-/// The names that a policy may have on the command line.
+/// Returns a parser of the names of policies.
 pub fn names() -> PossibleValuesParser {
     let all = NamedPolicy::all().into_iter().chain([(FILE, "actions from a file")]);
     PossibleValuesParser::new(all.map(|(name, help)| PossibleValue::new(name).help(help)))
 }
 
-/// A policy at work.
+/// A source of actions for one episode: a named policy, or a file.
 pub enum ActionSource {
     Named(Box<NamedPolicy>),
     File(std::vec::IntoIter<Vec<Action>>),
 }
 
 impl ActionSource {
-    /// The policy of a name for the episode of an instance.
+    /// Returns the named policy, or the actions of `file`, for one episode of an instance.
     pub fn new(
         name: &str,
         file: Option<&Path>,
@@ -46,7 +46,7 @@ impl ActionSource {
         }
     }
 
-    /// The actions of the next step; none when a file has no more.
+    /// Returns the actions of the next step; `None` after the last one of a file.
     pub fn act<E: Environment>(&mut self, episode: &Episode<E>) -> Result<Option<Vec<Action>>, Error> {
         match self {
             Self::Named(policy) => policy.act(episode).map(Some),
@@ -64,7 +64,7 @@ fn generator(config: &GridConfig) -> Result<Generator, Error> {
     }
 }
 
-/// The actions of a trace, or of a file with a list of numbers per line, as many as there are agents.
+/// Reads actions from a trace, or from a file with a list of numbers per line, one number per agent.
 fn read_actions(path: &Path, num_agents: usize) -> Result<Vec<Vec<Action>>, Error> {
     let failed = |error: std::io::Error| Error::io(path, error);
     let lines: Vec<String> = files::open(path)?.lines().collect::<Result<_, _>>().map_err(failed)?;

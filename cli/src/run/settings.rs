@@ -1,4 +1,4 @@
-//! The config of a run: a file, and flags that override it.
+//! The config of a run: a file and flags that override it.
 
 use std::path::{Path, PathBuf};
 
@@ -15,72 +15,73 @@ use crate::words::word;
 
 #[derive(Args, Debug)]
 pub struct Settings {
-    /// A config file with POGEMA's fields, YAML or JSON
+    /// Config file with POGEMA's fields, in YAML or JSON
     config: Option<PathBuf>,
-    /// A named map, a pattern of names among which the seed chooses, or a file with a map
+    /// Name of a map, pattern of names from which the seed chooses one, or file with a map [default: from the config,
+    /// else a random map]
     #[arg(long, value_name = "NAME|PATTERN|FILE")]
     map: Option<String>,
     #[command(flatten)]
     sources: Sources,
-    /// Starts and goals: a .scen file, or YAML with `agents_xy` and `targets_xy`
+    /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy`
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Seed of everything that is drawn
+    /// Seed of the map, starts, goals and random actions [default: from the config, else a new one in each run]
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
-    /// Number of agents
+    /// Number of agents [default: from the config, map, scenario or plan, else 1]
     #[arg(long, value_name = "N")]
     num_agents: Option<u64>,
-    /// Side of a drawn map
+    /// Side length of a random map [default: from the config, else 8]
     #[arg(long, value_name = "N")]
     size: Option<u64>,
-    /// Share of obstacles of a drawn map
+    /// Share of obstacles of a random map [default: from the config, else 0.3]
     #[arg(long, value_name = "P")]
     density: Option<f64>,
-    /// How far agents see
+    /// Observation radius: how many cells agents see in each direction [default: from the config, else 5]
     #[arg(long, value_name = "R")]
     obs_radius: Option<u64>,
-    /// Most steps of the episode
+    /// Maximum number of steps of the episode [default: from the config, else 64; for `pogema plan`, no limit]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<i64>,
-    /// What reaching a goal does
+    /// Effect of reaching a goal [default: from the config, else finish]
     #[arg(long, value_parser = word::<OnGoal>())]
     on_target: Option<OnGoal>,
-    /// How conflicts are resolved
+    /// Collision system, which resolves conflicting moves [default: from the config, else priority]
     #[arg(long, value_parser = word::<Collision>())]
     collision_system: Option<Collision>,
-    /// Any other field, such as `empty_outside=false`
+    /// Set any other field of the config, such as `empty_outside=false`; may be given several times
     #[arg(long = "set", value_name = "FIELD=VALUE")]
     others: Vec<String>,
 }
 
 impl Settings {
-    /// The map or config that was asked for, and the seed.
-    pub fn what(&self) -> Option<String> {
-        self.map_word().map(|name| match self.seed {
+    /// Returns the map or config as it was given, and the seed.
+    pub fn title(&self) -> Option<String> {
+        self.map_argument().map(|name| match self.seed {
             Some(seed) => format!("{name}, seed {seed}"),
             None => name,
         })
     }
 
-    /// The map or config that was asked for, as it was written.
-    pub fn map_word(&self) -> Option<String> {
+    /// Returns the map or config as it was given.
+    pub fn map_argument(&self) -> Option<String> {
         self.map.clone().or_else(|| self.config.as_ref().map(|path| path.display().to_string()))
     }
 
-    /// Whether a map is asked for.
+    /// Returns whether a map or config was given.
     pub fn has_map(&self) -> bool {
         self.map.is_some() || self.config.is_some()
     }
 
-    /// Most steps of an episode, if flags or file say so.
-    pub fn most_steps(&self) -> Result<Option<i64>, Error> {
-        let fields = self.config.as_deref().map(fields_of).transpose()?;
-        let told = fields.and_then(|fields| fields.get("max_episode_steps").and_then(Value::as_i64));
-        Ok(self.steps.or(told))
+    /// Returns the maximum number of steps, if a flag or the file sets it.
+    pub fn max_steps(&self) -> Result<Option<i64>, Error> {
+        let fields = self.config.as_deref().map(read_fields).transpose()?;
+        let in_file = fields.and_then(|fields| fields.get("max_episode_steps").and_then(Value::as_i64));
+        Ok(self.steps.or(in_file))
     }
 
-    /// The map that is asked for, or drawn.
+    /// Returns the given map, or a random one.
     pub fn map(&self) -> Result<Map, Error> {
         let config = self.config()?;
         match &config.map {
@@ -89,23 +90,23 @@ impl Settings {
         }
     }
 
-    /// The config that file and flags make together.
+    /// Returns the config from the file and the flags.
     pub fn config(&self) -> Result<GridConfig, Error> {
         self.config_for(None)
     }
 
-    /// The same for a number of agents, unless file or flags set another one.
+    /// Returns the config with a number of agents, unless the file or a flag sets another one.
     pub fn config_for(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
         self.read(num_agents).map_err(|error| self.located(error))
     }
 
-    /// The instance of a config that [`Settings::config`] made, and warnings about it.
+    /// Generates the instance of a config from [`Settings::config`], with warnings.
     pub fn generate(&self, config: &GridConfig) -> Result<Generated, Error> {
         let generated = InstanceSource::new(config.clone(), None).and_then(|mut source| source.generate());
         generated.map_err(|error| self.located(error))
     }
 
-    /// An error with the flag or the file that it comes from.
+    /// Adds to an error the flag or the file that caused it.
     fn located(&self, error: Error) -> Error {
         let flags = self.flags().unwrap_or_default();
         let field = match &error {
@@ -127,7 +128,7 @@ impl Settings {
         }
     }
 
-    /// The fields that flags set, each with its flag.
+    /// Returns the fields that flags set: name, flag and value.
     fn flags(&self) -> Result<Vec<(String, String, Value)>, Error> {
         let plain: [(&str, &str, Option<Value>); 8] = [
             ("seed", "--seed", self.seed.map(Into::into)),
@@ -148,7 +149,7 @@ impl Settings {
             })?;
             if !FIELDS.contains(&field) {
                 let hint = nearest(field, FIELDS).unwrap_or_default();
-                let expected = format!("a field of a config; the nearest is `{hint}`");
+                let expected = format!("a config field; did you mean `{hint}`?");
                 return Err(Error::argument("--set", field, expected));
             }
             Ok((field.to_owned(), format!("--set {field}"), value_of(value)))
@@ -158,7 +159,7 @@ impl Settings {
 
     fn read(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
         let mut fields = match &self.config {
-            Some(path) => fields_of(path)?,
+            Some(path) => read_fields(path)?,
             None => Object::new(),
         };
         fields.extend(self.flags()?.into_iter().map(|(field, _, value)| (field, value)));
@@ -180,12 +181,12 @@ impl Settings {
         config.with_scenario(&scenario, &fields)
     }
 
-    /// Takes the name of a map out of the fields, and returns the map that flag or name ask for.
+    /// Removes the map name from the fields and returns the map that the flag or the name selects.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     fn chosen_map(&self, fields: &mut Object<String, Value>) -> Result<Option<MapText>, Error> {
         let named = fields.get("map_name").and_then(Value::as_str).map(str::to_owned);
-        // What is no text is left for the config to refuse.
+        // A value that is not a text stays, so that the config rejects it.
         if named.is_some() {
             fields.remove("map_name");
         }
@@ -194,11 +195,11 @@ impl Settings {
         let text = if let Ok(text) = library.map(&word) {
             text.clone()
         } else if self.map.is_some() && Path::new(&word).exists() {
-            the_one(&word, read_maps(Path::new(&word), Reading::default())?)?
+            only_map(&word, read_maps(Path::new(&word), Reading::default())?)?
         } else {
             let seed = fields.get("seed").and_then(Value::as_u64);
             chosen(&library, &word, seed).map_err(|error| match &self.map {
-                Some(_) => Error::io(&word, format!("there is no such file; {error}")),
+                Some(_) => Error::io(&word, format!("no such file; {error}")),
                 None => error,
             })?
         };
@@ -206,28 +207,31 @@ impl Settings {
     }
 }
 
-/// The only map of a file.
-fn the_one(word: &str, maps: Vec<NamedMap>) -> Result<MapText, Error> {
+/// Returns the only map of a file.
+fn only_map(word: &str, maps: Vec<NamedMap>) -> Result<MapText, Error> {
     let found = maps.len();
     let mut maps = maps.into_iter();
     match (maps.next(), maps.next()) {
         (Some(map), None) => Ok(map.text),
-        _ => Err(Error::io(word, format!("{found} maps, expected one; `--maps {word} --map NAME` chooses"))),
+        _ => Err(Error::io(
+            word,
+            format!("found {found} maps, expected one; choose one with `--maps {word} --map NAME`"),
+        )),
     }
 }
 
-/// The map that a seed, or chance, chooses among those that match.
+/// Returns the matching map that the seed, or a random number, chooses.
 fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText, Error> {
     if let Some(seed) = seed {
         return library.choose(pattern, seed).map(|(_, text)| text.clone());
     }
     let names = library.matching(pattern)?;
-    let chance = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
-    let index = Generator::from_sequence(&chance).integers(0, names.len() as i64).unwrap_or_default();
+    let entropy = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
+    let index = Generator::from_sequence(&entropy).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
 }
 
-/// JSON has no NaN and would make it null, so it is left to the config to refuse the word.
+/// Converts a number to JSON; NaN, which JSON would turn into null, becomes a word that the config rejects.
 fn number(value: f64) -> Value {
     Number::from_f64(value).map_or_else(|| value.to_string().into(), Value::Number)
 }
@@ -236,7 +240,7 @@ fn value_of(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|_| text.into())
 }
 
-fn fields_of(path: &Path) -> Result<Object<String, Value>, Error> {
+fn read_fields(path: &Path) -> Result<Object<String, Value>, Error> {
     let text = read_text(path)?;
     let is_json = path.extension().is_some_and(|ending| ending == "json");
     let value =

@@ -1,4 +1,4 @@
-//! A case as a text picture, for the spec.
+//! Draws cases as text pictures for the spec.
 
 use std::fmt::Write as _;
 
@@ -9,11 +9,11 @@ use serde_json::Value;
 use super::{Case, CaseStep, Expect, Sees};
 use crate::request::{Record, Response, StepRecord};
 
-/// Frames in one row of a picture.
-const FRAMES_ABREAST: usize = 4;
+/// Maximum number of frames side by side.
+const MAX_FRAMES_PER_ROW: usize = 4;
 
 impl Case {
-    /// The case as text: its sentence, its config, what happens, and what it checks besides.
+    /// Draws the case as text: its sentence, its config, a frame per operation, and its other expectations.
     pub fn draw(&self, response: &Response) -> String {
         let mut text = format!("{}\n\n{}", self.says, self.draw_config());
         let mut map = None;
@@ -27,9 +27,9 @@ impl Case {
                 frames.push(Frame { head: head(step, record), body: picture::picture(map, state) });
             }
         }
-        for abreast in frames.chunks(FRAMES_ABREAST) {
+        for row in frames.chunks(MAX_FRAMES_PER_ROW) {
             text.push('\n');
-            text.push_str(&beside(abreast));
+            text.push_str(&side_by_side(row));
         }
         for (op, (record, expect)) in response.records.iter().zip(self.expectations()).enumerate() {
             text.push_str(&draw_facts(op, record, expect));
@@ -43,7 +43,7 @@ impl Case {
         text.trim_end().to_owned()
     }
 
-    /// The config but for a map that the frames show anyway.
+    /// Writes the config, one field per line; a text of several lines is indented below its field.
     fn draw_config(&self) -> String {
         let Some(fields) = self.config.as_object() else { return String::new() };
         let is_text = |value: &Value| value.as_str().is_some_and(|text| text.contains('\n'));
@@ -81,8 +81,8 @@ fn head(step: Option<&CaseStep>, record: &Record) -> String {
     }
 }
 
-/// Frames side by side, each under what led to it.
-fn beside(frames: &[Frame]) -> String {
+/// Joins frames side by side, each below its operation.
+fn side_by_side(frames: &[Frame]) -> String {
     let width = |frame: &Frame| {
         let body = frame.body.lines().map(|line| line.chars().count()).max().unwrap_or(0);
         body.max(frame.head.chars().count())
@@ -100,30 +100,30 @@ fn beside(frames: &[Frame]) -> String {
     text
 }
 
-/// What a case checks of one moment besides the picture.
+/// Lists the expectations of one moment other than the picture.
 fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
     let moment = if op == 0 { "reset".to_owned() } else { format!("operation {op}") };
     let mut facts = Vec::new();
-    let mut tell =
+    let mut add =
         |what: &str, value: Option<String>| facts.extend(value.map(|value| format!("{what} {value}")));
-    tell("cells", list(expect.cells.as_ref()));
-    tell("goals", list(expect.goals.as_ref()));
-    tell("active", list(expect.active.as_ref()));
-    tell("on goal", list(expect.on_goal.as_ref()));
-    tell("rewards", list(expect.rewards.as_ref()));
-    tell("terminated", list(expect.terminated.as_ref()));
-    tell("truncated", list(expect.truncated.as_ref()));
-    tell("caller's actions", list(expect.actions_after.as_ref()));
-    tell("xy", list(expect.xy.as_ref()));
-    tell("target_xy", list(expect.target_xy.as_ref()));
-    tell("global_xy", list(expect.global_xy.as_ref()));
-    tell("global_target_xy", list(expect.global_target_xy.as_ref()));
-    tell("derived", expect.derived.as_ref().map(Value::to_string));
-    tell("goals foretold", list(expect.foretold.as_ref()));
-    tell("padded dtype", expect.padded_dtype.clone());
-    tell("taken back", expect.moved.map(|moved| moved.to_string()));
-    tell("changes", list(expect.changes.as_ref()));
-    tell("metrics", expect.metrics.and(record.step()).map(draw_metrics));
+    add("cells", list(expect.cells.as_ref()));
+    add("goals", list(expect.goals.as_ref()));
+    add("active", list(expect.active.as_ref()));
+    add("on goal", list(expect.on_goal.as_ref()));
+    add("rewards", list(expect.rewards.as_ref()));
+    add("terminated", list(expect.terminated.as_ref()));
+    add("truncated", list(expect.truncated.as_ref()));
+    add("caller's actions", list(expect.actions_after.as_ref()));
+    add("xy", list(expect.xy.as_ref()));
+    add("target_xy", list(expect.target_xy.as_ref()));
+    add("global_xy", list(expect.global_xy.as_ref()));
+    add("global_target_xy", list(expect.global_target_xy.as_ref()));
+    add("derived", expect.derived.as_ref().map(Value::to_string));
+    add("foretold goals", list(expect.foretold.as_ref()));
+    add("padded dtype", expect.padded_dtype.clone());
+    add("taken back", expect.moved.map(|moved| moved.to_string()));
+    add("changes", list(expect.changes.as_ref()));
+    add("metrics", expect.metrics.and(record.step()).map(draw_metrics));
     let mut text = String::new();
     if !facts.is_empty() {
         let _ = writeln!(text, "\nafter {moment}: {}", facts.join("; "));
@@ -134,7 +134,7 @@ fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
     };
     let frames: Vec<Frame> = pictures.into_iter().filter_map(frame).collect();
     if !frames.is_empty() {
-        let _ = write!(text, "\n{}", beside(&frames));
+        let _ = write!(text, "\n{}", side_by_side(&frames));
     }
     if let Some(sees) = &expect.sees {
         let _ = write!(text, "\n{}", draw_window(&moment, sees));
@@ -158,5 +158,5 @@ fn draw_window(moment: &str, sees: &Sees) -> String {
         Some(Frame { head: name.into(), body })
     };
     let frames: Vec<Frame> = windows.into_iter().filter_map(frame).collect();
-    format!("agent {} sees after {moment}:\n{}", sees.agent, beside(&frames))
+    format!("agent {} sees after {moment}:\n{}", sees.agent, side_by_side(&frames))
 }

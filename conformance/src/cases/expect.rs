@@ -1,4 +1,4 @@
-//! What a case expects of one moment; only what is written is checked.
+//! The expectations of a case at one moment. Keys that are left out are not checked.
 
 use std::collections::BTreeMap;
 
@@ -9,85 +9,85 @@ use serde_json::Value;
 use crate::digits::{area_of, unpack};
 use crate::request::{Record, ResetRecord, StepRecord};
 
-/// What holds after one operation. Pictures may end in blank lines.
+/// Expectations after one operation. Blank lines at the end of a picture are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]
 pub struct Expect {
-    /// Agents (`a`…) and goals (`A`…) of active agents on the map.
+    /// The map with the active agents (`a`…) and their goals (`A`…).
     pub picture: Option<String>,
-    /// `o` where the occupancy grid marks a cell.
+    /// The map with `o` at each cell that the occupancy grid marks.
     pub occupied: Option<String>,
-    /// Where each agent is.
+    /// The cell of each agent.
     pub cells: Option<Vec<Cell>>,
-    /// Where each agent wants to go.
+    /// The goal of each agent.
     pub goals: Option<Vec<Cell>>,
-    /// Which agents take part.
+    /// Whether each agent is active.
     pub active: Option<Vec<bool>>,
-    /// Which agents reached their goals.
+    /// Whether each agent was on its goal.
     pub on_goal: Option<Vec<bool>>,
-    /// The rewards.
+    /// The reward of each agent.
     pub rewards: Option<Vec<f32>>,
-    /// Which agents ended.
+    /// Whether each agent is terminated.
     pub terminated: Option<Vec<bool>>,
-    /// Which agents were cut off.
+    /// Whether each agent is truncated.
     pub truncated: Option<Vec<bool>>,
-    /// The chosen actions, for a policy.
+    /// The actions that a policy chose.
     pub actions: Option<Vec<u8>>,
-    /// The caller's list after the step.
+    /// The caller's action list after the step.
     pub actions_after: Option<Vec<i64>>,
-    /// The figures of the episode; `{}` for none.
+    /// The metrics of the episode; `{}` for none.
     pub metrics: Option<Metrics>,
-    /// What one agent sees.
+    /// The windows of one agent.
     pub sees: Option<Sees>,
-    /// Cells counted from the starts.
+    /// Cells relative to the starts.
     pub xy: Option<Vec<[i32; 2]>>,
-    /// Goals counted from the starts.
+    /// Goals relative to the starts.
     pub target_xy: Option<Vec<[i32; 2]>>,
-    /// Cells counted from the border's corner.
+    /// Cells counted from the corner of the border.
     pub global_xy: Option<Vec<[i32; 2]>>,
-    /// Goals counted from the border's corner.
+    /// Goals counted from the corner of the border.
     pub global_target_xy: Option<Vec<[i32; 2]>>,
     /// The map with its border.
     pub padded: Option<String>,
     /// NumPy's name of the element type of the map with its border.
     pub padded_dtype: Option<String>,
-    /// What the config derived: some of `width`, `height`, `size`, `density`, `num_agents`.
+    /// Derived config fields: any of `width`, `height`, `size`, `density`, `num_agents`.
     pub derived: Option<Value>,
-    /// The goals foretold for each agent.
+    /// The foretold goals of each agent.
     pub foretold: Option<Vec<Vec<Cell>>>,
     /// Whether a step was taken back.
     pub moved: Option<bool>,
-    /// For each agent its changes: row, column, goal row, goal column, step, active.
+    /// The changes of each agent: row, column, goal row, goal column, step, active.
     pub changes: Option<Vec<Vec<Change>>>,
-    /// Keys that mean nothing: a misspelt expectation must not pass unseen.
+    /// Unknown keys. Each is a mismatch, so that a misspelt expectation does not pass unnoticed.
     #[serde(flatten)]
     pub unknown: BTreeMap<String, Value>,
 }
 
-/// The windows of one agent, as lines of `.` for 0 and anything else for 1.
+/// The windows of one agent, as lines of `.` for 0 and any other character for 1.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sees {
-    /// The agent.
+    /// The index of the agent.
     pub agent: usize,
     /// Its obstacles window.
     pub obstacles: Option<String>,
     /// Its agents window.
     pub agents: Option<String>,
-    /// Its goal window, of the `default` observation.
+    /// Its goal window, in `default` observations only.
     pub goal: Option<String>,
 }
 
 impl Expect {
-    /// Whether nothing is expected.
+    /// Returns whether there is no expectation.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The first thing that is not as expected, in words.
+    /// Describes the first deviation from the expectations.
     pub fn mismatch(&self, record: &Record, map: &Map) -> Option<String> {
         if let Some(key) = self.unknown.keys().next() {
-            return Some(format!("`{key}` is no expectation"));
+            return Some(format!("unknown expectation `{key}`"));
         }
         let state = record.state().map(|state| self.of_state(state, map));
         let rest = match record {
@@ -95,7 +95,7 @@ impl Expect {
             Record::Step(step) | Record::Astar(step) | Record::Sample(step) => self.of_step(step),
             Record::Back(back) => differ("moved", self.moved.as_ref(), &back.moved),
             Record::History(history) => differ("changes", self.changes.as_ref(), &history.changes),
-            Record::Odd(record) => Some(format!("the record fits no operation: {record}")),
+            Record::Odd(record) => Some(format!("the record does not match its operation: {record}")),
         };
         state.flatten().or(rest)
     }
@@ -121,8 +121,8 @@ impl Expect {
 
     fn of_derived(&self, reset: &ResetRecord) -> Option<String> {
         let derived = serde_json::to_value(&reset.derived).ok()?;
-        let wanted = self.derived.as_ref()?.as_object()?;
-        let wrong = wanted.iter().find(|(field, value)| derived[field.as_str()].as_f64() != value.as_f64());
+        let expected = self.derived.as_ref()?.as_object()?;
+        let wrong = expected.iter().find(|(field, value)| derived[field.as_str()].as_f64() != value.as_f64());
         wrong.map(|(field, value)| {
             format!("derived {field}: expected {value}, got {}", derived[field.as_str()])
         })
@@ -187,9 +187,8 @@ fn differ_in_lines(what: &str, expected: Option<&str>, got: &str) -> Option<Stri
 
 fn differ_in_window(what: &str, expected: Option<&str>, got: &[bool]) -> Option<String> {
     let lines: Vec<&str> = expected?.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let wanted: Vec<bool> = lines.concat().chars().map(|character| character != '.').collect();
-    let holds =
-        got.len() >= wanted.len() && got.len() < wanted.len() + 8 && got[..wanted.len()] == wanted[..];
+    let flags: Vec<bool> = lines.concat().chars().map(|character| character != '.').collect();
+    let holds = got.len() >= flags.len() && got.len() < flags.len() + 8 && got[..flags.len()] == flags[..];
     let side = lines.len().max(1);
     let drawn: Vec<String> = got
         .chunks(side)

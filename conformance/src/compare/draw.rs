@@ -1,4 +1,4 @@
-//! Draws the states and windows of a difference.
+//! Panels that show the states and windows of a difference.
 
 use pogema_core::picture::marks;
 use pogema_core::{Cell, Map, Snapshot};
@@ -7,14 +7,14 @@ use super::panel::{Content, Grid, Moment, Panel, Sign};
 use crate::digits::unpack;
 use crate::request::Response;
 
-/// The agents and goals of a state.
+/// Returns a grid of the agents and goals of a state.
 pub fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
     grid(map, marks(map, state).into_iter().map(Sign::from))
 }
 
 fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
-    let ground = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
-    let mut signs: Vec<Sign> = map.obstacles().iter().map(ground).collect();
+    let sign_of = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
+    let mut signs: Vec<Sign> = map.obstacles().iter().map(sign_of).collect();
     for &cell in &state.occupied {
         signs[map.index(cell)] = Sign::Occupied;
     }
@@ -26,7 +26,7 @@ fn grid(map: &Map, signs: impl Iterator<Item = Sign>) -> Grid {
     signs.chunks(map.width()).map(<[Sign]>::to_vec).collect()
 }
 
-/// The state before an operation, as expected after it, and as it came.
+/// Returns panels of the state before an operation, and of the expected and received states after it.
 pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
     let Some(map) = expected.map_at(op) else { return Vec::new() };
     let is_on_map = |cell: &Cell| map.contains(*cell);
@@ -48,7 +48,7 @@ pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
     states.into_iter().filter_map(panel).collect()
 }
 
-/// The expected window of one agent and the one that came, or nothing for a hash or a window of another size.
+/// Returns panels of the expected and received window of one agent; none for a hash or a window of another size.
 pub fn windows(expected: &str, got: &str, side: usize) -> Vec<Panel> {
     if got.contains(':') || expected.len() != got.len() {
         return Vec::new();
@@ -65,7 +65,7 @@ pub fn windows(expected: &str, got: &str, side: usize) -> Vec<Panel> {
         .into()
 }
 
-/// The place of the first value that differs, row by row.
+/// Returns the row-major index of the first value that differs.
 pub fn first_differing_bit(one: &str, other: &str) -> usize {
     let (one, other) = (unpack(one), unpack(other));
     let differing = one.iter().zip(&other).position(|(one, other)| one != other);

@@ -1,17 +1,17 @@
-//! The names of what differs.
+//! Names of values that differ.
 
 use serde::{Serialize, Serializer};
 
-/// What differs between two answers.
+/// A value that differs between two answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// The name of the value or list, such as `cell`.
     pub name: &'static str,
-    /// Which part of it differs.
+    /// The part that differs.
     pub part: FieldPart,
 }
 
-/// Which part of a value or list differs.
+/// The part of a value or list that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldPart {
     /// The value as a whole.
@@ -24,13 +24,13 @@ pub enum FieldPart {
     Window {
         /// The agent.
         agent: usize,
-        /// The first value that differs, row by row. A hash has no values.
+        /// The row-major index of the first value that differs; none for a hash, which has no values.
         value: Option<usize>,
     },
 }
 
 impl Field {
-    /// The field without its index. Differences of one kind have one cause.
+    /// Returns the field without its index. Differences of one kind have one cause.
     pub fn kind(&self) -> String {
         match self.part {
             FieldPart::Length => format!("number of {} entries", self.name),
@@ -38,7 +38,7 @@ impl Field {
         }
     }
 
-    /// The index of the agent or list element.
+    /// Returns the index of the agent or list element.
     pub fn index(&self) -> Option<usize> {
         match self.part {
             FieldPart::Element(index) | FieldPart::Window { agent: index, .. } => Some(index),

@@ -1,4 +1,4 @@
-//! The first place where two answers to one request differ.
+//! Comparison of two answers to one request.
 
 mod draw;
 mod field;
@@ -15,20 +15,20 @@ use crate::port::{Scope, Told, resolve_hashes};
 use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord};
 use crate::tally::{Families, Tally, families_of};
 
-/// Two answers differ: where, in what, and which rule that breaks.
+/// A difference between two answers, and the rule it breaks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Divergence {
     /// Index of the operation after which they differ.
     pub op: usize,
-    /// What differs, with the index of the agent or list element.
+    /// The value that differs, with the index of the agent or list element.
     pub field: Field,
-    /// What was expected.
+    /// The expected value.
     pub expected: String,
-    /// What came instead.
+    /// The received value.
     pub got: String,
-    /// The rule that says what is right.
+    /// The rule that defines the right value.
     pub rule: String,
-    /// The state before the operation, as expected after it, and as it came; then the windows that differ.
+    /// The state before the operation, the expected and received states after it, then the windows that differ.
     #[serde(serialize_with = "panel::serialize")]
     pub picture: Vec<Panel>,
 }
@@ -42,7 +42,7 @@ impl std::fmt::Display for Divergence {
     }
 }
 
-/// Finds the first difference between the expected answer and the one that came, counting every comparison.
+/// Returns the first difference between the expected and the received answer, and counts every comparison.
 pub fn compare(
     request: &Request,
     expected: &Response,
@@ -52,10 +52,10 @@ pub fn compare(
     compare_in(&Scope::ALL, request, expected, got, tally).into_iter().next()
 }
 
-/// The first difference of each kind, for an answer that need not hold everything.
+/// Returns the first difference of each kind, for an answer that may lack optional parts.
 ///
-/// Differences in what is told of a state do not end the comparison; a state that differs does, since nothing
-/// after it can be right.
+/// A difference in the state ends the comparison, since everything after it can differ too. Other differences do not
+/// end it.
 pub fn compare_in(
     scope: &Scope,
     request: &Request,
@@ -70,20 +70,20 @@ pub fn compare_in(
         return found.into_iter().collect();
     };
     let side = config.rules().side();
-    let (op, found, is_lost) = (0, Vec::new(), false);
+    let (op, found, states_differ) = (0, Vec::new(), false);
     let families = families_of(&config);
     let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
-    // What a port does with goals that are given shows itself where they are given.
+    // Instances give the goals, so only in config mode is a wrong goal attributed to the drawing of goals.
     let draws_goals =
         scope.drawn && !scope.is_whole() && config.on_target == OnGoal::Restart && !has_sequences;
-    let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, is_lost };
+    let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, states_differ };
     for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
         comparison.op = op;
         comparison.records(one, other);
         for found in comparison.found.iter_mut().filter(|found| found.op == op) {
             found.picture.splice(0..0, draw::states(expected, got, op));
         }
-        if comparison.is_lost || (scope.is_whole() && !comparison.found.is_empty()) {
+        if comparison.states_differ || (scope.is_whole() && !comparison.found.is_empty()) {
             return comparison.found;
         }
     }
@@ -97,7 +97,7 @@ pub fn compare_in(
     found
 }
 
-/// The rule that says whether an operation is to be refused.
+/// Returns the rule that decides whether an operation is an error.
 fn refusal_rule(op: Option<&Op>, is_refused: bool) -> &'static str {
     match op {
         Some(Op::Step(_)) if is_refused => "move/invalid",
@@ -111,7 +111,7 @@ fn refusal_rule(op: Option<&Op>, is_refused: bool) -> &'static str {
 }
 
 fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) -> Divergence {
-    let tell = |response: &Response| match (&response.error, response.records.get(op)) {
+    let describe = |response: &Response| match (&response.error, response.records.get(op)) {
         (_, Some(Record::Odd(odd))) => odd.to_string(),
         (Some(error), _) => format!("{}: {}", error.kind, error.message),
         (None, _) => "no error".into(),
@@ -119,14 +119,14 @@ fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) 
     Divergence {
         op,
         field: Field { name: "error", part: FieldPart::Whole },
-        expected: tell(expected),
-        got: tell(got),
+        expected: describe(expected),
+        got: describe(got),
         rule: rule.into(),
         picture: Vec::new(),
     }
 }
 
-/// A part of an answer that can be compared and shown.
+/// A part of an answer that can be compared and printed.
 trait Comparable: PartialEq + Serialize {}
 
 impl<T: PartialEq + Serialize> Comparable for T {}
@@ -139,8 +139,8 @@ struct Comparison<'a> {
     tally: &'a mut Tally,
     op: usize,
     found: Vec<Divergence>,
-    /// Whether the states went apart.
-    is_lost: bool,
+    /// Whether the states differ.
+    states_differ: bool,
 }
 
 impl Comparison<'_> {
@@ -157,7 +157,7 @@ impl Comparison<'_> {
     }
 
     fn resets(&mut self, expected: &ResetRecord, got: &ResetRecord) {
-        // Where starts and goals are given, nothing is said of how they are drawn.
+        // If starts and goals are given, the rules of drawing them do not apply.
         let place = if self.scope.drawn { self.families.place } else { "place/explicit" };
         if self.scope.drawn {
             if self.scope.tells(Told::Derived) {
@@ -197,13 +197,13 @@ impl Comparison<'_> {
             self.list("goal/finish/leave", "is_active", &expected.infos_active, &got.infos_active);
         }
         self.seen(one.observations.as_ref(), other.observations.as_ref());
-        self.figures(one.metrics.as_ref(), other.metrics.as_ref());
+        self.metrics(one.metrics.as_ref(), other.metrics.as_ref());
         if families.collide == "collide/soft" && self.scope.tells(Told::ActionsAfter) {
             self.list("collide/soft/rewrite", "caller's action", &expected.actions_after, &got.actions_after);
         }
     }
 
-    fn figures(&mut self, expected: Option<&Metrics>, got: Option<&Metrics>) {
+    fn metrics(&mut self, expected: Option<&Metrics>, got: Option<&Metrics>) {
         let rule = self.families.metrics;
         let Some(names) = &self.scope.metrics else { return self.value(rule, "metrics", &expected, &got) };
         if names.is_empty() {
@@ -267,7 +267,7 @@ impl Comparison<'_> {
             _ => true,
         };
         if holds {
-            // Whatever was not named: element types, the global map, and what fits no form at all.
+            // Everything else: element types, the global map, and values without a valid form.
             self.value(rule, "observations", expected, got);
         }
     }
@@ -284,7 +284,7 @@ impl Comparison<'_> {
         let differing = expected.iter().zip(got).position(|(one, other)| one != other);
         let Some(agent) = differing else { return self.list(rule, name, expected, got) };
         let (one, other) = (&expected[agent], &got[agent]);
-        // Of a hash that differs nothing else can be said.
+        // A hash that differs does not show which value differs.
         let value = (!other.contains(':')).then(|| draw::first_differing_bit(one, other));
         let num_found = self.found.len();
         self.tally.count(rule, false);
@@ -295,10 +295,10 @@ impl Comparison<'_> {
         false
     }
 
-    /// A part of the state, without which nothing that follows can be right.
+    /// Compares a part of the state. After a difference here, nothing that follows can be compared.
     fn state_list<T: Comparable>(&mut self, rule: &str, name: &'static str, expected: &[T], got: &[T]) {
         self.list(rule, name, expected, got);
-        self.is_lost |= expected != got;
+        self.states_differ |= expected != got;
     }
 
     fn list<T: Comparable>(&mut self, rule: &str, name: &'static str, expected: &[T], got: &[T]) -> bool {
@@ -321,8 +321,8 @@ impl Comparison<'_> {
     }
 
     fn report(&mut self, rule: &str, field: Field, expected: &impl Serialize, got: &impl Serialize) {
-        let is_told = |found: &Divergence| found.rule == rule && found.field.kind() == field.kind();
-        if self.is_lost || self.found.iter().any(is_told) {
+        let is_reported = |found: &Divergence| found.rule == rule && found.field.kind() == field.kind();
+        if self.states_differ || self.found.iter().any(is_reported) {
             return;
         }
         let (expected, got) = (in_json(expected), in_json(got));
@@ -331,7 +331,7 @@ impl Comparison<'_> {
     }
 }
 
-/// A value as those see it who write ports in other languages.
+/// Formats a value as JSON, the form that authors of ports see.
 fn in_json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_else(|error| error.to_string())
 }

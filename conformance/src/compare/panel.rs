@@ -1,4 +1,4 @@
-//! Pictures of a difference, and their text cut down to where something differs.
+//! Pictures of a difference, and their text form, cropped around the first difference.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -6,13 +6,13 @@ use std::ops::Range;
 use pogema_core::picture::{Mark, agent_letter};
 use serde::Serializer;
 
-/// Rows of signs, each row of one length.
+/// Rows of signs, all of one length.
 pub type Grid = Vec<Vec<Sign>>;
 
-/// What a picture shows at one place.
+/// The content of one place of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
-    /// Nothing.
+    /// A free place.
     Free,
     /// An obstacle.
     Obstacle,
@@ -22,12 +22,12 @@ pub enum Sign {
     Goal(u32),
     /// A mark of the occupancy grid.
     Occupied,
-    /// A value of a window that is not 0.
+    /// A nonzero value of a window.
     Set,
 }
 
 impl Sign {
-    /// The letter in texts, as in [`pogema_core::picture`].
+    /// Returns the character in texts, as in [`pogema_core::picture`].
     pub fn letter(self) -> char {
         match self {
             Self::Free => '.',
@@ -51,39 +51,39 @@ impl From<Mark> for Sign {
     }
 }
 
-/// Which state or answer a panel shows.
+/// The state or answer that a panel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
     /// The state before the operation.
     Before,
     /// The expected answer.
     Expected,
-    /// The answer that came.
+    /// The received answer.
     Got,
 }
 
-/// What the pictures of a panel show.
+/// The kind of pictures in a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Agents with their goals, then occupancy. There are no pictures if something is off the map.
+    /// Agents with their goals, then occupancy. If an agent, goal or mark is off the map, the panel has no pictures.
     State,
     /// The channels of one agent's window.
     Window,
 }
 
-/// Pictures of one size that stand side by side.
+/// Pictures of one size, shown side by side.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Panel {
-    /// Which state or answer it shows.
+    /// The state or answer that it shows.
     pub moment: Moment,
-    /// What its pictures show.
+    /// The kind of its pictures.
     pub content: Content,
     /// The pictures.
     pub grids: Vec<Grid>,
 }
 
 impl Panel {
-    /// A line that says what is shown.
+    /// Returns a one-line title.
     pub fn title(&self) -> String {
         let moment = match self.moment {
             Moment::Before => "before",
@@ -91,7 +91,7 @@ impl Panel {
             Moment::Got => "got",
         };
         let shown = match (self.content, self.grids.len()) {
-            (Content::State, 0) => ": somebody or something is off the map",
+            (Content::State, 0) => ": an agent, goal or mark is off the map",
             (Content::State, _) => ": agents and goals, then occupancy",
             (Content::Window, 3) => ": obstacles, agents, goal",
             (Content::Window, _) => "",
@@ -99,13 +99,13 @@ impl Panel {
         format!("{moment}{shown}")
     }
 
-    /// Rows and columns of each picture.
+    /// Returns the numbers of rows and columns of each picture.
     fn size(&self) -> (usize, usize) {
         let first = self.grids.first();
         (first.map_or(0, Vec::len), first.and_then(|grid| grid.first()).map_or(0, Vec::len))
     }
 
-    /// The first place where two panels of one size differ.
+    /// Returns the first place where two panels of one size differ.
     fn differs_at(&self, other: &Self) -> Option<(usize, usize)> {
         let differing = |(one, other): (&Grid, &Grid)| {
             let mut rows = one.iter().zip(other).enumerate();
@@ -117,27 +117,28 @@ impl Panel {
     }
 }
 
-/// How much of each panel a text shows.
+/// Maximum size of the pictures in a text.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Rows of each picture.
+    /// Maximum number of rows of each picture.
     pub rows: usize,
-    /// Columns of all pictures that are side by side.
+    /// Maximum total number of columns of the pictures side by side.
     pub columns: usize,
 }
 
 impl Limits {
-    /// Shows everything.
+    /// No limits.
     pub const NONE: Self = Self { rows: usize::MAX, columns: usize::MAX };
 }
 
-/// The panels as text. Large pictures are cut down to the neighbourhood of the first difference.
+/// Formats panels as text. Crops large pictures to the neighbourhood of the first difference.
 pub fn text_of_panels(panels: &[Panel], limits: Limits) -> String {
     let mut text = String::new();
     for panel in panels {
         let (height, width) = panel.size();
-        let alike = |other: &&Panel| (other.size(), other.grids.len()) == (panel.size(), panel.grids.len());
-        let (row, column) = place_of_difference(&panels.iter().filter(alike).collect::<Vec<_>>());
+        let same_size =
+            |other: &&Panel| (other.size(), other.grids.len()) == (panel.size(), panel.grids.len());
+        let (row, column) = place_to_show(&panels.iter().filter(same_size).collect::<Vec<_>>());
         let rows = around(row, limits.rows, height);
         let columns = around(column, limits.columns / panel.grids.len().max(1), width);
         let _ = write!(text, "  {}", panel.title());
@@ -155,28 +156,28 @@ pub fn text_of_panels(panels: &[Panel], limits: Limits) -> String {
     text
 }
 
-/// Writes panels into a report as their whole text.
+/// Serializes panels as their text without limits.
 pub fn serialize<S: Serializer>(panels: &[Panel], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&text_of_panels(panels, Limits::NONE))
 }
 
-/// The place to show: where an answer is not as expected, or else where the state changed.
-fn place_of_difference(alike: &[&Panel]) -> (usize, usize) {
-    let mut pairs = alike.windows(2).rev();
+/// Returns the place to show: where the answers differ, otherwise where the state changed.
+fn place_to_show(same_size: &[&Panel]) -> (usize, usize) {
+    let mut pairs = same_size.windows(2).rev();
     pairs.find_map(|pair| pair[0].differs_at(pair[1])).unwrap_or((0, 0))
 }
 
-/// At most `most` places of a line of `size`, with `place` in their middle if possible.
-fn around(place: usize, most: usize, size: usize) -> Range<usize> {
-    let begin = place.saturating_sub(most / 2).min(size.saturating_sub(most));
-    begin..(begin + most).min(size)
+/// Returns a range of at most `max_length` indices below `size`, centred on `place` if possible.
+fn around(place: usize, max_length: usize, size: usize) -> Range<usize> {
+    let begin = place.saturating_sub(max_length / 2).min(size.saturating_sub(max_length));
+    begin..(begin + max_length).min(size)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two states of a map, alike but for one cell.
+    /// Returns two states of a map that differ in one cell.
     fn two_states(height: usize, width: usize, (row, column): (usize, usize)) -> Vec<Panel> {
         let free = vec![vec![Sign::Free; width]; height];
         let mut agents = free.clone();
@@ -187,17 +188,17 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_stays_as_it_is() {
+    fn small_pictures_are_not_cropped() {
         let mut panels = two_states(12, 60, (11, 59));
         panels.push(Panel { moment: Moment::Got, content: Content::State, grids: Vec::new() });
         let text = text_of_panels(&panels, Limits { rows: 12, columns: 120 });
         assert_eq!(text, text_of_panels(&panels, Limits::NONE));
         assert_eq!(text.lines().count(), 27);
-        assert!(text.ends_with("\n  got: somebody or something is off the map\n"), "{text}");
+        assert!(text.ends_with("\n  got: an agent, goal or mark is off the map\n"), "{text}");
     }
 
     #[test]
-    fn what_is_cut_shows_the_difference() {
+    fn cropped_pictures_show_the_difference() {
         let panels = two_states(200, 300, (150, 299));
         let shown = text_of_panels(&panels, Limits { rows: 4, columns: 20 });
         let title = "agents and goals, then occupancy (rows 148 to 151 of 200, columns 290 to 299 of 300)";

@@ -1,4 +1,4 @@
-//! What follows from what a port claims: which requests it can play, and which comparisons count.
+//! Consequences of a port's claims: the requests it can play and the comparisons that apply.
 
 use pogema_core::{Observation, OnGoal, Words};
 use pogema_maps::{GridConfig, Targets};
@@ -8,22 +8,22 @@ use super::protocol::{Hello, Profile, Told};
 use crate::request::{Op, Record, Request, Response, numbers};
 use crate::tally::families_of;
 
-/// How a port is given an episode.
+/// The form in which a port receives an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// As an instance, in which everything is drawn already.
+    /// An instance, where everything is already drawn.
     Instance,
-    /// As a config, from which the port draws.
+    /// A config, from which the port draws.
     Config,
 }
 
-/// Something that a port does not claim, and the rules that therefore stay unchecked.
+/// A feature that a port does not claim, and the rules that therefore stay unchecked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unclaimed {
-    /// What is not claimed, in words.
+    /// The name of the feature.
     pub what: String,
-    /// A rule, or the first parts of one.
+    /// A rule, or the prefix of several rules.
     pub rule: &'static str,
 }
 
@@ -32,30 +32,30 @@ impl Unclaimed {
         Self { what: what.into(), rule }
     }
 
-    /// Whether a rule stays unchecked.
+    /// Returns whether a rule stays unchecked.
     pub fn covers(&self, rule: &str) -> bool {
         rule.strip_prefix(self.rule).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
     }
 }
 
-/// Which comparisons count.
+/// The comparisons that apply.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
-    /// Of what a config derives and draws.
+    /// Whether to compare the values that a config derives and draws.
     pub drawn: bool,
-    /// Of observations.
+    /// Whether to compare observations.
     pub observations: bool,
-    /// Of the figures of an episode: those of these names, or all.
+    /// The names of the metrics to compare; all metrics if absent.
     pub metrics: Option<Vec<String>>,
-    /// Of the key of this name; all without a list.
+    /// The optional keys to compare; all keys if absent.
     pub(super) tells: Option<Vec<Told>>,
 }
 
 impl Scope {
-    /// Everything.
+    /// All comparisons.
     pub const ALL: Self = Self { drawn: true, observations: true, metrics: None, tells: None };
 
-    /// What a port can be held to.
+    /// Returns the comparisons that apply to a port with the given claims.
     pub fn of(hello: &Hello, mode: Mode) -> Self {
         let claims = |profile| hello.profiles.contains(&profile);
         Self {
@@ -66,18 +66,18 @@ impl Scope {
         }
     }
 
-    /// Whether a further key counts.
+    /// Returns whether to compare an optional key.
     pub fn tells(&self, key: Told) -> bool {
         self.tells.as_ref().is_none_or(|keys| keys.contains(&key))
     }
 
-    /// Whether this is our own kind of answer, which holds everything.
+    /// Returns whether the answer is from an engine of this workspace or POGEMA, and so is complete.
     pub fn is_whole(&self) -> bool {
         self.tells.is_none()
     }
 }
 
-/// The profile that a rule belongs to.
+/// Returns the profile that contains a rule.
 pub fn profile_of(rule: &str) -> Profile {
     const SEEDING: [&str; 4] =
         ["border/noise", "goal/restart/draw", "goal/restart/foretold", "goal/restart/pool"];
@@ -95,10 +95,10 @@ pub fn profile_of(rule: &str) -> Profile {
     }
 }
 
-/// The request as a port can play it, and what had to be left out of it; or why it cannot play it at all.
+/// Adapts a request to a port. Returns the adapted request and the features left out of it.
 ///
 /// # Errors
-/// With the first thing that the port does not claim and that cannot be left out.
+/// The first required feature that the port does not claim.
 pub fn adapt(
     hello: &Hello,
     mode: Mode,
@@ -106,20 +106,20 @@ pub fn adapt(
     expected: &Response,
 ) -> Result<(Request, Vec<Unclaimed>), Unclaimed> {
     let Ok(config) = GridConfig::from_value(&request.config) else {
-        return refused(hello).map(|()| (request.clone(), Vec::new()));
+        return check_rejection(hello).map(|()| (request.clone(), Vec::new()));
     };
     check_rules(hello, &config)?;
     check_sizes(hello, &config, expected)?;
     if mode == Mode::Instance && expected.records.is_empty() {
-        return refused(hello).map(|()| (request.clone(), Vec::new()));
+        return check_rejection(hello).map(|()| (request.clone(), Vec::new()));
     }
     let mut request = request.clone();
     let left_out = leave_out(hello, mode, &config, &mut request, expected);
     Ok((request, left_out))
 }
 
-/// A config that is to be refused leaves nothing to play as an instance.
-fn refused(hello: &Hello) -> Result<(), Unclaimed> {
+/// Returns an error unless the port claims seeding, because an invalid config has no instance to play.
+fn check_rejection(hello: &Hello) -> Result<(), Unclaimed> {
     if hello.profiles.contains(&Profile::Seeding) {
         Ok(())
     } else {
@@ -154,13 +154,13 @@ fn check_sizes(hello: &Hello, config: &GridConfig, expected: &Response) -> Resul
         ("max_side", side, hello.max_side),
         ("max_radius", config.obs_radius, hello.max_radius),
     ];
-    match sizes.into_iter().find(|(_, size, most)| size > most) {
-        Some((what, _, most)) => Err(Unclaimed::new(format!("more than {what} {most}"), "config/limits")),
+    match sizes.into_iter().find(|(_, size, max)| size > max) {
+        Some((what, _, max)) => Err(Unclaimed::new(format!("{what} above {max}"), "config/limits")),
         None => Ok(()),
     }
 }
 
-/// Takes out of a request what a port does not claim and what the rest can be played without.
+/// Removes from a request the optional features that a port does not claim, and returns them.
 fn leave_out(
     hello: &Hello,
     mode: Mode,
@@ -190,10 +190,10 @@ fn leave_out(
     }
     let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
     if mode == Mode::Instance && config.on_target == OnGoal::Restart && !has_sequences {
-        // A goal that is drawn anew after a step back depends on where the agent stands; no list can hold that.
+        // A goal drawn again after a step back depends on the agent's cell, so no goal list can express it.
         request.ops.retain(|op| *op != Op::Back);
     }
-    leave_out_figures(hello, config, request, &mut left_out);
+    leave_out_metrics(hello, config, request, &mut left_out);
     if mode == Mode::Instance || !claims(Profile::Policies) {
         let was_left_out = leave_out_policies(request, expected);
         left_out.extend(was_left_out.filter(|_| !claims(Profile::Policies)));
@@ -201,7 +201,7 @@ fn leave_out(
     left_out
 }
 
-fn leave_out_figures(
+fn leave_out_metrics(
     hello: &Hello,
     config: &GridConfig,
     request: &mut Request,
@@ -232,9 +232,9 @@ fn leave_out_figures(
     }
 }
 
-/// Puts the actions that a policy chooses in its place.
+/// Replaces each policy operation by the actions that the policy chooses.
 fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Unclaimed> {
-    // Records and operations go together, one to one, up to the first error.
+    // Records match operations one to one, up to the first error.
     let kept =
         expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
     let mut records = kept.map(Record::step);
@@ -256,7 +256,7 @@ fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Uncl
     left_out
 }
 
-/// What a port would have to claim for a hand-written case of a rule to show anything.
+/// Returns a feature that the port does not claim but that a hand-written case of the rule requires, if any.
 pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     let profile = profile_of(rule);
     if !hello.profiles.contains(&profile) {
@@ -267,8 +267,8 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
         (Told::Derived, "config/size"),
         (Told::Foretold, "goal/restart/foretold"),
     ];
-    let lacking = needed
+    let missing = needed
         .into_iter()
         .find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
-    lacking.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
+    missing.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
 }

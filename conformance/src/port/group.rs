@@ -1,4 +1,4 @@
-//! Differences by their cause, so that one bug is one line.
+//! Differences grouped by cause, so that one bug is one entry of a report.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -10,43 +10,43 @@ use super::link::Misbehaviour;
 use crate::compare::Divergence;
 use crate::request::Request;
 
-/// Something wrong with a port, however often it was seen.
+/// A defect of a port, with all its occurrences.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// The rule that is broken; none if the port broke the protocol.
+    /// The broken rule; none if the port broke the protocol.
     pub rule: Option<String>,
-    /// What differs, without its index, or what was seen.
+    /// The field that differs, without its index, or the misbehaviour.
     pub what: String,
-    /// How often it was seen.
+    /// Number of occurrences.
     pub times: u64,
-    /// The hand-written cases that show it, by rule.
+    /// Number of hand-written cases that show it, by rule.
     pub cases: BTreeMap<String, u64>,
-    /// The smallest occasion.
+    /// The smallest occurrence.
     pub example: Example,
-    /// Where the smallest counterexample was kept.
+    /// The file of the smallest counterexample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<PathBuf>,
-    /// The command that plays it again.
+    /// The command that replays it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replay: Option<String>,
-    /// Why it is known and borne for now.
+    /// The reason why it is accepted for now, if it is a known deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<String>,
 }
 
-/// One occasion on which something was wrong.
+/// One occurrence of a defect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Example {
     /// The case, the line of a recording, or the number of a drawn case.
     pub name: String,
-    /// Whether the port was given an instance or a config.
+    /// Whether the port received an instance or a config.
     pub mode: Mode,
-    /// What was played.
+    /// The request that was played.
     pub request: Request,
     /// The difference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub divergence: Option<Divergence>,
-    /// What the port did instead of answering.
+    /// The misbehaviour of the port.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fault: Option<Misbehaviour>,
 }
@@ -67,12 +67,12 @@ impl Example {
         }
     }
 
-    /// Whether another occasion has the same cause.
+    /// Returns whether another occurrence has the same cause.
     pub fn is_like(&self, other: &Self) -> bool {
         self.key() == other.key()
     }
 
-    /// Small is easy to understand.
+    /// Returns a measure of size; smaller examples are easier to understand.
     fn size(&self) -> (usize, usize) {
         let written = |value: &serde_json::Value| value.to_string().len();
         (
@@ -82,14 +82,14 @@ impl Example {
     }
 }
 
-/// What was seen of a misbehaviour, without numbers and quoted answers.
+/// Returns the description of a misbehaviour without numbers and quoted answers.
 fn kind_of_fault(what: &str) -> String {
     let head = what.split(": `").next().unwrap_or(what);
     let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
     words.collect::<Vec<_>>().join(" ").replace(" (exit status:", "").replace(" (signal:", "")
 }
 
-/// Adds an occasion to the causes; `case_rule` is the rule of the hand-written case that it is.
+/// Adds an occurrence to the causes. `case_rule` is the rule of the hand-written case, if it is one.
 pub fn add(causes: &mut Vec<Cause>, example: Example, case_rule: Option<&str>) {
     let known = causes.iter().position(|known| known.example.is_like(&example));
     let at = known.unwrap_or(causes.len());

@@ -1,4 +1,4 @@
-//! What there is to check: cases, recordings and drawn episodes.
+//! Items to check: cases, recordings and random episodes.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::play::{NamedEngine, play};
 use crate::request::{Request, Response};
 use crate::script::play_script;
 
-/// One thing to check.
+/// One item to check.
 pub enum Item {
     Case(String, Box<Case>),
     Recorded(String, Box<GoldenRecording>),
@@ -47,7 +47,7 @@ impl Item {
     }
 }
 
-/// All that a plan asks for, cases first.
+/// Returns all items of a plan, cases first.
 pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
     let mut items = Vec::new();
     if !plan.files.is_empty() {
@@ -73,9 +73,9 @@ fn add_cases(items: &mut Vec<Item>, plan: &Plan) -> Result<(), Error> {
     let root = cases::folder();
     for path in golden::files(&root, ".yaml")? {
         let case = cases::read(&path)?;
-        // Where POGEMA does something else by decision of this project, a port may do as POGEMA does.
-        let is_wanted = plan.rules.as_ref().is_none_or(|rules| rules.matches(&case.rule));
-        if case.pogema.is_none() && is_wanted {
+        // If this project deviates from POGEMA by decision, a port may follow POGEMA.
+        let is_selected = plan.rules.as_ref().is_none_or(|rules| rules.matches(&case.rule));
+        if case.pogema.is_none() && is_selected {
             items.push(Item::Case(relative(&path, &root), Box::new(case)));
         }
     }

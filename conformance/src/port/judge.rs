@@ -1,4 +1,4 @@
-//! What one request shows of a port.
+//! The check of a port by one request.
 
 use super::claims::{Mode, Scope, Unclaimed, adapt};
 use super::link::{Link, Misbehaviour};
@@ -9,27 +9,27 @@ use crate::play::play;
 use crate::request::{Request, Response};
 use crate::tally::Tally;
 
-/// What one request shows of a port.
+/// The result of checking a port by one request.
 #[derive(Clone, Debug, Default)]
 pub struct Judged {
-    /// What was played, in the form that the port can play.
+    /// The request that was played, adapted to the port.
     pub request: Request,
     /// Comparisons by rule, up to the first difference.
     pub tally: Tally,
     /// The first difference of each kind.
     pub divergences: Vec<Divergence>,
-    /// Why there is no whole answer.
+    /// The misbehaviour that cut the answer short.
     pub fault: Option<Misbehaviour>,
-    /// What could not be checked.
+    /// The features that could not be checked.
     pub not_claimed: Vec<Unclaimed>,
-    /// Whether anything was played at all.
+    /// Whether the port was asked to play.
     pub is_played: bool,
 }
 
-/// Plays a request on a port and compares.
+/// Plays a request on a port and compares its answer with the expected one.
 ///
-/// `expected` is the right answer; where the port's claims ask for another form of the request, the reference is
-/// asked again.
+/// `expected` is the right answer. If the port's claims require an adapted request, the reference answers that one
+/// instead.
 pub fn judge(
     link: &mut dyn Link,
     hello: &Hello,
@@ -45,8 +45,8 @@ pub fn judge(
     if mode == Mode::Instance && expected.records.is_empty() {
         return judged;
     }
-    let again = (adapted != *request).then(|| play(&adapted));
-    let expected = again.as_ref().unwrap_or(expected);
+    let replayed = (adapted != *request).then(|| play(&adapted));
+    let expected = replayed.as_ref().unwrap_or(expected);
     let answered = play_on_port(link, hello, mode, &adapted, expected);
     judged.is_played = true;
     judged.fault = answered.fault;

@@ -1,4 +1,4 @@
-//! A counterexample as a case, so that it can be read, played again and kept for ever.
+//! Writes counterexamples as cases, which can be read, replayed and kept.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
 
-/// The file of a case, in the order in which it is read.
+/// The file of a case, with its keys in reading order.
 #[derive(Serialize)]
 struct CaseFile {
     rule: String,
@@ -44,7 +44,7 @@ struct StepOfFile {
     expected: BTreeMap<&'static str, Value>,
 }
 
-/// Writes an example as a case into a folder; gives the path, or nothing if it breaks no rule.
+/// Writes an example as a case into a folder. Returns the path, or `None` if the example breaks no rule.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.
@@ -62,7 +62,7 @@ pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathB
     Ok(Some(path))
 }
 
-/// An example in the format of cases.
+/// Formats an example as a case.
 ///
 /// # Errors
 /// If it cannot be written as YAML.
@@ -120,7 +120,7 @@ fn word(number: i64) -> Value {
     }
 }
 
-/// What to expect of a moment: a picture of each, and of the last all that could differ.
+/// Returns the expectations of a moment: a picture, and for the last moment everything that could differ.
 fn facts(
     record: &Record,
     map: Option<&Map>,
@@ -164,7 +164,7 @@ fn facts(
     facts
 }
 
-/// What the agent sees whose observation differs.
+/// Adds the observation of the agent whose observation differs.
 fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: Option<Field>) {
     let Some((field, agent)) = field.and_then(|field| Some((field, field.index()?))) else { return };
     match observed {

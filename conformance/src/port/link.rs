@@ -1,36 +1,36 @@
-//! Whoever answers the questions of the protocol.
+//! The interface to programs that speak the protocol.
 
 use serde::Serialize;
 
 use super::protocol::{Ask, Hello, Reply};
 
-/// Somebody who speaks the protocol.
+/// A connection to a program that speaks the protocol.
 pub trait Link: Send {
-    /// Who is it, and what does it claim?
+    /// Asks the port for its name and claims.
     ///
     /// # Errors
-    /// If it gives no answer, or none that can be understood.
+    /// If the answer is missing or cannot be parsed.
     fn hello(&mut self) -> Result<Hello, Misbehaviour>;
 
-    /// The answer to a question.
+    /// Sends a question and returns the answer.
     ///
     /// # Errors
-    /// If it gives no answer, or none that can be understood.
+    /// If the answer is missing or cannot be parsed.
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour>;
 }
 
-/// A port did not keep to the protocol, so that nothing can be said of its rules.
+/// A violation of the protocol, after which the rules cannot be checked.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Misbehaviour {
-    /// What was seen, in a line.
+    /// A one-line description.
     pub what: String,
-    /// The end of what it wrote to stderr.
+    /// The end of the port's stderr.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub stderr: String,
 }
 
 impl Misbehaviour {
-    /// Something seen in an answer.
+    /// Creates a misbehaviour without stderr.
     pub fn new(what: impl Into<String>) -> Self {
         Self { what: what.into(), stderr: String::new() }
     }

@@ -1,12 +1,12 @@
-//! Ports: implementations of the spec in any language, asked over a pipe.
+//! Ports: implementations of the spec in any language, queried over a pipe.
 //!
-//! | module | what it holds |
+//! | item | content |
 //! | --- | --- |
 //! | [`Ask`], [`Reply`], [`Hello`] | the protocol |
-//! | [`Link`], [`Process`], [`Server`] | who answers: a child process, or an engine of this workspace |
-//! | [`Port`] | a link as an environment |
-//! | [`Scope`], [`adapt`] | what follows from what a port claims |
-//! | [`play_on_port`] | a port's answer to a whole request |
+//! | [`Link`], [`Process`], [`Server`] | the answering side: a child process, or an engine of this workspace |
+//! | [`Port`] | a session with a port about one config |
+//! | [`Scope`], [`adapt`] | the consequences of a port's claims |
+//! | [`play_on_port`] | a port's answer to a complete request |
 
 mod claims;
 mod group;

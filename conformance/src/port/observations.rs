@@ -1,4 +1,4 @@
-//! What a port says its agents see, in the form that records keep.
+//! Conversion of observations between the protocol and records.
 
 use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
 use serde_json::{Value, json};
@@ -6,17 +6,17 @@ use sha2::{Digest, Sha256};
 
 use crate::digits::{pack, unpack};
 
-/// Reads what a port told; an error says in words what is wrong with its form.
+/// Reads observations from an answer. An error describes what is wrong with their form.
 ///
 /// Rule: observe/default, observe/pomapf, observe/mapf
-pub fn read(told: &Value, config: &Config, padded_dtype: &str) -> Result<Observed, String> {
+pub fn read(answer: &Value, config: &Config, padded_dtype: &str) -> Result<Observed, String> {
     let area = config.side() * config.side();
     let mut odd = Vec::new();
     if config.observation == Observation::Default {
-        let windows = windows("observations", told, config.num_agents, 3 * area, &mut odd)?;
+        let windows = windows("observations", answer, config.num_agents, 3 * area, &mut odd)?;
         return Ok(Observed::Default { dtype: "float32".into(), windows, odd });
     }
-    let array = |name: &str| told.get(name).ok_or_else(|| format!("`observations` has no `{name}`"));
+    let array = |name: &str| answer.get(name).ok_or_else(|| format!("`observations` has no `{name}`"));
     let places = |name: &str| pairs(name, array(name)?, config.num_agents);
     let pomapf = ObservedPomapf {
         dtype: "float32".into(),
@@ -29,11 +29,11 @@ pub fn read(told: &Value, config: &Config, padded_dtype: &str) -> Result<Observe
     if config.observation == Observation::Pomapf {
         return Ok(Observed::Pomapf(pomapf));
     }
-    let global_obstacles = match told.get("global_obstacles").unwrap_or(&Value::Null) {
+    let global_obstacles = match answer.get("global_obstacles").unwrap_or(&Value::Null) {
         Value::Null => None,
         rows => {
             let rows = serde_json::from_value(rows.clone())
-                .map_err(|_| "`global_obstacles` is no list of texts".to_owned())?;
+                .map_err(|_| "`global_obstacles` is not a list of strings".to_owned())?;
             Some(Padded { dtype: padded_dtype.into(), rows })
         }
     };
@@ -41,7 +41,7 @@ pub fn read(told: &Value, config: &Config, padded_dtype: &str) -> Result<Observe
     Ok(Observed::Mapf(ObservedMapf { pomapf, global_obstacles, global_xy, global_target_xy }))
 }
 
-/// The same the other way.
+/// Writes observations in the form of an answer.
 pub fn write(observed: &Observed) -> Value {
     let arrays = |pomapf: &ObservedPomapf| {
         json!({
@@ -53,19 +53,19 @@ pub fn write(observed: &Observed) -> Value {
         Observed::Default { windows, .. } => json!(windows),
         Observed::Pomapf(pomapf) => arrays(pomapf),
         Observed::Mapf(mapf) => {
-            let mut told = arrays(&mapf.pomapf);
-            told["global_xy"] = json!(mapf.global_xy);
-            told["global_target_xy"] = json!(mapf.global_target_xy);
-            told["global_obstacles"] = json!(mapf.global_obstacles.as_ref().map(|padded| &padded.rows));
-            told
+            let mut answer = arrays(&mapf.pomapf);
+            answer["global_xy"] = json!(mapf.global_xy);
+            answer["global_target_xy"] = json!(mapf.global_target_xy);
+            answer["global_obstacles"] = json!(mapf.global_obstacles.as_ref().map(|padded| &padded.rows));
+            answer
         }
     }
 }
 
-/// Puts the expected window in the place of every hash of it, so that the two can be compared as a whole.
-pub fn resolve_hashes(expected: &Observed, told: &mut Observed, side: usize) {
+/// Replaces each hash of an expected window by that window, so that observations can be compared as a whole.
+pub fn resolve_hashes(expected: &Observed, answer: &mut Observed, side: usize) {
     let area = side * side;
-    match (expected, told) {
+    match (expected, answer) {
         (Observed::Default { windows: one, .. }, Observed::Default { windows: other, .. }) => {
             resolve(one, other, 3 * area);
         }
@@ -81,16 +81,16 @@ pub fn resolve_hashes(expected: &Observed, told: &mut Observed, side: usize) {
     }
 }
 
-fn resolve(expected: &[String], told: &mut [String], num_values: usize) {
-    for (expected, told) in expected.iter().zip(told) {
-        let Some((algorithm, _)) = told.split_once(':') else { continue };
-        if hash(algorithm, unpack(expected).into_iter().take(num_values)).as_deref() == Some(told) {
-            told.clone_from(expected);
+fn resolve(expected: &[String], answer: &mut [String], num_values: usize) {
+    for (expected, answer) in expected.iter().zip(answer) {
+        let Some((algorithm, _)) = answer.split_once(':') else { continue };
+        if hash(algorithm, unpack(expected).into_iter().take(num_values)).as_deref() == Some(answer) {
+            answer.clone_from(expected);
         }
     }
 }
 
-/// The hash of one byte for each value.
+/// Returns the hash of the values, one byte per value.
 fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
     let bytes: Vec<u8> = values.map(u8::from).collect();
     match algorithm {
@@ -112,12 +112,12 @@ fn fnv1a64(bytes: &[u8]) -> u64 {
 
 fn windows(
     name: &str,
-    told: &Value,
+    answer: &Value,
     num_agents: usize,
     num_values: usize,
     odd: &mut Vec<String>,
 ) -> Result<Vec<String>, String> {
-    let list = told.as_array().ok_or_else(|| format!("`{name}` is no list"))?;
+    let list = answer.as_array().ok_or_else(|| format!("`{name}` is not a list"))?;
     if list.len() != num_agents {
         return Err(format!("`{name}` has length {}, expected {num_agents}, one for each agent", list.len()));
     }
@@ -127,27 +127,27 @@ fn windows(
     list.iter().enumerate().map(window).collect()
 }
 
-fn read_window(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
-    let Some(text) = told.as_str() else { return read_values(told, num_values, odd) };
+fn read_window(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+    let Some(text) = answer.as_str() else { return read_values(answer, num_values, odd) };
     let (digits, length) = match text.split_once(':') {
         Some(("sha256", digits)) => (digits, 64),
         Some(("fnv1a64", digits)) => (digits, 16),
-        Some((other, _)) => return Err(format!("is a hash of the unknown kind `{other}`")),
+        Some((other, _)) => return Err(format!("has the unknown hash algorithm `{other}`")),
         None => (text, 2 * num_values.div_ceil(8)),
     };
     if digits.len() != length {
         return Err(format!("has {} digits, expected {length}", digits.len()));
     }
     match digits.chars().find(|digit| !digit.is_ascii_hexdigit()) {
-        Some(digit) => Err(format!("has `{digit}` where a hexadecimal digit was expected")),
+        Some(digit) => Err(format!("contains `{digit}`, expected a hexadecimal digit")),
         None => Ok(text.to_ascii_lowercase()),
     }
 }
 
-/// Numbers nested to any depth. A number other than 0 and 1 is no bad form but a wrong answer.
-fn read_values(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+/// Reads numbers nested to any depth. A number other than 0 and 1 is valid in form but a wrong answer.
+fn read_values(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
     let mut bits = Vec::with_capacity(num_values);
-    let mut rest = vec![told];
+    let mut rest = vec![answer];
     while let Some(value) = rest.pop() {
         match value {
             Value::Array(values) => rest.extend(values.iter().rev()),
@@ -159,7 +159,7 @@ fn read_values(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result
                 }
                 bits.push(number != 0.0);
             }
-            other => return Err(format!("holds {other}, expected numbers, or a text")),
+            other => return Err(format!("contains {other}, expected numbers or a string")),
         }
     }
     if bits.len() == num_values {
@@ -169,9 +169,9 @@ fn read_values(told: &Value, num_values: usize, odd: &mut Vec<String>) -> Result
     }
 }
 
-fn pairs(name: &str, told: &Value, num_agents: usize) -> Result<Vec<[i32; 2]>, String> {
-    let pairs: Vec<[i32; 2]> = serde_json::from_value(told.clone())
-        .map_err(|_| format!("`{name}` is no list of pairs of whole numbers"))?;
+fn pairs(name: &str, answer: &Value, num_agents: usize) -> Result<Vec<[i32; 2]>, String> {
+    let pairs: Vec<[i32; 2]> = serde_json::from_value(answer.clone())
+        .map_err(|_| format!("`{name}` is not a list of pairs of whole numbers"))?;
     if pairs.len() == num_agents {
         Ok(pairs)
     } else {

@@ -1,4 +1,4 @@
-//! What a run checks.
+//! The plan of a run: what it checks.
 
 use std::path::PathBuf;
 
@@ -6,22 +6,22 @@ use pogema_core::words;
 
 use super::protocol::Profile;
 
-/// What to check.
+/// The items to check, and how.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
-    /// How many cases to draw.
+    /// Number of random cases.
     pub num_cases: u64,
-    /// Seed of the drawn cases.
+    /// Seed of the random cases.
     pub seed: u64,
-    /// Only rules that this matches.
+    /// A pattern; only matching rules are checked [default: all rules].
     pub rules: Option<glob::Pattern>,
-    /// Only these profiles; all that are claimed, if there are none.
+    /// The profiles to check [default: all that are claimed].
     pub profiles: Vec<Profile>,
-    /// How many cases are played side by side; one for each processor, if none is given.
+    /// Number of cases played in parallel [default: one per core].
     pub num_workers: Option<usize>,
-    /// These cases alone, and nothing else, if there are any.
+    /// Case files. If there are any, only they are checked.
     pub files: Vec<PathBuf>,
-    /// These parts alone; all, if there are none.
+    /// The parts to check [default: all].
     pub parts: Vec<Part>,
 }
 
@@ -32,7 +32,7 @@ words! {
         Cases = "cases",
         /// The recordings of POGEMA 1.4.0.
         Recordings = "recordings",
-        /// Drawn cases.
+        /// Random cases.
         Drawn = "drawn",
     }
 }

@@ -1,4 +1,4 @@
-//! A port's answer to a whole request, in the form of every other answer.
+//! A port's answer to a complete request, in the form of a [`Response`].
 
 use pogema_core::{Error, Metrics, Padded, TraceStep};
 use pogema_maps::{GridConfig, InstanceSource};
@@ -13,18 +13,18 @@ use crate::request::{
     actions_of, numbers, padded_dtype,
 };
 
-/// What a port answered, and what it did instead of answering.
+/// The answers of a port, and its misbehaviour, if any.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answered {
     /// The answers, up to the first refusal or misbehaviour.
     pub response: Response,
-    /// Why there are no more of them.
+    /// The misbehaviour that ended the answers.
     pub fault: Option<Misbehaviour>,
 }
 
 /// Plays a request on a port.
 ///
-/// `expected` is the right answer: a port that claims no policies is given the actions that stand there.
+/// `expected` is the right answer. A port that does not claim policies receives the actions from it.
 pub fn play_on_port(
     link: &mut dyn Link,
     hello: &Hello,
@@ -46,7 +46,7 @@ pub fn play_on_port(
     answered
 }
 
-/// A config that must be refused: there is nothing to play, and no form that an answer would have to keep.
+/// Asks a port to reset an invalid config. The port should answer with an error; no other key is required.
 fn refuse_config(link: &mut dyn Link, request: &Request, answered: &mut Answered) {
     let beginning = Beginning {
         config: Some(request.config.clone()),
@@ -67,10 +67,10 @@ enum Unplayable<'l> {
     Instance(Error),
 }
 
-/// What makes a record of a step.
+/// A constructor of the record of a step.
 type Kind = fn(Box<StepRecord>) -> Record;
 
-/// One request at work on a port.
+/// The state of a request that is being played on a port.
 struct PortPlay<'l> {
     port: Port<'l>,
     mode: Mode,
@@ -165,7 +165,8 @@ impl<'l> PortPlay<'l> {
             return self.step(&Ask::Act { policy }, kind);
         }
         let chosen = self.expected.records.get(index).and_then(Record::step);
-        let missing = || Error::Port { reason: "no actions are expected here".into() };
+        let missing =
+            || Error::Port { reason: "the expected answer has no actions for this operation".into() };
         let actions = numbers(&chosen.ok_or_else(missing)?.step.actions);
         self.step(&Ask::Step { actions }, kind)
     }
@@ -178,7 +179,7 @@ impl<'l> PortPlay<'l> {
             Ask::Step { actions } => actions.clone(),
             _ => reply.actions.unwrap_or_default(),
         };
-        // No action at all, and yet it was played: there is no record of such a step.
+        // The port played a number that is not an action, so there is no record of such a step.
         let Ok(actions) = actions_of(&numbers) else { return Ok(Record::Odd(json!({ "played": numbers }))) };
         let step = TraceStep {
             actions,

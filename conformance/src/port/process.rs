@@ -1,4 +1,4 @@
-//! A port in a process of its own, which may do anything but keep us waiting.
+//! A port in a child process. Every answer has a timeout.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -14,35 +14,35 @@ use serde::de::DeserializeOwned;
 use super::link::{Link, Misbehaviour};
 use super::protocol::{Ask, Hello, PROTOCOL, Reply};
 
-/// A longer line is no answer. Units: bytes.
-const LONGEST_LINE: usize = 1 << 26;
-/// So much of stderr is told. Units: bytes.
-const LONGEST_TAIL: usize = 2048;
-/// So much of a bad answer is quoted. Units: characters.
-const LONGEST_QUOTE: usize = 120;
-/// So long a port may take to start, if answers are to come sooner: imports alone can take seconds.
-const START_UP: Duration = Duration::from_secs(60);
-/// How long a port may take to end by itself when it is told goodbye.
-const GRACE: Duration = Duration::from_millis(500);
-/// How often it is looked whether a silent port is still there.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Maximum length of an answer. Units: bytes.
+const MAX_LINE_LENGTH: usize = 1 << 26;
+/// Length of the end of stderr that is reported. Units: bytes.
+const MAX_STDERR_LENGTH: usize = 2048;
+/// Length of the start of a bad answer that is quoted. Units: characters.
+const MAX_QUOTE_LENGTH: usize = 120;
+/// Minimum timeout of the first answer, since imports alone can take seconds.
+const MIN_START_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time that a port may take to exit after `bye` before it is killed.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
+/// Interval between checks whether a silent port is still running.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How a port is started.
+/// The command that starts a port, and its timeout.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// The command line as it was given.
+    /// The command line as given.
     pub text: String,
     words: Vec<String>,
     timeout: Duration,
 }
 
 impl Command {
-    /// A command line, split as a shell would, and the time that each answer may take.
+    /// Splits a command line as a shell would. `timeout` applies to each answer.
     ///
     /// # Errors
     /// [`Error::Config`] for an empty line or an open quote.
     pub fn new(text: &str, timeout: Duration) -> Result<Self, Error> {
-        let expected = "a command line, as for a shell";
+        let expected = "a shell command line";
         let words = shell_words::split(text).map_err(|_| Error::config("port", text, expected))?;
         if words.is_empty() {
             return Err(Error::config("port", text, expected));
@@ -51,25 +51,25 @@ impl Command {
     }
 }
 
-/// A port in a child process, with all that the process starts in turn.
+/// A port in a child process, with all processes that it starts.
 #[derive(Debug)]
 pub struct Process {
     child: Box<dyn ChildWrapper>,
     input: Option<Sender<Vec<u8>>>,
-    output: Receiver<Said>,
-    /// Whether more had come behind the last answer.
-    is_followed: bool,
-    tail: Arc<Mutex<VecDeque<u8>>>,
+    output: Receiver<Output>,
+    /// Whether further output followed the last answer.
+    has_more: bool,
+    stderr_end: Arc<Mutex<VecDeque<u8>>>,
     timeout: Duration,
 }
 
-/// What came from the port's stdout.
+/// Output from the port's stdout.
 #[derive(Debug)]
-enum Said {
-    /// A line, and whether more had come behind it.
+enum Output {
+    /// A line, and whether further output followed it.
     Line(Vec<u8>, bool),
     TooLong,
-    /// The end, and what stood behind the last line.
+    /// The end, and the text after the last line.
     End(Vec<u8>),
 }
 
@@ -77,84 +77,84 @@ impl Process {
     /// Starts a port.
     ///
     /// # Errors
-    /// If there is no such program.
+    /// If the program not_started be started.
     pub fn start(command: &Command) -> Result<Self, Misbehaviour> {
         let (program, arguments) = (&command.words[0], &command.words[1..]);
         let mut wrap = CommandWrap::with_new(program, |inner| {
             inner.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         });
-        // Killed as one, so that nothing a port has started outlives it.
+        // The group is killed as one, so that no process started by a port outlives it.
         #[cfg(unix)]
         wrap.wrap(process_wrap::std::ProcessGroup::leader());
         #[cfg(windows)]
         wrap.wrap(process_wrap::std::JobObject);
-        let cannot =
+        let not_started =
             |error: &std::io::Error| Misbehaviour::new(format!("`{program}` cannot be started: {error}"));
-        let mut child = wrap.spawn().map_err(|error| cannot(&error))?;
+        let mut child = wrap.spawn().map_err(|error| not_started(&error))?;
         let pipes = (child.stdin().take(), child.stdout().take(), child.stderr().take());
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
             return Err(Misbehaviour::new(format!("`{program}` has no pipes")));
         };
-        let tail = Arc::default();
-        let shared = Arc::clone(&tail);
-        std::thread::spawn(move || keep_tail(stderr, &shared));
+        let stderr_end = Arc::default();
+        let shared = Arc::clone(&stderr_end);
+        std::thread::spawn(move || keep_end(stderr, &shared));
         let (input, to_write) = channel::<Vec<u8>>();
-        // On threads of their own: a port that does not read, or does not write, blocks only them.
+        // Separate threads: a port that does not read or write blocks only them.
         std::thread::spawn(move || write_all(stdin, &to_write));
-        let (said, output) = channel();
-        std::thread::spawn(move || read_lines(BufReader::new(stdout), &said));
-        Ok(Self { child, input: Some(input), output, is_followed: false, tail, timeout: command.timeout })
+        let (sender, output) = channel();
+        std::thread::spawn(move || read_lines(BufReader::new(stdout), &sender));
+        Ok(Self { child, input: Some(input), output, has_more: false, stderr_end, timeout: command.timeout })
     }
 
     fn exchange<T: DeserializeOwned>(&mut self, ask: &Ask) -> Result<T, Misbehaviour> {
         let kind = kind_of(ask);
-        let unasked = if self.is_followed {
+        let unrequested = if self.has_more {
             self.output.recv_timeout(self.timeout).ok()
         } else {
             self.output.try_recv().ok()
         };
-        match unasked {
-            None | Some(Said::End(_)) => {}
-            Some(Said::TooLong) => return Err(self.saw("wrote a line that nobody asked for".into())),
-            Some(Said::Line(line, _)) => {
-                return Err(self.saw(format!("wrote a line that nobody asked for: `{}`", quote(&line))));
+        match unrequested {
+            None | Some(Output::End(_)) => {}
+            Some(Output::TooLong) => return Err(self.misbehaviour("wrote an unrequested line".into())),
+            Some(Output::Line(line, _)) => {
+                return Err(self.misbehaviour(format!("wrote an unrequested line: `{}`", quote(&line))));
             }
         }
         let mut line = serde_json::to_vec(ask).map_err(|error| Misbehaviour::new(error.to_string()))?;
         line.push(b'\n');
         if let Some(input) = &self.input {
-            // A port that is gone is noticed when its answer stays out.
+            // If the port has ended, waiting for its answer reports it.
             let _ = input.send(line);
         }
         let line = self.wait(kind)?;
         serde_json::from_slice(&line).map_err(|error| {
-            self.saw(format!("gave no readable answer to `{kind}` ({error}): `{}`", quote(&line)))
+            self.misbehaviour(format!("gave no readable answer to `{kind}` ({error}): `{}`", quote(&line)))
         })
     }
 
     fn wait(&mut self, kind: &str) -> Result<Vec<u8>, Misbehaviour> {
-        let timeout = if kind == "hello" { self.timeout.max(START_UP) } else { self.timeout };
+        let timeout = if kind == "hello" { self.timeout.max(MIN_START_TIMEOUT) } else { self.timeout };
         let until = Instant::now() + timeout;
         let mut has_ended = false;
         loop {
-            let patience = until.saturating_duration_since(Instant::now()).min(GLANCE);
-            match self.output.recv_timeout(patience) {
-                Ok(Said::Line(line, is_followed)) => {
-                    self.is_followed = is_followed;
+            let wait = until.saturating_duration_since(Instant::now()).min(POLL_INTERVAL);
+            match self.output.recv_timeout(wait) {
+                Ok(Output::Line(line, has_more)) => {
+                    self.has_more = has_more;
                     return Ok(line);
                 }
-                Ok(Said::TooLong) => {
-                    return Err(
-                        self.saw(format!("answered `{kind}` with a line of more than {LONGEST_LINE} bytes"))
-                    );
+                Ok(Output::TooLong) => {
+                    return Err(self.misbehaviour(format!(
+                        "answered `{kind}` with a line of more than {MAX_LINE_LENGTH} bytes"
+                    )));
                 }
-                Ok(Said::End(rest)) => return Err(self.ended(kind, &rest)),
+                Ok(Output::End(rest)) => return Err(self.ended(kind, &rest)),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(kind, b"")),
-                // Its children may keep its output open after its own end.
+                // The port's children may keep its output open after it has ended.
                 Err(RecvTimeoutError::Timeout) if has_ended => return Err(self.ended(kind, b"")),
                 Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
                     let seconds = timeout.as_secs_f64();
-                    return Err(self.saw(format!("gave no answer to `{kind}` within {seconds} s")));
+                    return Err(self.misbehaviour(format!("gave no answer to `{kind}` within {seconds} s")));
                 }
                 Err(RecvTimeoutError::Timeout) => has_ended = matches!(self.child.try_wait(), Ok(Some(_))),
             }
@@ -164,7 +164,7 @@ impl Process {
     fn ended(&mut self, kind: &str, rest: &[u8]) -> Misbehaviour {
         let rest =
             if rest.is_empty() { String::new() } else { format!(", after half a line: `{}`", quote(rest)) };
-        let until = Instant::now() + GRACE;
+        let until = Instant::now() + EXIT_TIMEOUT;
         let status = loop {
             match self.child.try_wait() {
                 Ok(Some(status)) => break format!("ended ({status})"),
@@ -172,15 +172,15 @@ impl Process {
                 _ => break "closed its output".into(),
             }
         };
-        self.saw(format!("{status} instead of answering `{kind}`{rest}"))
+        self.misbehaviour(format!("{status} instead of answering `{kind}`{rest}"))
     }
 
-    /// What was seen, with the end of stderr.
-    fn saw(&self, what: String) -> Misbehaviour {
-        // What a port writes last is often why; it may still be on its way.
+    /// Creates a misbehaviour with the end of stderr.
+    fn misbehaviour(&self, what: String) -> Misbehaviour {
+        // The last output on stderr often gives the reason; it may still be in transit.
         std::thread::sleep(Duration::from_millis(20));
-        let tail = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
-        let bytes: Vec<u8> = tail.iter().copied().collect();
+        let stderr_end = self.stderr_end.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes: Vec<u8> = stderr_end.iter().copied().collect();
         Misbehaviour { what, stderr: String::from_utf8_lossy(&bytes).trim_end().to_owned() }
     }
 }
@@ -191,7 +191,8 @@ impl Link for Process {
         if hello.protocol == PROTOCOL {
             Ok(hello)
         } else {
-            Err(self.saw(format!("speaks `{}`, expected `{PROTOCOL}`", shorten(&hello.protocol, 60))))
+            Err(self
+                .misbehaviour(format!("speaks `{}`, expected `{PROTOCOL}`", shorten(&hello.protocol, 60))))
         }
     }
 
@@ -207,11 +208,11 @@ impl Drop for Process {
         {
             let _ = input.send([bye, b"\n".to_vec()].concat());
         }
-        let until = Instant::now() + GRACE;
+        let until = Instant::now() + EXIT_TIMEOUT;
         while matches!(self.child.try_wait(), Ok(None)) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(1));
         }
-        // The whole group, even if its leader is gone already.
+        // Kill the whole group, even if its leader has already ended.
         let _ = self.child.start_kill();
         let _ = self.child.wait();
     }
@@ -232,8 +233,8 @@ fn kind_of(ask: &Ask) -> &'static str {
 }
 
 fn quote(line: &[u8]) -> String {
-    let start = &line[..line.len().min(4 * LONGEST_QUOTE)];
-    shorten(&String::from_utf8_lossy(start), LONGEST_QUOTE)
+    let start = &line[..line.len().min(4 * MAX_QUOTE_LENGTH)];
+    shorten(&String::from_utf8_lossy(start), MAX_QUOTE_LENGTH)
 }
 
 fn write_all(mut stdin: impl Write, lines: &Receiver<Vec<u8>>) {
@@ -244,29 +245,28 @@ fn write_all(mut stdin: impl Write, lines: &Receiver<Vec<u8>>) {
     }
 }
 
-fn read_lines(mut stdout: BufReader<impl Read>, said: &Sender<Said>) {
+fn read_lines(mut stdout: BufReader<impl Read>, sender: &Sender<Output>) {
     loop {
         let mut line = Vec::new();
-        let longest = LONGEST_LINE as u64 + 1;
-        let end =
-            stdout.by_ref().take(longest).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
+        let limit = MAX_LINE_LENGTH as u64 + 1;
+        let end = stdout.by_ref().take(limit).read_until(b'\n', &mut line).is_err() || !line.ends_with(b"\n");
         let next = match end {
-            true if line.len() > LONGEST_LINE => Said::TooLong,
-            true => Said::End(line),
-            false => Said::Line(line, !stdout.buffer().is_empty()),
+            true if line.len() > MAX_LINE_LENGTH => Output::TooLong,
+            true => Output::End(line),
+            false => Output::Line(line, !stdout.buffer().is_empty()),
         };
-        if said.send(next).is_err() || end {
+        if sender.send(next).is_err() || end {
             return;
         }
     }
 }
 
-fn keep_tail(mut stderr: impl Read, tail: &Mutex<VecDeque<u8>>) {
+fn keep_end(mut stderr: impl Read, stderr_end: &Mutex<VecDeque<u8>>) {
     let mut block = [0; 4096];
     while let Ok(count @ 1..) = stderr.read(&mut block) {
-        let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
-        tail.extend(&block[..count]);
-        let surplus = tail.len().saturating_sub(LONGEST_TAIL);
-        tail.drain(..surplus);
+        let mut stderr_end = stderr_end.lock().unwrap_or_else(PoisonError::into_inner);
+        stderr_end.extend(&block[..count]);
+        let surplus = stderr_end.len().saturating_sub(MAX_STDERR_LENGTH);
+        stderr_end.drain(..surplus);
     }
 }

@@ -1,6 +1,6 @@
-//! `pogema-conform/1`: what is asked of a port and what it answers, one JSON object a line.
+//! The protocol `pogema-conform/1`: questions to a port and its answers, one JSON object per line.
 //!
-//! docs/PORTING.md explains it to those who write ports.
+//! docs/PORTING.md explains it to authors of ports.
 
 use pogema_core::{
     Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader, words,
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::request::{Derived, Registered};
 
-/// The protocol that this version speaks.
+/// The version of the protocol.
 pub const PROTOCOL: &str = "pogema-conform/1";
 
 /// One question to a port.
@@ -18,42 +18,42 @@ pub const PROTOCOL: &str = "pogema-conform/1";
 #[serde(tag = "type", rename_all = "lowercase")]
 #[expect(missing_docs, reason = "the questions describe their fields")]
 pub enum Ask {
-    /// Who are you, and what do you claim? Always the first. Names the protocol that the runner speaks.
+    /// Asks for the port's name and claims, and names the runner's protocol. Always the first question.
     Hello { protocol: String },
-    /// Begin an episode.
+    /// Begins an episode.
     Reset(Box<Beginning>),
-    /// Play one step, with one number for each agent.
+    /// Plays one step, with one number per agent.
     Step { actions: Vec<i64> },
-    /// Play one step with the actions that a policy of your own chooses.
+    /// Plays one step with the actions that the port's own policy chooses.
     Act { policy: Policy },
-    /// What do the agents see? Asked where an answer left it out.
+    /// Asks for the observations, if an answer left them out.
     Observe,
-    /// What are the figures of the episode? Asked where an answer left them out.
+    /// Asks for the metrics of the episode, if an answer left them out.
     Metrics,
-    /// Take the last step back.
+    /// Takes the last step back.
     Back,
-    /// What have you kept of the episode?
+    /// Asks for the recorded history of the episode.
     History,
-    /// The end; no answer is awaited.
+    /// Ends the conversation. There is no answer.
     Bye,
 }
 
-/// What an episode begins from: an instance, a config, or the environment that is there already.
+/// The origin of an episode: an instance, a config, or the existing environment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Beginning {
-    /// Everything but the actions, as in the first line of a trace.
+    /// The complete instance, as in the first line of a trace.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instance: Option<TraceHeader>,
-    /// POGEMA's config fields, for a new environment that draws everything itself.
+    /// POGEMA's config fields, for a new environment that draws its instances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub config: Option<Value>,
     /// A map to register under a name before the config is read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub register: Option<Registered>,
-    /// The seed handed to `reset`, which POGEMA 1.4.0 ignores.
+    /// The argument `seed` of `reset`, which POGEMA 1.4.0 ignores.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// Figures that are only measured when asked for.
+    /// Optional metrics to measure.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub measure: Vec<String>,
 }
@@ -62,13 +62,13 @@ pub struct Beginning {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Policy {
-    /// Its A* policy. Rule: policy/astar
+    /// POGEMA's A* policy. Rule: policy/astar
     Astar,
-    /// What `sample_actions` draws. Rule: seed/actions
+    /// The random actions of `sample_actions`. Rule: seed/actions
     Sample,
 }
 
-/// A port's answer to [`Ask::Hello`]: who it is and what it claims. What is not claimed is not asked.
+/// A port's answer to [`Ask::Hello`]: its name and claims. The runner does not check what is not claimed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
     /// Must be [`PROTOCOL`].
@@ -78,37 +78,37 @@ pub struct Hello {
     /// The port's version.
     #[serde(default)]
     pub version: String,
-    /// The named sets of rules that it claims.
+    /// The claimed profiles.
     pub profiles: Vec<Profile>,
-    /// How it can resolve conflicts.
+    /// The supported collision systems.
     pub collision: Vec<Collision>,
-    /// What reaching a goal can do.
+    /// The supported modes of a reached goal.
     pub on_goal: Vec<OnGoal>,
-    /// What its agents can see; needed for the profile `observations`.
+    /// The supported types of observations; required for the profile `observations`.
     #[serde(default)]
     pub observation: Vec<Observation>,
-    /// What its occupancy grid can show.
+    /// The supported modes of the occupancy grid.
     #[serde(default = "as_released")]
     pub occupancy: Vec<Occupancy>,
-    /// Who can be rewarded.
+    /// The supported reward modes.
     #[serde(default = "own")]
     pub reward: Vec<Reward>,
-    /// Whether an instance may have noise beyond the wall.
+    /// Whether the port supports instances with noise beyond the wall.
     #[serde(default)]
     pub noise: bool,
-    /// The figures it measures; needed for the profile `metrics`.
+    /// The supported metrics; required for the profile `metrics`.
     #[serde(default)]
     pub metrics: Vec<String>,
-    /// The further keys that its answers hold.
+    /// The optional keys in its answers.
     #[serde(default)]
     pub tells: Vec<Told>,
-    /// The most agents it can play with.
+    /// The maximum number of agents [default: no limit].
     #[serde(default = "any_number")]
     pub max_agents: usize,
-    /// The longest side of a map it can play on.
+    /// The maximum side of a map [default: no limit].
     #[serde(default = "any_number")]
     pub max_side: usize,
-    /// The largest radius.
+    /// The maximum radius [default: no limit].
     #[serde(default = "any_number")]
     pub max_radius: usize,
 }
@@ -128,15 +128,15 @@ fn any_number() -> usize {
 words! {
     /// A named set of rules that a port claims.
     pub enum Profile {
-        /// Which agents move, the next goals, rewards and the end of the episode.
+        /// Moves of agents, next goals, rewards and the end of the episode.
         Core = "core",
-        /// What agents see.
+        /// Observations.
         Observations = "observations",
-        /// The figures of an episode.
+        /// Metrics of an episode.
         Metrics = "metrics",
         /// Maps, starts and goals drawn from a config and its seed.
         Seeding = "seeding",
-        /// Steps taken back, and the list of changes.
+        /// Steps back, and the list of changes.
         History = "history",
         /// POGEMA's own policies.
         Policies = "policies",
@@ -144,24 +144,24 @@ words! {
 }
 
 words! {
-    /// A key of an answer that not every port can give.
+    /// An optional key of an answer.
     pub enum Told {
-        /// The agents on their goals, before goals change. Rule: goal/finish
+        /// Whether each agent is on its goal, before goals change. Rule: goal/finish
         OnGoal = "on_goal",
         /// The cells that the occupancy grid marks. Rule: occupancy/as-released
         Occupied = "occupied",
         /// The map with its border. Rule: border/ring
         Padded = "padded",
-        /// The fields that the config derives. Rule: config/size
+        /// The derived config fields. Rule: config/size
         Derived = "derived",
-        /// The goals foretold for each agent. Rule: goal/restart/foretold
+        /// The foretold goals of each agent. Rule: goal/restart/foretold
         Foretold = "foretold",
-        /// The caller's list of actions after the step. Rule: collide/soft/rewrite
+        /// The caller's action list after the step. Rule: collide/soft/rewrite
         ActionsAfter = "actions_after",
     }
 }
 
-/// A port's answer to anything else; which keys it needs depends on the question and on what the port claims.
+/// A port's answer to any other question. The question and the port's claims determine the required keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "each is the key of its name, explained in docs/PORTING.md")]
@@ -186,7 +186,7 @@ pub struct Reply {
     pub truncated: Option<Vec<bool>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observations: Option<Value>,
-    /// `null` is an answer: there are no figures yet.
+    /// `null` means that there are no metrics yet.
     #[serde(skip_serializing_if = "Key::is_left_out")]
     pub metrics: Key<Metrics>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -209,28 +209,28 @@ pub struct Reply {
     pub changes: Option<Vec<Vec<Change>>>,
 }
 
-/// A row and a column, which a wrong port may count off the map.
+/// A row and a column. A faulty port may give numbers outside the map.
 pub type ToldCell = [i64; 2];
 
-/// A key that may be left out, and may be `null`, which is an answer too.
+/// A key that may be absent. `null` differs from an absent key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Key<T> {
-    /// It is not there.
+    /// The key is absent.
     #[default]
     LeftOut,
-    /// It is there, and says that there is nothing.
+    /// The key is present, with the value `null`.
     Null,
-    /// It is there.
+    /// The key is present, with a value.
     Given(T),
 }
 
 impl<T> Key<T> {
-    /// Whether it is not there.
+    /// Returns whether the key is absent.
     pub fn is_left_out(&self) -> bool {
         matches!(self, Self::LeftOut)
     }
 
-    /// What it gives, if anything.
+    /// Returns the value, if any.
     pub fn given(self) -> Option<T> {
         match self {
             Self::LeftOut | Self::Null => None,

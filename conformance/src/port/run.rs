@@ -1,4 +1,4 @@
-//! One run of ports over everything that they claim.
+//! Runs of ports over everything that they claim.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,22 +12,22 @@ use super::keep::keep;
 use super::link::{Link, Misbehaviour};
 use super::plan::Plan;
 use super::protocol::{Hello, Profile};
-use super::report::{PortReport, Shown, take};
+use super::report::{ItemResult, PortReport, add_result};
 use super::shrink::shrink;
 use crate::runner::{Progress, on_workers};
 
-/// After so many misbehaviours nothing more is asked of a port.
-const MOST_FAULTS: u64 = 20;
+/// Number of misbehaviours after which the other items of a port are skipped.
+const MAX_FAULTS: u64 = 20;
 
-/// A port and how a fresh one is started.
+/// A port, and a function that starts it.
 pub struct Subject<'a> {
-    /// What it is called before it has said its name: its command line.
+    /// The command line; names the port until it answers `hello`.
     pub command: String,
-    /// Starts one; each worker does so, and again after each misbehaviour.
+    /// Starts the port: once for each worker, and again after each misbehaviour.
     pub start: Box<dyn Fn() -> Result<Box<dyn Link>, Misbehaviour> + Sync + 'a>,
 }
 
-/// Checks ports, side by side.
+/// Checks ports in parallel. Calls `total` once with the number of checks, and `progress` after each check.
 ///
 /// # Errors
 /// If a case or recording cannot be read.
@@ -41,7 +41,7 @@ pub fn check_ports(
     let num_subjects = subjects.len() as u64;
     total(items.len() as u64 * num_subjects);
     let faults: Vec<AtomicU64> = subjects.iter().map(|_| AtomicU64::new(0)).collect();
-    let shown = on_workers(
+    let results = on_workers(
         plan.num_workers,
         items.len() as u64 * num_subjects,
         || Ok(subjects.iter().map(|_| None).collect::<Vec<Option<Running>>>()),
@@ -49,21 +49,21 @@ pub fn check_ports(
             let (item, subject) =
                 (&items[(number / num_subjects) as usize], (number % num_subjects) as usize);
             let slot = &mut running[subject];
-            let shown = show(&subjects[subject], subject, slot, &faults[subject], plan, item);
+            let result = check_item(&subjects[subject], subject, slot, &faults[subject], plan, item);
             progress();
-            shown
+            result
         },
     )?;
     let blank =
         |subject: &Subject<'_>| PortReport { command: subject.command.clone(), ..PortReport::default() };
     let mut reports: Vec<PortReport> = subjects.iter().map(blank).collect();
-    for shown in shown {
-        take(&mut reports[shown.subject], shown, plan);
+    for result in results {
+        add_result(&mut reports[result.subject], result, plan);
     }
     Ok(reports)
 }
 
-/// Makes the example of each cause as small as it can be and keeps it as a case.
+/// Shrinks the example of each cause and writes it as a case.
 ///
 /// # Errors
 /// If a case cannot be written.
@@ -77,7 +77,7 @@ pub fn shrink_causes(
     let mut slot = None;
     let name = report.hello.as_ref().map_or_else(|| report.command.clone(), |hello| hello.name.clone());
     for cause in report.causes.iter_mut().filter(|cause| cause.rule.is_some()) {
-        // A port that cannot be started again leaves the example as it was.
+        // If the port cannot be started again, the example stays unchanged.
         if let Ok(running) = running(subject, &mut slot, plan) {
             let shrunk = shrink(running.link.as_mut(), &running.hello, &cause.example);
             cause.example = shrunk.example;
@@ -101,16 +101,16 @@ struct Running {
     hello: Hello,
 }
 
-fn show(
+fn check_item(
     subject: &Subject<'_>,
     index: usize,
     slot: &mut Option<Running>,
     faults: &AtomicU64,
     plan: &Plan,
     item: &Item,
-) -> Result<Shown, Error> {
+) -> Result<ItemResult, Error> {
     let (request, expected) = item.request(plan.seed)?;
-    let mut shown = Shown {
+    let mut result = ItemResult {
         subject: index,
         name: item.name(plan.seed),
         case_rule: item.case_rule().map(str::to_owned),
@@ -120,19 +120,19 @@ fn show(
         hello: None,
     };
     for mode in [Mode::Instance, Mode::Config] {
-        if faults.load(Ordering::Relaxed) >= MOST_FAULTS {
-            shown.is_cut_off = shown.judged.is_empty();
+        if faults.load(Ordering::Relaxed) >= MAX_FAULTS {
+            result.is_cut_off = result.judged.is_empty();
             break;
         }
         let running = match running(subject, slot, plan) {
             Ok(running) => running,
             Err(fault) => {
-                faults.fetch_add(MOST_FAULTS, Ordering::Relaxed);
-                shown.judged.push((mode, Judged { fault: Some(fault), request, ..Judged::default() }));
+                faults.fetch_add(MAX_FAULTS, Ordering::Relaxed);
+                result.judged.push((mode, Judged { fault: Some(fault), request, ..Judged::default() }));
                 break;
             }
         };
-        shown.hello = Some(running.hello.clone());
+        result.hello = Some(running.hello.clone());
         if !is_played_in(mode, &running.hello, plan, item) {
             continue;
         }
@@ -141,17 +141,17 @@ fn show(
             None => judge(running.link.as_mut(), &running.hello, mode, &request, &expected),
         };
         if let Item::Case(_, case) = item {
-            // A case shows nothing of its rule without what the rule is about.
-            let lacking = judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(&case.rule));
-            judged.is_played &= !lacking || !judged.divergences.is_empty();
+            // Without the features that its rule is about, a case does not test the rule.
+            let missing = judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(&case.rule));
+            judged.is_played &= !missing || !judged.divergences.is_empty();
         }
         if judged.fault.is_some() {
             faults.fetch_add(1, Ordering::Relaxed);
             *slot = None;
         }
-        shown.judged.push((mode, judged));
+        result.judged.push((mode, judged));
     }
-    Ok(shown)
+    Ok(result)
 }
 
 fn running<'s>(
@@ -170,7 +170,7 @@ fn running<'s>(
     Ok(slot.insert(Running { link, hello }))
 }
 
-/// Whether an item is played in a mode: what is about drawing, from a config alone; the rest in every way there is.
+/// Returns whether an item is played in a mode. Items about drawing need a config; all others use every mode.
 fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
     let seeds = hello.profiles.contains(&Profile::Seeding);
     let only_seeding =
@@ -179,7 +179,7 @@ fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
         item.case_rule().is_some_and(|rule| profile_of(rule) == Profile::Seeding || rule == "seed/actions");
     match mode {
         Mode::Instance => !is_about_seeding && !only_seeding,
-        // What is not claimed is noted once.
+        // Items about seeding are included even if seeding is not claimed, to report that once.
         Mode::Config => seeds || is_about_seeding,
     }
 }

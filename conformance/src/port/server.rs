@@ -1,4 +1,4 @@
-//! The other side: an engine that answers the protocol, in this process or behind a pipe.
+//! An engine that answers the protocol, in this process or over a pipe.
 
 use std::io::{BufRead, Write};
 
@@ -18,12 +18,12 @@ pub struct Server {
 }
 
 impl Server {
-    /// A port that plays on an engine.
+    /// Creates a port that plays on an engine.
     pub fn new(engine: NamedEngine) -> Self {
         Self::with(engine.name, engine.make)
     }
 
-    /// A port that plays on whatever environments are made for it.
+    /// Creates a port that plays on the environments that `make` creates.
     pub fn with(
         name: &str,
         make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'static,
@@ -31,7 +31,7 @@ impl Server {
         Self { name: name.into(), make: Box::new(make), player: None }
     }
 
-    /// Begins an episode of an instance that no list of goals could hold.
+    /// Begins an episode of an instance whose goals cannot be written as lists.
     ///
     /// # Errors
     /// If the instance does not fit the rules.
@@ -50,7 +50,7 @@ impl Server {
             Ask::Back => Op::Back,
             Ask::History => Op::History,
         };
-        let before_reset = || Error::Port { reason: "reset comes first".into() };
+        let before_reset = || Error::Port { reason: "call `reset` first".into() };
         self.player.as_mut().ok_or_else(before_reset)?.perform(&op).map(reply_of)
     }
 
@@ -72,7 +72,9 @@ impl Server {
             self.player = None;
             self.player = Some(Player::new(&self.make, &request)?);
         }
-        let nothing = || Error::Port { reason: "there is nothing to reset".into() };
+        let nothing = || Error::Port {
+            reason: "reset needs an instance or a config, since there is no environment yet".into(),
+        };
         let op = Op::Reset(beginning.seed);
         self.player.as_mut().ok_or_else(nothing)?.perform(&op).map(reply_of)
     }
@@ -80,7 +82,7 @@ impl Server {
 
 impl Link for Server {
     fn hello(&mut self) -> Result<Hello, Misbehaviour> {
-        let figures =
+        let metrics =
             "ISR CSR ep_length SoC makespan avg_throughput avg_agents_density a_collisions o_collisions";
         Ok(Hello {
             protocol: PROTOCOL.into(),
@@ -93,7 +95,7 @@ impl Link for Server {
             occupancy: all(),
             reward: all(),
             noise: true,
-            metrics: figures.split(' ').map(str::to_owned).collect(),
+            metrics: metrics.split(' ').map(str::to_owned).collect(),
             tells: all(),
             max_agents: usize::MAX,
             max_side: usize::MAX,
@@ -111,7 +113,7 @@ fn all<T: Words>() -> Vec<T> {
     T::all().collect()
 }
 
-/// Serves an engine over a pair of pipes until the other side says goodbye; this is all that a port in Rust needs.
+/// Serves an engine over a pair of pipes until the runner sends `bye`. A port in Rust needs nothing else.
 ///
 /// # Errors
 /// [`Error::Io`] if a pipe breaks.
@@ -120,7 +122,7 @@ pub fn serve(engine: NamedEngine, input: impl BufRead, mut output: impl Write) -
     let mut server = Server::new(engine);
     for line in input.lines() {
         let line = line.map_err(failed)?;
-        let told = match serde_json::from_str(&line) {
+        let answer = match serde_json::from_str(&line) {
             Ok(Ask::Bye) => return Ok(()),
             Ok(Ask::Hello { .. }) => server.hello().map(|hello| serde_json::to_string(&hello)),
             Ok(ask) => server.ask(&ask).map(|reply| serde_json::to_string(&reply)),
@@ -130,22 +132,22 @@ pub fn serve(engine: NamedEngine, input: impl BufRead, mut output: impl Write) -
             }
         };
         let text =
-            told.map_err(|fault| Error::io("pipe", fault))?.map_err(|error| Error::io("pipe", error))?;
+            answer.map_err(|fault| Error::io("pipe", fault))?.map_err(|error| Error::io("pipe", error))?;
         writeln!(output, "{text}").and_then(|()| output.flush()).map_err(failed)?;
     }
     Ok(())
 }
 
-/// A record as an answer.
+/// Converts a record to an answer.
 fn reply_of(record: Record) -> Reply {
     let mut reply = Reply::default();
     if let Some(state) = record.state() {
-        let told = |cells: &[pogema_core::Cell]| -> Vec<ToldCell> {
+        let pairs = |cells: &[pogema_core::Cell]| -> Vec<ToldCell> {
             cells.iter().map(|cell| [i64::from(cell.row), i64::from(cell.col)]).collect()
         };
-        reply.cells = Some(told(&state.cells));
-        reply.goals = Some(told(&state.goals));
-        reply.occupied = Some(told(&state.occupied));
+        reply.cells = Some(pairs(&state.cells));
+        reply.goals = Some(pairs(&state.goals));
+        reply.occupied = Some(pairs(&state.occupied));
         reply.active = Some(state.active.clone());
         reply.on_goal = Some(state.on_goal.clone());
     }

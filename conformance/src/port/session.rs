@@ -1,4 +1,4 @@
-//! A conversation with a port about one config.
+//! A session with a port about one config.
 
 use pogema_core::{Cell, Config, Error, Instance, Observed, Snapshot, TraceHeader};
 
@@ -6,9 +6,9 @@ use super::link::{Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
 
-/// A port at work on one config.
+/// A session with a port about one config.
 ///
-/// An answer that breaks the protocol is an error; [`Port::fault`] then has the details.
+/// An answer that breaks the protocol is an error; [`Port::fault`] then returns the details.
 pub struct Port<'l> {
     link: &'l mut dyn Link,
     hello: &'l Hello,
@@ -21,40 +21,40 @@ pub struct Port<'l> {
 }
 
 impl<'l> Port<'l> {
-    /// A port that will play episodes of this config.
+    /// Creates a session that plays episodes of a config.
     pub fn new(link: &'l mut dyn Link, hello: &'l Hello, config: Config) -> Self {
-        // An instance lists so many goals for each agent: one is reached in a step at most.
+        // The goals that an instance lists for each agent. An agent reaches at most one goal per step.
         let num_goals = usize::try_from(config.max_steps).unwrap_or(0) + 2;
         let (reply, observed) = (Reply::default(), None);
         Self { link, hello, config, padded_dtype: "float64", num_goals, reply, observed, fault: None }
     }
 
-    /// The element type to put down for maps with their border, which the protocol does not tell.
+    /// Sets the element type to record for maps with their border, since the protocol does not report it.
     pub fn set_padded_dtype(&mut self, dtype: &'static str) {
         self.padded_dtype = dtype;
     }
 
-    /// How many goals an instance lists for each agent.
+    /// Sets the number of goals that an instance lists for each agent (at least 2).
     pub fn set_num_goals(&mut self, num_goals: usize) {
         self.num_goals = num_goals.max(2);
     }
 
-    /// What the port did instead of keeping to the protocol.
+    /// Returns the misbehaviour of the port, if any.
     pub fn fault(&self) -> Option<&Misbehaviour> {
         self.fault.as_ref()
     }
 
-    /// The last answer.
+    /// Returns the last answer.
     pub fn reply(&self) -> &Reply {
         &self.reply
     }
 
-    /// What the agents see, if the port claims to say so.
+    /// Returns the last observations, if the port claims to report them.
     pub fn observed(&self) -> Option<&Observed> {
         self.observed.as_ref()
     }
 
-    /// An instance as it is told to a port.
+    /// Returns an instance in the form that a port receives.
     pub fn header(&self, instance: &Instance) -> TraceHeader {
         TraceHeader::new(self.config, instance, self.num_goals)
     }
@@ -62,13 +62,13 @@ impl<'l> Port<'l> {
     /// Begins an episode.
     ///
     /// # Errors
-    /// If the port refuses, or keeps to no form.
+    /// If the port answers with an error or breaks the protocol.
     pub fn begin(&mut self, beginning: Beginning) -> Result<(), Error> {
         let is_drawn = beginning.instance.is_none();
         let reply = self.ask(&Ask::Reset(Box::new(beginning)))?;
         if is_drawn {
-            self.need("map", reply.map.as_ref())?;
-            self.check_crowd(&reply)?;
+            self.require("map", reply.map.as_ref())?;
+            self.check_num_agents(&reply)?;
         }
         self.check_state(&reply)?;
         self.observed = None;
@@ -76,56 +76,56 @@ impl<'l> Port<'l> {
         Ok(())
     }
 
-    /// Plays a step, or lets the port choose its actions.
+    /// Plays a step with the given actions, or with actions that the port chooses.
     ///
     /// # Errors
-    /// If the port refuses, or keeps to no form.
+    /// If the port answers with an error or breaks the protocol.
     pub fn advance(&mut self, ask: &Ask) -> Result<(), Error> {
         let mut reply = self.ask(ask)?;
         self.check_state(&reply)?;
-        self.need_list("rewards", reply.rewards.as_ref())?;
-        self.need_list("terminated", reply.terminated.as_ref())?;
-        self.need_list("truncated", reply.truncated.as_ref())?;
+        self.require_list("rewards", reply.rewards.as_ref())?;
+        self.require_list("terminated", reply.terminated.as_ref())?;
+        self.require_list("truncated", reply.truncated.as_ref())?;
         if matches!(ask, Ask::Act { .. }) {
-            self.need_list("actions", reply.actions.as_ref())?;
+            self.require_list("actions", reply.actions.as_ref())?;
         }
         if self.tells(Told::ActionsAfter) {
-            self.need_list("actions_after", reply.actions_after.as_ref())?;
+            self.require_list("actions_after", reply.actions_after.as_ref())?;
         }
         if self.claims(Profile::Metrics) && reply.metrics.is_left_out() {
             reply.metrics = self.ask(&Ask::Metrics)?.metrics;
-            self.need("metrics", (!reply.metrics.is_left_out()).then_some(&()))?;
+            self.require("metrics", (!reply.metrics.is_left_out()).then_some(&()))?;
         }
         self.take_observations(reply)?;
         Ok(())
     }
 
-    /// What the port has kept of the episode.
+    /// Returns the recorded history of the episode.
     ///
     /// # Errors
-    /// If the port refuses, or keeps to no form.
+    /// If the port answers with an error or breaks the protocol.
     pub fn history(&mut self) -> Result<Reply, Error> {
         let reply = self.ask(&Ask::History)?;
-        self.need_list("full", reply.full.as_ref())?;
-        self.need_list("changes", reply.changes.as_ref())?;
+        self.require_list("full", reply.full.as_ref())?;
+        self.require_list("changes", reply.changes.as_ref())?;
         Ok(reply)
     }
 
     /// Takes the last step back; returns whether there was one.
     ///
     /// # Errors
-    /// If the port refuses, or breaks the protocol.
+    /// If the port answers with an error or breaks the protocol.
     pub fn step_back(&mut self) -> Result<bool, Error> {
         let reply = self.ask(&Ask::Back)?;
         self.check_state(&reply)?;
-        self.need("moved", reply.moved.as_ref())?;
+        self.require("moved", reply.moved.as_ref())?;
         let moved = reply.moved == Some(true);
         self.reply = reply;
         Ok(moved)
     }
 
-    /// The state after the last answer. A port that does not report it gets `on_goal` false for every agent, and one mark
-    /// for every active agent.
+    /// Returns the state after the last answer. If the port does not report them, `on_goal` is false for every agent
+    /// and `occupied` has the cell of every active agent.
     pub fn snapshot(&self) -> Snapshot {
         let reply = &self.reply;
         let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();
@@ -167,53 +167,53 @@ impl<'l> Port<'l> {
         Error::Port { reason }
     }
 
-    fn need<T>(&mut self, key: &str, value: Option<&T>) -> Result<(), Error> {
+    fn require<T>(&mut self, key: &str, value: Option<&T>) -> Result<(), Error> {
         if value.is_some() {
             return Ok(());
         }
         Err(self.misbehaved(Misbehaviour::new(format!("left `{key}` out of an answer that needs it"))))
     }
 
-    fn need_list<T>(&mut self, key: &str, list: Option<&Vec<T>>) -> Result<(), Error> {
-        self.need(key, list)?;
-        let (length, want) = (list.map_or(0, Vec::len), self.config.num_agents);
-        if length == want {
+    fn require_list<T>(&mut self, key: &str, list: Option<&Vec<T>>) -> Result<(), Error> {
+        self.require(key, list)?;
+        let (length, expected) = (list.map_or(0, Vec::len), self.config.num_agents);
+        if length == expected {
             return Ok(());
         }
-        let what = format!("`{key}` has length {length}, expected {want}, one for each agent");
+        let what = format!("`{key}` has length {length}, expected {expected}, one for each agent");
         Err(self.misbehaved(Misbehaviour::new(what)))
     }
 
-    /// Passes unless the config was read as one of another number of agents, which is a wrong answer in good form.
-    fn check_crowd(&self, reply: &Reply) -> Result<(), Error> {
+    /// Returns an error if an answer consistently has a wrong number of agents. Its form is valid, but it is wrong.
+    fn check_num_agents(&self, reply: &Reply) -> Result<(), Error> {
         let lengths = [reply.cells.as_ref().map(Vec::len), reply.goals.as_ref().map(Vec::len)];
-        let want = self.config.num_agents;
+        let expected = self.config.num_agents;
         match lengths {
-            [Some(cells), Some(goals)] if cells == goals && cells != want => {
-                Err(Error::Port { reason: format!("there are {cells} agents, expected {want}") })
+            [Some(cells), Some(goals)] if cells == goals && cells != expected => {
+                Err(Error::Port { reason: format!("the answer has {cells} agents, expected {expected}") })
             }
             _ => Ok(()),
         }
     }
 
     fn check_state(&mut self, reply: &Reply) -> Result<(), Error> {
-        self.need_list("cells", reply.cells.as_ref())?;
-        self.need_list("goals", reply.goals.as_ref())?;
-        self.need_list("active", reply.active.as_ref())?;
+        self.require_list("cells", reply.cells.as_ref())?;
+        self.require_list("goals", reply.goals.as_ref())?;
+        self.require_list("active", reply.active.as_ref())?;
         if self.tells(Told::OnGoal) {
-            self.need_list("on_goal", reply.on_goal.as_ref())?;
+            self.require_list("on_goal", reply.on_goal.as_ref())?;
         }
         if self.tells(Told::Occupied) {
-            self.need("occupied", reply.occupied.as_ref())?;
+            self.require("occupied", reply.occupied.as_ref())?;
         }
         for (what, cells) in
             [("cell", &reply.cells), ("goal", &reply.goals), ("marked cell", &reply.occupied)]
         {
             for cell in cells.iter().flatten() {
                 if as_cell(cell).is_none() {
-                    // No breach of the form, but a wrong answer.
+                    // The form is valid, but the answer is wrong.
                     return Err(Error::Port {
-                        reason: format!("{what} ({}, {}) is on no map", cell[0], cell[1]),
+                        reason: format!("{what} ({}, {}) is out of range", cell[0], cell[1]),
                     });
                 }
             }
@@ -225,10 +225,10 @@ impl<'l> Port<'l> {
         if self.claims(Profile::Observations) {
             if reply.observations.is_none() {
                 reply.observations = self.ask(&Ask::Observe)?.observations;
-                self.need("observations", reply.observations.as_ref())?;
+                self.require("observations", reply.observations.as_ref())?;
             }
-            if let Some(told) = reply.observations.take() {
-                let observed = observations::read(&told, &self.config, self.padded_dtype);
+            if let Some(value) = reply.observations.take() {
+                let observed = observations::read(&value, &self.config, self.padded_dtype);
                 self.observed = Some(observed.map_err(|what| self.misbehaved(Misbehaviour::new(what)))?);
             }
         }
@@ -237,11 +237,11 @@ impl<'l> Port<'l> {
     }
 }
 
-/// A cell that may be on a map.
+/// Returns the cell, unless a number is out of range for every map.
 fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
     u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col))
 }
 
-fn as_cells(told: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {
-    told?.iter().map(as_cell).collect()
+fn as_cells(pairs: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {
+    pairs?.iter().map(as_cell).collect()
 }

@@ -1,4 +1,4 @@
-//! Makes a counterexample small enough to be understood at a glance.
+//! Shrinking of counterexamples, so that they are easy to understand.
 
 use pogema_core::Observation;
 use serde_json::{Value, json};
@@ -12,16 +12,16 @@ use super::test_episode::TestEpisode;
 use crate::play::play;
 use crate::request::{Op, Request, Response};
 
-/// So often a port is asked to play for one counterexample.
-const MOST_PLAYS: usize = 4000;
+/// Maximum number of requests played to shrink one counterexample.
+const MAX_PLAYS: usize = 4000;
 
-/// An example made smaller, and whether the port misbehaved meanwhile and has to be started again.
+/// A smaller example, and whether the port misbehaved in the process and must be started again.
 pub struct Shrunk {
     pub example: Example,
     pub has_faulted: bool,
 }
 
-/// Makes an example smaller as long as it shows the same cause.
+/// Shrinks an example as long as it shows the same cause.
 pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Shrunk {
     let mut shrinker = Shrinker { link, hello, best: example.clone(), plays: 0, has_faulted: false };
     if let Some(divergence) = &example.divergence {
@@ -39,19 +39,19 @@ pub struct Shrinker<'a> {
 }
 
 impl Shrinker<'_> {
-    /// Leaves out what comes after an operation, and then whatever else it can.
+    /// Removes the operations after `until`, then everything else that the cause does not need.
     fn shrink_until(&mut self, until: usize) {
         let request = self.best.request.clone();
         let expected = play(&request);
         let mut cut = request.clone();
         cut.ops.truncate(until + 1);
         self.accept(&cut);
-        if let Some(scene) = TestEpisode::of(&request, &expected, until) {
+        if let Some(episode) = TestEpisode::of(&request, &expected, until) {
             for mode in [Mode::Instance, Mode::Config] {
                 let before = self.best.mode;
                 self.best.mode = mode;
-                if self.accept(&scene.request()) {
-                    return self.shrink_scene(scene);
+                if self.accept(&episode.request()) {
+                    return self.shrink_episode(episode);
                 }
                 self.best.mode = before;
             }
@@ -59,12 +59,12 @@ impl Shrinker<'_> {
         self.shrink_config();
     }
 
-    /// Whether nothing more can be learned.
+    /// Returns whether shrinking must end.
     pub fn is_done(&self) -> bool {
-        self.has_faulted || self.plays >= MOST_PLAYS
+        self.has_faulted || self.plays >= MAX_PLAYS
     }
 
-    /// Takes a request as the new best if it shows the same cause.
+    /// Makes a request the new best if it shows the same cause.
     pub fn accept(&mut self, request: &Request) -> bool {
         if self.is_done() {
             return false;
@@ -88,50 +88,50 @@ impl Shrinker<'_> {
         is_like
     }
 
-    fn shrink_scene(&mut self, mut scene: TestEpisode) {
+    fn shrink_episode(&mut self, mut episode: TestEpisode) {
         loop {
-            let before = scene.clone();
-            self.start_later(&mut scene);
-            self.drop_agents(&mut scene);
-            self.drop_lines(&mut scene);
-            self.drop_steps(&mut scene);
-            self.simplify_fields(&mut scene);
-            self.clear_obstacles(&mut scene);
-            self.simplify_actions(&mut scene);
-            self.shorten_sequences(&mut scene);
-            if scene == before || self.is_done() {
+            let before = episode.clone();
+            self.start_later(&mut episode);
+            self.drop_agents(&mut episode);
+            self.drop_lines(&mut episode);
+            self.drop_steps(&mut episode);
+            self.simplify_fields(&mut episode);
+            self.clear_obstacles(&mut episode);
+            self.simplify_actions(&mut episode);
+            self.shorten_sequences(&mut episode);
+            if episode == before || self.is_done() {
                 return;
             }
         }
     }
 
-    fn try_scene(&mut self, scene: &mut TestEpisode, candidate: TestEpisode) -> bool {
-        let is_accepted = candidate != *scene && self.accept(&candidate.request());
+    fn try_episode(&mut self, episode: &mut TestEpisode, candidate: TestEpisode) -> bool {
+        let is_accepted = candidate != *episode && self.accept(&candidate.request());
         if is_accepted {
-            *scene = candidate;
+            *episode = candidate;
         }
         is_accepted
     }
 
-    /// Begins with the state just before the difference, or as late as may be.
-    fn start_later(&mut self, scene: &mut TestEpisode) {
-        let played: Response = play(&scene.request());
-        for num_ops in (1..scene.ops.len()).rev() {
-            let Some(later) = scene.begun_after(num_ops, &played) else { continue };
-            if self.try_scene(scene, later) {
+    /// Begins the episode as late as possible, at best just before the difference.
+    fn start_later(&mut self, episode: &mut TestEpisode) {
+        let played: Response = play(&episode.request());
+        for num_ops in (1..episode.ops.len()).rev() {
+            let Some(later) = episode.begun_after(num_ops, &played) else { continue };
+            if self.try_episode(episode, later) {
                 return;
             }
         }
     }
 
-    fn drop_agents(&mut self, scene: &mut TestEpisode) {
-        let mut size = scene.num_agents() / 2;
+    fn drop_agents(&mut self, episode: &mut TestEpisode) {
+        let mut size = episode.num_agents() / 2;
         while size > 0 {
             let mut first = 0;
-            while first < scene.num_agents() && scene.num_agents() > 1 {
-                let gone: Vec<usize> = (first..(first + size).min(scene.num_agents())).collect();
-                let fewer = scene.without_agents(&gone);
-                if fewer.num_agents() == 0 || !self.try_scene(scene, fewer) {
+            while first < episode.num_agents() && episode.num_agents() > 1 {
+                let gone: Vec<usize> = (first..(first + size).min(episode.num_agents())).collect();
+                let fewer = episode.without_agents(&gone);
+                if fewer.num_agents() == 0 || !self.try_episode(episode, fewer) {
                     first += size;
                 }
             }
@@ -139,102 +139,104 @@ impl Shrinker<'_> {
         }
     }
 
-    fn drop_lines(&mut self, scene: &mut TestEpisode) {
-        for row in (0..scene.rows.len()).rev() {
-            if scene.rows.len() > 1 {
-                let smaller = scene.without_row(row);
-                self.try_scene(scene, smaller);
+    fn drop_lines(&mut self, episode: &mut TestEpisode) {
+        for row in (0..episode.rows.len()).rev() {
+            if episode.rows.len() > 1 {
+                let smaller = episode.without_row(row);
+                self.try_episode(episode, smaller);
             }
         }
-        for col in (0..scene.rows[0].len()).rev() {
-            if scene.rows[0].len() > 1 {
-                let smaller = scene.without_col(col);
-                self.try_scene(scene, smaller);
+        for col in (0..episode.rows[0].len()).rev() {
+            if episode.rows[0].len() > 1 {
+                let smaller = episode.without_col(col);
+                self.try_episode(episode, smaller);
             }
         }
     }
 
-    /// Leaves out steps, and as many of the steps that the episode may last if it has to be so.
-    fn drop_steps(&mut self, scene: &mut TestEpisode) {
-        for at in (0..scene.ops.len()).rev() {
-            let mut shorter = scene.clone();
+    /// Removes steps, and shortens the episode limit accordingly if necessary.
+    fn drop_steps(&mut self, episode: &mut TestEpisode) {
+        for at in (0..episode.ops.len()).rev() {
+            let mut shorter = episode.clone();
             shorter.ops.remove(at);
-            if self.try_scene(scene, shorter.clone()) {
+            if self.try_episode(episode, shorter.clone()) {
                 continue;
             }
-            let max_steps = scene.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
+            let max_steps = episode.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
             shorter.fields.insert("max_episode_steps".into(), (max_steps - 1).max(1).into());
-            self.try_scene(scene, shorter);
+            self.try_episode(episode, shorter);
         }
     }
 
-    fn simplify_fields(&mut self, scene: &mut TestEpisode) {
+    fn simplify_fields(&mut self, episode: &mut TestEpisode) {
         for name in ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps"] {
-            let mut simpler = scene.clone();
+            let mut simpler = episode.clone();
             simpler.fields.remove(name);
             if name == "empty_outside" {
-                // Nothing else is drawn.
+                // Only noise needs the seed.
                 simpler.fields.remove("seed");
             }
-            self.try_scene(scene, simpler);
+            self.try_episode(episode, simpler);
         }
-        for (name, value) in
-            [("max_episode_steps", json!(scene.ops.len())), ("observation_type", json!(Observation::Pomapf))]
-        {
-            if scene.fields.contains_key(name) {
-                let mut simpler = scene.clone();
+        for (name, value) in [
+            ("max_episode_steps", json!(episode.ops.len())),
+            ("observation_type", json!(Observation::Pomapf)),
+        ] {
+            if episode.fields.contains_key(name) {
+                let mut simpler = episode.clone();
                 simpler.fields.insert(name.into(), value);
-                self.try_scene(scene, simpler);
+                self.try_episode(episode, simpler);
             }
         }
         for radius in 1..5 {
-            let mut simpler = scene.clone();
+            let mut simpler = episode.clone();
             simpler.fields.insert("obs_radius".into(), radius.into());
-            if scene.fields.get("obs_radius") == Some(&radius.into()) || self.try_scene(scene, simpler) {
+            if episode.fields.get("obs_radius") == Some(&radius.into()) || self.try_episode(episode, simpler)
+            {
                 break;
             }
         }
-        let plain = TestEpisode { density: false, collisions: false, ..scene.clone() };
-        self.try_scene(scene, plain);
+        let plain = TestEpisode { density: false, collisions: false, ..episode.clone() };
+        self.try_episode(episode, plain);
     }
 
-    fn clear_obstacles(&mut self, scene: &mut TestEpisode) {
-        let mut clear = scene.clone();
+    fn clear_obstacles(&mut self, episode: &mut TestEpisode) {
+        let mut clear = episode.clone();
         clear.rows.iter_mut().for_each(|row| row.fill(false));
-        if self.try_scene(scene, clear) {
+        if self.try_episode(episode, clear) {
             return;
         }
-        for row in 0..scene.rows.len() {
-            for col in 0..scene.rows[row].len() {
-                if scene.rows[row][col] {
-                    let mut fewer = scene.clone();
+        for row in 0..episode.rows.len() {
+            for col in 0..episode.rows[row].len() {
+                if episode.rows[row][col] {
+                    let mut fewer = episode.clone();
                     fewer.rows[row][col] = false;
-                    self.try_scene(scene, fewer);
+                    self.try_episode(episode, fewer);
                 }
             }
         }
     }
 
-    fn simplify_actions(&mut self, scene: &mut TestEpisode) {
-        for at in 0..scene.ops.len() {
-            for agent in 0..scene.num_agents() {
-                let mut simpler = scene.clone();
+    fn simplify_actions(&mut self, episode: &mut TestEpisode) {
+        for at in 0..episode.ops.len() {
+            for agent in 0..episode.num_agents() {
+                let mut simpler = episode.clone();
                 if let Op::Step(actions) = &mut simpler.ops[at]
                     && actions.get(agent).is_some_and(|&action| action != 0)
                 {
                     actions[agent] = 0;
-                    self.try_scene(scene, simpler);
+                    self.try_episode(episode, simpler);
                 }
             }
         }
     }
 
-    fn shorten_sequences(&mut self, scene: &mut TestEpisode) {
-        for agent in 0..scene.num_agents() {
-            while scene.goals[agent].len() > 2 {
-                let mut simpler = scene.clone();
+    fn shorten_sequences(&mut self, episode: &mut TestEpisode) {
+        for agent in 0..episode.num_agents() {
+            while episode.goals[agent].len() > 2 {
+                let mut simpler = episode.clone();
                 simpler.goals[agent].pop();
-                if !self.try_scene(scene, simpler) {
+                if !self.try_episode(episode, simpler) {
                     break;
                 }
             }

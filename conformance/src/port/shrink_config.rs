@@ -1,4 +1,4 @@
-//! Makes a config smaller from which a port draws.
+//! Shrinking of configs from which a port draws its instances.
 
 use serde_json::Value;
 
@@ -6,12 +6,12 @@ use super::shrink::Shrinker;
 use crate::request::Op;
 
 impl Shrinker<'_> {
-    /// Where map and agents are drawn by the port: fewer and smaller, with a smaller seed.
+    /// Shrinks the config: fewer fields and operations, smaller numbers and maps, and a smaller seed.
     pub fn shrink_config(&mut self) {
         loop {
             let before = self.best.request.clone();
             let Some(fields) = before.config.as_object() else { return };
-            // Without a seed every draw differs, with a bug or without.
+            // Without a seed, every draw differs even if the port has no bug.
             let names: Vec<String> = fields.keys().filter(|name| *name != "seed").cloned().collect();
             for name in names {
                 let mut simpler = self.best.request.clone();
@@ -48,10 +48,10 @@ impl Shrinker<'_> {
         }
     }
 
-    /// Looks for a seed that shows the cause on a smaller drawn map.
+    /// Searches for a seed that shows the cause on a smaller generated map.
     fn try_small_maps(&mut self) {
-        const LONGEST_SIDE: i64 = 4;
-        const MOST_SEEDS: i64 = 24;
+        const MAX_SIDE: i64 = 4;
+        const NUM_SEEDS: i64 = 24;
         let config = &self.best.request.config;
         let side = |name: &str| config.get(name).or(config.get("size")).and_then(Value::as_i64).unwrap_or(8);
         let (height, width) = (side("height"), side("width"));
@@ -61,12 +61,12 @@ impl Shrinker<'_> {
         {
             return;
         }
-        let sides = (1..=LONGEST_SIDE).flat_map(|rows| (1..=LONGEST_SIDE).map(move |cols| (rows, cols)));
+        let sides = (1..=MAX_SIDE).flat_map(|rows| (1..=MAX_SIDE).map(move |cols| (rows, cols)));
         let mut smaller: Vec<(i64, i64)> =
             sides.filter(|(rows, cols)| rows * cols < height * width).collect();
         smaller.sort_by_key(|(rows, cols)| (rows * cols, (rows - cols).abs()));
         for (rows, cols) in smaller {
-            for seed in 0..MOST_SEEDS {
+            for seed in 0..NUM_SEEDS {
                 let mut request = self.best.request.clone();
                 if let Some(fields) = request.config.as_object_mut() {
                     fields.remove("size");
@@ -81,12 +81,12 @@ impl Shrinker<'_> {
         }
     }
 
-    /// Takes rows and columns out of a map that is given, whatever seed then shows the cause.
+    /// Removes a row or column from a given map, with any seed that then shows the cause.
     fn try_smaller_map(&mut self) {
-        const MOST_SEEDS: i64 = 24;
+        const NUM_SEEDS: i64 = 24;
         let Some(map) = self.best.request.config.get("map").and_then(Value::as_str) else { return };
         for smaller in without_a_line(map) {
-            for seed in 0..MOST_SEEDS {
+            for seed in 0..NUM_SEEDS {
                 let mut request = self.best.request.clone();
                 request.config["map"] = smaller.as_str().into();
                 request.config["seed"] = seed.into();
@@ -100,10 +100,10 @@ impl Shrinker<'_> {
     fn try_number(&mut self, name: &str, value: i64) -> bool {
         let mut simpler = self.best.request.clone();
         let now = simpler.config.get(name).and_then(Value::as_i64);
-        // A map whose size is left out is drawn larger than need be.
-        let is_drawn_unasked =
+        // Without a size, the generated map has the default size, which may be larger than necessary.
+        let has_default_size =
             name == "size" && !simpler.config["map"].is_string() && simpler.config["height"].is_null();
-        if now.map_or(!is_drawn_unasked, |now| now <= value) {
+        if now.map_or(!has_default_size, |now| now <= value) {
             return false;
         }
         simpler.config[name] = value.into();
@@ -118,7 +118,7 @@ impl Shrinker<'_> {
     }
 }
 
-/// A map text with one row or one column less, in every way.
+/// Returns all map texts with one row or one column removed.
 fn without_a_line(text: &str) -> Vec<String> {
     let rows: Vec<Vec<char>> = text.lines().map(|row| row.chars().collect()).collect();
     let width = rows.iter().map(Vec::len).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! One episode with everything given, to be made smaller piece by piece.
+//! An explicit episode that can be shrunk piece by piece.
 
 use pogema_core::{Cell, OnGoal};
 use pogema_maps::GridConfig;
@@ -7,20 +7,20 @@ use serde_json::{Map as Object, Value, json};
 use crate::draw::text;
 use crate::request::{Op, Record, Request, Response, numbers};
 
-/// An episode: a map, agents, what they do, and the fields of the config that have nothing to do with those.
+/// An episode: a map, agents, operations, and the config fields that do not concern map or agents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TestEpisode {
-    /// Row by row, whether there is an obstacle.
+    /// Whether each cell has an obstacle, row by row.
     pub rows: Vec<Vec<bool>>,
-    /// Where each agent starts.
+    /// The start of each agent.
     pub starts: Vec<Cell>,
-    /// The goals of each agent, one after the other.
+    /// The goals of each agent, in order.
     pub goals: Vec<Vec<Cell>>,
-    /// What is done after the reset.
+    /// The operations after the reset.
     pub ops: Vec<Op>,
-    /// Whether agents get a new goal when they reach one.
+    /// Whether an agent that reaches its goal gets a new one.
     pub restarts: bool,
-    /// The other fields.
+    /// The other config fields.
     pub fields: Object<String, Value>,
     /// Whether the density of agents is measured.
     pub density: bool,
@@ -29,9 +29,9 @@ pub struct TestEpisode {
 }
 
 impl TestEpisode {
-    /// The last episode of a request, as far as the operation at `until`.
+    /// Returns the episode of a request that contains the operation at `until`, up to that operation.
     ///
-    /// None if its instance cannot be written into a config.
+    /// Returns `None` if there is no such episode or its instance cannot be generated.
     pub fn of(request: &Request, expected: &Response, until: usize) -> Option<Self> {
         let config = GridConfig::from_value(&request.config).ok()?;
         let until = until.min(request.ops.len().checked_sub(1)?);
@@ -46,8 +46,10 @@ impl TestEpisode {
         let num_goals = if restarts { until - begin + 2 } else { 1 };
         let map = instance.map();
         let rows = map.obstacles().chunks(map.width()).map(<[bool]>::to_vec).collect();
-        let ops =
-            request.ops[begin + 1..=until].iter().zip(begin + 1..).map(|(op, at)| plain(op, at, expected));
+        let ops = request.ops[begin + 1..=until]
+            .iter()
+            .zip(begin + 1..)
+            .map(|(op, at)| without_policy(op, at, expected));
         Some(Self {
             rows,
             starts: instance.starts().to_vec(),
@@ -60,7 +62,7 @@ impl TestEpisode {
         })
     }
 
-    /// The scene as a request.
+    /// Returns the episode as a request.
     pub fn request(&self) -> Request {
         let mut config = Object::new();
         config.insert("map".into(), text(&self.rows).into());
@@ -79,12 +81,12 @@ impl TestEpisode {
         }
     }
 
-    /// Number of agents.
+    /// Returns the number of agents.
     pub fn num_agents(&self) -> usize {
         self.starts.len()
     }
 
-    /// The scene as it stands after some of its operations, with the agents that still take part.
+    /// Returns the episode that begins after some of the operations, with the agents that are still active.
     pub fn begun_after(&self, num_ops: usize, played: &Response) -> Option<Self> {
         let state = played.records.get(num_ops)?.state()?;
         let passed = &played.records[1..=num_ops];
@@ -112,7 +114,7 @@ impl TestEpisode {
         Some(later)
     }
 
-    /// The scene without some agents.
+    /// Returns the episode without some agents.
     pub fn without_agents(&self, gone: &[usize]) -> Self {
         let kept: Vec<usize> = (0..self.num_agents()).filter(|agent| !gone.contains(agent)).collect();
         let mut fewer = self.clone();
@@ -130,7 +132,7 @@ impl TestEpisode {
         }
     }
 
-    /// The scene without one row, what stood there moved to the row that takes its place.
+    /// Returns the episode without one row. Starts and goals there move to the row that takes its place.
     pub fn without_row(&self, row: usize) -> Self {
         let mut smaller = self.clone();
         smaller.rows.remove(row);
@@ -139,7 +141,7 @@ impl TestEpisode {
         smaller
     }
 
-    /// The scene without one column, what stood there moved to the column that takes its place.
+    /// Returns the episode without one column. Starts and goals there move to the column that takes its place.
     pub fn without_col(&self, col: usize) -> Self {
         let mut smaller = self.clone();
         for row in &mut smaller.rows {
@@ -155,13 +157,13 @@ impl TestEpisode {
     }
 }
 
-/// The index of a row or column after one of them is removed.
+/// Returns the index of a row or column after one of them is removed.
 fn without_line(index: u16, removed: usize, num_left: usize) -> u16 {
     (index - u16::from(usize::from(index) > removed)).min(num_left.saturating_sub(1) as u16)
 }
 
-/// An operation without a policy.
-fn plain(op: &Op, at: usize, expected: &Response) -> Op {
+/// Returns an operation, with the chosen actions instead of a policy.
+fn without_policy(op: &Op, at: usize, expected: &Response) -> Op {
     let chosen = expected.records.get(at).and_then(Record::step);
     match (op, chosen) {
         (Op::Astar | Op::Sample, Some(step)) => Op::Step(numbers(&step.step.actions)),
@@ -169,7 +171,7 @@ fn plain(op: &Op, at: usize, expected: &Response) -> Op {
     }
 }
 
-/// The fields that say nothing of map and agents, where they differ from what they are by default.
+/// Returns the config fields that do not concern map or agents and differ from their defaults.
 fn fields(config: &GridConfig) -> Object<String, Value> {
     const FIELDS: [&str; 10] = [
         "on_target",
@@ -184,7 +186,7 @@ fn fields(config: &GridConfig) -> Object<String, Value> {
         "seed",
     ];
     let (values, default) = (config.to_value(), GridConfig::default().to_value());
-    // Without noise, the seed has nothing to draw.
+    // Without noise, nothing is drawn from the seed.
     let counts = |name: &&str| *name != "seed" || !config.empty_outside;
     let differing = FIELDS.into_iter().filter(counts).filter(|name| values[name] != default[name]);
     differing.map(|name| (name.to_owned(), values[name].clone())).collect()

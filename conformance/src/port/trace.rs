@@ -1,4 +1,4 @@
-//! Traces that a port wrote itself, for those who cannot be asked over a pipe.
+//! Checks of traces that a port wrote, for ports that cannot use a pipe.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -9,16 +9,16 @@ use super::claims::{Mode, Scope};
 use super::judge::Judged;
 use super::plan::Plan;
 use super::protocol::Told;
-use super::report::{PortReport, Shown, take};
+use super::report::{ItemResult, PortReport, add_result};
 use crate::compare::compare_in;
 use crate::files;
 use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
 
-/// Plays the actions of each trace on the reference and compares what it gives with what stands there.
+/// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
 /// # Errors
-/// [`Error::Trace`] or [`Error::Io`] for a file that is no trace.
+/// [`Error::Trace`] or [`Error::Io`] for a file that is not a trace.
 pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
     let mut report = PortReport { command: format!("{} traces", paths.len()), ..PortReport::default() };
     let plan = Plan::default();
@@ -26,7 +26,7 @@ pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
         let path = path.as_ref();
         let trace = Trace::read(files::open(path)?).map_err(|error| Error::io(path, error))?;
         let judged = judge_trace(&trace).map_err(|error| Error::io(path, error))?;
-        let shown = Shown {
+        let result = ItemResult {
             subject: 0,
             name: path.display().to_string(),
             case_rule: None,
@@ -35,14 +35,15 @@ pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
             is_cut_off: false,
             hello: None,
         };
-        take(&mut report, shown, &plan);
+        add_result(&mut report, result, &plan);
     }
     Ok(report)
 }
 
 fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     let (config, instance) = (&trace.header.config, trace.header.instance()?);
-    let mut player = Player::of_instance(&NamedEngine::REFERENCE.make, config, instance, &figures(trace))?;
+    let mut player =
+        Player::of_instance(&NamedEngine::REFERENCE.make, config, instance, &metric_names(trace))?;
     let mut request = Request { config: player.config.to_value(), ..Request::default() };
     let (mut expected, mut got) = (Response::default(), Response::default());
     request.ops.push(Op::Reset(None));
@@ -67,21 +68,21 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
     Ok(judged)
 }
 
-/// The figures that a trace gives anywhere.
-fn figures(trace: &Trace) -> Vec<String> {
-    let told = trace.steps.iter().filter_map(|step| step.metrics).flat_map(|metrics| metrics.named());
-    let names: BTreeSet<&str> = told.map(|(name, _)| name).collect();
+/// Returns the names of all metrics that occur in a trace.
+fn metric_names(trace: &Trace) -> Vec<String> {
+    let metrics = trace.steps.iter().filter_map(|step| step.metrics).flat_map(|metrics| metrics.named());
+    let names: BTreeSet<&str> = metrics.map(|(name, _)| name).collect();
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// What a trace can be held to: all of what it records throughout.
+/// Returns the comparisons that apply to a trace: of everything that it records throughout.
 fn scope_of(trace: &Trace) -> Scope {
     let is_seen =
         trace.start.observations.is_some() && trace.steps.iter().all(|step| step.observations.is_some());
     Scope {
         drawn: false,
         observations: is_seen,
-        metrics: Some(figures(trace)),
+        metrics: Some(metric_names(trace)),
         tells: Some(vec![Told::OnGoal, Told::Occupied]),
     }
 }

@@ -1,4 +1,4 @@
-//! The fast engine does what the reference does in every situation of a small scope.
+//! Checks the fast engine against the reference in every situation of small scopes.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,13 +8,14 @@ mod two_steps;
 
 use scope::{Scope, count_over_maps};
 
-/// Rows, columns and most agents.
+/// Rows, columns and the largest number of agents.
 type Bound = (usize, usize, usize);
 
-/// The scopes of some sizes, with 1 agent up to the most.
+/// Returns the scopes within some bounds: for each size, 1 agent up to the largest number.
 fn scopes(bounds: &[Bound]) -> Vec<Scope> {
-    let scope =
-        |&(height, width, most): &Bound| (1..=most).map(move |agents| Scope::new(height, width, agents));
+    let scope = |&(height, width, max_agents): &Bound| {
+        (1..=max_agents).map(move |agents| Scope::new(height, width, agents))
+    };
     bounds.iter().flat_map(scope).collect()
 }
 

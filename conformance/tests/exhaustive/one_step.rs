@@ -1,4 +1,4 @@
-//! Every step there is from every placement, any of the agents gone.
+//! Compares every step from every placement, with any subset of the agents finished.
 
 use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
 use pogema_fast::Engine;
@@ -6,21 +6,21 @@ use pogema_reference::Reference;
 
 use crate::scope::{RULES, Results, Scope, cells_of, placements, write_actions};
 
-/// Steps that [`check_map`] compares over all maps: each placement, with each set of active agents, each joint
-/// action and all rules.
+/// Returns the number of steps that [`check_map`] compares over all maps: each placement with each set of active
+/// agents, each joint action and all rules.
 pub fn num_steps(scope: Scope) -> u64 {
     (scope.num_placements() * scope.num_actions() as u64 * RULES.len() as u64) << scope.num_agents
 }
 
-/// Compares all steps on a map, any of the agents gone, and counts them.
+/// Compares all steps on a map, with any subset of the agents finished, and counts them.
 pub fn check_map(scope: Scope, map: &Map) -> u64 {
     (0..1 << scope.num_agents).map(|gone| check_without(gone, scope, map)).sum()
 }
 
-/// Compares all steps on a map where some agents, as bits, are gone.
+/// Compares all steps on a map where some agents are finished; `gone` is a bit set of them.
 fn check_without(gone: usize, scope: Scope, map: &Map) -> u64 {
     let starts = placements(map, scope.num_agents);
-    // Agents leave by finishing; where none does, goals are left out of it.
+    // Agents can leave only by finishing; if none does, goals must not matter.
     let on_goal = if gone == 0 { OnGoal::Nothing } else { OnGoal::Finish };
     let mut count = 0;
     for (collision, occupancy) in RULES {
@@ -34,14 +34,14 @@ fn check_without(gone: usize, scope: Scope, map: &Map) -> u64 {
     count
 }
 
-/// Both engines, and the agents that leave before the step which is compared.
+/// Both engines, and the agents that finish before the compared step.
 struct Both {
     reference: Reference,
     engine: Engine,
     gone: usize,
     results: Results,
-    /// What the reference gives, by joint action.
-    wanted: Vec<Option<Snapshot>>,
+    /// The states that the reference reaches, by joint action.
+    expected: Vec<Option<Snapshot>>,
 }
 
 impl Both {
@@ -51,7 +51,7 @@ impl Both {
             engine: Engine::new(config).unwrap(),
             gone,
             results: Results::new(config.num_agents),
-            wanted: vec![None; 5usize.pow(config.num_agents as u32)],
+            expected: vec![None; 5usize.pow(config.num_agents as u32)],
         }
     }
 
@@ -74,36 +74,37 @@ impl Both {
         assert_eq!(self.reference.snapshot().active, active, "{starts:?} on\n{}", map.rows().join("\n"));
         let config = *self.engine.config();
         let mut actions = waits.clone();
-        for number in 0..self.wanted.len() {
+        for number in 0..self.expected.len() {
             self.engine.reset(&instance).unwrap();
             if self.gone != 0 {
                 self.engine.step(&waits, self.results.out()).unwrap();
             }
             write_actions(number, &mut actions);
             self.engine.step(&actions, self.results.out()).unwrap();
-            let got = self.engine.snapshot();
-            let want = self.want(number, &actions);
-            assert_eq!(want, &got, "{starts:?} {actions:?} {instance:?} {config:?}");
+            let actual = self.engine.snapshot();
+            let expected = self.expected(number, &actions);
+            assert_eq!(expected, &actual, "{starts:?} {actions:?} {instance:?} {config:?}");
         }
-        self.wanted.len() as u64
+        self.expected.len() as u64
     }
 
-    /// What the reference gives. It is asked once for all actions of those who are gone, since those do not count
-    /// (rule: move/inactive); the one where they wait comes first.
-    fn want(&mut self, number: usize, actions: &[Action]) -> &Snapshot {
+    /// Returns the state that the reference reaches. The actions of finished agents do not count (rule: move/inactive),
+    /// so the reference plays only the joint action in which they wait; that one has the lowest number of its class.
+    fn expected(&mut self, number: usize, actions: &[Action]) -> &Snapshot {
         let digit = |agent: usize| 5usize.pow(agent as u32);
         let gone = (0..actions.len()).filter(|&agent| self.is_gone(agent));
-        let asked = number - gone.map(|agent| number / digit(agent) % 5 * digit(agent)).sum::<usize>();
-        if asked == number {
+        let played = number - gone.map(|agent| number / digit(agent) % 5 * digit(agent)).sum::<usize>();
+        if played == number {
             let mut reference = self.reference.clone();
             reference.step(actions, self.results.out()).unwrap();
-            self.wanted[number] = Some(reference.snapshot());
+            self.expected[number] = Some(reference.snapshot());
         }
-        self.wanted[asked].as_ref().unwrap()
+        self.expected[played].as_ref().unwrap()
     }
 }
 
-/// A goal that one step from a start does not reach, if there is one; and never the start itself.
+/// Returns a goal that the agent cannot reach in one step, if the map has one, else any cell other than the start, if
+/// the map has one.
 fn far_from(map: &Map, start: Cell) -> Cell {
     let distance = |cell: &Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col);
     let is_far = |cell: &Cell| *cell != start && (map.is_obstacle(*cell) || distance(cell) > 1);

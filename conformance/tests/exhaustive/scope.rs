@@ -1,4 +1,4 @@
-//! What there is within a scope: maps, placements, joint actions, rules.
+//! The contents of a scope: maps, placements, joint actions and rules.
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
@@ -21,7 +21,7 @@ impl Scope {
         self.height * self.width
     }
 
-    /// How many maps there are, one for each set of obstacles.
+    /// Returns the number of maps: one for each set of obstacles.
     pub const fn num_maps(self) -> usize {
         1 << self.num_cells()
     }
@@ -31,8 +31,8 @@ impl Scope {
         Map::new(self.height, self.width, obstacles).unwrap()
     }
 
-    /// How many placements of the agents on different free cells there are, over all maps: each cell of a
-    /// placement is free, each other cell is an obstacle or not.
+    /// Returns the number of placements of the agents on different free cells, over all maps. The cells of a placement
+    /// are free; each other cell is free or an obstacle.
     pub fn num_placements(self) -> u64 {
         let (cells, agents) = (self.num_cells() as u64, self.num_agents as u64);
         if agents > cells {
@@ -41,18 +41,18 @@ impl Scope {
         (0..agents).map(|agent| cells - agent).product::<u64>() << (cells - agents)
     }
 
-    /// How many joint actions there are.
+    /// Returns the number of joint actions.
     pub fn num_actions(self) -> usize {
         5usize.pow(self.num_agents as u32)
     }
 }
 
-/// All cells of a map.
+/// Returns all cells of a map.
 pub fn cells_of(map: &Map) -> Vec<Cell> {
     (0..map.obstacles().len()).map(|index| map.cell_at(index)).collect()
 }
 
-/// All placements of agents on different free cells.
+/// Returns all placements of agents on different free cells.
 pub fn placements(map: &Map, num_agents: usize) -> Vec<Vec<Cell>> {
     let free: Vec<Cell> = cells_of(map).into_iter().filter(|&cell| !map.is_obstacle(cell)).collect();
     let is_allowed =
@@ -60,7 +60,7 @@ pub fn placements(map: &Map, num_agents: usize) -> Vec<Vec<Cell>> {
     tuples(&free, num_agents).into_iter().filter(is_allowed).collect()
 }
 
-/// All lists of so many entries of a list.
+/// Returns all tuples of `length` entries of a list.
 pub fn tuples(list: &[Cell], length: usize) -> Vec<Vec<Cell>> {
     let mut tuples = vec![Vec::new()];
     for _ in 0..length {
@@ -73,7 +73,7 @@ pub fn tuples(list: &[Cell], length: usize) -> Vec<Vec<Cell>> {
     tuples
 }
 
-/// A joint action by its number, which has one digit to the base 5 for each agent.
+/// Writes the joint action with a number, whose digits to base 5 are the actions of the agents.
 pub fn write_actions(number: usize, actions: &mut [Action]) {
     let mut rest = number;
     for action in actions {
@@ -92,7 +92,7 @@ pub const RULES: [(Collision, Occupancy); 6] = [
     (Collision::Soft, Occupancy::Exact),
 ];
 
-/// What a step gives besides the state.
+/// The results of a step besides the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Results {
     rewards: Vec<f32>,
@@ -115,7 +115,7 @@ impl Results {
     }
 }
 
-/// Adds up what a check counts on each map of some scopes, the maps shared among threads.
+/// Sums the counts of a check over all maps of some scopes, in parallel.
 pub fn count_over_maps(scopes: &[Scope], check: fn(Scope, &Map) -> u64) -> u64 {
     let maps: Vec<(Scope, usize)> =
         scopes.iter().flat_map(|&scope| (0..scope.num_maps()).map(move |index| (scope, index))).collect();

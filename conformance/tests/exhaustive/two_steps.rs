@@ -1,4 +1,4 @@
-//! Every two steps from every placement with every choice of goals, with all that can be seen of them.
+//! Compares every two steps from every placement with every choice of goals: states, results and observations.
 
 use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
 use pogema_fast::Engine;
@@ -8,8 +8,8 @@ use crate::scope::{RULES, Results, Scope, cells_of, placements, tuples, write_ac
 
 const ON_GOAL: [OnGoal; 3] = [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart];
 
-/// Steps that [`check_map`] compares over all maps: from each placement, with each choice of goals, all first steps
-/// and after each of them all second ones, by all rules.
+/// Returns the number of steps that [`check_map`] compares over all maps: from each placement, with each choice of
+/// goals and under all rules, all first steps, and after each of them all second steps.
 pub fn num_steps(scope: Scope) -> u64 {
     let num_goals = (scope.num_cells() as u64).pow(scope.num_agents as u32);
     let num_actions = scope.num_actions() as u64;
@@ -45,7 +45,7 @@ pub fn check_map(scope: Scope, map: &Map) -> u64 {
     count
 }
 
-/// An instance in which another goal, on the next cell of the map, follows each first one.
+/// Returns an instance in which each first goal is followed by a second one on the next cell of the map.
 fn instance(map: &Map, starts: &[Cell], goals: &[Cell]) -> Instance {
     let next = |goal: Cell| map.cell_at((map.index(goal) + 1) % map.obstacles().len());
     let stream = |&goal: &Cell| GoalStream::sequence(goal, [goal, next(goal)].into());
@@ -53,15 +53,15 @@ fn instance(map: &Map, starts: &[Cell], goals: &[Cell]) -> Instance {
     Instance::new(map.clone(), Outside::Free, starts.to_vec(), goals).unwrap()
 }
 
-/// All that can be seen of a step.
+/// All outputs of a step.
 #[derive(Clone, Debug, PartialEq)]
-struct Seen {
+struct Outputs {
     state: Snapshot,
     results: Results,
     observation: Vec<f32>,
 }
 
-impl Seen {
+impl Outputs {
     fn step(environment: &mut impl Environment, actions: &[Action]) -> Self {
         let mut results = Results::new(actions.len());
         environment.step(actions, results.out()).unwrap();
@@ -86,37 +86,37 @@ impl Both {
         let num_actions = 5usize.pow(num_agents as u32);
         let (mut first, mut second) = (vec![Action::Stay; num_agents], vec![Action::Stay; num_agents]);
         self.reference.reset(instance).unwrap();
-        // The reference is asked once for all second steps from the same state.
-        let mut asked: Vec<(Snapshot, Vec<Seen>)> = Vec::new();
+        // Different first steps may reach the same state: its second steps are played once.
+        let mut played: Vec<(Snapshot, Vec<Outputs>)> = Vec::new();
         for number in 0..num_actions {
             write_actions(number, &mut first);
             let mut reference = self.reference.clone();
-            let want = Seen::step(&mut reference, &first);
+            let expected = Outputs::step(&mut reference, &first);
             self.engine.reset(instance).unwrap();
-            let got = Seen::step(&mut self.engine, &first);
-            assert_eq!(want, got, "{first:?} {instance:?} {:?}", self.engine.config());
-            let known = asked.iter().position(|(state, _)| *state == want.state);
+            let actual = Outputs::step(&mut self.engine, &first);
+            assert_eq!(expected, actual, "{first:?} {instance:?} {:?}", self.engine.config());
+            let known = played.iter().position(|(state, _)| *state == expected.state);
             let known = known.unwrap_or_else(|| {
-                asked.push((want.state, all_steps(&reference, num_actions)));
-                asked.len() - 1
+                played.push((expected.state, all_steps(&reference, num_actions)));
+                played.len() - 1
             });
-            for (number, want) in asked[known].1.iter().enumerate() {
+            for (number, expected) in played[known].1.iter().enumerate() {
                 write_actions(number, &mut second);
                 self.engine.reset(instance).unwrap();
                 self.engine.step(&first, Results::new(num_agents).out()).unwrap();
-                let got = Seen::step(&mut self.engine, &second);
-                assert_eq!(want, &got, "{first:?} {second:?} {instance:?} {:?}", self.engine.config());
+                let actual = Outputs::step(&mut self.engine, &second);
+                assert_eq!(expected, &actual, "{first:?} {second:?} {instance:?} {:?}", self.engine.config());
             }
         }
         (num_actions + num_actions * num_actions) as u64
     }
 }
 
-fn all_steps(reference: &Reference, num_actions: usize) -> Vec<Seen> {
+fn all_steps(reference: &Reference, num_actions: usize) -> Vec<Outputs> {
     let mut actions = vec![Action::Stay; reference.config().num_agents];
     let step = |number: usize| {
         write_actions(number, &mut actions);
-        Seen::step(&mut reference.clone(), &actions)
+        Outputs::step(&mut reference.clone(), &actions)
     };
     (0..num_actions).map(step).collect()
 }

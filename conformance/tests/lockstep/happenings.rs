@@ -1,20 +1,20 @@
-//! How often the interesting things happened: a run that met none of them proves little.
+//! Counts of the relevant events in random plans: a run without them would prove little.
 
 use pogema_conformance::{Back, Events, Record, Response, StepRecord};
 use pogema_core::{Action, Snapshot, TraceStep};
 
 use crate::pair::Results;
 
-/// Counts of what happened in the steps that were compared.
+/// Counts of events in the compared steps.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Happenings {
+pub struct EventCounts {
     pub events: Events,
-    /// Agents that followed an agent that followed another.
+    /// Agents that followed an agent that itself followed another one.
     pub long_chains: u64,
 }
 
-impl Happenings {
-    /// Counts what happened in a step.
+impl EventCounts {
+    /// Counts the events of a step.
     pub fn watch(&mut self, before: Snapshot, actions: Vec<Action>, after: Snapshot, results: Results) {
         self.long_chains += num_in_long_chains(&before, &after);
         let Results { rewards, terminated, truncated } = results;
@@ -32,8 +32,8 @@ impl Happenings {
         self.events.watch(&Response { records, ..Response::default() });
     }
 
-    /// Each count by name, with what a fair number of plans must reach.
-    pub fn with_least(&self) -> [(&'static str, u64, u64); 9] {
+    /// Returns each count with its name and the minimum that 2000 plans must reach.
+    pub fn with_minimums(&self) -> [(&'static str, u64, u64); 9] {
         let events = &self.events;
         [
             ("swaps", events.swaps, 1000),

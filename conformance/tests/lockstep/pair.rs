@@ -1,4 +1,4 @@
-//! The reference and the fast engine on every path, played side by side.
+//! The reference, and the fast engine on every SIMD path, played in lockstep.
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -7,13 +7,13 @@ use pogema_core::{Action, Config, Environment, Error, Instance, Seen, Snapshot, 
 use pogema_fast::{Engine, SimdPath, words_per_agent};
 use pogema_reference::Reference;
 
-/// What a value is before an engine writes it.
+/// The initial value of buffers, to detect values that an engine does not write.
 const UNWRITTEN: u8 = 7;
 
-/// What went wrong, in words.
+/// A result whose error describes a difference.
 pub type Outcome<T> = Result<T, String>;
 
-/// One environment, played by all.
+/// The reference and the fast engines with the same config, in the same state.
 pub struct Pair {
     pub reference: Reference,
     pub engines: Vec<(SimdPath, Engine)>,
@@ -23,7 +23,7 @@ pub struct Pair {
     past: Vec<Snapshot>,
 }
 
-/// What a step gives besides the state.
+/// The results of a step besides the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Results {
     pub rewards: Vec<f32>,
@@ -44,23 +44,23 @@ impl Pair {
 
     pub fn reset(&mut self, instance: &Instance) -> Outcome<()> {
         self.size = (instance.map().height(), instance.map().width());
-        let want = self.reference.reset(instance);
+        let expected = self.reference.reset(instance);
         for (path, engine) in &mut self.engines {
-            same(*path, "reset", &want, &engine.reset(instance))?;
+            same(*path, "reset", &expected, &engine.reset(instance))?;
         }
         let state = self.check_state()?;
-        if want.is_ok() {
+        if expected.is_ok() {
             self.past = vec![state];
         }
         Ok(())
     }
 
     pub fn step(&mut self, actions: &[Action]) -> Outcome<(Snapshot, Results)> {
-        let want = results(&mut self.reference, actions);
+        let expected = results(&mut self.reference, actions);
         for (path, engine) in &mut self.engines {
-            same(*path, "results of the step", &want, &results(engine, actions))?;
+            same(*path, "results of the step", &expected, &results(engine, actions))?;
         }
-        let results = want.map_err(|error| error.to_string())?;
+        let results = expected.map_err(|error| error.to_string())?;
         let state = self.check_state()?;
         self.past.push(state.clone());
         Ok((state, results))
@@ -72,43 +72,43 @@ impl Pair {
         }
         let before = self.past.last().cloned().unwrap_or_default();
         let step = self.past.len().saturating_sub(1) as u64;
-        let want = self.reference.restore(step, &before);
+        let expected = self.reference.restore(step, &before);
         for (path, engine) in &mut self.engines {
-            same(*path, "step back", &want, &engine.restore(step, &before))?;
+            same(*path, "step back", &expected, &engine.restore(step, &before))?;
         }
         self.check_state().map(|_| ())
     }
 
     /// Compares the states.
     pub fn check_state(&self) -> Outcome<Snapshot> {
-        let want = self.reference.snapshot();
+        let expected = self.reference.snapshot();
         for (path, engine) in &self.engines {
-            same(*path, "state", &want, &engine.snapshot())?;
+            same(*path, "state", &expected, &engine.snapshot())?;
             same(*path, "step", &self.reference.state().step, &engine.state().step)?;
         }
-        Ok(want)
+        Ok(expected)
     }
 
-    /// Compares everything that can be observed; some agents once more by themselves.
+    /// Compares all observations; those of the agents `some` also separately.
     pub fn check_observations(&self, some: Range<usize>) -> Outcome<()> {
         let config = self.config();
-        let mut want = vec![f32::from(UNWRITTEN); config.num_observed()];
-        let outcome = self.reference.observe(&mut want);
+        let mut expected = vec![f32::from(UNWRITTEN); config.num_observed()];
+        let outcome = self.reference.observe(&mut expected);
         for (path, engine) in &self.engines {
-            let mut got = vec![f32::from(UNWRITTEN); config.num_observed()];
-            same(*path, "observing", &outcome, &engine.observe(&mut got))?;
-            same(*path, "observation", &bits_of(&want), &bits_of(&got))?;
+            let mut actual = vec![f32::from(UNWRITTEN); config.num_observed()];
+            same(*path, "observing", &outcome, &engine.observe(&mut actual))?;
+            same(*path, "observation", &bits_of(&expected), &bits_of(&actual))?;
         }
         if outcome.is_ok() {
-            self.check_ranges(&want, &[0..config.num_agents, some])?;
+            self.check_ranges(&expected, &[0..config.num_agents, some])?;
         }
-        let want_map = map_of(&self.reference, config, self.size);
-        let want_seen = seen_by(&self.reference);
+        let expected_map = map_of(&self.reference, config, self.size);
+        let expected_seen = seen_by(&self.reference);
         for (path, engine) in &self.engines {
-            same(*path, "map with its border", &want_map, &map_of(engine, config, self.size))?;
-            same(*path, "counts of what is seen", &want_seen, &seen_by(engine))?;
+            same(*path, "map with its border", &expected_map, &map_of(engine, config, self.size))?;
+            same(*path, "counts of what is seen", &expected_seen, &seen_by(engine))?;
             if outcome.is_ok() {
-                check_windows(*path, engine, config, &want)?;
+                check_windows(*path, engine, config, &expected)?;
             }
         }
         Ok(())
@@ -117,10 +117,10 @@ impl Pair {
     fn check_ranges(&self, whole: &[f32], ranges: &[Range<usize>]) -> Outcome<()> {
         let per_agent = whole.len() / self.config().num_agents;
         for agents in ranges {
-            let want = &whole[agents.start * per_agent..agents.end * per_agent];
+            let expected = &whole[agents.start * per_agent..agents.end * per_agent];
             for (path, engine) in &self.engines {
-                let mut values = vec![f32::from(UNWRITTEN); want.len()];
-                let mut bytes = vec![UNWRITTEN; want.len()];
+                let mut values = vec![f32::from(UNWRITTEN); expected.len()];
+                let mut bytes = vec![UNWRITTEN; expected.len()];
                 let mut words = vec![u64::MAX; agents.len() * words_per_agent(self.config().radius)];
                 let observed = engine
                     .observe_agents(agents.clone(), &mut values)
@@ -128,12 +128,12 @@ impl Pair {
                     .and_then(|()| engine.observe_bits(agents.clone(), &mut words));
                 observed.map_err(|error| error.to_string())?;
                 let from_bytes: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte)).collect();
-                same(*path, "f32 of some agents", &bits_of(want), &bits_of(&values))?;
-                same(*path, "u8 of some agents", &want, &from_bytes.as_slice())?;
+                same(*path, "f32 of some agents", &bits_of(expected), &bits_of(&values))?;
+                same(*path, "u8 of some agents", &expected, &from_bytes.as_slice())?;
                 same(
                     *path,
                     "bits of some agents",
-                    &want,
+                    &expected,
                     &unpack(&words, agents.len(), per_agent)?.as_slice(),
                 )?;
             }
@@ -142,17 +142,17 @@ impl Pair {
     }
 }
 
-/// Passes if the fast engine gives what the reference gives.
-fn same<T: PartialEq + Debug>(path: SimdPath, what: &str, want: &T, got: &T) -> Outcome<()> {
-    if want == got {
+/// Checks that the fast engine returns the same value as the reference.
+fn same<T: PartialEq + Debug>(path: SimdPath, what: &str, expected: &T, actual: &T) -> Outcome<()> {
+    if expected == actual {
         return Ok(());
     }
-    Err(format!("{path}: {what} differs\n reference: {want:?}\n      fast: {got:?}"))
+    Err(format!("{path}: {what} differs\n reference: {expected:?}\n      fast: {actual:?}"))
 }
 
 fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<Results, Error> {
     let num_agents = actions.len();
-    // The opposite of what most steps give, so that a place left out shows.
+    // The opposite of the usual results, to detect places that an engine does not write.
     let flags = vec![true; num_agents];
     let mut results =
         Results { rewards: vec![-1.0; num_agents], terminated: flags.clone(), truncated: flags };
@@ -176,24 +176,24 @@ fn seen_by(environment: &impl Environment) -> Result<Vec<Seen>, Error> {
     environment.count_seen(&mut seen).map(|()| seen)
 }
 
-/// Passes if the windows that `POMAPF` has apart are those of the `default` observation.
+/// Checks that the separate windows of `POMAPF` equal those of the `default` observation.
 fn check_windows(path: SimdPath, engine: &Engine, config: Config, default: &[f32]) -> Outcome<()> {
     let area = config.side() * config.side();
     let channel =
         |index: usize| default.chunks(area).skip(index).step_by(3).flatten().copied().collect::<Vec<f32>>();
-    let want = [channel(0), channel(1)];
-    let mut got = want.clone().map(|values| vec![f32::from(UNWRITTEN); values.len()]);
-    let [obstacles, agents] = &mut got;
+    let expected = [channel(0), channel(1)];
+    let mut actual = expected.clone().map(|values| vec![f32::from(UNWRITTEN); values.len()]);
+    let [obstacles, agents] = &mut actual;
     engine.observe_windows(obstacles, agents).map_err(|error| error.to_string())?;
-    same(path, "windows of POMAPF", &want, &got)
+    same(path, "windows of POMAPF", &expected, &actual)
 }
 
-/// Tells 0 from -0.
+/// Returns the bits of values, to distinguish 0 from -0.
 fn bits_of(values: &[f32]) -> Vec<u32> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// The values of some agents from their bits; the bits that no value has must be 0.
+/// Unpacks the values of some agents from their bits; unused bits must be 0.
 fn unpack(words: &[u64], num_agents: usize, per_agent: usize) -> Outcome<Vec<f32>> {
     let mut values = Vec::with_capacity(num_agents * per_agent);
     for words in words.chunks(per_agent.div_ceil(64)) {

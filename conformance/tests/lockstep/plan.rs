@@ -1,4 +1,4 @@
-//! Random plans: a config, instances and what is done with them, mostly small and crowded.
+//! Random plans: a config, instances and operations, mostly small and crowded.
 
 use std::sync::Arc;
 
@@ -10,16 +10,16 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// Longest side of a map, unless it is a corridor.
-const LONGEST_SIDE: usize = 14;
-/// Most cells of a map.
-const MOST_CELLS: usize = LONGEST_SIDE * LONGEST_SIDE;
-/// Most agents.
-const MOST_AGENTS: usize = 30;
-/// Values of all windows together stay below this, so that wide windows do not take all the time.
-const MOST_SEEN: usize = 70_000;
+/// Largest side length of a map that is not a corridor.
+const MAX_SIDE: usize = 14;
+/// Largest number of cells of a map.
+const MAX_CELLS: usize = MAX_SIDE * MAX_SIDE;
+/// Largest number of agents.
+const MAX_AGENTS: usize = 30;
+/// Largest number of values in all windows together, so that wide windows do not dominate the run time.
+const MAX_OBSERVED: usize = 70_000;
 
-/// What is played.
+/// A config, instances, and the operations to play.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub config: Config,
@@ -30,21 +30,21 @@ pub struct Plan {
 /// One operation.
 #[derive(Clone, Debug)]
 pub enum Op {
-    /// Where the agents drift, and for each agent a number that says whether it drifts along.
+    /// The drift, and for each agent a number: 0 to 4 is an action, larger ones follow the drift.
     Step(Drift, Vec<u8>),
     Back,
     /// Resets to one of the instances.
     Reset(usize),
 }
 
-/// Where agents go that do not choose for themselves.
+/// The direction of agents without an action of their own.
 #[derive(Clone, Copy, Debug)]
 pub enum Drift {
-    /// All the same way: queues.
+    /// All agents in the same direction, which makes queues.
     Along(Action),
-    /// Round each 2 x 2 block: rings.
+    /// Around each 2 x 2 block, which makes rings.
     Round,
-    /// Towards the neighbour in the other column of two: swaps.
+    /// Towards the neighbour in the other column of a pair, which makes swaps.
     Across,
     /// One step towards the goal.
     ToGoal,
@@ -70,7 +70,7 @@ impl Drift {
         }
     }
 
-    /// The actions of all agents in a state.
+    /// Returns the actions of all agents in a state.
     pub fn actions(self, choices: &[u8], state: &Snapshot) -> Vec<Action> {
         let places = state.cells.iter().zip(&state.goals);
         let choose = |(&choice, (&cell, &goal)): (&u8, (&Cell, &Cell))| {
@@ -80,14 +80,14 @@ impl Drift {
     }
 }
 
-/// The numbers that an instance is made of; each of them shrinks by itself.
+/// The numbers that define an instance; each of them shrinks independently.
 #[derive(Clone, Debug)]
 struct Ground {
     height: usize,
     width: usize,
     /// Obstacles per 100 cells.
     density: u8,
-    /// Below the density, the cell holds an obstacle.
+    /// One number per cell; the cell is an obstacle if it is below the density.
     heights: Vec<u8>,
     /// The agents start on the cells with the lowest numbers.
     order: Vec<u16>,
@@ -127,21 +127,21 @@ impl Ground {
     }
 }
 
-/// A number that looks random.
+/// Returns a pseudo-random number.
 fn mix(seed: u64, index: usize) -> u64 {
     let mixed = (seed ^ index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (mixed ^ mixed >> 31).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 33
 }
 
 fn grounds() -> impl Strategy<Value = Ground> {
-    let side = || prop_oneof![6 => 1..=5usize, 3 => 1..=LONGEST_SIDE];
+    let side = || prop_oneof![6 => 1..=5usize, 3 => 1..=MAX_SIDE];
     let across = || 1..=2usize;
-    let along = || 1..=MOST_CELLS / 2;
+    let along = || 1..=MAX_CELLS / 2;
     let extent = prop_oneof![8 => (side(), side()), 1 => (across(), along()), 1 => (along(), across())];
     let density = prop_oneof![3 => Just(0u8), 3 => 1..=25u8, 1 => 25..=80u8, 1 => Just(100u8)];
     let noise = prop_oneof![3 => Just(None), 1 => any::<u64>().prop_map(Some)];
-    let goals = vec(vec(any::<u16>(), 1..=3), MOST_AGENTS);
-    let numbers = (vec(0..100u8, MOST_CELLS), vec(any::<u16>(), MOST_CELLS), proptest::bool::weighted(0.08));
+    let goals = vec(vec(any::<u16>(), 1..=3), MAX_AGENTS);
+    let numbers = (vec(0..100u8, MAX_CELLS), vec(any::<u16>(), MAX_CELLS), proptest::bool::weighted(0.08));
     (extent, density, numbers, goals, noise).prop_map(
         |((height, width), density, (heights, order, starts_on_obstacles), goals, noise)| Ground {
             height,
@@ -191,8 +191,8 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
         1 => Just(Drift::Across),
         2 => Just(Drift::ToGoal),
     ];
-    // Mostly everybody drifts, often nobody does.
-    let choice = |most: u8| vec(0..most, MOST_AGENTS);
+    // The larger the range, the more agents drift; with the range 5, none does.
+    let choice = |max: u8| vec(0..max, MAX_AGENTS);
     let choices = prop_oneof![1 => choice(5), 2 => choice(10), 3 => choice(60)];
     let op = prop_oneof![
         16 => (drift, choices).prop_map(|(drift, choices)| Op::Step(drift, choices)),
@@ -202,18 +202,18 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
     vec(op, 0..=14)
 }
 
-/// Plans that differ in everything the engines can be told.
+/// Returns a strategy for plans that vary every input of the engines.
 pub fn plans() -> impl Strategy<Value = Plan> {
-    // Crowds come from here: this share of the cells, in quarters, has an agent.
-    (configs(), vec(grounds(), 2), any::<bool>(), 0..=4usize, 0..MOST_AGENTS, ops()).prop_map(
+    // `quarters` makes crowds: it is the share of cells with an agent, in quarters; 0 means `few` agents.
+    (configs(), vec(grounds(), 2), any::<bool>(), 0..=4usize, 0..MAX_AGENTS, ops()).prop_map(
         |(config, mut grounds, same_size, quarters, few, mut ops)| {
             if same_size {
                 (grounds[1].height, grounds[1].width) = (grounds[0].height, grounds[0].width);
             }
             let num_cells = grounds.iter().map(|ground| ground.height * ground.width).min().unwrap_or(1);
-            let wanted = if quarters == 0 { few % num_cells } else { num_cells * quarters / 4 };
-            let most = (MOST_SEEN / (config.side() * config.side())).min(MOST_AGENTS).min(num_cells);
-            let num_agents = wanted.clamp(1, most.max(1));
+            let requested = if quarters == 0 { few % num_cells } else { num_cells * quarters / 4 };
+            let max_agents = (MAX_OBSERVED / (config.side() * config.side())).min(MAX_AGENTS).min(num_cells);
+            let num_agents = requested.clamp(1, max_agents.max(1));
             let config = Config { num_agents, ..config };
             let instances = grounds.iter().map(|ground| ground.instance(num_agents, config.radius)).collect();
             for op in &mut ops {

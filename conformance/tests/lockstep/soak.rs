@@ -1,4 +1,4 @@
-//! Long episodes of a crowd on one map, in which a mistake that needs many steps to show has the time.
+//! Long episodes of a crowd on one map, for errors that appear only after many steps.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use crate::pair::Pair;
 
 const NUM_AGENTS: usize = 500;
 const SIDE: usize = 40;
-/// Everything that agents see is compared once in so many steps.
-const OBSERVED_EVERY: u64 = 100;
+/// Number of steps between two comparisons of the observations.
+const OBSERVATION_INTERVAL: u64 = 100;
 
-/// Numbers that look random, the same in every run.
+/// A generator of pseudo-random numbers, the same in every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -21,7 +21,7 @@ impl Numbers {
     }
 }
 
-/// A map of which a fifth is obstacles; goals near the starts follow each other for ever.
+/// Returns an instance whose map has a fifth of obstacles; each agent has an endless cycle of goals near its start.
 fn crowd(numbers: &mut Numbers) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(5) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
@@ -41,7 +41,7 @@ fn crowd(numbers: &mut Numbers) -> Instance {
     Instance::new(map, Outside::Free, starts, goals).unwrap()
 }
 
-/// Half of the agents head for their goals, the others go anywhere.
+/// Chooses actions: about half of them lead towards the goal, the others are random.
 fn choose_actions(numbers: &mut Numbers, state: &Snapshot, actions: &mut [Action]) {
     for (agent, action) in actions.iter_mut().enumerate() {
         let (cell, goal) = (state.cells[agent], state.goals[agent]);
@@ -54,7 +54,7 @@ fn choose_actions(numbers: &mut Numbers, state: &Snapshot, actions: &mut [Action
     }
 }
 
-/// Plays so many steps with each collision system.
+/// Plays a number of steps with each collision system.
 fn soak(num_steps: u64) {
     for (seed, collision) in
         [Collision::Priority, Collision::BlockBoth, Collision::Soft].into_iter().enumerate()
@@ -73,7 +73,7 @@ fn soak(num_steps: u64) {
                 pair.step(&actions).unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
             num_reached += after.on_goal.iter().filter(|&&reached| reached).count() as u64;
             state = after;
-            if step % OBSERVED_EVERY == 0 {
+            if step % OBSERVATION_INTERVAL == 0 {
                 pair.check_observations(17..400)
                     .unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
             }
@@ -83,12 +83,12 @@ fn soak(num_steps: u64) {
 }
 
 #[test]
-fn a_crowd_stays_in_step() {
+fn a_crowd_stays_in_lockstep() {
     soak(2_000);
 }
 
 #[test]
 #[ignore = "minutes: cargo test --release -p pogema-conformance --test lockstep -- --ignored"]
-fn a_crowd_stays_in_step_for_100_000_steps() {
+fn a_crowd_stays_in_lockstep_for_100_000_steps() {
     soak(100_000);
 }

@@ -1,4 +1,4 @@
-"""A port that goes wrong in the way that its argument names, in its third step, once in the life of a folder."""
+"""A port that misbehaves in its third step, in the way that its argument names, once per folder."""
 
 import json
 import os
@@ -19,21 +19,21 @@ HELLO = {
 steps = 0
 
 
-def state(question):
-    """Whatever the form asks for: everybody stays at the start, which is not what is checked here."""
-    instance = question["instance"]
+def state(request):
+    """Return a well-formed state: all agents stay at their starts, since moves are not checked here."""
+    instance = request["instance"]
     cells = instance["starts"]
     return {"cells": cells, "goals": [goals[0] for goals in instance["goals"]], "active": [True] * len(cells)}
 
 
-def say(text):
-    """One line."""
+def print_line(text):
+    """Print a line."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
 def is_first():
-    """Whether no port went wrong in this folder before; from now on one has."""
+    """Return whether no port has misbehaved in this folder yet, and mark that one has now."""
     try:
         os.close(os.open(f"{FOLDER}/marker", os.O_CREAT | os.O_EXCL))
     except FileExistsError:
@@ -41,8 +41,8 @@ def is_first():
     return True
 
 
-def go_wrong(answer):
-    """Does what the argument names, or gives an answer that is wrong in its form."""
+def misbehave(answer):
+    """Misbehave in the way that the argument names."""
     if WAY == "exit":
         print("the reason is here", file=sys.stderr, flush=True)
         sys.exit(7)
@@ -51,7 +51,7 @@ def go_wrong(answer):
     if WAY == "hang":
         time.sleep(3600)
     if WAY == "garbage":
-        say("Traceback (most recent call last):")
+        print_line("Traceback (most recent call last):")
     if WAY == "half-line":
         sys.stdout.write('{"cells": [[')
         sys.stdout.flush()
@@ -64,24 +64,24 @@ def go_wrong(answer):
         block = "x" * (1 << 20)
         for _ in range(80):
             sys.stdout.write(block)
-        say("")
+        print_line("")
     if WAY == "binary":
         sys.stdout.buffer.write(b"\xff\xfe\x00\n")
         sys.stdout.flush()
     if WAY == "wrong-length":
-        say(json.dumps({**answer, "rewards": answer["rewards"] + [0]}))
+        print_line(json.dumps({**answer, "rewards": answer["rewards"] + [0]}))
     if WAY == "left-out":
         answer.pop("truncated")
-        say(json.dumps(answer))
+        print_line(json.dumps(answer))
     if WAY == "nan":
-        say(json.dumps({**answer, "rewards": [float("nan")] * len(answer["rewards"])}))
+        print_line(json.dumps({**answer, "rewards": [float("nan")] * len(answer["rewards"])}))
     if WAY == "null":
-        say("null")
+        print_line("null")
     if WAY == "short-window":
-        say(json.dumps({**answer, "observations": [[0, 1]] * len(answer["cells"])}))
+        print_line(json.dumps({**answer, "observations": [[0, 1]] * len(answer["cells"])}))
     if WAY == "twice":
-        # At once, so that the second line is there before the next question.
-        say(json.dumps(answer) + "\n" + json.dumps(answer))
+        # In one write, so that the second line arrives before the next request.
+        print_line(json.dumps(answer) + "\n" + json.dumps(answer))
     if WAY == "stderr-flood":
         for _ in range(200_000):
             print("a very long complaint about nothing at all, over and over", file=sys.stderr)
@@ -97,31 +97,31 @@ def go_wrong(answer):
             print(child.pid, file=pids)
         os._exit(1)
     if WAY == "deaf":
-        say(json.dumps(answer))
+        print_line(json.dumps(answer))
         time.sleep(3600)
 
 
 start = {}
 if WAY == "not-in-hello":
-    say('{"name": "something else"}')
+    print_line('{"name": "something else"}')
     time.sleep(3600)
 for line in sys.stdin:
-    question = json.loads(line)
-    if question["type"] == "hello":
-        say(json.dumps({**HELLO, "protocol": "other/9"} if WAY == "other-protocol" else HELLO))
-    elif question["type"] == "reset":
-        start = state(question)
+    request = json.loads(line)
+    if request["type"] == "hello":
+        print_line(json.dumps({**HELLO, "protocol": "other/9"} if WAY == "other-protocol" else HELLO))
+    elif request["type"] == "reset":
+        start = state(request)
         if WAY == "short-window":
-            side = 2 * question["instance"]["config"]["radius"] + 1
+            side = 2 * request["instance"]["config"]["radius"] + 1
             start["observations"] = [[0] * (3 * side * side)] * len(start["cells"])
-        say(json.dumps(start))
-    elif question["type"] == "step":
+        print_line(json.dumps(start))
+    elif request["type"] == "step":
         steps += 1
         flags = [False] * len(start["cells"])
         reply = {**start, "rewards": [0] * len(flags), "terminated": flags, "truncated": flags}
         if steps == 3 and is_first():
-            go_wrong(reply)
+            misbehave(reply)
         else:
-            say(json.dumps(reply))
+            print_line(json.dumps(reply))
     else:
         break

@@ -1,4 +1,4 @@
-//! Whatever a port does instead of answering, the run goes on, says what was seen, and leaves nothing behind.
+//! Checks that a run survives a misbehaving port: it continues, reports the fault, and leaves no process behind.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -31,8 +31,8 @@ fn check(way: &str, folder: &Path) -> PortReport {
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }
 
-/// Checks that a port that goes wrong is told so, and that cases were played after that.
-fn assert_error(way: &str, what: &str) -> PortReport {
+/// Checks that a fault is reported and that the run plays further cases after it.
+fn assert_fault(way: &str, what: &str) -> PortReport {
     let folder = tempfile::tempdir().unwrap();
     let report = check(way, folder.path());
     let faults: Vec<String> =
@@ -40,78 +40,78 @@ fn assert_error(way: &str, what: &str) -> PortReport {
     assert!(faults.iter().any(|fault| fault.contains(what)), "{way}: {faults:?}");
     assert!(report.misbehaves(), "{way}");
     let errors: u64 = report.rules.values().map(|row| row.errors).sum();
-    assert_eq!(errors, 1, "{way}: not one case has the verdict `error`");
-    assert!(report.num_played >= 5, "{way}: the run did not go on");
+    assert_eq!(errors, 1, "{way}: expected one case with the verdict `error`");
+    assert!(report.num_played >= 5, "{way}: the run did not continue");
     assert_eq!(report.num_not_run, 0, "{way}");
     report
 }
 
 #[test]
-fn a_port_that_ends_is_told_with_its_status_and_last_words() {
-    let report = assert_error("exit", "ended (exit status: 7) instead of answering `step`");
+fn a_port_that_exits_is_reported_with_its_status_and_last_output() {
+    let report = assert_fault("exit", "ended (exit status: 7) instead of answering `step`");
     let fault = report.causes.iter().find_map(|cause| cause.example.fault.clone()).unwrap();
     assert_eq!(fault.stderr, "the reason is here");
-    assert_error("abort", "ended (signal: 6");
+    assert_fault("abort", "ended (signal: 6");
 }
 
 #[test]
-fn a_port_that_keeps_silent_is_given_up_in_time() {
-    assert_error("hang", "gave no answer to `step` within 1.5 s");
-    assert_error("half-line-then-hang", "gave no answer to `step` within 1.5 s");
-    assert_error("closes-stdout", "closed its output instead of answering `step`");
+fn a_silent_port_times_out() {
+    assert_fault("hang", "gave no answer to `step` within 1.5 s");
+    assert_fault("half-line-then-hang", "gave no answer to `step` within 1.5 s");
+    assert_fault("closes-stdout", "closed its output instead of answering `step`");
 }
 
 #[test]
-fn what_is_no_answer_is_quoted() {
-    assert_error(
+fn unreadable_answers_are_quoted() {
+    assert_fault(
         "garbage",
         "gave no readable answer to `step` (expected value at line 1 column 1): `Traceback",
     );
-    assert_error("half-line", "instead of answering `step`, after half a line: `{\"cells\": [[`");
-    assert_error("binary", "gave no readable answer to `step`");
-    assert_error("null", "gave no readable answer to `step`");
-    assert_error("nan", "gave no readable answer to `step`");
-    assert_error("huge-line", "answered `step` with a line of more than 67108864 bytes");
+    assert_fault("half-line", "instead of answering `step`, after half a line: `{\"cells\": [[`");
+    assert_fault("binary", "gave no readable answer to `step`");
+    assert_fault("null", "gave no readable answer to `step`");
+    assert_fault("nan", "gave no readable answer to `step`");
+    assert_fault("huge-line", "answered `step` with a line of more than 67108864 bytes");
 }
 
 #[test]
-fn what_lacks_its_form_is_named() {
-    assert_error("wrong-length", "`rewards` has length");
-    assert_error("left-out", "left `truncated` out of an answer that needs it");
-    assert_error("short-window", "`observations` of agent 0 has 2 values, expected ");
-    assert_error("twice", "wrote a line that nobody asked for");
+fn malformed_answers_are_described() {
+    assert_fault("wrong-length", "`rewards` has length");
+    assert_fault("left-out", "left `truncated` out of an answer that needs it");
+    assert_fault("short-window", "`observations` of agent 0 has 2 values, expected ");
+    assert_fault("twice", "wrote an unrequested line");
 }
 
 #[test]
-fn a_flood_on_stderr_neither_blocks_nor_fills_the_memory() {
-    let report = assert_error("stderr-flood", "ended (exit status: 1)");
+fn a_flood_on_stderr_neither_blocks_nor_exhausts_memory() {
+    let report = assert_fault("stderr-flood", "ended (exit status: 1)");
     let fault = report.causes.iter().find_map(|cause| cause.example.fault.clone()).unwrap();
     assert!(fault.stderr.ends_with("the last words"), "{}", fault.stderr);
     assert!(fault.stderr.len() <= 2048);
 }
 
 #[test]
-fn a_port_that_answers_and_then_neither_reads_nor_ends_is_given_up() {
-    assert_error("deaf", "gave no answer to");
+fn a_port_that_stops_reading_without_exiting_times_out() {
+    assert_fault("deaf", "gave no answer to");
 }
 
 #[test]
-fn what_a_port_has_started_ends_with_it() {
+fn child_processes_end_with_the_port() {
     let folder = tempfile::tempdir().unwrap();
     let report = check("fork", folder.path());
     assert!(report.misbehaves());
     let started = std::fs::read_to_string(folder.path().join("pids")).unwrap();
-    assert!(started.lines().count() >= 1, "nothing was started");
+    assert!(started.lines().count() >= 1, "the port started no process");
     for pid in started.lines() {
-        // Gone, or a zombie that nobody has waited for.
+        // The process has ended, or is a zombie whose parent has not waited for it.
         let status = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
         let state = status.rsplit(") ").next().and_then(|rest| rest.chars().next());
-        assert!(matches!(state, None | Some('Z')), "process {pid} is still there: {status}");
+        assert!(matches!(state, None | Some('Z')), "process {pid} still runs: {status}");
     }
 }
 
 #[test]
-fn a_port_that_cannot_begin_is_asked_nothing_more() {
+fn a_port_that_cannot_start_plays_no_cases() {
     for (way, what) in [
         ("not-in-hello", "gave no readable answer to `hello` (missing field `protocol`"),
         ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),

@@ -1,5 +1,5 @@
-//! The literal engine with one planted bug. The engine itself has no bugs: the bug changes its config, instance, actions,
-//! states and results on their way in or out.
+//! The literal engine with one planted bug. The engine itself is correct: the bug changes its config, instance,
+//! actions, states and results on their way in or out.
 
 use pogema_conformance::Literal;
 use pogema_core::{
@@ -9,58 +9,58 @@ use pogema_core::{
 
 use crate::flaw::Flaw;
 use crate::moves::Moves;
-use crate::views::{is_ring, shown_goal, spoil};
+use crate::views::{corrupt, is_ring, shown_goal};
 
-/// A `Literal` behind a flaw.
+/// A [`Literal`] engine behind a flaw.
 pub struct Flawed {
     flaw: Flaw,
     config: Config,
     inner: Literal,
     instance: Option<Instance>,
-    /// The state that others see.
-    told: Snapshot,
+    /// The state that callers see.
+    visible: Snapshot,
 }
 
 impl Flawed {
     pub fn make(flaw: Flaw, config: Config) -> Result<Box<dyn Environment>, Error> {
         let mut inner = config;
         match flaw {
-            Flaw::CutOffOneLate => inner.max_steps = config.max_steps.max(1).saturating_add(1),
-            Flaw::CutOffOneEarly => inner.max_steps = config.max_steps.saturating_sub(1),
-            Flaw::NeverCutOffAtZero if config.max_steps <= 0 => inner.max_steps = i64::MAX,
-            Flaw::SoftMarksNobodyLoses if config.collision == Collision::Soft => {
+            Flaw::TruncatesOneLate => inner.max_steps = config.max_steps.max(1).saturating_add(1),
+            Flaw::TruncatesOneEarly => inner.max_steps = config.max_steps.saturating_sub(1),
+            Flaw::NeverTruncatesAtZero if config.max_steps <= 0 => inner.max_steps = i64::MAX,
+            Flaw::SoftNoVanishing if config.collision == Collision::Soft => {
                 inner.occupancy = Occupancy::Exact;
             }
             _ => {}
         }
         let inner = Literal::new(inner)?;
-        Ok(Box::new(Self { flaw, config, inner, instance: None, told: Snapshot::default() }))
+        Ok(Box::new(Self { flaw, config, inner, instance: None, visible: Snapshot::default() }))
     }
 
     fn map(&self) -> &Map {
         self.instance.as_ref().unwrap().map()
     }
 
-    /// Puts the inner engine into the state that others see. An engine refuses impossible states, such as two agents on
-    /// one cell; others see them nevertheless.
+    /// Restores the inner engine to the visible state. The engine rejects impossible states, such as two agents on one
+    /// cell; callers see them nevertheless.
     fn follow(&mut self) {
         let step = self.inner.state().step;
-        let _ = self.inner.restore(step, &self.told);
+        let _ = self.inner.restore(step, &self.visible);
     }
 
-    /// Gives agents their last goal back if the sequence began again.
+    /// Returns agents to their last goal if their sequence started again.
     fn keep_last_goals(&mut self, before: &Snapshot) {
         let first = self.instance.as_ref().unwrap().first_goals();
-        for (agent, goal) in self.told.goals.iter_mut().enumerate() {
-            if self.told.on_goal[agent] && *goal == first[agent] {
+        for (agent, goal) in self.visible.goals.iter_mut().enumerate() {
+            if self.visible.on_goal[agent] && *goal == first[agent] {
                 *goal = before.goals[agent];
             }
         }
     }
 
-    fn spoil_results(&self, before: &Snapshot, out: StepOut<'_>) {
+    fn corrupt_results(&self, before: &Snapshot, out: StepOut<'_>) {
         let is_own = self.config.reward == Reward::Own;
-        for (agent, cell) in self.told.cells.iter().enumerate() {
+        for (agent, cell) in self.visible.cells.iter().enumerate() {
             let is_there = *cell == before.goals[agent];
             match (self.flaw, self.config.on_goal) {
                 (Flaw::RewardEveryStepOnGoal, OnGoal::Finish)
@@ -75,9 +75,9 @@ impl Flawed {
                     out.terminated[agent] = is_there;
                 }
                 (Flaw::FinishEndsForOneStep, OnGoal::Finish) => {
-                    out.terminated[agent] = self.told.on_goal[agent];
+                    out.terminated[agent] = self.visible.on_goal[agent];
                 }
-                (Flaw::CutOffActiveOnly, _) => out.truncated[agent] &= before.active[agent],
+                (Flaw::TruncatesActiveOnly, _) => out.truncated[agent] &= before.active[agent],
                 _ => {}
             }
         }
@@ -99,11 +99,13 @@ impl Environment for Flawed {
         let (starts, goals) = (instance.starts().to_vec(), instance.goals().to_vec());
         self.inner.reset(&Instance::new(instance.map().clone(), outside, starts, goals)?)?;
         self.instance = Some(instance.clone());
-        self.told = self.inner.snapshot();
+        self.visible = self.inner.snapshot();
         if self.flaw == Flaw::StartOnGoalFinishes && self.config.on_goal == OnGoal::Finish {
-            self.told.active = self.told.on_goal.iter().map(|reached| !reached).collect();
-            let Snapshot { cells, active, .. } = self.told.clone();
-            self.told.occupied.retain(|cell| cells.iter().zip(&active).any(|(own, &is)| is && own == cell));
+            self.visible.active = self.visible.on_goal.iter().map(|reached| !reached).collect();
+            let Snapshot { cells, active, .. } = self.visible.clone();
+            self.visible
+                .occupied
+                .retain(|cell| cells.iter().zip(&active).any(|(own, &is)| is && own == cell));
             self.follow();
         }
         Ok(())
@@ -111,18 +113,18 @@ impl Environment for Flawed {
 
     fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
         Error::check_length("actions", self.config.num_agents, actions.len())?;
-        let before = self.told.clone();
+        let before = self.visible.clone();
         let is_over = self.inner.state().step as i64 >= self.config.max_steps.max(1);
         let map = self.map().clone();
         let moves = Moves::new(self.flaw, &self.config, &map, &before, is_over, actions);
         let StepOut { rewards, terminated, truncated } = out;
         self.inner.step(&moves.played(), StepOut { rewards, terminated, truncated })?;
-        self.told = self.inner.snapshot();
-        moves.add_missing(&mut self.told);
+        self.visible = self.inner.snapshot();
+        moves.add_missing(&mut self.visible);
         if self.flaw == Flaw::SequenceStopsAtItsEnd && self.config.on_goal == OnGoal::Restart {
             self.keep_last_goals(&before);
         }
-        self.spoil_results(&before, StepOut { rewards, terminated, truncated });
+        self.corrupt_results(&before, StepOut { rewards, terminated, truncated });
         self.follow();
         Ok(())
     }
@@ -130,22 +132,22 @@ impl Environment for Flawed {
     fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         let mut state = state.clone();
         if self.flaw == Flaw::BackKeepsGoals {
-            state.goals.clone_from(&self.told.goals);
+            state.goals.clone_from(&self.visible.goals);
         }
         let step = if self.flaw == Flaw::BackKeepsTime { self.inner.state().step } else { step };
         self.inner.restore(step, &state)?;
-        self.told = self.inner.snapshot();
+        self.visible = self.inner.snapshot();
         Ok(())
     }
 
     fn state(&self) -> State<'_> {
-        self.told.state(self.inner.state().step)
+        self.visible.state(self.inner.state().step)
     }
 
     fn occupied(&self) -> Vec<Cell> {
-        let mut occupied = self.told.occupied.clone();
+        let mut occupied = self.visible.occupied.clone();
         if [Flaw::FinishedAreSeen, Flaw::FinishedStillBlock].contains(&self.flaw) {
-            let agents = self.told.cells.iter().zip(&self.told.active);
+            let agents = self.visible.cells.iter().zip(&self.visible.active);
             occupied.extend(agents.filter(|(_, active)| !**active).map(|(cell, _)| cell));
             occupied.sort_unstable();
             occupied.dedup();
@@ -163,7 +165,7 @@ impl Environment for Flawed {
         let _ = inner.restore(step, &shown);
         inner.observe(out)?;
         for (agent, channels) in out.chunks_mut(3 * self.config.side().pow(2)).enumerate() {
-            spoil(self.flaw, &self.config, self.map(), &self.told, agent, channels);
+            corrupt(self.flaw, &self.config, self.map(), &self.visible, agent, channels);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
-//! The planted bugs, each with the rule that must catch it.
+//! The planted bugs, each with the rule whose cases must catch it.
 
-/// One way in which a port goes wrong.
+/// A bug that can be planted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flaw {
     Faultless,
@@ -11,11 +11,11 @@ pub enum Flaw {
     FinishedMove,
     // Conflicts.
     PriorityHighestFirst,
-    PriorityNobodyFollows,
+    PriorityNoFollowing,
     BlockBothLowestEnters,
     BlockBothFollows,
     SoftSwaps,
-    SoftNobodyFollows,
+    SoftNoFollowing,
     SoftHighestWins,
     SoftAllContendersStay,
     SoftOnlyDirectConflicts,
@@ -23,7 +23,7 @@ pub enum Flaw {
     SoftWaitClaimsNothing,
     SoftNoRotation,
     SoftObstaclesLast,
-    SoftMarksNobodyLoses,
+    SoftNoVanishing,
     // Goals, rewards, ends.
     FinishedStillBlock,
     StartOnGoalFinishes,
@@ -34,12 +34,12 @@ pub enum Flaw {
     NothingEndsEachAlone,
     RestartEndsOnGoal,
     FinishEndsForOneStep,
-    CutOffOneLate,
-    CutOffOneEarly,
-    CutOffActiveOnly,
-    NeverCutOffAtZero,
-    StandsStillAfterTheEnd,
-    // What is seen.
+    TruncatesOneLate,
+    TruncatesOneEarly,
+    TruncatesActiveOnly,
+    NeverTruncatesAtZero,
+    NoMovesAfterTheEnd,
+    // Observations.
     GoalClampedByLongerAxis,
     GoalNormalised,
     SelfUnseen,
@@ -50,7 +50,7 @@ pub enum Flaw {
     FinishedAreSeen,
     PositionsFromCorner,
     GlobalPositionsWithoutBorder,
-    // Figures.
+    // Metrics.
     MakespanOneShort,
     SumOfCostsCountsFromZero,
     LengthIsOfEpisode,
@@ -69,15 +69,15 @@ pub enum Flaw {
     CallersListUntouched,
 }
 
-/// Each bug, what it is in words, and the rule whose cases must catch it.
+/// Each bug, its description, and the rule whose cases must catch it.
 pub const PLANTED: [(Flaw, &str, &str); 56] = [
     (Flaw::UpIsDown, "up and down are swapped", "move/actions"),
     (Flaw::RowsAreColumns, "rows and columns are swapped in moves", "move/actions"),
     (Flaw::MapHasNoWall, "agents may walk off the map", "move/actions"),
-    (Flaw::FinishedMove, "finished agents go on moving", "move/inactive"),
+    (Flaw::FinishedMove, "finished agents still move", "move/inactive"),
     (Flaw::PriorityHighestFirst, "priority: the highest index moves first", "collide/priority/contest"),
     (
-        Flaw::PriorityNobodyFollows,
+        Flaw::PriorityNoFollowing,
         "priority: a cell left in this step counts as taken",
         "collide/priority/follow",
     ),
@@ -88,27 +88,27 @@ pub const PLANTED: [(Flaw, &str, &str); 56] = [
     ),
     (Flaw::BlockBothFollows, "block_both: a cell being left may be entered", "collide/block-both/occupied"),
     (Flaw::SoftSwaps, "soft: two agents may swap", "collide/soft/swap"),
-    (Flaw::SoftNobodyFollows, "soft: a cell being left counts as taken", "collide/soft/chain"),
+    (Flaw::SoftNoFollowing, "soft: a cell being left counts as taken", "collide/soft/chain"),
     (Flaw::SoftHighestWins, "soft: the highest index wins a contested cell", "collide/soft/contest"),
-    (Flaw::SoftAllContendersStay, "soft: all who want one cell stay", "collide/soft/contest"),
+    (Flaw::SoftAllContendersStay, "soft: all agents that request the same cell stay", "collide/soft/contest"),
     (
         Flaw::SoftOnlyDirectConflicts,
-        "soft: whoever follows a hindered agent still moves",
+        "soft: an agent that follows a blocked agent still moves",
         "collide/soft/chain",
     ),
     (
         Flaw::SoftChainStopsAfterOne,
-        "soft: only the first follower of a hindered agent stays",
+        "soft: only the first follower of a blocked agent stays",
         "collide/soft/chain",
     ),
     (Flaw::SoftWaitClaimsNothing, "soft: an agent that waits does not keep its cell", "collide/soft/stay"),
-    (Flaw::SoftNoRotation, "soft: a ring of agents stays where it is", "collide/soft/chain"),
-    (Flaw::SoftObstaclesLast, "soft: obstacles are looked at after conflicts", "collide/soft"),
-    (Flaw::SoftMarksNobodyLoses, "soft: no agent vanishes from the occupancy grid", "occupancy/as-released"),
+    (Flaw::SoftNoRotation, "soft: a ring of agents does not rotate", "collide/soft/chain"),
+    (Flaw::SoftObstaclesLast, "soft: obstacles are checked after conflicts", "collide/soft"),
+    (Flaw::SoftNoVanishing, "soft: no agent vanishes from the occupancy grid", "occupancy/as-released"),
     (Flaw::FinishedStillBlock, "finished agents still block their cells", "goal/finish/leave"),
     (
         Flaw::StartOnGoalFinishes,
-        "an agent that starts on its goal is finished at once",
+        "an agent that starts on its goal finishes immediately",
         "goal/finish/start-on-goal",
     ),
     (Flaw::RewardEveryStepOnGoal, "a finished agent is rewarded in every step", "reward/own"),
@@ -122,14 +122,14 @@ pub const PLANTED: [(Flaw, &str, &str); 56] = [
         "finish: an agent is terminated only in the step of its arrival",
         "end/terminated",
     ),
-    (Flaw::CutOffOneLate, "the episode is cut off one step late", "end/truncated"),
-    (Flaw::CutOffOneEarly, "the episode is cut off one step early", "end/truncated"),
-    (Flaw::CutOffActiveOnly, "only active agents are cut off", "end/truncated"),
-    (Flaw::NeverCutOffAtZero, "zero steps mean no limit", "end/truncated"),
-    (Flaw::StandsStillAfterTheEnd, "nobody moves after the end of the episode", "end/after"),
+    (Flaw::TruncatesOneLate, "the episode is truncated one step late", "end/truncated"),
+    (Flaw::TruncatesOneEarly, "the episode is truncated one step early", "end/truncated"),
+    (Flaw::TruncatesActiveOnly, "only active agents are truncated", "end/truncated"),
+    (Flaw::NeverTruncatesAtZero, "zero steps mean no limit", "end/truncated"),
+    (Flaw::NoMovesAfterTheEnd, "agents do not move after the end of the episode", "end/after"),
     (
         Flaw::GoalClampedByLongerAxis,
-        "a far goal is shown on the rim of its longer axis alone",
+        "a far goal is shown on the rim along its longer axis only",
         "observe/default/goal",
     ),
     (
@@ -138,8 +138,8 @@ pub const PLANTED: [(Flaw, &str, &str); 56] = [
         "observe/default/goal",
     ),
     (Flaw::SelfUnseen, "an agent does not see itself", "observe/default/agents"),
-    (Flaw::NoRing, "there is no wall around the map in what agents see", "border/ring"),
-    (Flaw::OutsideFilled, "what lies outside is all obstacles", "border/outside"),
+    (Flaw::NoRing, "observations omit the wall around the map", "border/ring"),
+    (Flaw::OutsideFilled, "the outside is full of obstacles", "border/outside"),
     (Flaw::WindowTransposed, "windows have rows and columns swapped", "observe/default/window"),
     (Flaw::FinishedSeeNothing, "finished agents see nothing", "observe/default/inactive"),
     (Flaw::FinishedAreSeen, "finished agents are still seen", "observe/default/inactive"),
@@ -159,16 +159,16 @@ pub const PLANTED: [(Flaw, &str, &str); 56] = [
     (Flaw::SolvedIfAnyIs, "CSR is 1 if any agent arrived", "metrics/finish"),
     (Flaw::ThroughputOfEachAgent, "throughput is divided by the number of agents", "metrics/restart"),
     (Flaw::ShuffleForwards, "the shuffle goes forwards", "place/order"),
-    (Flaw::DrawsOf64Bits, "bounded draws take 64 bits in place of 32", "place/order"),
+    (Flaw::DrawsOf64Bits, "bounded draws take 64 bits instead of 32", "place/order"),
     (Flaw::ObstaclesColumnByColumn, "obstacles are drawn column by column", "place/obstacles"),
     (Flaw::PairsAcrossComponents, "start and goal may lie in different components", "place/components"),
     (Flaw::OneStreamForAllGoals, "next goals of all agents come from one stream", "seed/goals"),
     (Flaw::NextGoalMayBeHere, "the next goal may be the cell just reached", "goal/restart/draw"),
-    (Flaw::BackKeepsTime, "a step back does not give the time back", "history/step-back"),
-    (Flaw::BackKeepsGoals, "a step back leaves goals as they are", "history/step-back"),
+    (Flaw::BackKeepsTime, "a step back does not restore the step count", "history/step-back"),
+    (Flaw::BackKeepsGoals, "a step back does not restore the goals", "history/step-back"),
     (
         Flaw::CallersListUntouched,
-        "soft: the caller's list of actions stays as it was",
+        "soft: the caller's list of actions stays unchanged",
         "collide/soft/rewrite",
     ),
 ];

@@ -1,4 +1,5 @@
-//! Does the kit catch bugs? Each planted one must be caught by the cases of its rule, and shrink to a few cells.
+//! Checks that the kit catches bugs: the cases of its rule catch each planted bug, and its counterexample shrinks to a
+//! few cells.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -44,13 +45,13 @@ fn check(flaw: Flaw, plan: &Plan) -> PortReport {
 fn the_port_without_a_bug_conforms() {
     let plan = Plan { num_cases: 400, parts: Vec::new(), ..plan() };
     let report = check(Flaw::Faultless, &plan);
-    let told =
+    let found =
         report.causes.iter().map(|cause| format!("{:?}", cause.example)).collect::<Vec<_>>().join("\n");
-    assert!(report.causes.is_empty(), "{told}");
+    assert!(report.causes.is_empty(), "{found}");
     assert!(report.num_played > 4000, "only {} cases", report.num_played);
 }
 
-/// Agents, rows, columns and steps of a counterexample.
+/// Returns the numbers of agents, rows, columns and steps of a counterexample.
 fn size(cause: &Cause) -> (usize, usize, usize, usize) {
     let request = &cause.example.request;
     let played = pogema_conformance::play(request);
@@ -64,17 +65,20 @@ fn size(cause: &Cause) -> (usize, usize, usize, usize) {
     (reset.state.cells.len(), map.height(), map.width(), steps)
 }
 
-/// Bugs that need more room or time than the others, and why.
+/// Bugs whose counterexamples are larger, and the reason.
 const LARGER: [(Flaw, &str); 2] = [
     (Flaw::SoftNoRotation, "the smallest ring on a grid has four agents"),
-    (Flaw::SoftChainStopsAfterOne, "the agent in front, two that stay behind it, and one that does not"),
+    (
+        Flaw::SoftChainStopsAfterOne,
+        "a chain of four: the blocked agent, two followers that stay and one that moves",
+    ),
 ];
 
 #[test]
 fn each_bug_is_caught_by_the_cases_of_its_rule_and_shrinks() {
     let mut table = String::new();
     let mut wrong = String::new();
-    for (flaw, words, rule) in PLANTED {
+    for (flaw, description, rule) in PLANTED {
         let mut report = check(flaw, &plan());
         let folder = tempfile::tempdir().unwrap();
         shrink_causes(&subject(flaw), &mut report, &plan(), folder.path(), &|| ()).unwrap();
@@ -82,21 +86,24 @@ fn each_bug_is_caught_by_the_cases_of_its_rule_and_shrinks() {
         let Some(cause) = report.causes.iter().find(|cause| cause.cases.keys().any(is_of_rule)) else {
             let seen: Vec<_> =
                 report.causes.iter().map(|cause| (&cause.rule, &cause.what, &cause.cases)).collect();
-            let _ = writeln!(wrong, "{flaw:?} is not caught by the cases of {rule}, but: {seen:?}");
+            let _ = writeln!(wrong, "{flaw:?} is not caught by the cases of {rule}, found: {seen:?}");
             continue;
         };
         let (agents, height, width, steps) = size(cause);
         let is_small = agents <= 3 && height <= 4 && width <= 4 && steps <= 3;
         if !is_small && LARGER.iter().all(|(larger, _)| *larger != flaw) {
-            let _ = writeln!(wrong, "{flaw:?} needs {agents} agents, {height} x {width}, {steps} steps");
+            let _ = writeln!(
+                wrong,
+                "the counterexample of {flaw:?} has {agents} agents, {height} x {width}, {steps} steps"
+            );
         }
-        let _ = writeln!(table, "| {words} | `{rule}` | {agents} | {height} × {width} | {steps} |");
+        let _ = writeln!(table, "| {description} | `{rule}` | {agents} | {height} × {width} | {steps} |");
     }
     assert!(wrong.is_empty(), "{wrong}");
     check_table(&table);
 }
 
-/// Passes if the table in the book is this one; `BLESS=1` writes it there.
+/// Checks the table in `docs/trust.md`; with `BLESS=1`, writes it.
 fn check_table(table: &str) {
     const BEGIN: &str = "<!-- planted -->\n";
     const END: &str = "<!-- /planted -->";
@@ -106,10 +113,10 @@ fn check_table(table: &str) {
     let end = text.find(END).unwrap();
     let head =
         "| planted bug | caught by the cases of | agents | map | steps |\n| --- | --- | --- | --- | --- |\n";
-    let wanted = format!("{head}{table}");
+    let expected = format!("{head}{table}");
     if std::env::var_os("BLESS").is_some() {
-        std::fs::write(&path, format!("{}{wanted}{}", &text[..begin], &text[end..])).unwrap();
+        std::fs::write(&path, format!("{}{expected}{}", &text[..begin], &text[end..])).unwrap();
     } else {
-        assert_eq!(&text[begin..end], wanted, "run with BLESS=1 to write docs/trust.md");
+        assert_eq!(&text[begin..end], expected, "run with BLESS=1 to write docs/trust.md");
     }
 }

@@ -1,13 +1,13 @@
-//! Bugs in who moves: agents that stay although they may go, and agents that go although they have to stay.
+//! Bugs in moves: agents that stay although they may move, and agents that move although they have to stay.
 
 use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
 use crate::flaw::Flaw;
 
-/// A cell, or a place next to the map.
+/// A cell, or a position next to the map.
 type Place = (i32, i32);
 
-/// What agents aim at in one step, and how a flaw changes who gets there.
+/// The requested moves of one step, and the changes that a flaw makes to them.
 pub struct Moves<'a> {
     flaw: Flaw,
     config: &'a Config,
@@ -20,7 +20,7 @@ pub struct Moves<'a> {
 }
 
 impl<'a> Moves<'a> {
-    /// The moves that agents want to make; `is_over` says whether the episode has ended already.
+    /// Creates the requested moves; `is_over` says whether the episode has already ended.
     pub fn new(
         flaw: Flaw,
         config: &'a Config,
@@ -29,22 +29,23 @@ impl<'a> Moves<'a> {
         is_over: bool,
         actions: &[Action],
     ) -> Self {
-        let actions: Vec<Action> = actions.iter().map(|&action| turned(flaw, action)).collect();
+        let actions: Vec<Action> = actions.iter().map(|&action| misread_action(flaw, action)).collect();
         let cells = before.cells.iter().map(|cell| cell.toward(Action::Stay)).collect();
         let targets = before.cells.iter().zip(&actions).map(|(cell, &action)| cell.toward(action)).collect();
         Self { flaw, config, map, before, is_over, actions, cells, targets }
     }
 
-    /// The actions, except that an agent waits if the flaw keeps it back.
+    /// Returns the actions; agents that the flaw holds back wait.
     pub fn played(&self) -> Vec<Action> {
         let agents = self.actions.iter().enumerate();
         agents.map(|(agent, &action)| if self.is_kept_back(agent) { Action::Stay } else { action }).collect()
     }
 
-    /// Moves the agents that stayed in `after`, but go on with the flaw.
+    /// Moves the agents that stayed in `after`, but move with the flaw.
     pub fn add_missing(&self, after: &mut Snapshot) {
-        let stayed = |agent: usize| self.wants(agent) && after.cells[agent] == self.before.cells[agent];
-        let is_missing = |&agent: &usize| stayed(agent) && self.goes_nevertheless(agent, &after.cells);
+        let stayed =
+            |agent: usize| self.tries_to_move(agent) && after.cells[agent] == self.before.cells[agent];
+        let is_missing = |&agent: &usize| stayed(agent) && self.moves_despite_rules(agent, &after.cells);
         let missing: Vec<usize> = (0..self.targets.len()).filter(is_missing).collect();
         for agent in missing {
             let (row, col) = self.targets[agent];
@@ -53,18 +54,19 @@ impl<'a> Moves<'a> {
     }
 
     fn is_kept_back(&self, agent: usize) -> bool {
-        let is_led_to_finished =
+        let leads_to_finished =
             |other: usize| !self.before.active[other] && self.cells[other] == self.targets[agent];
         let follows = self.occupant(agent).is_some();
         match (self.flaw, self.config.collision) {
-            (Flaw::StandsStillAfterTheEnd, _) => self.is_over,
-            (Flaw::FinishedStillBlock, _) => (0..self.cells.len()).any(is_led_to_finished),
+            (Flaw::NoMovesAfterTheEnd, _) => self.is_over,
+            (Flaw::FinishedStillBlock, _) => (0..self.cells.len()).any(leads_to_finished),
             (Flaw::PriorityHighestFirst, Collision::Priority) => {
                 self.rivals(agent).any(|other| other > agent)
                     || self.occupant(agent).is_some_and(|other| other < agent)
             }
-            (Flaw::PriorityNobodyFollows, Collision::Priority)
-            | (Flaw::SoftNobodyFollows, Collision::Soft) => follows,
+            (Flaw::PriorityNoFollowing, Collision::Priority) | (Flaw::SoftNoFollowing, Collision::Soft) => {
+                follows
+            }
             (Flaw::BlockBothLowestEnters, Collision::BlockBoth) => self.has_lower_rival(agent),
             (Flaw::SoftHighestWins, Collision::Soft) => self.rivals(agent).any(|other| other > agent),
             (Flaw::SoftAllContendersStay, Collision::Soft) => self.rivals(agent).next().is_some(),
@@ -73,7 +75,7 @@ impl<'a> Moves<'a> {
         }
     }
 
-    fn goes_nevertheless(&self, agent: usize, after: &[Cell]) -> bool {
+    fn moves_despite_rules(&self, agent: usize, after: &[Cell]) -> bool {
         let target = self.targets[agent];
         if self.flaw == Flaw::FinishedMove {
             let is_taken = after.iter().any(|cell| cell.toward(Action::Stay) == target);
@@ -88,13 +90,13 @@ impl<'a> Moves<'a> {
                 ahead > agent && after[ahead] != self.before.cells[ahead]
             }
             (Flaw::BlockBothFollows, Collision::BlockBoth) => {
-                self.wants(ahead) && self.rivals(agent).next().is_none()
+                self.tries_to_move(ahead) && self.rivals(agent).next().is_none()
             }
             (Flaw::SoftSwaps, Collision::Soft) => self.targets[ahead] == self.cells[agent],
             (Flaw::SoftOnlyDirectConflicts, Collision::Soft) => self.distance_to_cause(agent) >= 2,
             (Flaw::SoftChainStopsAfterOne, Collision::Soft) => self.distance_to_cause(agent) >= 3,
             (Flaw::SoftWaitClaimsNothing, Collision::Soft) => {
-                !self.wants(ahead) && !self.has_lower_rival(agent)
+                !self.tries_to_move(ahead) && !self.has_lower_rival(agent)
             }
             (Flaw::SoftObstaclesLast, Collision::Soft) => {
                 self.is_blocked(self.targets[ahead]) && !self.has_lower_rival(agent)
@@ -103,7 +105,7 @@ impl<'a> Moves<'a> {
         }
     }
 
-    fn wants(&self, agent: usize) -> bool {
+    fn tries_to_move(&self, agent: usize) -> bool {
         self.targets[agent] != self.cells[agent]
     }
 
@@ -115,7 +117,7 @@ impl<'a> Moves<'a> {
         !self.is_on_map(place) || self.map.is_obstacle(Cell::new(place.0 as u16, place.1 as u16))
     }
 
-    /// The other active agent on the cell that an agent aims at.
+    /// Returns the other active agent on the target cell of an agent.
     fn occupant(&self, agent: usize) -> Option<usize> {
         let is_there = |&other: &usize| {
             other != agent && self.before.active[other] && self.cells[other] == self.targets[agent]
@@ -123,11 +125,14 @@ impl<'a> Moves<'a> {
         (0..self.cells.len()).find(is_there)
     }
 
-    /// The other active agents that want to enter the same cell.
+    /// Returns the other active agents that try to enter the same cell.
     fn rivals(&self, agent: usize) -> impl Iterator<Item = usize> {
         let target = self.targets[agent];
         (0..self.cells.len()).filter(move |&other| {
-            other != agent && self.before.active[other] && self.wants(other) && self.targets[other] == target
+            other != agent
+                && self.before.active[other]
+                && self.tries_to_move(other)
+                && self.targets[other] == target
         })
     }
 
@@ -135,18 +140,18 @@ impl<'a> Moves<'a> {
         self.rivals(agent).any(|other| other < agent)
     }
 
-    /// Whether an agent is part of a ring in which each wants the cell of the next one.
+    /// Returns whether an agent is part of a ring in which each agent requests the cell of the next one.
     fn rotates(&self, agent: usize) -> bool {
         let next = |&other: &usize| self.occupant(other);
         std::iter::successors(self.occupant(agent), next).take(self.cells.len()).any(|other| other == agent)
     }
 
-    /// How many agents ahead the cause lies that keeps an agent where it is: 0 for a wait, a swap or an obstacle of its
-    /// own, 1 for a cell that another agent keeps or wins.
+    /// Returns how many agents ahead the cause lies that keeps an agent in place: 0 if the agent itself waits, swaps or
+    /// moves into an obstacle, 1 if another agent keeps or wins the cell.
     fn distance_to_cause(&self, agent: usize) -> usize {
         let ahead = self.occupant(agent);
         let swaps = ahead.is_some_and(|other| self.targets[other] == self.cells[agent]);
-        if !self.wants(agent) || swaps || self.is_blocked(self.targets[agent]) {
+        if !self.tries_to_move(agent) || swaps || self.is_blocked(self.targets[agent]) {
             return 0;
         }
         match ahead {
@@ -156,13 +161,13 @@ impl<'a> Moves<'a> {
     }
 }
 
-/// An action as a port with this flaw reads it.
-fn turned(flaw: Flaw, action: Action) -> Action {
+/// Returns an action as a port with this flaw reads it.
+fn misread_action(flaw: Flaw, action: Action) -> Action {
     use Action::{Down, Left, Right, Stay, Up};
-    let turned = match flaw {
+    let actions = match flaw {
         Flaw::UpIsDown => [Stay, Down, Up, Left, Right],
         Flaw::RowsAreColumns => [Stay, Left, Right, Up, Down],
         _ => Action::ALL,
     };
-    turned[action as usize]
+    actions[action as usize]
 }

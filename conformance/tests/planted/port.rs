@@ -1,4 +1,4 @@
-//! A planted bug as a port.
+//! A port with a planted bug.
 
 use std::sync::{Arc, Mutex};
 
@@ -26,7 +26,7 @@ impl Planted {
         Self { flaw, server, num_agents: 0, radius: 0, starts: Vec::new(), elapsed: 0 }
     }
 
-    /// Draws the instance itself where the bug is in the drawing.
+    /// Generates the instance here if the bug is in the generation.
     fn begin(&mut self, beginning: &Beginning) -> Option<Reply> {
         let config = GridConfig::from_value(beginning.config.as_ref()?).ok()?;
         let drawn = InstanceSource::new(config.clone(), None).ok()?.generate().ok()?.instance;
@@ -38,17 +38,17 @@ impl Planted {
         Some(reply)
     }
 
-    /// Notes what positions are counted from.
-    fn note_origins(&mut self, beginning: &Beginning, reply: &Reply) {
+    /// Records the origins of positions.
+    fn record_origins(&mut self, beginning: &Beginning, reply: &Reply) {
         let config = beginning.config.as_ref().and_then(|config| GridConfig::from_value(config).ok());
-        let told = beginning.instance.as_ref().map(|header| header.config.radius);
-        if let Some(radius) = told.or(config.map(|config| config.obs_radius)) {
+        let header_radius = beginning.instance.as_ref().map(|header| header.config.radius);
+        if let Some(radius) = header_radius.or(config.map(|config| config.obs_radius)) {
             self.radius = radius as i64;
         }
         self.starts = reply.cells.clone().unwrap_or_default();
     }
 
-    fn spoil_positions(&self, observations: &mut Value) {
+    fn corrupt_positions(&self, observations: &mut Value) {
         let mut add = |name: &str, origin: &dyn Fn(usize) -> [i64; 2]| {
             let Some(pairs) = observations.get_mut(name).and_then(Value::as_array_mut) else { return };
             for (agent, pair) in pairs.iter_mut().enumerate() {
@@ -67,7 +67,7 @@ impl Planted {
         };
     }
 
-    fn spoil_figures(&self, reply: &mut Reply) {
+    fn corrupt_metrics(&self, reply: &mut Reply) {
         let Key::Given(metrics) = &mut reply.metrics else { return };
         match self.flaw {
             Flaw::MakespanOneShort => metrics.makespan = metrics.makespan.map(|steps| steps - 1.0),
@@ -107,12 +107,12 @@ impl Link for Planted {
         self.num_agents = reply.cells.as_ref().map_or(self.num_agents, Vec::len);
         self.elapsed += u64::from(reply.rewards.is_some());
         if let Ask::Reset(beginning) = ask {
-            self.note_origins(beginning, &reply);
+            self.record_origins(beginning, &reply);
         }
         if let Some(observations) = &mut reply.observations {
-            self.spoil_positions(observations);
+            self.corrupt_positions(observations);
         }
-        self.spoil_figures(&mut reply);
+        self.corrupt_metrics(&mut reply);
         if let (Flaw::CallersListUntouched, Ask::Step { actions }) = (self.flaw, ask) {
             reply.actions_after = reply.actions_after.map(|_| actions.clone());
         }
@@ -120,7 +120,7 @@ impl Link for Planted {
     }
 }
 
-/// The instance as a port with this bug draws it; none where the bug makes no difference.
+/// Generates the instance as a port with this bug does; returns `None` if the bug makes no difference.
 fn draw(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Instance> {
     let restarts = config.on_target == OnGoal::Restart;
     let is_seeded = config.map.is_none() && config.map_name.is_none() && config.agents_xy.is_none();
@@ -156,16 +156,16 @@ fn columns_first(config: &GridConfig) -> Option<Map> {
     Map::new(height, width, obstacles).ok()
 }
 
-/// A whole number from 0 to `most`, by throwing away what is too large.
-fn interval(flaw: Flaw, generator: &mut Generator, most: usize) -> usize {
-    let mask = most.next_power_of_two().max(most + 1).next_power_of_two() - 1;
+/// Draws an integer from 0 to `max` by rejection of larger numbers.
+fn interval(flaw: Flaw, generator: &mut Generator, max: usize) -> usize {
+    let mask = max.next_power_of_two().max(max + 1).next_power_of_two() - 1;
     loop {
         let drawn = if flaw == Flaw::DrawsOf64Bits {
             generator.next_u64() as usize & mask
         } else {
             generator.next_u32() as usize & mask
         };
-        if drawn <= most {
+        if drawn <= max {
             return drawn;
         }
     }
@@ -176,8 +176,8 @@ fn pairs(flaw: Flaw, config: &GridConfig, map: &Map) -> Option<(Vec<Cell>, Vec<G
     let mut order: Vec<usize> = (0..map.obstacles().len()).filter(|&at| !map.obstacles()[at]).collect();
     if flaw == Flaw::ShuffleForwards {
         for at in 0..order.len().saturating_sub(1) {
-            let most = order.len() - 1 - at;
-            order.swap(at, at + interval(flaw, &mut generator, most));
+            let max = order.len() - 1 - at;
+            order.swap(at, at + interval(flaw, &mut generator, max));
         }
     } else {
         for at in (1..order.len()).rev() {
@@ -219,20 +219,20 @@ fn streams(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Vec<Goal
             _ => Arc::new(Mutex::new(Generator::seeded(seed as u64))),
         };
         let pool = cells.of(components.label(goal)?).to_vec();
-        Some(GoalStream::drawn(goal, Box::new(Loose { flaw, generator, pool })))
+        Some(GoalStream::drawn(goal, Box::new(FlawedGoals { flaw, generator, pool })))
     });
     streams.collect()
 }
 
 /// Draws next goals with a bug.
 #[derive(Clone, Debug)]
-struct Loose {
+struct FlawedGoals {
     flaw: Flaw,
     generator: Arc<Mutex<Generator>>,
     pool: Vec<Cell>,
 }
 
-impl GoalSource for Loose {
+impl GoalSource for FlawedGoals {
     fn next_goal(&mut self, at: Cell) -> Cell {
         let mut generator = self.generator.lock().unwrap();
         loop {

@@ -1,10 +1,10 @@
-//! Bugs in what agents see.
+//! Bugs in observations.
 
 use pogema_core::{Cell, Config, Map, Snapshot};
 
 use crate::flaw::Flaw;
 
-/// The goal that an agent sees in place of its own.
+/// Returns the goal that the observation shows instead of the agent's goal.
 pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
     let radius = radius as i32;
     let down = i32::from(goal.row) - i32::from(cell.row);
@@ -26,7 +26,7 @@ pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
 /// Plants a bug in the observation of one agent.
 ///
 /// Shape: three channels of a window each.
-pub fn spoil(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: usize, channels: &mut [f32]) {
+pub fn corrupt(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: usize, channels: &mut [f32]) {
     let side = config.side();
     let area = side * side;
     match flaw {
@@ -48,7 +48,7 @@ pub fn spoil(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: us
     }
 }
 
-/// Whether a place belongs to the wall around the map. Places count from the corner of the border.
+/// Returns whether a position belongs to the wall around the map. Positions count from the corner of the border.
 pub fn is_ring(config: &Config, map: &Map, (row, col): (usize, usize)) -> bool {
     let inner = |at: usize, size: usize| (config.radius..config.radius + size).contains(&at);
     let outer = |at: usize, size: usize| (config.radius..config.radius + size + 2).contains(&(at + 1));

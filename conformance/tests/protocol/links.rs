@@ -1,25 +1,25 @@
-//! Ports that say the same things in other ways.
+//! Ports that give the answers of the reference in other forms.
 
 use pogema_conformance::NamedEngine;
 use pogema_conformance::port::{Ask, Hello, Key, Link, Misbehaviour, Reply, Server};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// The reference as a port, with what it says changed on the way.
-pub struct Told {
+/// The reference as a port, with functions that change its answers.
+pub struct AlteredPort {
     server: Server,
     hello: fn(&mut Hello),
     reply: fn(&Ask, &mut Reply),
     last: Reply,
 }
 
-impl Told {
+impl AlteredPort {
     pub fn boxed(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> Box<dyn Link> {
         Box::new(Self { server: Server::new(NamedEngine::REFERENCE), hello, reply, last: Reply::default() })
     }
 }
 
-impl Link for Told {
+impl Link for AlteredPort {
     fn hello(&mut self) -> Result<Hello, Misbehaviour> {
         let mut hello = self.server.hello()?;
         (self.hello)(&mut hello);
@@ -41,13 +41,13 @@ impl Link for Told {
     }
 }
 
-/// Leaves out what can be asked for.
+/// Leaves out observations and metrics, which can be requested separately.
 pub fn terse(_: &Ask, reply: &mut Reply) {
     reply.observations = None;
     reply.metrics = Key::LeftOut;
 }
 
-/// Tells numbers where the reference tells digits.
+/// Writes windows as numbers instead of digits.
 pub fn in_numbers(ask: &Ask, reply: &mut Reply) {
     change_windows(ask, reply, |bits| json!(bits.chunks(3).collect::<Vec<_>>()));
 }
@@ -66,7 +66,7 @@ pub fn in_fnv(ask: &Ask, reply: &mut Reply) {
     });
 }
 
-/// Tells hashes of windows of which the last cell is wrong.
+/// Writes hashes of windows whose last cell is wrong.
 pub fn in_wrong_sha256(ask: &Ask, reply: &mut Reply) {
     change_windows(ask, reply, |bits| {
         let mut wrong = bits.to_vec();
@@ -76,7 +76,7 @@ pub fn in_wrong_sha256(ask: &Ask, reply: &mut Reply) {
     });
 }
 
-/// Tells one value that is neither 0 nor 1.
+/// Writes 0.5 for each 1.
 pub fn in_halves(ask: &Ask, reply: &mut Reply) {
     change_windows(ask, reply, |bits| {
         let values: Vec<f64> = bits.iter().map(|&bit| if bit == 1 { 0.5 } else { 0.0 }).collect();
@@ -84,25 +84,25 @@ pub fn in_halves(ask: &Ask, reply: &mut Reply) {
     });
 }
 
-fn change_windows(_: &Ask, reply: &mut Reply, tell: fn(&[u8]) -> Value) {
+fn change_windows(_: &Ask, reply: &mut Reply, encode: fn(&[u8]) -> Value) {
     match &mut reply.observations {
-        Some(Value::Array(windows)) => change(windows, 3, tell),
+        Some(Value::Array(windows)) => change(windows, 3, encode),
         Some(Value::Object(arrays)) => {
             for name in ["obstacles", "agents"] {
-                change(arrays[name].as_array_mut().unwrap(), 1, tell);
+                change(arrays[name].as_array_mut().unwrap(), 1, encode);
             }
         }
         _ => {}
     }
 }
 
-fn change(windows: &mut [Value], num_channels: usize, tell: fn(&[u8]) -> Value) {
+fn change(windows: &mut [Value], num_channels: usize, encode: fn(&[u8]) -> Value) {
     for window in windows {
         let bits = bits(window.as_str().unwrap());
-        // The digits hold some zeros more than there are values.
+        // The digits are padded with zeros.
         let mut sizes = (1..).step_by(2).map(|side: usize| num_channels * side * side);
         let size = sizes.find(|size| size.div_ceil(8) * 8 == bits.len()).unwrap();
-        *window = tell(&bits[..size]);
+        *window = encode(&bits[..size]);
     }
 }
 

@@ -1,4 +1,4 @@
-//! What ports may say and how, and what a run makes of it.
+//! Checks which answers ports may give, in which forms, and how a run judges them.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,44 +14,45 @@ use pogema_conformance::{NamedEngine, Op, Request};
 use pogema_core::{Collision, Observation, OnGoal};
 use serde_json::json;
 
-use links::{Told, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
+use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
 
 fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
-    let subject = Subject { command: "told".into(), start: Box::new(move || Ok(Told::boxed(hello, reply))) };
+    let subject =
+        Subject { command: "altered".into(), start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))) };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }
 
-fn whats(report: &PortReport) -> Vec<String> {
+fn cause_names(report: &PortReport) -> Vec<String> {
     report.causes.iter().map(|cause| format!("{:?} {}", cause.rule, cause.what)).collect()
 }
 
 #[test]
-fn answers_may_leave_out_what_can_be_asked_for() {
-    assert_eq!(whats(&check(|_| (), terse)), [""; 0]);
+fn answers_may_omit_what_can_be_requested() {
+    assert_eq!(cause_names(&check(|_| (), terse)), [""; 0]);
 }
 
 #[test]
 fn windows_may_be_numbers_or_hashes() {
     for form in [in_numbers, in_sha256, in_fnv] {
         let report = check(|_| (), form);
-        assert_eq!(whats(&report), [""; 0]);
+        assert_eq!(cause_names(&report), [""; 0]);
         assert!(report.rules["observe/default/goal"].passed > 0);
     }
 }
 
 #[test]
-fn a_wrong_hash_and_a_half_are_differences() {
+fn a_wrong_hash_and_a_value_of_one_half_are_differences() {
     for form in [in_wrong_sha256, in_halves] {
         let report = check(|_| (), form);
-        assert!(report.diverges() && !report.misbehaves(), "{:?}", whats(&report));
+        assert!(report.diverges() && !report.misbehaves(), "{:?}", cause_names(&report));
         assert!(report.causes.iter().all(|cause| cause.rule.as_ref().unwrap().starts_with("observe/")));
         assert!(report.rules["observe/default/goal"].failed > 0);
     }
 }
 
 #[test]
-fn keys_that_nobody_knows_are_ignored() {
+fn unknown_keys_are_ignored() {
     let hello = json!({
         "protocol": "pogema-conform/1", "name": "n", "profiles": ["core"], "collision": ["soft"],
         "on_goal": ["finish"], "mood": "good",
@@ -63,7 +64,7 @@ fn keys_that_nobody_knows_are_ignored() {
 }
 
 #[test]
-fn what_is_not_claimed_is_listed_and_never_asked() {
+fn unclaimed_features_are_listed_and_never_requested() {
     fn modest(hello: &mut Hello) {
         hello.profiles = vec![Profile::Core, Profile::Observations];
         hello.collision = vec![Collision::Priority];
@@ -84,7 +85,7 @@ fn what_is_not_claimed_is_listed_and_never_asked() {
         assert!(beginning.config.is_none() && beginning.measure.is_empty() && !config.persistent);
     }
     let report = check(modest, strict);
-    assert_eq!(whats(&report), [""; 0]);
+    assert_eq!(cause_names(&report), [""; 0]);
     for what in [
         "collision soft",
         "collision block_both",
@@ -105,7 +106,7 @@ fn what_is_not_claimed_is_listed_and_never_asked() {
 }
 
 #[test]
-fn a_key_that_is_claimed_must_be_there() {
+fn a_claimed_key_must_be_present() {
     fn forgets(_: &Ask, reply: &mut Reply) {
         reply.occupied = None;
     }
@@ -113,10 +114,10 @@ fn a_key_that_is_claimed_must_be_there() {
     assert!(report.misbehaves());
     assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
     let report = check(|hello| hello.tells.retain(|key| *key != Key::Occupied), forgets);
-    assert_eq!(whats(&report), [""; 0]);
+    assert_eq!(cause_names(&report), [""; 0]);
 }
 
-/// A port that plays an instance gives what the reference gives.
+/// A port that plays an instance returns the records of the reference.
 #[test]
 fn a_port_steps_in_lockstep_with_the_reference() {
     for observation in ["default", "POMAPF", "MAPF"] {
@@ -135,8 +136,8 @@ fn a_port_steps_in_lockstep_with_the_reference() {
         let answered = play_on_port(&mut server, &hello, Mode::Instance, &request, &expected);
         assert_eq!(answered.fault, None);
         assert_eq!(answered.response.records.len(), 31);
-        for (want, got) in expected.records.iter().zip(&answered.response.records).skip(1) {
-            assert_eq!(want, got, "{observation}");
+        for (expected, actual) in expected.records.iter().zip(&answered.response.records).skip(1) {
+            assert_eq!(expected, actual, "{observation}");
         }
     }
 }

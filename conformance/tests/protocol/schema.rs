@@ -1,4 +1,4 @@
-//! The schema in the tree fits what is really said.
+//! Checks the protocol's JSON schema against real messages.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -10,30 +10,30 @@ use pogema_conformance::port::{
 };
 use serde_json::{Value, json};
 
-/// Writes down what is said.
-struct Listening {
+/// A port that records all messages.
+struct Recording {
     server: Server,
-    said: Arc<Mutex<Vec<Value>>>,
+    messages: Arc<Mutex<Vec<Value>>>,
 }
 
-impl Listening {
-    fn note(&self, value: &impl serde::Serialize) {
-        self.said.lock().unwrap().push(serde_json::to_value(value).unwrap());
+impl Recording {
+    fn record(&self, value: &impl serde::Serialize) {
+        self.messages.lock().unwrap().push(serde_json::to_value(value).unwrap());
     }
 }
 
-impl Link for Listening {
+impl Link for Recording {
     fn hello(&mut self) -> Result<Hello, Misbehaviour> {
-        self.note(&Ask::Hello { protocol: PROTOCOL.into() });
+        self.record(&Ask::Hello { protocol: PROTOCOL.into() });
         let hello = self.server.hello()?;
-        self.note(&hello);
+        self.record(&hello);
         Ok(hello)
     }
 
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
-        self.note(ask);
+        self.record(ask);
         let reply = self.server.ask(ask)?;
-        self.note(&reply);
+        self.record(&reply);
         Ok(reply)
     }
 }
@@ -46,27 +46,27 @@ fn schema() -> Validator {
 }
 
 #[test]
-fn all_that_is_said_fits_the_schema() {
-    let said = Arc::new(Mutex::new(Vec::new()));
+fn all_messages_fit_the_schema() {
+    let messages = Arc::new(Mutex::new(Vec::new()));
     let start = || {
-        let link = Listening { server: Server::new(NamedEngine::REFERENCE), said: Arc::clone(&said) };
+        let link = Recording { server: Server::new(NamedEngine::REFERENCE), messages: Arc::clone(&messages) };
         Ok(Box::new(link) as Box<dyn Link>)
     };
-    let subject = Subject { command: "listening".into(), start: Box::new(start) };
+    let subject = Subject { command: "recording".into(), start: Box::new(start) };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap();
     let schema = schema();
-    let said = said.lock().unwrap();
-    assert!(said.len() > 1000, "only {} lines were said", said.len());
-    for line in said.iter() {
-        if let Err(wrong) = schema.validate(line) {
-            panic!("{line}\n{wrong}");
+    let messages = messages.lock().unwrap();
+    assert!(messages.len() > 1000, "only {} messages were recorded", messages.len());
+    for message in messages.iter() {
+        if let Err(wrong) = schema.validate(message) {
+            panic!("{message}\n{wrong}");
         }
     }
 }
 
 #[test]
-fn what_is_wrong_does_not_fit_the_schema() {
+fn wrong_messages_do_not_fit_the_schema() {
     let schema = schema();
     for wrong in [
         json!({ "type": "reset", "instance": {} }),

@@ -1,4 +1,4 @@
-//! Traces that ports write themselves.
+//! Checks traces that ports write.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
 
-/// An episode as a port might write it down: without observations and figures.
+/// Returns the trace of an episode as a port may write it: without observations and metrics.
 fn trace() -> Trace {
     let config = json!({
         "size": 5, "num_agents": 4, "density": 0.1, "seed": 1, "collision_system": "soft",
@@ -40,7 +40,7 @@ fn trace() -> Trace {
     trace
 }
 
-fn written(trace: &Trace, folder: &tempfile::TempDir, name: &str) -> PathBuf {
+fn write_trace(trace: &Trace, folder: &tempfile::TempDir, name: &str) -> PathBuf {
     let path = folder.path().join(name);
     let mut text = Vec::new();
     trace.write(&mut text).unwrap();
@@ -49,12 +49,12 @@ fn written(trace: &Trace, folder: &tempfile::TempDir, name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_true_trace_passes_and_an_altered_one_does_not() {
+fn a_correct_trace_passes_and_an_altered_one_fails() {
     let folder = tempfile::tempdir().unwrap();
     let right = trace();
     let mut wrong = right.clone();
     wrong.steps[7].state.cells[2] = Cell::new(0, 0);
-    let paths = [written(&right, &folder, "right.jsonl"), written(&wrong, &folder, "wrong.jsonl")];
+    let paths = [write_trace(&right, &folder, "right.jsonl"), write_trace(&wrong, &folder, "wrong.jsonl")];
     let report = check_traces(&paths[..1]).unwrap();
     assert!(!report.diverges() && report.num_steps == 12);
     assert!(report.rules["collide/soft"].passed == 1 && report.rules["reward/own"].passed == 1);
@@ -69,7 +69,7 @@ fn a_true_trace_passes_and_an_altered_one_does_not() {
 }
 
 #[test]
-fn what_is_no_trace_is_refused_with_its_name() {
+fn invalid_traces_are_rejected_with_their_path() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("not-a-trace");
     std::fs::write(&path, "{}\n").unwrap();

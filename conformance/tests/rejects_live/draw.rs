@@ -1,39 +1,39 @@
-//! Random configs, most of them nearly right.
+//! Random configs, most of them nearly valid.
 
 use pogema_conformance::{Op, Request, draw_request};
 use pogema_maps::FIELDS;
 use pogema_numpy::Generator;
 use serde_json::{Map as Object, Value, json};
 
-/// The drawn configs are always the same.
+/// The seed of the configs, fixed so that every run draws the same ones.
 const SEED: u64 = 14_000;
 
-/// A config with a bad or an odd field or two: a playable one that is spoilt, or one of a few random fields.
+/// Returns a request whose config has up to two odd fields: a playable config, or one of up to three random fields.
 pub fn request(case: u64) -> Request {
-    let mut dice = Dice(Generator::seeded(SEED + case));
+    let mut random = RandomValues(Generator::seeded(SEED + case));
     let mut request = draw_request(SEED, case);
     request.ops = vec![Op::Reset(None)];
     request.density = false;
-    if dice.below(2) == 0 {
+    if random.below(2) == 0 {
         request.register = None;
         request.config = json!({});
-        for _field in 0..dice.below(4) {
-            dice.set_near(&mut request.config);
+        for _field in 0..random.below(4) {
+            random.set_near(&mut request.config);
         }
     }
-    for _field in 0..dice.below(3) {
-        dice.set_odd(&mut request.config);
+    for _field in 0..random.below(3) {
+        random.set_odd(&mut request.config);
     }
-    // Without a seed the two would draw different things.
+    // Without a seed the two implementations would draw different random numbers.
     if request.config.get("seed").is_none_or(Value::is_null) {
         request.config["seed"] = json!(case);
     }
     request
 }
 
-struct Dice(Generator);
+struct RandomValues(Generator);
 
-impl Dice {
+impl RandomValues {
     fn below(&mut self, limit: usize) -> usize {
         self.0.integers(0, limit as i64).unwrap() as usize
     }
@@ -47,7 +47,7 @@ impl Dice {
         config[field] = self.near(field);
     }
 
-    /// Spoils a field, or takes it away.
+    /// Sets a field to a value that may be wrong, or removes it.
     fn set_odd(&mut self, config: &mut Value) {
         let field = FIELDS[self.below(FIELDS.len())];
         match self.below(8) {
@@ -65,7 +65,7 @@ impl Dice {
         (0..self.below(4)).map(|_| self.cell()).collect()
     }
 
-    /// A value of the right kind, which may still be wrong in its place.
+    /// Returns a value of the right type, which may still be wrong for the field.
     fn near(&mut self, field: &str) -> Value {
         match field {
             "MOVES" => {

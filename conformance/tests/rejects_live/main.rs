@@ -1,4 +1,4 @@
-//! What a live POGEMA 1.4.0 refuses, we refuse; what we refuse besides, we refuse for a reason that was decided on.
+//! Checks that we reject all configs that a live POGEMA 1.4.0 rejects, and further ones only for a decided reason.
 //!
 //! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-conformance --test rejects_live`
 
@@ -25,13 +25,13 @@ fn start_pogema() -> Oracle {
     Oracle::start(Path::new(&python)).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The class of the error with which POGEMA refuses a config, or the first reset of it.
-fn refusal_of_pogema(pogema: &mut Oracle, request: &Request) -> Option<String> {
+/// Returns the class of the error with which POGEMA rejects a config or its first reset.
+fn pogema_error(pogema: &mut Oracle, request: &Request) -> Option<String> {
     pogema.ask(request).unwrap().error.map(|error| error.kind)
 }
 
-/// The line with which we refuse a config, or the first reset of it.
-fn our_refusal(request: &Request) -> Option<String> {
+/// Returns the message with which we reject a config or its first reset.
+fn our_error(request: &Request) -> Option<String> {
     let reset = || -> Result<(), Error> {
         let config = GridConfig::from_value(&request.config)?;
         let named = request.register.as_ref().filter(|map| config.map_name.as_ref() == Some(&map.name));
@@ -43,7 +43,7 @@ fn our_refusal(request: &Request) -> Option<String> {
     reset().err().map(|error| error.to_string())
 }
 
-/// A request about a config, which may name the map `narrow`.
+/// Returns a request with a config, which may name the map `narrow`.
 fn request(config: &str) -> Request {
     let config: Value = serde_json::from_str(config).unwrap_or_else(|error| panic!("{config}: {error}"));
     let register = Some(Registered { name: "narrow".into(), rows: vec!["#.".into()] });
@@ -51,84 +51,82 @@ fn request(config: &str) -> Request {
 }
 
 #[test]
-fn what_pogema_refuses_we_refuse() {
+fn configs_that_pogema_rejects_are_rejected() {
     let mut pogema = start_pogema();
-    for (kind, config) in tables::REFUSED {
+    for (kind, config) in tables::REJECTED {
         let request = request(config);
-        assert_eq!(refusal_of_pogema(&mut pogema, &request).as_deref(), Some(kind), "POGEMA on {config}");
-        assert!(our_refusal(&request).is_some(), "we accept {config}");
+        assert_eq!(pogema_error(&mut pogema, &request).as_deref(), Some(kind), "POGEMA on {config}");
+        assert!(our_error(&request).is_some(), "we accept {config}");
     }
 }
 
 #[test]
-fn maps_that_pogema_does_not_register_we_refuse() {
+fn maps_that_pogema_does_not_register_are_rejected() {
     let mut pogema = start_pogema();
     for (kind, rows) in tables::UNREGISTRABLE {
         let rows = rows.iter().map(|&row| row.to_owned()).collect();
         let register = Some(Registered { name: "broken".into(), rows });
         let request = Request { register, ..request(r#"{"map_name": "broken"}"#) };
-        assert_eq!(refusal_of_pogema(&mut pogema, &request).as_deref(), Some(kind));
-        assert!(our_refusal(&request).is_some(), "we accept {:?}", request.register);
+        assert_eq!(pogema_error(&mut pogema, &request).as_deref(), Some(kind));
+        assert!(our_error(&request).is_some(), "we accept {:?}", request.register);
     }
 }
 
 #[test]
-fn what_we_refuse_alone_has_the_reason_it_should() {
+fn configs_that_only_we_reject_have_the_expected_reason() {
     let mut pogema = start_pogema();
-    for (reason, config) in tables::REFUSED_BY_US {
+    for (reason, config) in tables::REJECTED_BY_US {
         let request = request(config);
-        assert_eq!(refusal_of_pogema(&mut pogema, &request), None, "POGEMA on {config}");
-        let message = our_refusal(&request).unwrap_or_else(|| panic!("we accept {config}"));
+        assert_eq!(pogema_error(&mut pogema, &request), None, "POGEMA on {config}");
+        let message = our_error(&request).unwrap_or_else(|| panic!("we accept {config}"));
         assert_eq!(reasons::reason(&request.config, &message), Some(reason), "{config}: {message}");
     }
     for reason in reasons::names() {
-        assert!(tables::REFUSED_BY_US.iter().any(|(known, _)| *known == reason), "no config for: {reason}");
+        assert!(tables::REJECTED_BY_US.iter().any(|(known, _)| *known == reason), "no config for: {reason}");
     }
 }
 
 #[test]
-fn both_accept_what_is_in_order() {
+fn valid_configs_are_accepted_by_both() {
     let mut pogema = start_pogema();
     for config in tables::ACCEPTED {
         let request = request(config);
-        assert_eq!(refusal_of_pogema(&mut pogema, &request), None, "POGEMA on {config}");
-        assert_eq!(our_refusal(&request), None, "{config}");
+        assert_eq!(pogema_error(&mut pogema, &request), None, "POGEMA on {config}");
+        assert_eq!(our_error(&request), None, "{config}");
     }
 }
 
 #[test]
-fn random_configs_are_refused_by_both_or_for_a_known_reason() {
+fn random_configs_are_rejected_by_both_or_for_a_known_reason() {
     let mut pogema = start_pogema();
     let mut wrong = Vec::new();
     let mut counts = BTreeMap::<&str, u64>::new();
     for case in 0..NUM_DRAWN {
         let request = draw::request(case);
-        let theirs = refusal_of_pogema(&mut pogema, &request);
-        let outcome = match (theirs.as_deref(), our_refusal(&request)) {
-            // The oracle's own errors: it ran out of time, or cannot drive the wrapper of a framework.
+        let theirs = pogema_error(&mut pogema, &request);
+        let outcome = match (theirs.as_deref(), our_error(&request)) {
+            // Errors of the oracle itself: it timed out, or cannot drive the wrapper of a framework.
             (Some("Timeout" | "ProtocolError"), _) => "not comparable",
-            (Some(_), Some(_)) => "both refuse",
+            (Some(_), Some(_)) => "both reject",
             (None, None) => "both accept",
             (Some(kind), None) => {
                 wrong.push(format!(
-                    "only POGEMA refuses, {kind}: {}",
+                    "only POGEMA rejects, {kind}: {}",
                     serde_json::to_string(&request).unwrap()
                 ));
-                "only POGEMA refuses"
+                "only POGEMA rejects"
             }
             (None, Some(message)) => reasons::reason(&request.config, &message).unwrap_or_else(|| {
-                wrong.push(format!(
-                    "we refuse alone: {message}: {}",
-                    serde_json::to_string(&request).unwrap()
-                ));
-                "we refuse for no known reason"
+                wrong
+                    .push(format!("only we reject: {message}: {}", serde_json::to_string(&request).unwrap()));
+                "only we reject, for no known reason"
             }),
         };
         *counts.entry(outcome).or_default() += 1;
     }
     println!("{counts:#?}");
     assert!(wrong.is_empty(), "{} of {NUM_DRAWN}\n{}", wrong.len(), wrong.join("\n"));
-    for outcome in ["both refuse", "both accept"] {
+    for outcome in ["both reject", "both accept"] {
         assert!(counts[outcome] > NUM_DRAWN / 10, "{counts:#?}");
     }
     assert!(counts.get("not comparable").is_none_or(|&count| count < NUM_DRAWN / 10), "{counts:#?}");

@@ -1,4 +1,4 @@
-//! Why we refuse what POGEMA accepts: every reason there is, each as narrow as its decision.
+//! All reasons for which we reject configs that POGEMA accepts, each as narrow as its decision.
 
 use serde_json::Value;
 
@@ -9,48 +9,50 @@ const OURS: [&str; 3] = ["occupancy", "reward", "limits"];
 const POOLS: [&str; 2] = ["possible_agents_xy", "possible_targets_xy"];
 const POSITIONS: [&str; 4] = ["agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy"];
 
-/// What we refused and what we said.
-struct Refusal<'a> {
+/// A rejected config and our error message.
+struct Rejection<'a> {
     config: &'a Value,
     message: &'a str,
 }
 
-impl Refusal<'_> {
+impl Rejection<'_> {
     fn says(&self, text: &str) -> bool {
         self.message.contains(text)
     }
 
-    /// Whether the message is about one of these fields, and the value there is as it says.
+    /// Returns whether the message is about one of these fields, and the value of that field fulfils `has`.
     fn is_about(&self, fields: &[&str], has: impl Fn(&Value) -> bool) -> bool {
         let field = self.message.strip_prefix("config: `").and_then(|rest| rest.split('`').next());
         field.is_some_and(|field| fields.contains(&field) && self.config.get(field).is_some_and(has))
     }
 }
 
-type Holds = fn(&Refusal<'_>) -> bool;
+type Holds = fn(&Rejection<'_>) -> bool;
 
 const REASONS: [(&str, Holds); 21] = [
-    ("a key that is no field", |no| no.says("config: unknown field `")),
+    ("an unknown key", |no| no.says("config: unknown field `")),
     ("a whole number with a decimal point", |no| no.is_about(&INTEGERS, Value::is_f64)),
-    ("a number as a text", |no| no.is_about(&numbers(), Value::is_string)),
-    ("true or false as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
-    ("a constant in another form", |no| {
+    ("a number given as text", |no| no.is_about(&numbers(), Value::is_string)),
+    ("a boolean given as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
+    ("a constant of another type", |no| {
         no.is_about(&["FREE", "OBSTACLE"], |value| value.is_boolean() || value.is_f64())
     }),
-    ("a flag as a number or a word", |no| {
+    ("a flag given as a number or word", |no| {
         no.is_about(&FLAGS, |value| value.is_number() || value.is_string())
     }),
     ("a name that is a number", |no| {
         no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a text")
     }),
-    ("true or false as a coordinate", |no| no.is_about(&POSITIONS, holds_flag) && no.says("expected a pair")),
-    ("a pool that is no list of cells", |no| {
+    ("a boolean given as a coordinate", |no| {
+        no.is_about(&POSITIONS, holds_flag) && no.says("expected a pair")
+    }),
+    ("a pool that is not a list of cells", |no| {
         no.is_about(&POOLS, |_| true) && (no.says("expected a pair") || no.says("expected a list of"))
     }),
-    ("an episode longer than 64 bits can count", |no| {
+    ("an episode length above 2^63 - 1", |no| {
         no.is_about(&["max_episode_steps"], |value| value.is_u64() && !value.is_i64())
     }),
-    ("other moves", |no| no.is_about(&["MOVES"], Value::is_array)),
+    ("a changed table of moves", |no| no.is_about(&["MOVES"], Value::is_array)),
     ("letters with lifelong goals", |no| {
         no.says("config: `targets_xy` is `one goal per agent`") && no.config["map"].is_string()
     }),
@@ -58,14 +60,14 @@ const REASONS: [(&str, Holds); 21] = [
         no.says("is not 0 (free) or 1 (obstacle)") && no.config["map"].is_array()
     }),
     ("an unknown map", |no| no.is_about(&["map_name"], Value::is_string) && no.says("a registered map")),
-    ("two agents with one start", |no| no.says("is the start of agent")),
-    ("a pool that leaves the map", |no| {
+    ("two agents with the same start", |no| no.says("is the start of agent")),
+    ("a pool with cells outside the map", |no| {
         no.is_about(&POOLS, Value::is_array) && no.says("expected cells inside")
     }),
     ("a pool without a next goal", |no| no.says("no next goal can be drawn from possible_targets_xy")),
     ("sequences for some agents only", |no| no.says("expected a sequence for each of the")),
-    ("throughput over no steps", |no| no.is_about(&["max_episode_steps"], |value| *value == 0)),
-    ("a bad value of a field of ours", |no| no.is_about(&OURS, |_| true)),
+    ("throughput over zero steps", |no| no.is_about(&["max_episode_steps"], |value| *value == 0)),
+    ("an invalid value of one of our own fields", |no| no.is_about(&OURS, |_| true)),
     ("a named map that is too small", |no| {
         no.says("for which the map has room") && no.config["map_name"].is_string()
     }),
@@ -83,13 +85,13 @@ fn holds_flag(value: &Value) -> bool {
     }
 }
 
-/// The name of the reason, if there is a known one.
+/// Returns the name of the reason for a rejection, if it is a known one.
 pub fn reason(config: &Value, message: &str) -> Option<&'static str> {
-    let refusal = Refusal { config, message };
-    REASONS.iter().find(|(_, holds)| holds(&refusal)).map(|(name, _)| *name)
+    let rejection = Rejection { config, message };
+    REASONS.iter().find(|(_, holds)| holds(&rejection)).map(|(name, _)| *name)
 }
 
-/// The names of all reasons.
+/// Returns the names of all reasons.
 pub fn names() -> impl Iterator<Item = &'static str> {
     REASONS.iter().map(|(name, _)| *name)
 }

@@ -1,9 +1,9 @@
-//! Configs that POGEMA refuses, configs that only we refuse, and configs in order.
+//! Configs that POGEMA rejects, configs that only we reject, and configs that both accept.
 
 /// The class of POGEMA's error and a config that raises it: every check of `grid_config.py`, and every `raise` of
 /// `grid.py`, `generator.py` and `make_pogema.py` that a config can lead to.
-pub const REFUSED: [(&str, &str); 107] = [
-    // The types that pydantic checks.
+pub const REJECTED: [(&str, &str); 107] = [
+    // Types, which pydantic checks.
     ("ValidationError", r#"{"on_target": "stop"}"#),
     ("ValidationError", r#"{"on_target": null}"#),
     ("ValidationError", r#"{"seed": "zero"}"#),
@@ -59,11 +59,11 @@ pub const REFUSED: [(&str, &str); 107] = [
     ("ValidationError", r#"{"num_agents": 10000001}"#),
     ("ValidationError", r#"{"obs_radius": 0}"#),
     ("ValidationError", r#"{"obs_radius": 129}"#),
-    // Sides.
+    // Side lengths.
     ("ValidationError", r#"{"width": 5}"#),
     ("ValidationError", r#"{"height": 5}"#),
     ("ValidationError", r#"{"height": 5, "width": null, "size": 5}"#),
-    // A bad side is an error even where a map would replace it.
+    // A bad side length is an error even if a map replaces it.
     ("ValidationError", r#"{"size": 1, "map": ".."}"#),
     ("ValidationError", r#"{"density": 2, "map": ".."}"#),
     // Starts.
@@ -110,7 +110,7 @@ pub const REFUSED: [(&str, &str); 107] = [
     ("ValidationError", r#"{"map": [["."]]}"#),
     ("ValidationError", r#"{"map": [0, 1]}"#),
     ("ValueError", r#"{"map": [[0, 0], [0]]}"#),
-    // What only shows when the environment is made or reset.
+    // Errors that appear only when the environment is created or reset.
     ("KeyError", r#"{"auto_reset": true}"#),
     ("NotImplementedError", r#"{"integration": "rllib"}"#),
     ("IndexError", r#"{"agents_xy": [[0, 0]], "targets_xy": [[0, 1], [1, 1]]}"#),
@@ -120,43 +120,46 @@ pub const REFUSED: [(&str, &str); 107] = [
     ("IndexError", r#"{"possible_agents_xy": [[99, 99]], "possible_targets_xy": [[0, 0]]}"#),
 ];
 
-/// Maps that cannot be registered under a name, and the class of POGEMA's error.
+/// The class of POGEMA's error, and a map that cannot be registered under a name.
 pub const UNREGISTRABLE: [(&str, &[&str]); 3] =
     [("KeyError", &["..", ".?"]), ("AssertionError", &["..", "."]), ("KeyError", &["5"])];
 
-/// The reason and a config that POGEMA accepts.
-pub const REFUSED_BY_US: [(&str, &str); 39] = [
-    ("a key that is no field", r#"{"colision_system": "soft"}"#),
+/// The reason of our rejection, and a config that POGEMA accepts.
+pub const REJECTED_BY_US: [(&str, &str); 39] = [
+    ("an unknown key", r#"{"colision_system": "soft"}"#),
     ("a whole number with a decimal point", r#"{"num_agents": 2.0}"#),
     ("a whole number with a decimal point", r#"{"seed": 1.7}"#),
     ("a whole number with a decimal point", r#"{"max_episode_steps": 1e300}"#),
-    ("a number as a text", r#"{"size": "8"}"#),
-    ("a number as a text", r#"{"density": "0.5"}"#),
-    ("true or false as a number", r#"{"num_agents": true}"#),
-    ("true or false as a number", r#"{"density": false}"#),
-    ("a constant in another form", r#"{"FREE": false}"#),
-    ("a constant in another form", r#"{"OBSTACLE": 1.0}"#),
-    ("a flag as a number or a word", r#"{"persistent": 1}"#),
-    ("a flag as a number or a word", r#"{"empty_outside": "off"}"#),
+    ("a number given as text", r#"{"size": "8"}"#),
+    ("a number given as text", r#"{"density": "0.5"}"#),
+    ("a boolean given as a number", r#"{"num_agents": true}"#),
+    ("a boolean given as a number", r#"{"density": false}"#),
+    ("a constant of another type", r#"{"FREE": false}"#),
+    ("a constant of another type", r#"{"OBSTACLE": 1.0}"#),
+    ("a flag given as a number or word", r#"{"persistent": 1}"#),
+    ("a flag given as a number or word", r#"{"empty_outside": "off"}"#),
     ("a name that is a number", r#"{"map_name": 5}"#),
-    ("true or false as a coordinate", r#"{"agents_xy": [[true, false]]}"#),
-    ("true or false as a coordinate", r#"{"targets_xy": [[[0, 0], [0, true]]]}"#),
-    ("a pool that is no list of cells", r#"{"possible_agents_xy": [5]}"#),
-    ("a pool that is no list of cells", r#"{"possible_targets_xy": [[0, -1]]}"#),
-    ("an episode longer than 64 bits can count", r#"{"max_episode_steps": 18446744073709551615}"#),
-    ("other moves", r#"{"MOVES": [[0, 0], [0, 1]]}"#),
+    ("a boolean given as a coordinate", r#"{"agents_xy": [[true, false]]}"#),
+    ("a boolean given as a coordinate", r#"{"targets_xy": [[[0, 0], [0, true]]]}"#),
+    ("a pool that is not a list of cells", r#"{"possible_agents_xy": [5]}"#),
+    ("a pool that is not a list of cells", r#"{"possible_targets_xy": [[0, -1]]}"#),
+    ("an episode length above 2^63 - 1", r#"{"max_episode_steps": 18446744073709551615}"#),
+    ("a changed table of moves", r#"{"MOVES": [[0, 0], [0, 1]]}"#),
     ("letters with lifelong goals", r#"{"map": "aA", "on_target": "restart"}"#),
     ("cells other than 0 and 1", r#"{"map": [[0, 2], [0, 0]]}"#),
     ("cells other than 0 and 1", r#"{"map": [[0, 0.0]]}"#),
     ("cells other than 0 and 1", r#"{"map": [[false, false, true]]}"#),
     ("an unknown map", r#"{"map_name": "nowhere"}"#),
-    ("two agents with one start", r#"{"agents_xy": [[0, 0], [0, 0]], "targets_xy": [[0, 1], [1, 1]]}"#),
+    ("two agents with the same start", r#"{"agents_xy": [[0, 0], [0, 0]], "targets_xy": [[0, 1], [1, 1]]}"#),
     (
-        "two agents with one start",
+        "two agents with the same start",
         r#"{"possible_agents_xy": [[0, 0], [0, 0]], "possible_targets_xy": [[0, 1], [1, 1]], "num_agents": 2}"#,
     ),
-    ("a pool that leaves the map", r#"{"possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 9]]}"#),
-    ("a pool that leaves the map", r#"{"possible_targets_xy": [[0, 9]], "on_target": "restart"}"#),
+    (
+        "a pool with cells outside the map",
+        r#"{"possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 9]]}"#,
+    ),
+    ("a pool with cells outside the map", r#"{"possible_targets_xy": [[0, 9]], "on_target": "restart"}"#),
     (
         "a pool without a next goal",
         r#"{"map": ".....\n.....", "possible_agents_xy": [[0, 0]], "possible_targets_xy": [], "on_target": "restart"}"#,
@@ -165,18 +168,18 @@ pub const REFUSED_BY_US: [(&str, &str); 39] = [
         "sequences for some agents only",
         r#"{"targets_xy": [[[0, 0], [0, 1]]], "on_target": "restart", "num_agents": 2}"#,
     ),
-    ("throughput over no steps", r#"{"max_episode_steps": 0, "on_target": "restart"}"#),
-    ("a bad value of a field of ours", r#"{"occupancy": "exactly"}"#),
-    ("a bad value of a field of ours", r#"{"reward": 1}"#),
-    ("a bad value of a field of ours", r#"{"limits": null}"#),
+    ("throughput over zero steps", r#"{"max_episode_steps": 0, "on_target": "restart"}"#),
+    ("an invalid value of one of our own fields", r#"{"occupancy": "exactly"}"#),
+    ("an invalid value of one of our own fields", r#"{"reward": 1}"#),
+    ("an invalid value of one of our own fields", r#"{"limits": null}"#),
     ("a named map that is too small", r#"{"map_name": "narrow", "seed": 0}"#),
-    ("a number as a text", r#"{"map": "..", "size": "8"}"#),
-    ("a number as a text", r#"{"seed": "5"}"#),
-    ("a flag as a number or a word", r#"{"auto_reset": 0}"#),
+    ("a number given as text", r#"{"map": "..", "size": "8"}"#),
+    ("a number given as text", r#"{"seed": "5"}"#),
+    ("a flag given as a number or word", r#"{"auto_reset": 0}"#),
     ("a name that is a number", r#"{"map_name": 1.5}"#),
 ];
 
-/// At the edge, and right for both.
+/// Configs at the limits, which both accept.
 pub const ACCEPTED: [&str; 22] = [
     "{}",
     r#"{"seed": 0}"#,

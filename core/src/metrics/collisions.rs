@@ -1,4 +1,4 @@
-//! Moves that came to nothing.
+//! The number of prevented moves.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ pub struct CollisionMeter {
 }
 
 impl CollisionMeter {
-    /// Takes one step in: where each agent was, whether it took part, what it wanted, where it is now.
+    /// Counts one step, given each agent's cell before, whether it was active, its action, and its cell after.
     pub fn feed(&mut self, map: &Map, before: &[Cell], active: &[bool], actions: &[Action], after: &[Cell]) {
         for (agent, &action) in actions.iter().enumerate() {
             if !active[agent] || action == Action::Stay || before[agent] != after[agent] {

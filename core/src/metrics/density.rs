@@ -1,13 +1,13 @@
-//! How crowded agents find it.
+//! The density of agents in the windows of the agents.
 
 use serde::{Deserialize, Serialize};
 
-/// What one agent sees in its window.
+/// The number of agents and free cells in one agent's window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
-    /// Agents, itself included.
+    /// Number of agents, the observing agent included.
     pub agents: u32,
-    /// Cells without an obstacle.
+    /// Number of cells without an obstacle.
     pub free_cells: u32,
 }
 
@@ -23,13 +23,14 @@ pub struct DensityMeter {
 }
 
 impl DensityMeter {
-    /// Begins an episode.
+    /// Starts an episode.
     pub fn reset(&mut self) {
         self.means.clear();
     }
 
-    /// Adds one moment, the one after the reset included. A window without a free cell counts as empty; POGEMA divides
-    /// by zero there.
+    /// Adds the windows of one frame. Call it after the reset, too.
+    ///
+    /// A window without a free cell counts as empty; POGEMA divides by zero there.
     pub fn feed(&mut self, seen: &[Seen]) {
         let share = |&Seen { agents, free_cells }: &Seen| match free_cells {
             0 => 0.0,
@@ -39,13 +40,13 @@ impl DensityMeter {
         self.means.push(pairwise_mean(&shares));
     }
 
-    /// The average so far.
+    /// Returns the average so far.
     pub fn mean(&self) -> f64 {
         pairwise_mean(&self.means)
     }
 }
 
-/// The mean with NumPy's order of additions, on which the last bits of a sum depend.
+/// Returns the mean, with additions in NumPy's order because the last bits of a sum depend on the order.
 ///
 /// Source: NumPy 1.26, `mean` of a contiguous float64 array
 pub fn pairwise_mean(values: &[f64]) -> f64 {

@@ -1,11 +1,11 @@
-//! Valid inputs, made invalid in small ways.
+//! Random small mutations of valid inputs.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use serde_json::{Value, json};
 
-/// A text after up to four cuts, insertions and repetitions, each of up to eight characters.
+/// Generates texts with up to four cuts, insertions or repetitions, each of up to eight characters.
 pub fn mutated(
     texts: &'static [&'static str],
     tokens: &'static [&'static str],
@@ -23,7 +23,7 @@ pub fn mutated(
     })
 }
 
-/// A value of any kind, most of them out of place wherever they stand.
+/// Generates JSON values of any type, most of which are wrong in every place.
 pub fn odd_value() -> impl Strategy<Value = Value> {
     let numbers = [json!(0), json!(1), json!(2), json!(-1), json!(0.5), json!(1e300), json!(-0.0)];
     let limits = [json!(i64::MIN), json!(i64::MAX), json!(u64::MAX), json!(65_535), json!(65_536)];
@@ -38,7 +38,7 @@ pub fn odd_value() -> impl Strategy<Value = Value> {
     select(all)
 }
 
-/// A message is one line that a terminal can show.
+/// Asserts that a message is one short line without control characters.
 pub fn assert_one_line(message: &str) {
     assert!(!message.is_empty() && !message.chars().any(char::is_control), "{message:?}");
     assert!(message.chars().count() < 500, "{message}");

@@ -1,4 +1,4 @@
-//! The work of one call, cut into parts for the threads.
+//! The work of one call, split into parts for the threads.
 
 use pogema_core::{Action, Config, Error, StepOut};
 
@@ -8,22 +8,22 @@ use crate::simd::fetch_all;
 use super::Lane;
 use super::team::Team;
 
-/// Where observations of a batch go, if anywhere.
+/// The buffer for the observations of a batch, if they are requested.
 #[derive(Debug)]
 pub enum Observations<'a> {
-    /// None are wanted.
+    /// No observations are requested.
     None,
     /// Shape: `[lanes, agents, 3, side, side]`
     F32(&'a mut [f32]),
     /// Shape: `[lanes, agents, 3, side, side]`
     U8(&'a mut [u8]),
-    /// Shape: `[lanes, agents, words]` with [`words_per_agent`] words; as [`crate::Engine::observe_bits`] writes
-    /// them.
+    /// Shape: `[lanes, agents, words]` with [`words_per_agent`] words, in the format of
+    /// [`crate::Engine::observe_bits`].
     Bits(&'a mut [u64]),
 }
 
 impl Observations<'_> {
-    /// Entries per lane.
+    /// Returns the number of entries per lane.
     pub(super) fn per_lane(&self, config: &Config) -> usize {
         match self {
             Self::None => 0,
@@ -63,7 +63,7 @@ impl Observations<'_> {
         }
     }
 
-    /// Whether a buffer for all lanes is better written around the cache.
+    /// Returns whether a buffer for all lanes should be written with stores that bypass the cache.
     pub(super) fn is_beyond_cache(&self) -> bool {
         match self {
             Self::None => false,
@@ -84,12 +84,12 @@ impl Observations<'_> {
     }
 }
 
-/// What a step or a look at a batch shows of its lanes; observations alone are a view, too.
+/// The buffers that a step or an observation of a batch fills. [`Observations`] alone convert into them.
 #[derive(Debug)]
 pub struct ObservationBuffers<'a> {
-    /// What agents see.
+    /// The buffer for observations.
     pub observations: Observations<'a>,
-    /// Which actions make sense, as [`crate::Engine::mask_actions`] writes them, if that is wanted.
+    /// The buffer for action masks, in the format of [`crate::Engine::mask_actions`], if they are requested.
     ///
     /// Shape: `[lanes, agents, 5]`
     pub masks: Option<&'a mut [i8]>,
@@ -104,8 +104,8 @@ impl<'a> From<Observations<'a>> for ObservationBuffers<'a> {
 impl ObservationBuffers<'_> {
     pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
         self.observations.check(num_lanes, config)?;
-        let want = num_lanes * config.num_agents * Action::ALL.len();
-        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", want, masks.len()))
+        let expected = num_lanes * config.num_agents * Action::ALL.len();
+        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", expected, masks.len()))
     }
 
     fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
@@ -122,22 +122,22 @@ impl ObservationBuffers<'_> {
     }
 }
 
-/// Some lanes, the actions and buffers of their step if there is one, and what is shown of them.
+/// Some lanes, the actions and results of their step if there is one, and the buffers for their observations.
 pub(super) struct Jobs<'a> {
     pub lanes: &'a mut [Lane],
     pub steps: Option<(&'a [Action], StepOut<'a>)>,
-    pub view: ObservationBuffers<'a>,
-    /// Whether the observations of all lanes together are better written around the cache.
+    pub buffers: ObservationBuffers<'a>,
+    /// Whether the observations of all lanes should be written with stores that bypass the cache.
     pub beyond_cache: bool,
 }
 
-/// What is done to a lane that steps.
+/// The function that plays a step of a lane.
 type Play<'a> = &'a (dyn Fn(&mut Lane, &[Action], StepOut<'_>) -> Result<(), Error> + Sync);
 
 impl Jobs<'_> {
-    /// Plays and observes all lanes, shared among a team.
+    /// Plays and observes all lanes on the threads of a team.
     pub fn run(self, team: &Team, play: Play<'_>) -> Result<(), Error> {
-        // Parts small enough that no thread waits long for another.
+        // The parts are small, so that no thread waits long for another.
         const PARTS_PER_THREAD: usize = 4;
         if team.num_threads() == 1 {
             return self.run_here(play);
@@ -162,13 +162,13 @@ impl Jobs<'_> {
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
             }
-            first.view.write(lane, first.beyond_cache)?;
+            first.buffers.write(lane, first.beyond_cache)?;
             self = rest;
         }
         Ok(())
     }
 
-    /// Asks for what the first lane needs, so that it comes from memory while the lane before plays.
+    /// Prefetches the data of the first lane, so that it is loaded from memory while the previous lane plays.
     fn fetch_first(&self) {
         let Some(Lane { engine, .. }) = self.lanes.first() else { return };
         if self.steps.is_some() {
@@ -178,7 +178,7 @@ impl Jobs<'_> {
             fetch_all(&engine.targets);
             fetch_all(&engine.ahead);
         }
-        if !matches!(self.view.observations, Observations::None) {
+        if !matches!(self.buffers.observations, Observations::None) {
             fetch_all(engine.obstacles.words());
         }
         fetch_all(engine.occupied.words());
@@ -187,16 +187,16 @@ impl Jobs<'_> {
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {
-        let Some(lane) = self.lanes.first() else { unreachable!("split only while there are lanes") };
+        let Some(lane) = self.lanes.first() else { unreachable!("a split needs at least one lane") };
         let config = pogema_core::Environment::config(&lane.engine);
         let num_agents = num_lanes * config.num_agents;
         let beyond_cache = self.beyond_cache;
-        let (left, right) = self.view.split_at(num_lanes, config);
+        let (left, right) = self.buffers.split_at(num_lanes, config);
         let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
         let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
         (
-            Self { lanes: left_lanes, steps: left_steps, view: left, beyond_cache },
-            Self { lanes: right_lanes, steps: right_steps, view: right, beyond_cache },
+            Self { lanes: left_lanes, steps: left_steps, buffers: left, beyond_cache },
+            Self { lanes: right_lanes, steps: right_steps, buffers: right, beyond_cache },
         )
     }
 }

@@ -1,4 +1,4 @@
-//! One environment of a batch, from episode to episode.
+//! A lane: one environment of a batch with its episodes.
 
 use pogema_core::{Action, Config, EpisodeMeter, Error, Instance, Metrics, StepOut};
 
@@ -12,22 +12,22 @@ pub struct Lane {
     pub index: usize,
     pub engine: Engine,
     meter: EpisodeMeter,
-    /// The number of the present episode.
+    /// The number of the current episode.
     pub episode: Option<u64>,
-    /// The number of the episode that the preparer is asked for.
-    pub wanted: u64,
-    /// The instance of the episode before that, if it is here and was not begun yet.
+    /// The number of the episode that is requested from the preparer.
+    pub requested: u64,
+    /// The instance of the episode before the requested one, if that episode has not begun.
     pub pending: Option<Instance>,
-    /// The environment at the end of its last episode, or where its next one lies ready.
+    /// The environment at the end of its last episode; if `is_next_ready`, the next episode.
     ended: Engine,
     metrics: Option<Metrics>,
     /// Whether an episode ended in the last step.
     pub has_just_ended: bool,
-    /// Whether the environment stands at the end of an episode.
+    /// Whether the current episode has ended.
     is_over: bool,
-    /// Whether the next episode lies ready in `ended`; only then while the episode is over.
-    is_laid_out: bool,
-    /// Why the lane has no next episode.
+    /// Whether `ended` holds the next episode. This is only possible after the current episode has ended.
+    is_next_ready: bool,
+    /// The reason why the lane has no next episode.
     pub failure: Option<Error>,
 }
 
@@ -38,13 +38,13 @@ impl Lane {
             engine: Engine::with_path(config, path)?,
             meter: EpisodeMeter::new(&config),
             episode: None,
-            wanted: 0,
+            requested: 0,
             pending: None,
             ended: Engine::with_path(config, path)?,
             metrics: None,
             has_just_ended: false,
             is_over: false,
-            is_laid_out: false,
+            is_next_ready: false,
             failure: None,
         })
     }
@@ -71,17 +71,17 @@ impl Lane {
         if self.has_just_ended {
             self.metrics = metrics;
             self.is_over = true;
-            self.follow(autoreset, preparer);
+            self.handle_end(autoreset, preparer);
         }
         Ok(())
     }
 
-    /// Begins the next episode if it lies ready, else leaves the environment as it ended.
+    /// Begins the next episode if it is ready, and otherwise leaves the environment as it ended.
     fn step_after_end(&mut self, out: StepOut<'_>) {
         out.rewards.fill(0.0);
         self.has_just_ended = false;
-        if self.is_laid_out {
-            self.turn();
+        if self.is_next_ready {
+            self.switch_to_next();
             out.terminated.fill(false);
             out.truncated.fill(false);
         } else {
@@ -90,61 +90,61 @@ impl Lane {
         }
     }
 
-    /// Does after the end of an episode what the batch does by itself.
-    fn follow(&mut self, autoreset: Autoreset, preparer: &Preparer) {
+    /// Applies the autoreset mode after the end of an episode.
+    fn handle_end(&mut self, autoreset: Autoreset, preparer: &Preparer) {
         if autoreset == Autoreset::Off {
             return;
         }
-        // Made ready within this step even if it begins with the next one, so that a step which has no episode to
-        // begin can refuse before anything is played.
-        match self.lay_out_next(preparer) {
-            Ok(()) if autoreset == Autoreset::SameStep => self.turn(),
+        // The next episode is prepared in this step even if it begins with the next step. If there is none, the next
+        // step can therefore fail before any lane plays.
+        match self.prepare_next(preparer) {
+            Ok(()) if autoreset == Autoreset::SameStep => self.switch_to_next(),
             Ok(()) => {}
             Err(error) => self.failure = Some(error),
         }
     }
 
-    fn lay_out_next(&mut self, preparer: &Preparer) -> Result<(), Error> {
-        self.look_ahead(preparer)?;
+    fn prepare_next(&mut self, preparer: &Preparer) -> Result<(), Error> {
+        self.fetch_next(preparer)?;
         self.pending.take().map_or(Ok(()), |instance| self.ended.start(instance))?;
-        self.is_laid_out = true;
+        self.is_next_ready = true;
         Ok(())
     }
 
-    /// Takes the episode that lies ready, and puts the ended one aside.
-    fn turn(&mut self) {
+    /// Switches to the prepared episode, and keeps the ended one.
+    fn switch_to_next(&mut self) {
         std::mem::swap(&mut self.engine, &mut self.ended);
-        self.is_laid_out = false;
-        self.note_begin();
+        self.is_next_ready = false;
+        self.mark_begun();
     }
 
-    fn note_begin(&mut self) {
-        self.episode = self.wanted.checked_sub(1);
+    fn mark_begun(&mut self) {
+        self.episode = self.requested.checked_sub(1);
         self.is_over = false;
     }
 
-    /// Gets the instance of the next episode, unless it is here already.
-    pub fn look_ahead(&mut self, preparer: &Preparer) -> Result<(), Error> {
-        if self.is_laid_out {
+    /// Fetches the instance of the next episode, unless the lane already has it.
+    pub fn fetch_next(&mut self, preparer: &Preparer) -> Result<(), Error> {
+        if self.is_next_ready {
             return Ok(());
         }
         if self.pending.is_none() {
             let taken = preparer.take(self.index);
-            self.wanted += u64::from(taken.is_ok());
-            preparer.want(self.index, self.wanted);
+            self.requested += u64::from(taken.is_ok());
+            preparer.request(self.index, self.requested);
             self.pending = Some(taken?);
         }
-        // INVARIANT: there is one now.
+        // INVARIANT: `pending` holds an instance now.
         self.pending.as_ref().map_or(Ok(()), |instance| instance.check_fits(&self.engine.config))
     }
 
-    /// Begins the episode whose instance is here.
+    /// Begins the next episode. Call [`Lane::fetch_next`] first.
     pub fn begin(&mut self) -> Result<(), Error> {
-        if self.is_laid_out {
-            self.turn();
+        if self.is_next_ready {
+            self.switch_to_next();
         } else {
             self.pending.take().map_or(Ok(()), |instance| self.engine.start(instance))?;
-            self.note_begin();
+            self.mark_begun();
         }
         self.meter.reset();
         self.failure = None;
@@ -152,16 +152,16 @@ impl Lane {
         Ok(())
     }
 
-    /// Begins episode 0 of another source, whose instance is here.
-    pub fn begin_anew(&mut self, instance: Instance, preparer: &Preparer) -> Result<(), Error> {
+    /// Begins episode 0 of another source with its instance.
+    pub fn begin_with(&mut self, instance: Instance, preparer: &Preparer) -> Result<(), Error> {
         self.pending = Some(instance);
-        self.is_laid_out = false;
-        self.wanted = 1;
-        preparer.want(self.index, self.wanted);
+        self.is_next_ready = false;
+        self.requested = 1;
+        preparer.request(self.index, self.requested);
         self.begin()
     }
 
-    /// The environment at the end of its last episode, and the episode's figures.
+    /// Returns the environment at the end of the last ended episode, and the metrics of the episode.
     pub fn ended(&self) -> Option<(&Engine, Metrics)> {
         let engine = if self.is_over { &self.engine } else { &self.ended };
         self.metrics.map(|metrics| (engine, metrics))

@@ -1,4 +1,4 @@
-//! Many environments, stepped and observed by one call.
+//! Batches: many environments, stepped and observed by one call.
 
 mod jobs;
 mod lane;
@@ -17,26 +17,27 @@ use team::Team;
 pub use jobs::{ObservationBuffers, Observations};
 pub use prepare::Instances;
 
-/// What follows the end of a lane's episode by itself.
+/// The time at which a lane begins its next episode after the end of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Autoreset {
-    /// The next episode begins within the same step: rewards and ends are those of the last step, observations
-    /// those of the new episode.
+    /// The next episode begins within the same step. Rewards and ends are those of the last step, and observations
+    /// are those of the new episode.
     #[default]
     SameStep,
-    /// The next episode begins with the next step, which ignores the lane's actions: rewards are 0, nothing ends,
-    /// observations are those of the new episode.
+    /// The next episode begins with the next step, which ignores the lane's actions. Rewards are 0, all ends are false,
+    /// and observations are those of the new episode.
     NextStep,
-    /// Nothing: steps leave the lane as it ended, with rewards of 0 and the ends of its last step, until a reset.
+    /// The lane stays at the end until a reset. Further steps give rewards of 0 and repeat the ends of the last step.
     Off,
 }
 
-/// Many environments of one config, the lanes, each with its own map and its own episodes.
+/// Many environments (lanes) of one config, each with its own map and its own episodes.
 ///
-/// Every array has a leading axis `lanes`. An episode that ends, since all agents terminated or were cut off, is
-/// followed by what [`Autoreset`] says, and stays readable through [`Batch::ended`] until the lane's next one ends.
+/// Every array has a leading axis `lanes`. An episode ends when all agents are terminated or all are truncated. The
+/// lane then continues according to [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next
+/// episode ends.
 ///
-/// What comes out does not depend on the number of threads.
+/// Results do not depend on the number of threads.
 pub struct Batch {
     config: Config,
     autoreset: Autoreset,
@@ -47,11 +48,12 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch of `num_lanes` environments, played by at most `num_threads` threads, the calling one among them. Call
-    /// `reset` before the first step.
+    /// Creates a batch of `num_lanes` environments on at most `num_threads` threads, the calling thread included.
+    ///
+    /// Call `reset` before the first step.
     ///
     /// # Errors
-    /// If the config is out of range; for no lanes, or a number of threads other than 1 to 1024; if threads cannot be
+    /// If the config is out of range, if `num_lanes` is 0, if `num_threads` is not 1 to 1024, or if threads cannot be
     /// started.
     pub fn new(
         config: Config,
@@ -72,41 +74,43 @@ impl Batch {
         Ok(Self { config, autoreset: Autoreset::default(), lanes, team, preparer, is_started: false })
     }
 
-    /// The same batch with another rule for the ends of episodes, to be chosen before the first reset.
+    /// Sets the autoreset mode. Call this before the first reset.
     #[must_use]
     pub fn with_autoreset(mut self, autoreset: Autoreset) -> Self {
         self.autoreset = autoreset;
         self
     }
 
-    /// The rules and sizes of every lane.
+    /// Returns the rules and sizes of every lane.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// Number of lanes.
+    /// Returns the number of lanes.
     pub fn num_lanes(&self) -> usize {
         self.lanes.len()
     }
 
-    /// Begins the next episode of every lane, the first time episode 0.
+    /// Begins the next episode of every lane; the first call begins episode 0.
     ///
     /// # Errors
-    /// If a lane has no next instance, or one that does not fit the config; every lane is then as it was. If
-    /// memory does not suffice for a lane's map; that lane is then as it was.
+    /// If a lane has no next instance, or one that does not fit the config; every lane is then unchanged. If there is
+    /// not enough memory for a lane's map; that lane is then unchanged.
     pub fn reset(&mut self) -> Result<(), Error> {
         self.reset_lanes(&vec![true; self.lanes.len()])
     }
 
-    /// Begins the next episode of some lanes and leaves the others as they are; the first time it has to be all.
+    /// Begins the next episode of the chosen lanes and leaves the others unchanged.
+    ///
+    /// The first call must choose all lanes.
     ///
     /// # Errors
-    /// As for [`Batch::reset`]; if there is not one flag per lane, or a lane is left out the first time.
+    /// As for [`Batch::reset`]; also if there is not one flag per lane, or if the first call leaves out a lane.
     pub fn reset_lanes(&mut self, chosen: &[bool]) -> Result<(), Error> {
         self.check_chosen(chosen)?;
         let preparer = &self.preparer;
         over_lanes(&self.team, &mut self.lanes, |lane| {
-            if chosen[lane.index] { lane.look_ahead(preparer) } else { Ok(()) }
+            if chosen[lane.index] { lane.fetch_next(preparer) } else { Ok(()) }
         })?;
         over_lanes(
             &self.team,
@@ -119,11 +123,13 @@ impl Batch {
         Ok(())
     }
 
-    /// Begins episode 0 of another source in some lanes, and leaves the others as they are; their later episodes
-    /// come from the new source, too, under the numbers that follow, but for one that lies ready already.
+    /// Begins episode 0 of another source in the chosen lanes, and leaves the current episodes of the others unchanged.
+    ///
+    /// The later episodes of the other lanes come from the new source, too, and their numbers continue. Only an episode
+    /// that is already prepared still comes from the old source.
     ///
     /// # Errors
-    /// As for [`Batch::reset_lanes`]; if the thread of the source cannot be started.
+    /// As for [`Batch::reset_lanes`]; also if the thread of the source cannot be started.
     pub fn reset_with(&mut self, source: impl Instances + 'static, chosen: &[bool]) -> Result<(), Error> {
         self.check_chosen(chosen)?;
         let (team, config) = (&self.team, &self.config);
@@ -142,62 +148,62 @@ impl Batch {
         let mut begun = Ok(());
         for (lane, instance) in self.lanes.iter_mut().zip(firsts) {
             match instance {
-                Some(instance) => begun = begun.and(lane.begin_anew(instance, &self.preparer)),
-                None => self.preparer.want(lane.index, lane.wanted),
+                Some(instance) => begun = begun.and(lane.begin_with(instance, &self.preparer)),
+                None => self.preparer.request(lane.index, lane.requested),
             }
         }
         self.is_started |= begun.is_ok();
         begun
     }
 
-    /// Plays one step in every lane, begins new episodes as [`Autoreset`] says, and shows what comes out.
+    /// Plays one step in every lane, begins new episodes according to [`Autoreset`], and fills the buffers.
     ///
     /// Shape: `actions` and each buffer of `out` are `[lanes, agents]`.
     ///
     /// # Errors
     /// Before the first reset, for a list or buffer of the wrong length, or if a lane's next episode could not
-    /// begin in an earlier step; nothing is played then.
+    /// be prepared in an earlier step. No lane plays then.
     pub fn step<'a>(
         &mut self,
         actions: &[Action],
         out: StepOut<'_>,
-        view: impl Into<ObservationBuffers<'a>>,
+        buffers: impl Into<ObservationBuffers<'a>>,
     ) -> Result<(), Error> {
-        let view = view.into();
+        let buffers = buffers.into();
         self.check_started()?;
         let num_agents = self.lanes.len() * self.config.num_agents;
         Error::check_length("actions", num_agents, actions.len())?;
         out.check(num_agents)?;
-        view.check(self.lanes.len(), &self.config)?;
+        buffers.check(self.lanes.len(), &self.config)?;
         if let Some(failure) = self.lanes.iter().find_map(|lane| lane.failure.as_ref()) {
             return Err(failure.clone());
         }
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
-        let beyond_cache = view.observations.is_beyond_cache();
+        let beyond_cache = buffers.observations.is_beyond_cache();
         let steps = Some((actions, out));
-        let jobs = Jobs { lanes: &mut self.lanes, steps, view, beyond_cache };
+        let jobs = Jobs { lanes: &mut self.lanes, steps, buffers, beyond_cache };
         jobs.run(&self.team, &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
     }
 
-    /// Observes every lane, or shows whatever else is asked for.
+    /// Fills the buffers with the observations and action masks of every lane.
     ///
     /// # Errors
     /// Before the first reset, or for a buffer of the wrong length.
     ///
     /// Rule: observe/default
-    pub fn observe<'a>(&mut self, view: impl Into<ObservationBuffers<'a>>) -> Result<(), Error> {
-        let view = view.into();
+    pub fn observe<'a>(&mut self, buffers: impl Into<ObservationBuffers<'a>>) -> Result<(), Error> {
+        let buffers = buffers.into();
         self.check_started()?;
-        view.check(self.lanes.len(), &self.config)?;
-        let beyond_cache = view.observations.is_beyond_cache();
-        let jobs = Jobs { lanes: &mut self.lanes, steps: None, view, beyond_cache };
+        buffers.check(self.lanes.len(), &self.config)?;
+        let beyond_cache = buffers.observations.is_beyond_cache();
+        let jobs = Jobs { lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
         jobs.run(&self.team, &|_, _, _| Ok(()))
     }
 
-    /// Observes the last episodes of some lanes at their ends, in the order given.
+    /// Writes the terminal observations of the last ended episodes of some lanes, in the given order.
     ///
     /// # Errors
-    /// For a lane that is not there or of which no episode ended yet, or for a buffer of the wrong length.
+    /// For a lane that does not exist or has no ended episode, or for a buffer of the wrong length.
     pub fn observe_ended(&self, lanes: &[usize], observations: Observations<'_>) -> Result<(), Error> {
         let no_end = |lane| Error::NotEnded { lane };
         let engine = |&lane| Ok(self.ended(lane)?.ok_or_else(|| no_end(lane))?.0);
@@ -221,35 +227,35 @@ impl Batch {
         }
     }
 
-    /// The environment of a lane.
+    /// Returns the environment of a lane.
     ///
     /// # Errors
-    /// If there is no such lane.
+    /// If the lane does not exist.
     pub fn lane(&self, lane: usize) -> Result<&Engine, Error> {
         self.check_lane(lane).map(|lane| &lane.engine)
     }
 
-    /// The number of a lane's present episode; none before the first reset.
+    /// Returns the number of a lane's current episode, or `None` before the first reset.
     ///
     /// # Errors
-    /// If there is no such lane.
+    /// If the lane does not exist.
     pub fn episode(&self, lane: usize) -> Result<Option<u64>, Error> {
         self.check_lane(lane).map(|lane| lane.episode)
     }
 
-    /// Whether an episode of a lane ended in the last step.
+    /// Returns whether an episode of a lane ended in the last step.
     ///
     /// # Errors
-    /// If there is no such lane.
+    /// If the lane does not exist.
     pub fn has_just_ended(&self, lane: usize) -> Result<bool, Error> {
         self.check_lane(lane).map(|lane| lane.has_just_ended)
     }
 
-    /// The last episode of a lane that ended: the environment at its end, for the terminal observation, and its
-    /// figures.
+    /// Returns the last ended episode of a lane: the environment at its end, for the terminal observation, and its
+    /// metrics.
     ///
     /// # Errors
-    /// If there is no such lane.
+    /// If the lane does not exist.
     ///
     /// Rule: metrics/finish, metrics/nothing, metrics/restart
     pub fn ended(&self, lane: usize) -> Result<Option<(&Engine, Metrics)>, Error> {
@@ -273,7 +279,7 @@ impl Batch {
         self.lanes.get(lane).ok_or_else(|| Error::config("lane", lane, expected()))
     }
 
-    /// Writes a buffer part by part, shared among the team.
+    /// Writes a buffer in parts, on the threads of the team.
     fn in_parts<T: Send>(
         &self,
         per_part: usize,
@@ -285,7 +291,7 @@ impl Batch {
     }
 }
 
-/// Does something to all lanes, shared among a team; the error is that of the first lane that has one.
+/// Calls a function for all lanes on the threads of a team. If several lanes fail, the error is that of the first.
 fn over_lanes<T: Send + Sync>(
     team: &Team,
     lanes: &mut [Lane],

@@ -1,4 +1,4 @@
-//! The next instance of each lane, made while the lane still plays.
+//! Preparation of the next instance of each lane while the lane still plays.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -8,15 +8,15 @@ use std::thread::JoinHandle;
 
 use pogema_core::{Error, Instance};
 
-/// Where the instances of a batch come from.
+/// A source of the instances of a batch.
 ///
-/// What it gives may depend on the lane and on the number of the episode, and on nothing else, so that a batch
-/// plays the same episodes on any number of threads. Any such function is one.
+/// An instance may depend only on the lane and on the number of the episode, so that a batch plays the same episodes on
+/// any number of threads. Functions of these two numbers implement this trait.
 pub trait Instances: Send + Sync {
-    /// The instance of an episode of a lane, both counted from 0.
+    /// Returns the instance of an episode of a lane, both counted from 0.
     ///
     /// # Errors
-    /// If there is none.
+    /// If the source has no such instance.
     fn instance(&self, lane: usize, episode: u64) -> Result<Instance, Error>;
 }
 
@@ -26,12 +26,12 @@ impl<F: Fn(usize, u64) -> Result<Instance, Error> + Send + Sync> Instances for F
     }
 }
 
-/// How far the next instance of a lane is.
+/// The progress of the next instance of a lane.
 enum Progress {
-    /// Nobody has begun it.
-    Wanted(u64),
-    /// The background thread is at it.
-    InWork,
+    /// The instance of this episode is requested, but no thread has started on it.
+    Requested(u64),
+    /// The background thread is generating the instance.
+    InProgress,
     Ready(Result<Instance, Error>),
     Taken,
 }
@@ -43,7 +43,7 @@ struct Slot {
 
 impl Slot {
     fn lock(&self) -> MutexGuard<'_, Progress> {
-        // A panic of the source is caught, so that no progress is ever half written.
+        // A panic of the source is caught, so a poisoned lock still holds a valid progress.
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -64,8 +64,8 @@ impl Shared {
 
     fn prepare(&self, lane: usize) {
         let mut progress = self.slots[lane].lock();
-        let Progress::Wanted(episode) = *progress else { return };
-        *progress = Progress::InWork;
+        let Progress::Requested(episode) = *progress else { return };
+        *progress = Progress::InProgress;
         drop(progress);
         let made = self.make(lane, episode);
         *self.slots[lane].lock() = Progress::Ready(made);
@@ -73,56 +73,59 @@ impl Shared {
     }
 }
 
-/// Makes instances ahead, on a thread of its own.
+/// A background thread that generates instances in advance.
 pub struct Preparer {
     shared: Arc<Shared>,
-    /// Lanes that want an instance; closed when the batch is dropped.
-    wanted: Option<Sender<usize>>,
+    /// The lanes with a requested instance. The channel closes when the batch is dropped.
+    requests: Option<Sender<usize>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Preparer {
-    /// Begins with the first episode of each lane.
+    /// Starts the thread, with the first episode of each lane requested.
     pub fn new(source: Box<dyn Instances>, num_lanes: usize) -> Result<Self, Error> {
-        let slot = |_| Slot { progress: Mutex::new(Progress::Wanted(0)), ready: Condvar::new() };
+        let slot = |_| Slot { progress: Mutex::new(Progress::Requested(0)), ready: Condvar::new() };
         let slots = (0..num_lanes).map(slot).collect();
         let shared = Arc::new(Shared { source, slots, is_over: AtomicBool::new(false) });
-        let (wanted, lanes) = channel();
+        let (requests, lanes) = channel();
         let thread = std::thread::Builder::new().name("pogema instances".into());
         let theirs = Arc::clone(&shared);
         let thread = thread
             .spawn(move || work(&theirs, &lanes))
             .map_err(|error| Error::external("thread that prepares instances", error))?;
-        Ok(Self { shared, wanted: Some(wanted), thread: Some(thread) })
+        Ok(Self { shared, requests: Some(requests), thread: Some(thread) })
     }
 
-    /// The next instance of a lane: at once if it is ready, else made here, or waited for if it is in work.
+    /// Takes the next instance of a lane.
+    ///
+    /// If it is in progress, this call waits for it. If the background thread has not started on it, this call
+    /// generates it.
     pub fn take(&self, lane: usize) -> Result<Instance, Error> {
         let slot = &self.shared.slots[lane];
         let mut progress = slot.lock();
         loop {
             match std::mem::replace(&mut *progress, Progress::Taken) {
                 Progress::Ready(made) => return made,
-                Progress::Wanted(episode) => {
+                Progress::Requested(episode) => {
                     drop(progress);
                     return self.shared.make(lane, episode);
                 }
-                Progress::InWork => {
-                    *progress = Progress::InWork;
+                Progress::InProgress => {
+                    *progress = Progress::InProgress;
                     progress = slot.ready.wait(progress).unwrap_or_else(PoisonError::into_inner);
                 }
-                // INVARIANT: a lane asks for its next instance before it takes it.
+                // INVARIANT: a lane requests its next instance before it takes it.
                 Progress::Taken => return Err(Error::external("batch", "no instance was requested")),
             }
         }
     }
 
-    /// Asks for the instance of an episode.
-    pub fn want(&self, lane: usize, episode: u64) {
-        *self.shared.slots[lane].lock() = Progress::Wanted(episode);
-        if let Some(wanted) = &self.wanted {
-            // Without the thread the lane makes its instance itself.
-            let _ = wanted.send(lane);
+    /// Requests the instance of an episode.
+    pub fn request(&self, lane: usize, episode: u64) {
+        *self.shared.slots[lane].lock() = Progress::Requested(episode);
+        if let Some(requests) = &self.requests {
+            // If the thread has ended, the lane generates its instance itself.
+            let _ = requests.send(lane);
         }
     }
 }
@@ -139,9 +142,9 @@ fn work(shared: &Shared, lanes: &Receiver<usize>) {
 impl Drop for Preparer {
     fn drop(&mut self) {
         self.shared.is_over.store(true, Relaxed);
-        self.wanted = None;
+        self.requests = None;
         if let Some(thread) = self.thread.take() {
-            // INVARIANT: the thread catches the panics of the source and has none of its own.
+            // INVARIANT: the thread catches panics of the source and does not panic otherwise.
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! Work shared between the calling thread and helpers.
+//! Work sharing between the calling thread and helper threads.
 
 use std::hint::spin_loop;
 use std::sync::atomic::{AtomicUsize, Ordering::Acquire, Ordering::Release};
@@ -7,22 +7,22 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use pogema_core::Error;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Looks at the others' progress before the caller goes to sleep: some tens of microseconds.
-const MOST_LOOKS: usize = 1000;
-/// Pauses that a helper needs to hand in what it did.
-const HANDING_IN: usize = 5;
+/// Number of spins before the caller sleeps while it waits for the helpers: some tens of microseconds.
+const MAX_SPINS: usize = 1000;
+/// Number of further spins, in which the helpers leave the scope.
+const FINAL_SPINS: usize = 5;
 
-/// The calling thread and the threads that help it.
+/// The calling thread and its helper threads.
 ///
-/// The caller works along, and at the end looks for the others awake for a while: to hand a step over to other
-/// threads, sleep, and be woken takes as long as the steps of some lanes.
+/// The caller works, too, and then spins for a while until the helpers are done. Handing a step to other threads,
+/// sleeping and waking up would take as long as the steps of some lanes.
 #[derive(Debug)]
 pub struct Team {
     helpers: Option<ThreadPool>,
 }
 
 impl Team {
-    /// A team of so many threads, the caller's among them.
+    /// Creates a team of `num_threads` threads, the calling thread included.
     ///
     /// # Errors
     /// If threads cannot be started.
@@ -33,15 +33,15 @@ impl Team {
         Ok(Self { helpers })
     }
 
-    /// Number of threads, the caller's among them.
+    /// Returns the number of threads, the calling thread included.
     pub fn num_threads(&self) -> usize {
         1 + self.helpers.as_ref().map_or(0, ThreadPool::current_num_threads)
     }
 
-    /// Does all parts of some work; what comes out is in the order of the parts.
+    /// Does all parts of some work and returns the results in the order of the parts.
     ///
-    /// Each thread begins where its share begins, so that it finds near it what it worked on the last time, and then
-    /// takes over what others have not begun.
+    /// Each thread begins at the start of its own share, whose data is in its cache from the last call. It then takes
+    /// parts that no other thread has begun.
     pub fn share<P: Send, T: Send + Sync>(&self, parts: Vec<P>, work: impl Fn(P) -> T + Sync) -> Vec<T> {
         let Some(helpers) = &self.helpers else { return parts.into_iter().map(work).collect() };
         let (num_parts, num_threads) = (parts.len(), self.num_threads());
@@ -51,37 +51,37 @@ impl Team {
             for part in (first..num_parts).chain(0..first) {
                 let taken = open[part].lock().unwrap_or_else(PoisonError::into_inner).take();
                 if let Some(taken) = taken {
-                    // INVARIANT: empty until now, since nobody else takes this part.
+                    // INVARIANT: empty until now, since no other thread takes this part.
                     let _ = done[part].set(work(taken));
                 }
             }
         };
-        let num_at_work = AtomicUsize::new(num_threads - 1);
+        let num_working = AtomicUsize::new(num_threads - 1);
         helpers.in_place_scope(|scope| {
-            let (work_from, num_at_work) = (&work_from, &num_at_work);
+            let (work_from, num_working) = (&work_from, &num_working);
             for helper in 1..num_threads {
                 scope.spawn(move |_| {
                     work_from(helper * num_parts / num_threads);
-                    num_at_work.fetch_sub(1, Release);
+                    num_working.fetch_sub(1, Release);
                 });
             }
             work_from(0);
-            look_until(|| num_at_work.load(Acquire) == 0);
+            spin_until(|| num_working.load(Acquire) == 0);
         });
-        // INVARIANT: the scope ends when all parts are done.
+        // INVARIANT: the scope ends after all parts are done.
         done.into_iter().filter_map(OnceLock::into_inner).collect()
     }
 }
 
-/// Looks again and again, for a while.
-fn look_until(is_done: impl Fn() -> bool) {
-    for _ in 0..MOST_LOOKS {
+/// Spins until the condition holds, but only for a limited time.
+fn spin_until(is_done: impl Fn() -> bool) {
+    for _ in 0..MAX_SPINS {
         if is_done() {
             break;
         }
         spin_loop();
     }
-    for _ in 0..HANDING_IN {
+    for _ in 0..FINAL_SPINS {
         spin_loop();
     }
 }
@@ -94,7 +94,7 @@ mod tests {
     use super::Team;
 
     #[test]
-    fn what_comes_out_is_in_order_and_done_once() {
+    fn results_are_in_order_and_each_part_is_done_once() {
         for num_threads in [1, 2, 3, 8] {
             let team = Team::new(num_threads).unwrap();
             assert_eq!(team.num_threads(), num_threads);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn all_threads_work_at_once_and_the_caller_is_one_of_them() {
+    fn all_threads_work_concurrently_and_the_caller_is_one_of_them() {
         let team = Team::new(3).unwrap();
         let all_here = Barrier::new(3);
         let mut threads = team.share(vec![(); 3], |()| {
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_caller_waits_for_whoever_takes_long() {
+    fn the_caller_waits_for_slow_helpers() {
         let team = Team::new(2).unwrap();
         let here = thread::current().id();
         let both_here = Barrier::new(2);

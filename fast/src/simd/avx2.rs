@@ -1,4 +1,4 @@
-//! Bits to values, 32 bytes at a time.
+//! Conversion of bits to values with AVX2, 32 bytes at a time.
 
 use std::arch::x86_64::{
     __m256i, _mm256_and_ps, _mm256_and_si256, _mm256_castsi256_ps, _mm256_cmpeq_epi8, _mm256_cmpeq_epi32,
@@ -18,8 +18,8 @@ pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32]) {
     let first = (lead + head.len()) / F32_PER_VECTOR;
     let num_vectors = body.len() / F32_PER_VECTOR;
     let (body, tail) = body.split_at_mut(num_vectors * F32_PER_VECTOR);
-    // SAFETY: the path is only taken where AVX2 is there (`SimdPath::check`); `body` holds `num_vectors` vectors, and
-    // `check_enough` has seen that `words` hold a bit for each value.
+    // SAFETY: this path is only used if the machine has AVX2 (`SimdPath::check`). `body` holds `num_vectors` vectors,
+    // and `check_enough` has checked that `words` hold a bit for each value.
     unsafe { spread_f32_vectors(words.as_ptr().cast::<u8>().add(first), num_vectors, body.as_mut_ptr()) };
     let (words, lead) = words_from(words, lead, head.len() + body.len());
     scalar::spread(words, lead, tail, table);
@@ -38,23 +38,25 @@ pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8]) {
     scalar::spread(words, lead, tail, table);
 }
 
-/// The values before the first whole vector of bits, and the rest.
+/// Splits a buffer into the values before the first whole vector of bits, and the rest.
 fn split<V>(lead: usize, out: &mut [V], per_vector: usize) -> (&mut [V], &mut [V]) {
     let num_before = lead.next_multiple_of(per_vector) - lead;
     out.split_at_mut(num_before.min(out.len()))
 }
 
-/// The words from the one on that holds the bit of value `index`, and which bit of it that is.
+/// Returns the words starting at the one with the bit of value `index`, and the position of that bit in it.
 fn words_from(words: &[u64], lead: usize, index: usize) -> (&[u64], usize) {
     let bit = lead + index;
     (&words[(bit / 64).min(words.len())..], bit % 64)
 }
 
+/// Converts `num_vectors` bytes of bits to vectors of `f32`.
+///
 /// # Safety
-/// AVX2; `bytes` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `bytes` and `out` hold `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32) {
-    // Four bytes at a time, since fetching them is the most of it.
+    // Four bytes at a time, since loading them takes most of the time.
     const TOGETHER: usize = 4;
     let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
     let bits =
@@ -78,21 +80,23 @@ unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32
     }
 }
 
-/// Stores 1 where the bit is set, else 0.
+/// Stores 1 for each set bit, and 0 for each unset bit.
 ///
 /// # Safety
-/// AVX2; `out` holds a vector.
+/// The machine has AVX2; `out` holds a vector.
 #[target_feature(enable = "avx2")]
 #[inline]
 unsafe fn store_f32_vector(word: __m256i, bits: __m256i, out: *mut f32) {
     let is_set = _mm256_cmpeq_epi32(_mm256_and_si256(word, bits), bits);
     let values = _mm256_and_ps(_mm256_castsi256_ps(is_set), _mm256_set1_ps(1.0));
-    // SAFETY: the caller says that there is room.
+    // SAFETY: the caller guarantees that `out` holds a vector.
     unsafe { _mm256_storeu_ps(out, values) };
 }
 
+/// Converts `num_vectors` words of bits to vectors of `u8`.
+///
 /// # Safety
-/// AVX2; `words` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `words` and `out` hold `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_u8_vectors(words: *const u32, num_vectors: usize, out: *mut u8) {
     let bits = _mm256_set1_epi64x(0x8040_2010_0804_0201_u64 as i64);
@@ -108,7 +112,7 @@ unsafe fn spread_u8_vectors(words: *const u32, num_vectors: usize, out: *mut u8)
     }
 }
 
-/// Which byte of four holds the bit of each of 32 values.
+/// Returns for each of 32 values which of four bytes holds its bit.
 #[target_feature(enable = "avx2")]
 fn byte_of_each() -> __m256i {
     _mm256_setr_epi8(

@@ -1,4 +1,4 @@
-//! Windows of up to 11 x 11, cut out of the strips four rows at a time.
+//! Extraction of windows of up to 11 x 11 from the strips with AVX2, four rows at a time.
 
 use std::arch::x86_64::{
     __m256i, _mm_cvtsi32_si128, _mm_cvtsi128_si64, _mm_extract_epi64, _mm_or_si128, _mm256_and_si256,
@@ -10,29 +10,29 @@ use std::ops::Range;
 use std::sync::atomic::AtomicU64;
 
 use super::WindowSource;
-use super::sights::{GROUP, Sights};
+use super::positions::{GROUP, WindowPositions};
 use crate::bits::BitWriter;
 use crate::grid::MOST_ROWS;
 
-/// Rows of a vector.
+/// Number of rows in a vector.
 const LANES: usize = 4;
 
-/// Writes all three channels of some agents, or says that the windows are too large for this.
+/// Writes all three channels of some agents, or returns false if the windows are too large for this path.
 pub fn pack(
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     lead: usize,
     apart: bool,
     words: &mut [u64],
 ) -> bool {
-    // SAFETY: the path is only taken where its features are there (`SimdPath::check`).
+    // SAFETY: this path is only used if the machine has its features (`SimdPath::check`).
     unsafe {
-        match scene.radius {
-            1 => pack_side::<3>(scene, agents, lead, apart, words),
-            2 => pack_side::<5>(scene, agents, lead, apart, words),
-            3 => pack_side::<7>(scene, agents, lead, apart, words),
-            4 => pack_side::<9>(scene, agents, lead, apart, words),
-            5 => pack_side::<11>(scene, agents, lead, apart, words),
+        match source.radius {
+            1 => pack_side::<3>(source, agents, lead, apart, words),
+            2 => pack_side::<5>(source, agents, lead, apart, words),
+            3 => pack_side::<7>(source, agents, lead, apart, words),
+            4 => pack_side::<9>(source, agents, lead, apart, words),
+            5 => pack_side::<11>(source, agents, lead, apart, words),
             _ => return false,
         }
     }
@@ -41,7 +41,7 @@ pub fn pack(
 
 #[target_feature(enable = "avx2")]
 fn pack_side<const SIDE: usize>(
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     lead: usize,
     apart: bool,
@@ -51,18 +51,18 @@ fn pack_side<const SIDE: usize>(
     let mut writer = BitWriter::new(words, lead);
     for begin in agents.clone().step_by(GROUP) {
         let end = agents.end.min(begin + GROUP);
-        let sights = Sights::of::<SIDE>(scene, begin..end);
+        let positions = WindowPositions::of::<SIDE>(source, begin..end);
         for index in 0..end - begin {
-            let first = sights.first[index] as usize;
-            for strips in [scene.obstacles, scene.occupied] {
+            let first = positions.first[index] as usize;
+            for strips in [source.obstacles, source.occupied] {
                 let rows = &strips.words()[first..first + MOST_ROWS];
-                let [low, high] = window::<SIDE>(rows, sights.shift[index]);
+                let [low, high] = window::<SIDE>(rows, positions.shift[index]);
                 writer.push(low, num_cells.min(64) as u32);
                 if num_cells > 64 {
                     writer.push(high, num_cells as u32 - 64);
                 }
             }
-            writer.push_one_of(sights.goal[index] as usize - 2 * num_cells, num_cells);
+            writer.push_one_of(positions.goal[index] as usize - 2 * num_cells, num_cells);
             if apart {
                 writer.end_word();
             }
@@ -71,7 +71,7 @@ fn pack_side<const SIDE: usize>(
     writer.end_word();
 }
 
-/// The cells of a window, row after row.
+/// Returns the cells of a window, row after row.
 #[target_feature(enable = "avx2")]
 #[inline]
 fn window<const SIDE: usize>(rows: &[AtomicU64], shift: u32) -> [u64; 2] {
@@ -79,7 +79,7 @@ fn window<const SIDE: usize>(rows: &[AtomicU64], shift: u32) -> [u64; 2] {
     let shift = _mm_cvtsi32_si128(shift as i32);
     let (mut low, mut high) = (_mm256_setzero_si256(), _mm256_setzero_si256());
     for (rows, places) in rows.as_chunks::<LANES>().0.iter().zip(&layout.places[..SIDE.div_ceil(LANES)]) {
-        // SAFETY: there are as many rows as a vector takes. No thread writes them, since a step borrows the engine
+        // SAFETY: `rows` holds as many words as a vector. No thread writes them, since a step borrows the engine
         // mutably.
         let rows = unsafe { _mm256_loadu_si256(rows.as_ptr().cast()) };
         let rows = _mm256_and_si256(_mm256_srl_epi64(rows, shift), vector(&places.mask));
@@ -100,30 +100,30 @@ fn vector(lanes: &[u64; LANES]) -> __m256i {
     unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) }
 }
 
-/// Where the bits of each row of a window go; everything follows from its side.
+/// The target positions of the bits of each row of a window, which depend only on its side.
 struct Layout {
     places: [Places; MOST_ROWS / LANES],
 }
 
-/// Where the bits of four rows go.
+/// The target positions of the bits of four rows.
 #[derive(Clone, Copy)]
 struct Places {
-    /// The bits of a row, where there is one.
+    /// A mask of the bits of a row; 0 beyond the last row.
     mask: [u64; LANES],
-    /// How far up in the first word.
+    /// Left shift in the first word.
     low: [u64; LANES],
-    /// How far up in the second word.
+    /// Left shift in the second word.
     high: [u64; LANES],
-    /// How far down in the second word, where a row begins in the first.
+    /// Right shift in the second word, for a row that begins in the first word.
     over: [u64; LANES],
 }
 
 impl Layout {
     const fn of(side: usize) -> Self {
-        // A shift by 64 leaves nothing.
+        // A shift by 64 clears all bits.
         let none = Places { mask: [0; LANES], low: [64; LANES], high: [64; LANES], over: [64; LANES] };
         let mut places = [none; MOST_ROWS / LANES];
-        // A plain loop, since a constant knows no iterators.
+        // A plain loop, since constant functions cannot use iterators.
         let mut row = 0;
         while row < side {
             let (places, lane) = (&mut places[row / LANES], row % LANES);

@@ -1,4 +1,4 @@
-//! Bits to values, a line of memory at a time.
+//! Conversion of bits to values with AVX-512, one cache line at a time.
 
 use std::arch::x86_64::{
     _mm_sfence, _mm512_mask_storeu_epi8, _mm512_mask_storeu_ps, _mm512_maskz_mov_epi8, _mm512_maskz_mov_ps,
@@ -13,8 +13,8 @@ const F32_PER_LINE: usize = per_line::<f32>();
 const U8_PER_LINE: usize = per_line::<u8>();
 
 pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: bool) {
-    // SAFETY: the path is only taken where AVX-512 is there (`SimdPath::check`), and `check_enough` has seen that
-    // `words` hold a bit for each value.
+    // SAFETY: this path is only used if the machine has AVX-512 (`SimdPath::check`), and `check_enough` has checked
+    // that `words` hold a bit for each value.
     unsafe {
         if beyond_cache {
             spread_f32_lines::<true>(words, lead, out);
@@ -35,22 +35,24 @@ pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool)
     }
 }
 
+/// Converts bits to values of `f32`, one cache line at a time.
+///
 /// # Safety
-/// `words` hold `lead` bits and one for each value.
+/// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
 unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [f32]) {
     let one = _mm512_set1_ps(1.0);
     let masks = words.as_ptr().cast::<u16>();
     let lines = Lines::of(out, lead);
     for (line, inside) in lines.cut {
-        // SAFETY: the line holds values of `out`, and the mask leaves out what lies before or after it.
+        // SAFETY: the line holds values of `out`, and the mask excludes everything before and after `out`.
         unsafe {
             let values = _mm512_maskz_mov_ps(*masks.add(line), one);
             _mm512_mask_storeu_ps(lines.start.wrapping_add(line * F32_PER_LINE), inside as u16, values);
         }
     }
     for line in lines.whole {
-        // SAFETY: the whole line lies in `out` and, as `Lines` says, at its place in memory.
+        // SAFETY: the whole line lies in `out`, and `Lines` guarantees that it is aligned.
         unsafe {
             let values = _mm512_maskz_mov_ps(*masks.add(line), one);
             let place = lines.start.wrapping_add(line * F32_PER_LINE);
@@ -62,22 +64,24 @@ unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize,
     }
 }
 
+/// Converts bits to values of `u8`, one cache line at a time.
+///
 /// # Safety
-/// `words` hold `lead` bits and one for each value.
+/// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
 unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [u8]) {
     let one = _mm512_set1_epi8(1);
     let masks = words.as_ptr();
     let lines = Lines::of(out, lead);
     for (line, inside) in lines.cut {
-        // SAFETY: the line holds values of `out`, and the mask leaves out what lies before or after it.
+        // SAFETY: the line holds values of `out`, and the mask excludes everything before and after `out`.
         unsafe {
             let values = _mm512_maskz_mov_epi8(*masks.add(line), one);
             _mm512_mask_storeu_epi8(lines.start.wrapping_add(line * U8_PER_LINE).cast(), inside, values);
         }
     }
     for line in lines.whole {
-        // SAFETY: the whole line lies in `out` and, as `Lines` says, at its place in memory.
+        // SAFETY: the whole line lies in `out`, and `Lines` guarantees that it is aligned.
         unsafe {
             let values = _mm512_maskz_mov_epi8(*masks.add(line), one);
             let place = lines.start.wrapping_add(line * U8_PER_LINE).cast();
@@ -89,22 +93,25 @@ unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, 
     }
 }
 
-/// The lines of memory that a buffer lies in.
+/// The cache lines of a buffer.
 struct Lines<V> {
-    /// Where the line begins that holds bit 0; it may lie before the buffer.
+    /// The start of the line that holds bit 0; it may lie before the buffer.
     start: *mut V,
-    /// The lines that the buffer fills.
+    /// The lines that the buffer fills completely.
     whole: Range<usize>,
     /// The first and the last line, with a mask of the values that lie in the buffer.
     cut: [(usize, u64); 2],
 }
 
 impl<V> Lines<V> {
-    /// The lines of a buffer whose first value is at bit `lead`.
+    /// Returns the lines of a buffer whose first value is at bit `lead`.
     fn of(out: &mut [V], lead: usize) -> Self {
         let per_line = per_line::<V>();
         let (start, end) = (out.as_mut_ptr().wrapping_sub(lead), lead + out.len());
-        assert!(start.addr().is_multiple_of(64) && !out.is_empty(), "the lead leads to no line of memory");
+        assert!(
+            start.addr().is_multiple_of(64) && !out.is_empty(),
+            "the buffer is empty, or the lead does not align it"
+        );
         let (first, last) = (lead / per_line, (end - 1) / per_line);
         let inside = |line: usize| {
             let begin = lead.saturating_sub(line * per_line);

@@ -1,16 +1,17 @@
-//! Where the bits of a window of up to 11 x 11 go.
+//! The target positions of the bits of windows of up to 11 x 11.
 
-/// Words of a vector.
+/// Number of words in a vector.
 pub const LANES: usize = 8;
 
-/// Everything about it that follows from its side.
+/// The layout of a window, which depends only on its side.
 pub struct Layout {
-    /// Which 16 bits of two vectors of rows are wanted where.
+    /// The source of each 16 bits in the two vectors with the first eight rows.
     pub first_rows: [u16; 4 * LANES],
+    /// The source of each 16 bits when the rows after the eighth are added.
     pub last_rows: [u16; 4 * LANES],
-    /// The bits of a row, where there is one.
-    pub is_wanted: [u16; 4 * LANES],
-    /// Puts the second row of a pair after the first.
+    /// A mask of the bits of each row; 0 beyond the last row.
+    pub row_mask: [u16; 4 * LANES],
+    /// The factors that shift the second row of a pair after the first.
     pub pair: [u16; 4 * LANES],
     pub terms: [Term; 4],
     pub num_terms: usize,
@@ -19,11 +20,11 @@ pub struct Layout {
 /// One part of each word of a record.
 #[derive(Clone, Copy)]
 pub struct Term {
-    /// Where the part comes from.
+    /// The source lane of the part.
     pub lane: [u64; LANES],
-    /// How far it is turned to the left.
-    pub turn: [u64; LANES],
-    /// Which of its bits are wanted.
+    /// The left rotation of the part.
+    pub rotation: [u64; LANES],
+    /// A mask of the bits that belong to the word.
     pub mask: [u64; LANES],
 }
 
@@ -32,16 +33,16 @@ impl Layout {
     const PARTS: [(usize, usize); 6] = [(0, 0), (0, 4), (1, 0), (1, 4), (0, 8), (1, 8)];
 
     pub const fn of(side: usize) -> Self {
-        let none = Term { lane: [0; LANES], turn: [0; LANES], mask: [0; LANES] };
+        let none = Term { lane: [0; LANES], rotation: [0; LANES], mask: [0; LANES] };
         let mut layout = Self {
             first_rows: [0; 4 * LANES],
             last_rows: [0; 4 * LANES],
-            is_wanted: [0; 4 * LANES],
+            row_mask: [0; 4 * LANES],
             pair: [0; 4 * LANES],
             terms: [none; 4],
             num_terms: 0,
         };
-        // Plain loops, since a constant knows no iterators.
+        // Plain loops, since constant functions cannot use iterators.
         let mut word = 0;
         while word < 4 * LANES {
             layout.place_row(side, word);
@@ -58,14 +59,14 @@ impl Layout {
     const fn place_row(&mut self, side: usize, word: usize) {
         const OTHER: u16 = 32;
         let (row, lane) = (word as u16 % 8, word as u16 / 4);
-        // Row after row of the obstacles, then of the agents; a row is in the lowest 16 bits of its lane.
+        // First the rows of the obstacles, then those of the agents. A row is in the lowest 16 bits of its lane.
         self.first_rows[word] = if word < 8 { 4 * row } else { OTHER | (4 * row) };
         self.last_rows[word] = if word < 16 { word as u16 } else { OTHER | (4 * (word as u16 - 16) % 32) };
         self.pair[word] = if word.is_multiple_of(2) { 1 } else { 1 << side };
         if (lane as usize) < Self::PARTS.len() {
             let (_, first) = Self::PARTS[lane as usize];
             let is_row = first + word % 4 < side;
-            self.is_wanted[word] = if is_row { (1 << side) - 1 } else { 0 };
+            self.row_mask[word] = if is_row { (1 << side) - 1 } else { 0 };
         }
     }
 
@@ -78,7 +79,7 @@ impl Layout {
             let (low, high) = (max(begin, 64 * word), min(begin + num_rows * side, 64 * word + 64));
             if low < high {
                 self.terms[term].lane[word] = part as u64;
-                self.terms[term].turn[word] = ((begin + 64 * LANES - 64 * word) % 64) as u64;
+                self.terms[term].rotation[word] = ((begin + 64 * LANES - 64 * word) % 64) as u64;
                 self.terms[term].mask[word] = (u64::MAX >> (64 - (high - low))) << (low - 64 * word);
                 term += 1;
             }

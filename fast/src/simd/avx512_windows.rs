@@ -1,8 +1,8 @@
-//! Windows of up to 11 x 11, cut out of the strips.
+//! Extraction of windows of up to 11 x 11 from the strips with AVX-512.
 //!
-//! All of it happens in vectors. Rows of a window are brought to 16 bits each, then pairs and fours of them are pushed
-//! together, and what is left, up to six parts, is put where it belongs in the words of the agent. The whole record is
-//! then shifted to the bit where the one before ended.
+//! All work happens in vectors. The rows of a window are reduced to 16 bits each, then joined to pairs and to groups of
+//! four. The result, up to six parts, is moved to its position in the words of the agent (the record). The whole record
+//! is then shifted to the bit where the previous record ends.
 
 use std::arch::x86_64::{
     __m512i, _mm_cvtsi32_si128, _mm_cvtsi64_si128, _mm256_loadu_si256, _mm512_and_si512,
@@ -16,41 +16,41 @@ use std::ops::Range;
 use std::sync::atomic::AtomicU64;
 
 use super::avx512_layout::{LANES, Layout};
-use super::sights::{GROUP, Sights};
+use super::positions::{GROUP, WindowPositions};
 use super::{MOST_WORDS, WindowSource};
 use crate::grid::MOST_ROWS;
 
-/// Writes all three channels of some agents, or says that the windows are too large for this.
+/// Writes all three channels of some agents, or returns false if the windows are too large for this path.
 pub fn pack(
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     lead: usize,
     apart: bool,
     words: &mut [u64],
 ) -> bool {
-    // SAFETY: the path is only taken where its features are there (`SimdPath::check`).
+    // SAFETY: this path is only used if the machine has its features (`SimdPath::check`).
     unsafe {
-        match (scene.radius, apart) {
-            (1, false) => pack_on::<3>(scene, agents, lead, words),
-            (2, false) => pack_on::<5>(scene, agents, lead, words),
-            (3, false) => pack_on::<7>(scene, agents, lead, words),
-            (4, false) => pack_on::<9>(scene, agents, lead, words),
-            (5, false) => pack_on::<11>(scene, agents, lead, words),
-            (1, true) => pack_apart::<3, 1>(scene, agents, words),
-            (2, true) => pack_apart::<5, 2>(scene, agents, words),
-            (3, true) => pack_apart::<7, 3>(scene, agents, words),
-            (4, true) => pack_apart::<9, 4>(scene, agents, words),
-            (5, true) => pack_apart::<11, 6>(scene, agents, words),
+        match (source.radius, apart) {
+            (1, false) => pack_contiguous::<3>(source, agents, lead, words),
+            (2, false) => pack_contiguous::<5>(source, agents, lead, words),
+            (3, false) => pack_contiguous::<7>(source, agents, lead, words),
+            (4, false) => pack_contiguous::<9>(source, agents, lead, words),
+            (5, false) => pack_contiguous::<11>(source, agents, lead, words),
+            (1, true) => pack_apart::<3, 1>(source, agents, words),
+            (2, true) => pack_apart::<5, 2>(source, agents, words),
+            (3, true) => pack_apart::<7, 3>(source, agents, words),
+            (4, true) => pack_apart::<9, 4>(source, agents, words),
+            (5, true) => pack_apart::<11, 6>(source, agents, words),
             _ => return false,
         }
     }
     true
 }
 
-/// Each agent's bits right after those of the agent before.
+/// Writes each agent's bits directly after those of the previous agent.
 #[target_feature(enable = "avx512f,avx512bw")]
-fn pack_on<const SIDE: usize>(
-    scene: &WindowSource<'_>,
+fn pack_contiguous<const SIDE: usize>(
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     lead: usize,
     words: &mut [u64],
@@ -59,15 +59,15 @@ fn pack_on<const SIDE: usize>(
     words[bit / 64] = 0;
     for begin in agents.clone().step_by(GROUP) {
         let end = agents.end.min(begin + GROUP);
-        let sights = Sights::of::<SIDE>(scene, begin..end);
+        let positions = WindowPositions::of::<SIDE>(source, begin..end);
         let first_bit = bit;
-        // The word in which the agent before ended.
+        // The word in which the bits of the previous agent end.
         let mut carry = _mm512_zextsi128_si512(_mm_cvtsi64_si128(words[bit / 64] as i64));
         for index in 0..end - begin {
-            let record = record::<SIDE, false>(scene, &sights, index);
+            let record = record::<SIDE, false>(source, &positions, index);
             let (first, shift) = (bit / 64, bit % 64);
             let left = _mm512_sll_epi64(record, _mm_cvtsi32_si128(shift as i32));
-            // Bits that a shift pushes out of a word go on in the next one.
+            // Bits that are shifted out of a word continue in the next word.
             let below = _mm512_maskz_alignr_epi64::<7>(0xfe, record, record);
             let right = _mm512_srl_epi64(below, _mm_cvtsi32_si128(64 - shift as i32));
             let shifted = _mm512_ternarylogic_epi64::<OR>(left, right, carry);
@@ -78,29 +78,30 @@ fn pack_on<const SIDE: usize>(
             let last = _mm512_set1_epi64((bit / 64 - first) as i64);
             carry = _mm512_maskz_permutexvar_epi64(1, last, shifted);
         }
-        for (goal, record) in sights.goal[..end - begin].iter().zip((first_bit..).step_by(3 * SIDE * SIDE)) {
+        for (goal, record) in positions.goal[..end - begin].iter().zip((first_bit..).step_by(3 * SIDE * SIDE))
+        {
             let goal = record + *goal as usize;
             words[goal / 64] |= 1 << (goal % 64);
         }
     }
 }
 
-/// Each agent's bits in words of its own.
+/// Writes each agent's bits into separate words.
 #[target_feature(enable = "avx512f,avx512bw")]
 fn pack_apart<const SIDE: usize, const WORDS: usize>(
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     words: &mut [u64],
 ) {
     let outs = words.as_chunks_mut::<WORDS>().0.chunks_mut(GROUP);
     for (begin, outs) in agents.clone().step_by(GROUP).zip(outs) {
-        let sights = Sights::of::<SIDE>(scene, begin..agents.end.min(begin + GROUP));
+        let positions = WindowPositions::of::<SIDE>(source, begin..agents.end.min(begin + GROUP));
         for (index, out) in outs.iter_mut().enumerate() {
-            let record = record::<SIDE, true>(scene, &sights, index);
-            // SAFETY: the mask leaves out what lies after `out`.
+            let record = record::<SIDE, true>(source, &positions, index);
+            // SAFETY: the mask excludes everything after `out`.
             unsafe { _mm512_mask_storeu_epi64(out.as_mut_ptr().cast(), (1 << WORDS) - 1, record) };
         }
-        for (goal, out) in sights.goal.iter().zip(outs) {
+        for (goal, out) in positions.goal.iter().zip(outs) {
             let goal = *goal as usize;
             out[goal / 64] |= 1 << (goal % 64);
         }
@@ -114,37 +115,39 @@ const OR_AND: i32 = 0xf8;
 /// `a ? b : c`, bit by bit.
 const CHOOSE: i32 = 0xca;
 
-/// All bits of an agent. `APART` only makes each caller's copy its own, so that it is put in place there.
+/// Returns all bits of an agent. `APART` only gives each caller a separate copy, so that the copy is inlined.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
 fn record<const SIDE: usize, const APART: bool>(
-    scene: &WindowSource<'_>,
-    sights: &Sights,
+    source: &WindowSource<'_>,
+    positions: &WindowPositions,
     index: usize,
 ) -> __m512i {
-    let first = sights.first[index] as usize;
-    let obstacles = &scene.obstacles.words()[first..first + MOST_ROWS];
-    let occupied = &scene.occupied.words()[first..first + MOST_ROWS];
-    let parts = parts::<SIDE>(obstacles, occupied, sights.shift[index]);
+    let first = positions.first[index] as usize;
+    let obstacles = &source.obstacles.words()[first..first + MOST_ROWS];
+    let occupied = &source.occupied.words()[first..first + MOST_ROWS];
+    let parts = parts::<SIDE>(obstacles, occupied, positions.shift[index]);
     let mut record = _mm512_setzero_si512();
     let layout = const { &Layout::of(SIDE) };
     for term in &layout.terms[..layout.num_terms] {
         let moved =
-            _mm512_rolv_epi64(_mm512_permutexvar_epi64(vector(&term.lane), parts), vector(&term.turn));
+            _mm512_rolv_epi64(_mm512_permutexvar_epi64(vector(&term.lane), parts), vector(&term.rotation));
         record = _mm512_ternarylogic_epi64::<OR_AND>(record, moved, vector(&term.mask));
     }
     record
 }
 
-/// The rows of both windows by fours: lane by lane rows 0 to 3 and 4 to 7 of the obstacles, the same of the agents, then
-/// the last rows of the obstacles and of the agents. Above their bits lanes hold anything.
+/// Returns the rows of both windows in groups of four.
+///
+/// The lanes hold rows 0 to 3 and 4 to 7 of the obstacles, the same rows of the agents, then the last rows of the
+/// obstacles and of the agents. The upper bits of a lane are arbitrary.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
 fn parts<const SIDE: usize>(obstacles: &[AtomicU64], occupied: &[AtomicU64], shift: u32) -> __m512i {
     let shift = _mm_cvtsi32_si128(shift as i32);
     let (obstacles, occupied) = (obstacles.as_ptr().cast::<i64>(), occupied.as_ptr().cast::<i64>());
-    // SAFETY: the caller has cut out MOST_ROWS words, a vector and a half. No thread writes them, since a step borrows
-    // the engine mutably.
+    // SAFETY: the caller passes MOST_ROWS words, a vector and a half. No thread writes them, since a step borrows the
+    // engine mutably.
     let (first, second) = unsafe { (_mm512_loadu_epi64(obstacles), _mm512_loadu_epi64(occupied)) };
     let (first, second) = (_mm512_srl_epi64(first, shift), _mm512_srl_epi64(second, shift));
     let layout = const { &Layout::of(SIDE) };
@@ -158,7 +161,7 @@ fn parts<const SIDE: usize>(obstacles: &[AtomicU64], occupied: &[AtomicU64], shi
         let last = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(first), second);
         rows = _mm512_permutex2var_epi16(rows, words(&layout.last_rows), _mm512_srl_epi64(last, shift));
     }
-    let rows = _mm512_and_si512(rows, words(&layout.is_wanted));
+    let rows = _mm512_and_si512(rows, words(&layout.row_mask));
     let pairs = _mm512_madd_epi16(rows, words(&layout.pair));
     let upper = _mm512_srl_epi64(pairs, _mm_cvtsi32_si128(32 - 2 * SIDE as i32));
     let is_upper = ((1u64 << (2 * SIDE)) - 1) << (2 * SIDE);

@@ -1,6 +1,6 @@
-//! The one place for machine code: windows cut out of the strips, and bits spread to values.
+//! All code with intrinsics: extraction of windows from the strips, and conversion of bits to values.
 //!
-//! Every path does what `scalar` does, bit for bit; the tests run all that the machine has.
+//! Every path has the same results as `scalar`, bit for bit. The tests run all paths that the machine supports.
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "256-bit intrinsics")]
@@ -16,9 +16,9 @@ mod avx512_layout;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512_windows;
-mod scalar;
 #[cfg(target_arch = "x86_64")]
-mod sights;
+mod positions;
+mod scalar;
 
 use std::fmt;
 use std::ops::Range;
@@ -27,10 +27,10 @@ use pogema_core::{Cell, Error};
 
 use crate::grid::Strips;
 
-/// How observations are computed. What comes out is the same.
+/// The instruction set that computes observations. The results are the same for all paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdPath {
-    /// No intrinsics; on every machine.
+    /// No intrinsics; available on every machine.
     Scalar,
     /// AVX2.
     Avx2,
@@ -39,13 +39,13 @@ pub enum SimdPath {
 }
 
 impl SimdPath {
-    /// All paths, the plainest first.
+    /// All paths, from the narrowest vectors to the widest.
     pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
 
     /// The environment variable that forces a path.
     pub const VARIABLE: &'static str = "POGEMA_SIMD";
 
-    /// Whether this machine has it.
+    /// Returns whether this machine supports the path.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
@@ -58,15 +58,15 @@ impl SimdPath {
         }
     }
 
-    /// The widest path that this machine has.
+    /// Returns the widest path that this machine supports.
     pub fn best() -> Self {
         Self::ALL.into_iter().rev().find(|path| path.is_available()).unwrap_or(Self::Scalar)
     }
 
-    /// The path that the variable `POGEMA_SIMD` names, else the widest.
+    /// Returns the path named by the variable `POGEMA_SIMD` [default: the widest path of this machine].
     ///
     /// # Errors
-    /// [`Error::Config`] if the variable holds anything but the name of a path that this machine has.
+    /// [`Error::Config`] if the variable is set, but not to the name of a path that this machine supports.
     pub fn from_environment() -> Result<Self, Error> {
         let Some(value) = std::env::var_os(Self::VARIABLE) else { return Ok(Self::best()) };
         let name = value.to_string_lossy();
@@ -94,14 +94,14 @@ impl fmt::Display for SimdPath {
     }
 }
 
-/// Which channels of a window are wanted.
+/// The requested channels of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Channels {
     /// Obstacles, agents, goal.
     All,
-    /// Obstacles alone.
+    /// Only obstacles.
     Obstacles,
-    /// Agents alone.
+    /// Only agents.
     Agents,
 }
 
@@ -111,7 +111,7 @@ impl Channels {
     }
 }
 
-/// What agents look at.
+/// The grids, cells and goals from which windows are extracted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WindowSource<'a> {
     pub obstacles: &'a Strips,
@@ -126,14 +126,14 @@ impl WindowSource<'_> {
         2 * self.radius + 1
     }
 
-    /// The index of the goal, or of the rim towards it, within a window of a side.
+    /// Returns the index of the goal in a window with a given side. A goal outside the window is clamped to its rim.
     ///
     /// Rule: observe/default/goal
     #[allow(clippy::inline_always, reason = "so that each path compiles it with its own features")]
     #[inline(always)]
     pub fn goal_index(cell: Cell, goal: Cell, side: usize) -> usize {
         let radius = side as u16 / 2;
-        // Without a sign, since places differ by more than one of 16 bits can say.
+        // Unsigned arithmetic, since differences of cells can exceed a signed number of 16 bits.
         let toward = |cell: u16, goal: u16| {
             radius + goal.saturating_sub(cell).min(radius) - cell.saturating_sub(goal).min(radius)
         };
@@ -141,7 +141,7 @@ impl WindowSource<'_> {
     }
 }
 
-/// A type that observations are made of.
+/// An element type of observations.
 pub trait Value: Copy + Send + Sync + Default + PartialEq + fmt::Debug + sealed::Spread {}
 
 impl Value for f32 {}
@@ -151,8 +151,10 @@ pub(crate) mod sealed {
     use super::SimdPath;
 
     pub trait Spread: Sized {
-        /// Makes a value of each bit, but not of the first `lead`, fewer than 64, of which the caller says that
-        /// they bring `out` to a line of memory. `beyond_cache` if the values will not be read soon.
+        /// Converts each bit to a value, but skips the first `lead` bits.
+        ///
+        /// `lead` is below 64, and the caller chooses it so that `out` begins `lead` values after a cache line begins.
+        /// `beyond_cache` states that the values will not be read soon.
         fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool);
     }
 }
@@ -167,7 +169,9 @@ impl sealed::Spread for f32 {
             #[cfg(target_arch = "x86_64")]
             SimdPath::Avx512 => avx512::spread_f32(words, lead, out, beyond_cache),
             #[cfg(not(target_arch = "x86_64"))]
-            SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("a path is checked when an engine is made"),
+            SimdPath::Avx2 | SimdPath::Avx512 => {
+                unreachable!("the path is checked when an engine is created")
+            }
         }
     }
 }
@@ -182,7 +186,9 @@ impl sealed::Spread for u8 {
             #[cfg(target_arch = "x86_64")]
             SimdPath::Avx512 => avx512::spread_u8(words, lead, out, beyond_cache),
             #[cfg(not(target_arch = "x86_64"))]
-            SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("a path is checked when an engine is made"),
+            SimdPath::Avx2 | SimdPath::Avx512 => {
+                unreachable!("the path is checked when an engine is created")
+            }
         }
     }
 }
@@ -191,45 +197,45 @@ fn check_enough(words: &[u64], num_bits: usize) {
     assert!(num_bits <= 64 * words.len(), "{num_bits} bits do not fit {} words", words.len());
 }
 
-/// Asks for a value that will be needed soon.
+/// Prefetches a value that will be needed soon.
 #[inline]
 #[allow(unsafe_code, reason = "a hint to the processor")]
 pub(crate) fn fetch<T>(what: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: a hint changes nothing, and every x86-64 has it.
+        // SAFETY: a prefetch has no effect on memory, and every x86-64 processor supports it.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(what).cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = what;
 }
 
-/// Asks for a whole list.
+/// Prefetches a whole list.
 pub(crate) fn fetch_all<T>(list: &[T]) {
     list.chunks(per_line::<T>()).for_each(|line| fetch(&line[0]));
 }
 
-/// Values of a type from one line of memory to the next.
+/// Returns the number of values of a type in a cache line.
 pub(crate) const fn per_line<V>() -> usize {
     64 / size_of::<V>()
 }
 
-/// How many values `out` begins after a line of memory.
+/// Returns how many values after the start of a cache line `out` begins.
 pub(crate) fn lead_of<V>(out: &[V]) -> usize {
     out.as_ptr().addr() / size_of::<V>() % per_line::<V>()
 }
 
-/// Words that a path may write from the one on in which an agent's bits begin.
+/// Number of words that a path may write for an agent, from the word in which the agent's bits begin.
 pub(crate) const MOST_WORDS: usize = 8;
 
-/// Writes the windows of some agents as bits, one after the other from bit `lead` on; if `apart`, each agent's
+/// Writes the windows of some agents as bits, one after another from bit `lead` on. If `apart`, the bits of each agent
 /// begin a new word.
 ///
 /// Rule: observe/default, observe/default/window, observe/default/agents, observe/default/inactive
 pub(crate) fn pack(
     path: SimdPath,
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     channels: Channels,
     (lead, apart): (usize, bool),
@@ -239,13 +245,13 @@ pub(crate) fn pack(
     if channels == Channels::All {
         let is_done = match path {
             SimdPath::Scalar => false,
-            SimdPath::Avx2 => avx2_windows::pack(scene, agents.clone(), lead, apart, words),
-            SimdPath::Avx512 => avx512_windows::pack(scene, agents.clone(), lead, apart, words),
+            SimdPath::Avx2 => avx2_windows::pack(source, agents.clone(), lead, apart, words),
+            SimdPath::Avx512 => avx512_windows::pack(source, agents.clone(), lead, apart, words),
         };
         if is_done {
             return;
         }
     }
     let _ = path;
-    scalar::pack(scene, agents, channels, (lead, apart), words);
+    scalar::pack(source, agents, channels, (lead, apart), words);
 }

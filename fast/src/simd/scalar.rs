@@ -1,4 +1,4 @@
-//! What the other paths are measured against.
+//! The path without intrinsics, with which the other paths are compared.
 
 use std::ops::Range;
 use std::sync::atomic::Ordering::Relaxed;
@@ -8,29 +8,29 @@ use crate::grid::{STRIDE, Strips};
 
 use super::{Channels, WindowSource};
 
-/// Widest window that lies in one strip.
+/// Side of the widest window that lies in one strip.
 const NARROW: usize = 64 - STRIDE + 1;
 
 pub fn pack(
-    scene: &WindowSource<'_>,
+    source: &WindowSource<'_>,
     agents: Range<usize>,
     channels: Channels,
     (lead, apart): (usize, bool),
     words: &mut [u64],
 ) {
-    let side = scene.side();
+    let side = source.side();
     let mut writer = BitWriter::new(words, lead);
     for agent in agents {
-        let cell = scene.cells[agent];
+        let cell = source.cells[agent];
         let (row, col) = (usize::from(cell.row), usize::from(cell.col));
         if channels != Channels::Agents {
-            write_window(scene.obstacles, row, col, side, &mut writer);
+            write_window(source.obstacles, row, col, side, &mut writer);
         }
         if channels != Channels::Obstacles {
-            write_window(scene.occupied, row, col, side, &mut writer);
+            write_window(source.occupied, row, col, side, &mut writer);
         }
         if channels == Channels::All {
-            writer.push_one_of(WindowSource::goal_index(cell, scene.goals[agent], side), side * side);
+            writer.push_one_of(WindowSource::goal_index(cell, source.goals[agent], side), side * side);
         }
         if apart {
             writer.end_word();
@@ -43,7 +43,7 @@ fn write_window(strips: &Strips, row: usize, col: usize, side: usize, writer: &m
     let (words, shift) = strips.window(row, col);
     if side <= NARROW {
         let mask = u64::MAX >> (64 - side);
-        // As many rows at a time as fit a word.
+        // As many rows at a time as fit in a word.
         for rows in words[..side].chunks(64 / side) {
             let row_bits = |word: &std::sync::atomic::AtomicU64| (word.load(Relaxed) >> shift) & mask;
             let bits = rows.iter().rev().fold(0, |bits, word| bits << side | row_bits(word));
@@ -60,7 +60,7 @@ fn write_window(strips: &Strips, row: usize, col: usize, side: usize, writer: &m
     }
 }
 
-/// The values of each byte of bits.
+/// The eight values for each byte of bits.
 pub type Table<V> = [[V; 8]; 256];
 
 pub static FLOATS: Table<f32> = table([0.0, 1.0]);
@@ -68,7 +68,7 @@ pub static BYTES: Table<u8> = table([0, 1]);
 
 const fn table<V: Copy>(values: [V; 2]) -> Table<V> {
     let mut table = [[values[0]; 8]; 256];
-    // A plain loop, since a constant knows no iterators.
+    // A plain loop, since constant functions cannot use iterators.
     let mut index = 0;
     while index < 8 * 256 {
         table[index / 8][index % 8] = values[((index / 8) >> (index % 8)) & 1];
@@ -93,7 +93,7 @@ pub fn spread<V: Copy>(words: &[u64], lead: usize, out: &mut [V], table: &Table<
     }
 }
 
-/// The values of each word of bits, the first of which begins with `lead` bits that have none.
+/// Splits the values by the words of their bits. The first word begins with `lead` bits that have no value.
 fn split_by_words<V>(lead: usize, out: &mut [V]) -> impl Iterator<Item = &mut [V]> {
     let (first, rest) = out.split_at_mut(out.len().min((64 - lead % 64) % 64));
     std::iter::once(first).chain(rest.chunks_mut(64)).filter(|part| !part.is_empty())

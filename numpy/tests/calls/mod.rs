@@ -1,11 +1,11 @@
-//! Calls of a generator as data, so that the same calls can be put to NumPy and to us.
+//! Calls of a generator as data, so that NumPy and this crate can make the same calls.
 
 use pogema_numpy::{Generator, SeedSequence};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// A generator's start, calls of it in order, and what NumPy answers.
+/// The initial state of a generator, its calls in order, and NumPy's answers.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Run {
     pub start: Start,
@@ -14,17 +14,17 @@ pub struct Run {
     pub answers: Vec<Value>,
 }
 
-/// Where a generator begins.
+/// The initial state of a generator.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// At a seed in 32-bit words, lowest first.
+    /// A seed in 32-bit words, lowest first.
     Words(Vec<u32>),
-    /// At PCG64's first state and its stream, in decimal.
+    /// PCG64's initial state and its stream, in decimal.
     Pcg(String, String),
 }
 
-/// One call; shuffles are of a list, of an array, and of an array's rows.
+/// One call. Shuffles apply to a list, to an array, or to the rows of an array.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(tag = "call", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Call {
@@ -63,7 +63,7 @@ impl From<Bits> for String {
 }
 
 impl Run {
-    /// Fails at the first call that we answer differently.
+    /// Fails at the first call whose answer differs from NumPy's.
     pub fn replay(&self, name: &str) {
         assert_eq!(self.calls.len(), self.answers.len(), "{name}: one answer for each call");
         let mut generator = self.start.generator();
@@ -86,7 +86,7 @@ impl Start {
 }
 
 impl Call {
-    /// The answer, or null if the call is refused.
+    /// Returns the answer, or null if the call is rejected.
     fn make(&self, generator: &mut Generator) -> Value {
         match self {
             Self::NextU32 => json!(generator.next_u32()),

@@ -1,4 +1,4 @@
-"""Writes vectors.json beside this file. Run it with NumPy 1.26.4."""
+"""Writes vectors.json into the folder of this file. Run it with NumPy 1.26.4."""
 
 import json
 import sys
@@ -20,7 +20,7 @@ RANGES = [
 ]  # fmt: skip
 WEIGHTS = [
     [1.0], [0.5, 0.25, 0.25], [0.75, 0.25], [1 / 3] * 3, [0.1] * 10, [0.0, 1.0, 0.0], [0.2, 0.2], [-0.5, 1.5],
-    # At the tolerance of the sum; a plain sum would let the last one pass.
+    # Sums at the tolerance. Without compensated summation the last one would be accepted.
     [0.5, 0.5 + 2**-26], [0.5, 0.5 + 2**-26 + 2**-52], [0.24, 0.22, 0.31, 0.1, 0.1300000149011613],
 ]  # fmt: skip
 PROBABILITIES = [0.0, 5e-324, 0.1, 0.3, 1 / 3, 0.5, float(np.nextafter(0.5, 1)), 0.7, 0.999, 1.0, 1.5, float("nan")]
@@ -63,13 +63,13 @@ def calls_by_topic():
 
 
 def mixed(topics):
-    """The first call of every topic, then the second of every topic, and so on."""
+    """Returns the first call of every topic, then the second of every topic, and so on."""
     longest = max(map(len, topics.values()))
     return [calls[turn] for turn in range(longest) for calls in topics.values() if turn < len(calls)]
 
 
 def run(seed, calls):
-    # A last draw of each kind shows that both streams have used up equally much.
+    # A final draw of each kind shows that both streams are at the same position.
     made = {"start": {"words": to_words(seed)}, "calls": [*calls, {"call": "next_u32"}, {"call": "next_u64"}]}
     return made | {"answers": answers(made)}
 

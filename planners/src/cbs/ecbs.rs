@@ -10,8 +10,8 @@
 //! | OPEN, FOCAL | [`FocalQueue`] |
 //! | fmin(i) | [`crate::cbs::node::Node::least`] |
 //!
-//! The low level searches for the least cost first, and then for few conflicts within the weight, with the soft
-//! constraints of [`crate::sipp`].
+//! The low level searches for the least cost first, and then for few conflicts within the suboptimality bound, with
+//! the soft constraints of [`crate::sipp`].
 
 use crate::budget::{Budget, Clock};
 use crate::cbs::focal::FocalQueue;
@@ -30,7 +30,7 @@ use crate::team_task::{TeamTask, one_leg_each};
 /// Parameters of [`Ecbs`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct EcbsParams {
-    /// The suboptimality bound: a plan costs at most this many times the least. Values up to 1 mean optimal plans.
+    /// The suboptimality bound: a plan costs at most this many times the optimum. Values up to 1 mean optimal plans.
     pub weight: f64,
     /// Seed of tie-breaking.
     pub seed: u64,
@@ -46,14 +46,14 @@ impl Default for EcbsParams {
 
 /// The planner ECBS, which is bounded-suboptimal. A node of its budget is a node of the constraint tree.
 ///
-/// It proves that a problem is impossible where [`crate::Cbs`] does.
+/// It proves a problem impossible in the same cases as [`crate::Cbs`].
 #[derive(Clone, Debug, Default)]
 pub struct Ecbs {
     params: EcbsParams,
 }
 
 impl Ecbs {
-    /// A planner with these parameters.
+    /// Creates a planner with these parameters.
     pub fn new(params: EcbsParams) -> Self {
         Self { params }
     }
@@ -84,12 +84,12 @@ pub(crate) enum Found {
     Paths { paths: Paths, lower_bound: u64 },
     /// No paths within the budget; no plan costs less than the lower bound.
     Nothing { lower_bound: u64 },
-    /// There are no paths, for a reason.
+    /// A proof that no paths exist, in words.
     Proof(String),
 }
 
-/// Searches for conflict-free paths within the suboptimality bound; `give_up` may return a proof at every node that
-/// there are none.
+/// Searches for conflict-free paths within the suboptimality bound. At every node, `give_up` may return a proof that no
+/// such paths exist.
 pub(crate) fn search(
     sipp: &mut Sipp,
     graph: &Graph,
@@ -123,5 +123,5 @@ pub(crate) fn search(
             }
         }
     }
-    Found::Proof("no plan is as short as it has to be".to_owned())
+    Found::Proof("the search exhausted the constraint tree".to_owned())
 }

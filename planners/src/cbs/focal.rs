@@ -30,7 +30,7 @@ pub(super) struct FocalQueue {
 }
 
 impl FocalQueue {
-    /// An empty queue.
+    /// Creates an empty queue.
     pub fn new(weight: f64, num_vertices: usize, memory: MemoryUse) -> Self {
         Self {
             weight,
@@ -72,8 +72,9 @@ impl FocalQueue {
     }
 }
 
-/// Whether a cost is at most `weight` times the least, with a tolerance for rounding: the costs of single agents are
-/// rounded one by one, and without the tolerance no node might be within the bound.
+/// Returns whether a cost is at most `weight` times the least, with a tolerance for rounding.
+///
+/// The costs of single agents are rounded one by one. Without the tolerance, no node might be within the bound.
 fn is_within(cost: u64, least: u64, weight: f64) -> bool {
     cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
 }
@@ -83,8 +84,8 @@ mod tests {
     use super::is_within;
 
     #[test]
-    fn what_is_just_so_many_times_the_least_is_within() {
-        // Nine agents whose paths cost 7 in place of 5; 45 times 1.4 is a little under 63 in floating point.
+    fn a_cost_equal_to_the_bound_is_within_it() {
+        // Nine agents whose paths cost 7 instead of 5; in floating point, 45 × 1.4 is slightly less than 63.
         assert!(is_within(63, 45, 1.4));
         assert!(!is_within(64, 45, 1.4));
         assert!(is_within(6, 5, 1.2) && !is_within(7, 5, 1.2));

@@ -1,8 +1,8 @@
 //! Independence detection: agents are planned together only if their optimal paths conflict.
 //!
 //! Each group of agents is planned alone. If the plans of two groups conflict, one group is replanned at the same cost
-//! around the other. If that fails, the two groups are merged. The sum of the lower bounds of all groups is a lower bound
-//! on the sum of costs, even if some groups have no plan yet.
+//! around the other. If that fails, the two groups are merged. The sum of the lower bounds of all groups is a lower
+//! bound on the sum of costs, even if some groups have no plan yet.
 //!
 //! Paper: Standley, "Finding Optimal Solutions to Cooperative Pathfinding Problems", AAAI 2010.
 //!
@@ -68,7 +68,7 @@ pub(super) struct Groups<'a> {
 }
 
 impl<'a> Groups<'a> {
-    /// One group for each agent, without plans.
+    /// Creates one group for each agent, without plans.
     pub fn new(problem: &'a Problem, costs: &[CostToGo], params: &'a CbsParams) -> Self {
         let mut groups = Self {
             problem,
@@ -185,7 +185,7 @@ impl<'a> Groups<'a> {
         true
     }
 
-    /// Searches for an optimal plan of a group; returns why there is none, if that is proved.
+    /// Searches for an optimal plan of a group; if it proves that none exists, returns the reason.
     fn plan_group(&mut self, index: usize, clock: &mut Clock) -> Option<String> {
         let found = self.search(index, None, (u64::MAX, self.all[index].max_nodes), clock);
         let group = &mut self.all[index];

@@ -13,7 +13,7 @@ use crate::team_task::TeamTask;
 /// The first index of paths from outside the search. It exceeds the number of agents and of constraints.
 const OUTSIDE: usize = 1 << 24;
 
-/// What the low level minimises.
+/// The objective of the low level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Aim {
     /// The cost, then the number of conflicts.

@@ -59,7 +59,8 @@ impl Mdd {
         self.levels.iter().map(level).sum()
     }
 
-    /// Whether every optimal path visits a vertex after a step, or makes a move in it.
+    /// Returns whether every optimal path is at a vertex after a step; with `from`, whether every optimal path makes
+    /// that move in the step.
     pub(crate) fn is_forced(&self, step: usize, from: Option<Vertex>, at: Vertex) -> bool {
         let is_only =
             |step: usize, vertex: Vertex| self.levels.get(step).is_none_or(|level| *level == [vertex]);

@@ -14,17 +14,17 @@ impl MemoryUse {
     /// The default byte budget.
     pub(crate) const DEFAULT_BYTES: usize = 1 << 30;
 
-    /// A count with a byte budget.
+    /// Creates a count with a byte budget.
     pub(crate) fn new(max_bytes: usize) -> Self {
         Self { max_bytes, num_bytes: 0 }
     }
 
-    /// Whether the budget is exceeded.
+    /// Returns whether the budget is exceeded.
     pub(crate) fn is_full(&self) -> bool {
         self.num_bytes > self.max_bytes
     }
 
-    /// Counts bytes besides nodes.
+    /// Counts bytes in addition to the nodes.
     pub(crate) fn add(&mut self, num_bytes: usize) {
         self.num_bytes += num_bytes;
     }

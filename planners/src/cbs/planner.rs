@@ -17,7 +17,7 @@ pub struct Cbs {
 }
 
 impl Cbs {
-    /// A planner with these parameters.
+    /// Creates a planner with these parameters.
     pub fn new(params: CbsParams) -> Self {
         Self { params }
     }

@@ -53,7 +53,7 @@ pub(super) enum Found {
         lower_bound: u64,
         is_full: bool,
     },
-    /// There is no plan, for a reason.
+    /// A proof that no plan exists, in words.
     Nothing(String),
 }
 
@@ -93,16 +93,16 @@ pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, cl
         }
         search.expand(entry, &conflict);
     }
-    Found::Nothing("no plan is as short as it has to be".to_owned())
+    Found::Nothing("the search exhausted the constraint tree".to_owned())
 }
 
 /// A node of the constraint tree in the open list.
 struct Entry {
     node: Node,
-    /// The MDD of each agent, where it was needed.
+    /// The MDD of each agent, if it has been computed.
     mdds: Vec<Option<Arc<Mdd>>>,
     num_conflicts: usize,
-    /// The conflict to be resolved next.
+    /// The conflict to resolve next.
     choice: Option<PathConflict>,
 }
 
@@ -131,7 +131,7 @@ impl Search<'_> {
                     mdd.is_forced(constraint.step, constraint.from, constraint.at)
                 })
                 .count();
-            // A cardinal conflict costs a step more; disjoint cardinal conflicts add up.
+            // A cardinal conflict adds at least one step to the cost; disjoint cardinal conflicts add up.
             if num_forced == 2 && !is_counted[one] && !is_counted[other] {
                 (is_counted[one], is_counted[other]) = (true, true);
                 num_disjoint += 1;

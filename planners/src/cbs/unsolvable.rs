@@ -4,7 +4,7 @@ use crate::budget::Clock;
 use crate::joint::reachability::{Reachability, reachability};
 use crate::problem::Problem;
 
-/// Stops searches of unsolvable problems, where joint states are few enough to prove it.
+/// Stops the search of an unsolvable problem that has few enough joint states to prove it.
 #[derive(Debug, Default)]
 pub(crate) struct UnsolvabilityCheck {
     num_nodes: u64,
@@ -16,15 +16,15 @@ impl UnsolvabilityCheck {
     /// The limit on joint states.
     const MAX_STATES: usize = 100_000;
 
-    /// Counts a node, and runs the check once. Returns why there is no plan, if it is proved.
+    /// Counts a node, and runs the check once. Returns the reason if it proves that no plan exists.
     pub(crate) fn count(&mut self, problem: &Problem, clock: &mut Clock) -> Option<String> {
         self.num_nodes += 1;
         if self.num_nodes == Self::AFTER { Self::run(problem, clock) } else { None }
     }
 
-    /// Returns why there is no plan, if the joint search proves it.
+    /// Runs the joint search. Returns the reason if it proves that no plan exists.
     pub(crate) fn run(problem: &Problem, clock: &mut Clock) -> Option<String> {
-        let has_none = reachability(problem, Self::MAX_STATES, clock) == Reachability::Unreachable;
-        has_none.then(|| "the agents cannot pass each other, whatever they do".to_owned())
+        let is_unsolvable = reachability(problem, Self::MAX_STATES, clock) == Reachability::Unreachable;
+        is_unsolvable.then(|| "no sequence of moves leads all agents to their goals".to_owned())
     }
 }

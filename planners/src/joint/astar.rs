@@ -35,7 +35,7 @@ pub(crate) struct JointTask<'a> {
 pub(crate) enum Found {
     /// The paths of the agents up to the step after which they rest, with the least sum of costs.
     Paths(Vec<Vec<Vertex>>),
-    /// There is no plan.
+    /// No plan exists.
     Nothing,
     /// The limit on joint states or the budget was exceeded.
     Unknown,
@@ -70,7 +70,7 @@ struct JointAstar<'a> {
     least: u64,
 }
 
-/// The number of agents that fit the set of resting agents.
+/// The limit on agents: the set of resting agents has one bit for each.
 const MAX_AGENTS: usize = u32::BITS as usize;
 
 /// Finds a plan of least sum of costs.

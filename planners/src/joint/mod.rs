@@ -1,7 +1,7 @@
-//! Searches through joint states: the vertices of all agents at once.
+//! Searches through joint states: the vertices of all agents together.
 //!
 //! [`astar`] finds plans of least cost for a few agents, [`solvability`] applies it to a map, and [`reachability`]
-//! decides without costs whether a problem has a plan at all.
+//! decides whether a problem has a plan, without regard to costs.
 
 pub(crate) mod astar;
 pub(crate) mod reachability;

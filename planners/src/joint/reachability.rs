@@ -17,7 +17,7 @@ pub(crate) enum Reachability {
     Unknown,
 }
 
-/// Searches breadth-first until the goals are reached or the limit on joint states is exceeded.
+/// Decides whether the goals can be reached, by breadth-first search up to a limit on joint states.
 ///
 /// Reachability does not depend on time, and every agent can wait. It is therefore enough to move one agent at a time,
 /// or one ring of agents that follow each other.

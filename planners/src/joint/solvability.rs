@@ -25,7 +25,7 @@ pub enum Solvability {
 }
 
 impl Solvability {
-    /// Whether the scenario is solvable, if it is known.
+    /// Returns whether the scenario is solvable, if the search could decide it.
     pub fn is_solvable(self) -> Option<bool> {
         match self {
             Self::Solvable { .. } => Some(true),

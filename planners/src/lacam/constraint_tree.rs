@@ -14,7 +14,7 @@ pub(crate) struct ConstraintNode {
 }
 
 impl ConstraintNode {
-    /// Returns the next node in breadth-first order, if there is one.
+    /// Returns the next node in breadth-first order, if any.
     pub fn after(mut self, graph: &Graph, now: &[Vertex], order: &[Agent]) -> Option<Self> {
         self.number += 1;
         if self.number >= self.width.max(1) {

@@ -1,8 +1,8 @@
 //! LaCAM*: a first plan within milliseconds, refined until the budget is spent.
 //!
-//! Papers: Okumura, "Engineering LaCAM*: Towards Real-Time, Large-Scale, and Near-Optimal Multi-Agent Pathfinding", AAMAS
-//! 2024, which runs search and refinement side by side; the papers of [`search`], which finds plans and proves that there
-//! is none, and of [`lns`], which refines plans.
+//! Papers: Okumura, "Engineering LaCAM*: Towards Real-Time, Large-Scale, and Near-Optimal Multi-Agent Pathfinding",
+//! AAMAS 2024, which runs search and refinement side by side; the papers of [`search`], which finds plans or proves
+//! that none exists, and of [`lns`], which refines plans.
 
 mod components;
 mod constraint_tree;

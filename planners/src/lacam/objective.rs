@@ -3,11 +3,11 @@
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
 
-/// What a search minimises.
+/// The objective of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Objective {
-    /// The sum of loss: in each step, the number of agents that are not on their goals both before and after it. The sum
-    /// of loss of a plan is at most its sum of costs.
+    /// The sum of loss: in each step, the number of agents that are not on their goals both before and after it. The
+    /// sum of loss of a plan is at most its sum of costs.
     SumOfLoss,
     /// The number of steps.
     Makespan,

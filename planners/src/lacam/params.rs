@@ -11,7 +11,7 @@ pub struct LacamParams {
     pub pibt: PibtRules,
     /// Number of threads; all but the first only refine. With several threads, plans are not reproducible.
     pub threads: usize,
-    /// Whether the first plan is refined.
+    /// Whether to refine the first plan.
     pub refine: bool,
     /// Number of consecutive failed attempts to refine a plan after which a planner without time and node limits stops.
     pub patience: u64,

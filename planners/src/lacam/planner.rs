@@ -14,7 +14,7 @@ pub struct Lacam {
 }
 
 impl Lacam {
-    /// A planner with these parameters.
+    /// Creates a planner with these parameters.
     pub fn new(params: LacamParams) -> Self {
         Self { params }
     }

@@ -1,4 +1,4 @@
-//! One call of LaCAM*: the first plan, then refinement and search in turn.
+//! One call of LaCAM*: finds a first plan, then alternates refinement and search.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -70,13 +70,15 @@ impl<'a> PlanCall<'a> {
         }
     }
 
-    /// Returns why agents in a small component of the map cannot all reach their goals, if a short search proves it.
+    /// Searches the small components of the map. Returns the reason if the agents of one cannot all reach their goals.
     fn impossible_component(&mut self) -> Option<String> {
         for Component { agents, problem, costs } in small_components(self.problem, self.costs) {
             let mut search = Search::new(&problem, &costs, options(self.params, 0, Objective::SumOfLoss));
             if let Advance::Found(Found::Impossible) = advance(&mut search, &mut self.clock, COMPONENT_NODES)
             {
-                return Some(format!("all that agents {agents:?} can do in their part of the map was tried"));
+                return Some(format!(
+                    "the search exhausted all configurations of agents {agents:?} in their component"
+                ));
             }
         }
         None
@@ -145,7 +147,7 @@ impl<'a> PlanCall<'a> {
                         refiner.improve();
                     }
                 };
-                // Where the system starts no more threads, those that run suffice.
+                // If the system cannot start another thread, the running threads suffice.
                 if std::thread::Builder::new().spawn_scoped(scope, refine).is_err() {
                     break;
                 }
@@ -156,7 +158,7 @@ impl<'a> PlanCall<'a> {
         })
     }
 
-    /// Number of threads that refine; each has its own tables.
+    /// Returns the number of threads that refine; each thread has its own tables.
     fn num_threads(&self, num_steps: usize) -> usize {
         if !self.params.refine || !lns::supports(self.problem) {
             return 0;
@@ -165,8 +167,8 @@ impl<'a> PlanCall<'a> {
         self.params.threads.max(1).min(room)
     }
 
-    /// Alternates refinement and search; the longer refinement fails, the more nodes the search expands. Returns whether
-    /// there may be a plan within the step limit.
+    /// Alternates refinement and search; the longer refinement fails, the more nodes the search expands. Returns
+    /// whether a plan within the step limit may exist.
     fn refine_and_search(&mut self, refiner: &mut Refiner<'_>) -> bool {
         let mut idle: u64 = 0;
         while refiner.cost().is_none_or(|cost| cost > self.lower_bound) {
@@ -191,7 +193,7 @@ impl<'a> PlanCall<'a> {
         true
     }
 
-    /// Expands nodes and adopts a better plan. Returns whether there may be a plan within the step limit.
+    /// Expands nodes and adopts a better plan. Returns whether a plan within the step limit may exist.
     fn search_further(&mut self, refiner: &mut Refiner<'_>, max_nodes: u64) -> bool {
         for _ in 0..max_nodes {
             if self.clock.count_node() {
@@ -222,14 +224,14 @@ impl<'a> PlanCall<'a> {
     }
 }
 
-/// Attempts to refine between two turns of the search.
+/// Refinement attempts between two turns of the search.
 const NUM_ATTEMPTS: usize = 32;
 
 /// Node limit for one small component of the map.
 const COMPONENT_NODES: usize = 20_000;
 
 fn exhausted() -> Outcome {
-    Outcome::Impossible { reason: "all that the agents can do was tried".to_owned() }
+    Outcome::Impossible { reason: "the search exhausted all configurations".to_owned() }
 }
 
 fn options(params: &LacamParams, attempt: u64, objective: Objective) -> SearchOptions {
@@ -237,7 +239,7 @@ fn options(params: &LacamParams, attempt: u64, objective: Objective) -> SearchOp
     SearchOptions { objective, pibt: params.pibt, max_bytes: params.max_bytes, seed }
 }
 
-/// The state of a search after some more nodes.
+/// The state of a search after it expanded more nodes.
 enum Advance {
     Found(Found),
     Full,

@@ -68,7 +68,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search of a problem with known costs to go.
+    /// Creates a search of a problem with known costs to go.
     pub fn new(problem: &'a Problem, costs: &'a [CostToGo], options: SearchOptions) -> Self {
         let starts = &problem.starts[..];
         let cost = |agent: Agent| costs[agent as usize][starts[agent as usize] as usize];
@@ -134,7 +134,7 @@ impl<'a> Search<'a> {
         };
         let (graph, now, order) =
             (&self.problem.graph, self.explored.configuration(top), self.explored.order(top));
-        // Spread, so that equal digits lead different nodes to different vertices.
+        // A hash of the node, so that equal digits lead different nodes to different vertices.
         let turn = u64::from(top).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
         constraints.read(graph, now, order, turn, &mut self.constraints);
         let after = constraints.after(graph, now, order);
@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
         if let Some(to) = self.explored.find(next) {
             self.explored.connect(from, to);
             self.relax(from, to);
-            // Returning to a deep node finds little. Now and then, the search restarts from the root.
+            // Returning to a deep node finds little, so the search occasionally restarts from the root.
             let again = if self.random.next_u32().is_multiple_of(1000) { 0 } else { to };
             self.open.push(again);
         } else {

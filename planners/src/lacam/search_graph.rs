@@ -52,7 +52,7 @@ pub(super) struct SearchGraph {
 }
 
 impl SearchGraph {
-    /// The graph of the start configuration and its priorities.
+    /// Creates the graph of the start configuration and its priorities.
     pub fn new(starts: &[Vertex], priorities: Vec<u32>, to_go: u64) -> Self {
         let mut graph = Self {
             num_agents: starts.len(),
@@ -74,7 +74,7 @@ impl SearchGraph {
         &self.nodes[node as usize]
     }
 
-    /// Returns a node to be changed.
+    /// Returns a node for changes.
     #[inline]
     pub fn get_mut(&mut self, node: u32) -> &mut Node {
         &mut self.nodes[node as usize]
@@ -143,7 +143,7 @@ impl SearchGraph {
         node
     }
 
-    /// Adds an edge, unless it is known.
+    /// Adds an edge unless it exists.
     pub fn connect(&mut self, from: u32, to: u32) {
         if !self.known_edges.insert((from, to)) {
             return;

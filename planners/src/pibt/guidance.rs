@@ -23,7 +23,7 @@ use crate::problem::Agent;
 pub struct GuidanceParams {
     /// The cost without traffic.
     pub edge: u32,
-    /// The additional cost for each agent that plans to move the other path.
+    /// The additional cost for each agent that plans to move along the edge in the opposite direction.
     pub contraflow: u32,
     /// The additional cost for each agent that plans to visit the vertex at the end of the edge.
     pub congestion: u32,
@@ -50,7 +50,7 @@ pub(crate) struct Guidance {
 }
 
 impl Guidance {
-    /// Guidance without traffic.
+    /// Creates guidance without traffic.
     pub fn new(graph: Arc<Graph>, num_agents: usize, params: GuidanceParams) -> Self {
         let num_vertices = graph.num_vertices();
         Self {

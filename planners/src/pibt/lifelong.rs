@@ -31,12 +31,12 @@ pub struct PibtLifelong {
 enum CostTables {
     /// Shortest paths.
     Shortest { distances: Distances, costs: Vec<CostToGo> },
-    /// Costs to go in traffic.
+    /// Guide paths: costs to go that include congestion.
     Guided { guidance: Guidance, costs: Vec<Vec<u32>> },
 }
 
 impl PibtLifelong {
-    /// A planner for a map. The first step fixes the number of agents.
+    /// Creates a planner for a map. The first step fixes the number of agents.
     pub fn new(graph: Arc<Graph>, params: PibtParams) -> Self {
         Self::for_agents(graph, 0, params)
     }
@@ -57,10 +57,11 @@ impl PibtLifelong {
         Self { graph, params, step, priorities, goals: vec![Vertex::MAX; num_agents], costs }
     }
 
-    /// Returns the next configuration. Goals may be equal or unreachable. Another number of agents begins a new episode.
+    /// Returns the next configuration. Goals may be equal or unreachable. A different number of agents begins a new
+    /// episode.
     ///
     /// # Errors
-    /// [`Error::Length`] for another number of goals than agents; [`Error::Agent`] for an unknown vertex or a shared
+    /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for an unknown vertex or a shared
     /// start vertex.
     pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
         self.check(now, goals)?;
@@ -78,7 +79,7 @@ impl PibtLifelong {
                 self.step.run(&StepInput { graph, now, goals, costs, order }, &[])
             }
         };
-        let next = next.ok_or_else(|| Error::instance("two agents are in one cell"))?;
+        let next = next.ok_or_else(|| Error::instance("two agents share a cell"))?;
         self.priorities.update(|agent| next[agent] == goals[agent]);
         Ok(next)
     }
@@ -88,11 +89,14 @@ impl PibtLifelong {
         let num_vertices = self.graph.num_vertices() as Vertex;
         for (agent, (&place, &goal)) in now.iter().zip(goals).enumerate() {
             if place.max(goal) >= num_vertices {
-                return Err(Error::agent(agent, format!("the map has {num_vertices} free cells")));
+                return Err(Error::agent(
+                    agent,
+                    format!("position or goal is not a vertex below {num_vertices}"),
+                ));
             }
         }
         match self.step.find_shared_vertex(now) {
-            Some(agent) => Err(Error::agent(agent, "it is in one cell with another")),
+            Some(agent) => Err(Error::agent(agent, "it shares its cell with another agent")),
             None => Ok(()),
         }
     }

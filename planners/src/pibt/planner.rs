@@ -29,17 +29,17 @@ pub struct Pibt {
 }
 
 impl Pibt {
-    /// A planner with these parameters.
+    /// Creates a planner with these parameters.
     pub fn new(params: PibtParams) -> Self {
         Self { params }
     }
 
-    /// Returns the number of steps after which it gives up. Agents that do not walk in circles need far fewer.
+    /// Returns the number of steps after which the planner gives up. Agents that do not move in circles need far fewer.
     fn max_steps(problem: &Problem) -> usize {
         problem.max_steps.unwrap_or(10 * problem.graph.num_vertices() + 100)
     }
 
-    /// Steps until all agents are on their goals or a limit is reached.
+    /// Steps until all agents are on their goals, a limit is reached or the budget is spent.
     fn run(
         &self,
         problem: &Problem,

@@ -40,7 +40,7 @@ pub(crate) struct Priorities {
 }
 
 impl Priorities {
-    /// Initial priorities: the higher the cost of an agent, the higher its priority.
+    /// Creates the initial priorities: the higher the cost of an agent, the higher its priority.
     pub fn new(num_agents: usize, cost: impl Fn(Agent) -> u32) -> Self {
         let values = initial_priorities(num_agents, cost);
         let order = (0..num_agents as Agent).collect();

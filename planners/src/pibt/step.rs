@@ -1,4 +1,4 @@
-//! The step of PIBT: agents choose in order of priority, and push away the agents on the vertices they want.
+//! The step of PIBT: agents choose in order of priority, and push other agents off the vertices they choose.
 //!
 //! Papers: Okumura, Machida, Défago, Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent Path
 //! Finding", AIJ 2022; tie-breaking by hindrance: Okumura, Nagai, "Lightweight and Effective Preference Construction in
@@ -23,7 +23,7 @@ use crate::problem::Agent;
 pub struct PibtRules {
     /// Whether two agents that block each other in a corridor move to a place where they can swap.
     pub swap: bool,
-    /// Whether an agent breaks ties in favour of the vertex that hinders fewer agents.
+    /// Whether an agent breaks ties in favour of the vertex where it hinders fewer agents.
     pub hindrance: bool,
 }
 
@@ -65,7 +65,7 @@ impl PibtStep {
         Self { rules, random, standing: empty.clone(), taken: empty, next: Vec::new(), stack: Vec::new() }
     }
 
-    /// Returns the next configuration, which satisfies the constraints. PIBT can fail only if there are
+    /// Returns the next configuration, which satisfies the constraints. PIBT fails only under
     /// constraints.
     pub fn run<C: Costs>(
         &mut self,
@@ -119,7 +119,7 @@ impl PibtStep {
         self.next[agent as usize] = vertex;
     }
 
-    /// Whether the agent on a vertex moves to the vertex of this agent.
+    /// Returns whether the agent on a vertex moves to the vertex of this agent.
     fn would_swap<C: Costs>(&self, input: &StepInput<'_, C>, agent: Agent, vertex: Vertex) -> bool {
         let other = self.standing[vertex as usize];
         other != NONE && other != agent && self.next[other as usize] == input.place(agent)
@@ -214,13 +214,13 @@ impl PibtStep {
         Frame { agent, places, num_places: num_places as u8, tried: 0, follower }
     }
 
-    /// Number of other agents beside a vertex that want to move there.
+    /// Returns the number of other agents next to a vertex that would come closer to their goals there.
     fn num_hindered<C: Costs>(&self, input: &StepInput<'_, C>, agent: Agent, vertex: Vertex) -> u64 {
-        let wants = |&&place: &&Vertex| {
+        let would_approach = |&&place: &&Vertex| {
             let other = self.standing[place as usize];
             other != NONE && other != agent && input.cost(other, vertex) < input.cost(other, place)
         };
-        input.graph.neighbours(vertex).iter().filter(wants).count() as u64
+        input.graph.neighbours(vertex).iter().filter(would_approach).count() as u64
     }
 }
 
@@ -231,7 +231,7 @@ enum Try {
     Stuck,
 }
 
-/// Sorts at most five by insertion.
+/// Sorts at most five candidates by insertion.
 fn sort_few(keyed: &mut [(u64, Vertex)]) {
     for end in 1..keyed.len() {
         let mut at = end;

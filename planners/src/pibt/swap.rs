@@ -4,7 +4,7 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | pusher, puller | the agent that wants to pass, and the agent that must come along to the fork |
+//! | pusher, puller | the agent that tries to pass, and the agent that it pulls along to the fork |
 
 use crate::graph::Vertex;
 use crate::pibt::input::{Costs, NONE, StepInput};
@@ -20,7 +20,7 @@ pub(super) struct Swap<'a, C> {
 }
 
 impl<C: Costs> Swap<'_, C> {
-    /// Returns the agent that must be pulled along so that the two can swap.
+    /// Returns the agent that must be pulled along so that the two can swap, or [`NONE`].
     pub fn partner(&self, agent: Agent, best: Vertex) -> Agent {
         let here = self.input.place(agent);
         if best == here {
@@ -37,7 +37,7 @@ impl<C: Costs> Swap<'_, C> {
         self.pusher_behind(agent, best)
     }
 
-    /// Returns a neighbour that can pass the agent only after the agent makes room.
+    /// Returns a neighbouring agent that can pass only after this agent makes room, or [`NONE`].
     fn pusher_behind(&self, agent: Agent, best: Vertex) -> Agent {
         let here = self.input.place(agent);
         let is_pusher = |&place: &Vertex| {
@@ -51,7 +51,7 @@ impl<C: Costs> Swap<'_, C> {
         found.map_or(NONE, |place| self.standing[place as usize])
     }
 
-    /// Whether the pusher, following the puller, meets no fork before one of them must turn.
+    /// Returns whether the pusher, following the puller, meets no fork before one of them must turn.
     fn must_swap(&self, pusher: Agent, puller: Agent, mut behind: Vertex, mut ahead: Vertex) -> bool {
         while self.input.cost(pusher, ahead) < self.input.cost(pusher, behind) {
             match self.continuation(behind, ahead) {
@@ -65,7 +65,7 @@ impl<C: Costs> Swap<'_, C> {
                 || self.input.cost(pusher, ahead) < self.input.cost(pusher, behind))
     }
 
-    /// Whether the puller reaches a fork by moving away from the pusher.
+    /// Returns whether the puller reaches a fork by moving away from the pusher.
     fn can_swap(&self, pusher: Vertex, puller: Vertex) -> bool {
         let (mut behind, mut ahead) = (pusher, puller);
         loop {
@@ -80,7 +80,7 @@ impl<C: Costs> Swap<'_, C> {
         }
     }
 
-    /// Returns how a corridor continues; a dead end that is occupied by an agent on its goal does not count.
+    /// Returns how a corridor continues. A dead end occupied by an agent on its goal does not count.
     fn continuation(&self, behind: Vertex, ahead: Vertex) -> Corridor {
         let mut corridor = Corridor::End;
         for &vertex in self.input.graph.neighbours(ahead) {

@@ -29,7 +29,7 @@ pub struct AStarAgent {
 }
 
 impl AStarAgent {
-    /// An agent without knowledge of the map, with a source of random actions.
+    /// Creates an agent without knowledge of the map, with a source of random actions.
     pub fn new(random_action: Box<dyn FnMut() -> Action + Send>) -> Self {
         Self { obstacles: HashSet::new(), last: None, random_action }
     }
@@ -151,12 +151,12 @@ fn distance(one: Place, other: Place) -> i32 {
     (one.0 - other.0).abs() + (one.1 - other.1).abs()
 }
 
-/// Returns the first move of the path to the goal, or a wait if there is none.
+/// Returns the first move of the path to the goal, or a wait if no path was found.
 fn first_move(start: Place, goal: Place, obstacles: &HashSet<Place>) -> Action {
-    let came_by = search(start, goal, obstacles);
+    let came_from = search(start, goal, obstacles);
     let mut at = goal;
     let mut action = Action::Stay;
-    while let Some(&Some((from, step))) = came_by.get(&at) {
+    while let Some(&Some((from, step))) = came_from.get(&at) {
         (at, action) = (from, step);
     }
     action
@@ -164,7 +164,7 @@ fn first_move(start: Place, goal: Place, obstacles: &HashSet<Place>) -> Action {
 
 /// Returns the predecessor and the move by which each cell was first reached.
 fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Place, Option<(Place, Action)>> {
-    let mut came_by = HashMap::from([(start, None)]);
+    let mut came_from = HashMap::from([(start, None)]);
     let mut open = HeapQ::new(is_before);
     open.push(Node { place: start, cost: 0, estimate: distance(start, goal) });
     for _ in 0..MAX_EXPANSIONS {
@@ -172,10 +172,10 @@ fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Plac
         for action in [Action::Up, Action::Down, Action::Left, Action::Right] {
             let (down, right) = action.delta();
             let place = (node.place.0 + down, node.place.1 + right);
-            if obstacles.contains(&place) || came_by.contains_key(&place) {
+            if obstacles.contains(&place) || came_from.contains_key(&place) {
                 continue;
             }
-            came_by.insert(place, Some((node.place, action)));
+            came_from.insert(place, Some((node.place, action)));
             let cost = node.cost + 1;
             open.push(Node { place, cost, estimate: cost + distance(place, goal) });
         }
@@ -183,5 +183,5 @@ fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Plac
             break;
         }
     }
-    came_by
+    came_from
 }

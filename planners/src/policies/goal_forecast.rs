@@ -1,4 +1,4 @@
-//! Future goals, for planners that may know them.
+//! Future goals, for planners that use them.
 
 use std::collections::VecDeque;
 
@@ -18,7 +18,7 @@ impl GoalForecast {
     /// Number of known goals of each agent, including the current one.
     const NUM_GOALS: usize = 24;
 
-    /// The forecast at the start of an episode.
+    /// Creates the forecast at the start of an episode.
     pub fn new(instance: &Instance) -> Self {
         let mut streams = instance.goals().to_vec();
         let ahead = streams.iter_mut().map(|stream| {
@@ -38,7 +38,10 @@ impl GoalForecast {
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let error = |reason: String| Error::OutOfStep { reason };
         if now.step != self.step || now.goals.len() != self.ahead.len() {
-            let reason = format!("the goals to come are known for step {}, not for {}", self.step, now.step);
+            let reason = format!(
+                "found the state of step {}, expected step {} of the same episode",
+                now.step, self.step
+            );
             return Err(error(reason));
         }
         self.step += 1;
@@ -48,7 +51,10 @@ impl GoalForecast {
                 draw(&mut self.streams[agent], goals);
             }
             if goals.front() != Some(&now.goals[agent]) {
-                return Err(error(format!("goal {} of agent {agent} was not to come", now.goals[agent])));
+                return Err(error(format!(
+                    "goal {} of agent {agent} does not match its future goals",
+                    now.goals[agent]
+                )));
             }
         }
         Ok(())

@@ -13,12 +13,12 @@ pub(super) struct HeapQ<T> {
 }
 
 impl<T: Copy> HeapQ<T> {
-    /// An empty heap with a comparison.
+    /// Creates an empty heap with a comparison.
     pub fn new(is_less: fn(&T, &T) -> bool) -> Self {
         Self { items: Vec::new(), is_less }
     }
 
-    /// Whether the heap is empty.
+    /// Returns whether the heap is empty.
     pub fn is_empty(&self) -> bool {
         self.items.is_empty()
     }

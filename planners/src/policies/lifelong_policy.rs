@@ -22,7 +22,7 @@ pub struct LifelongPolicy {
 }
 
 impl LifelongPolicy {
-    /// A policy of a planner, with a budget for each step.
+    /// Creates a policy of a planner, with a budget for each step.
     pub fn new(name: LifelongName, settings: PlannerSettings, budget: Budget) -> Self {
         Self { name, settings, budget, planner: None, forecast: None }
     }
@@ -35,7 +35,7 @@ impl LifelongPolicy {
         }
     }
 
-    /// Provides future goals to the planner in the episode that begins, as in the RHCR paper. [`LifelongPolicy::act`] must
+    /// Provides the future goals of the new episode to the planner, as in the RHCR paper. [`LifelongPolicy::act`] must
     /// then be called in every step.
     ///
     /// # Errors
@@ -43,7 +43,11 @@ impl LifelongPolicy {
     pub fn provide_future_goals(&mut self, instance: &Instance) -> Result<(), Error> {
         let (_, planner) = self.planner_on(instance.map());
         if !planner.uses_future_goals() {
-            return Err(Error::argument("planner", self.name, "`rhcr`, to make use of goals still to come"));
+            return Err(Error::argument(
+                "planner",
+                self.name,
+                "a planner that uses future goals, such as `rhcr`",
+            ));
         }
         self.forecast = Some(GoalForecast::new(instance));
         Ok(())
@@ -52,8 +56,8 @@ impl LifelongPolicy {
     /// Returns the actions of all agents; inactive agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are provided
-    /// and the state is not the next one of their episode.
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are
+    /// provided and the state is not the next one of their episode.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let future = self.forecast.as_mut().map(|forecast| {

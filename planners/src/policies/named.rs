@@ -65,9 +65,9 @@ impl NamedPolicy {
         all
     }
 
-    /// Makes the policy of a name for the episode of an instance; `random` draws from `generator`.
+    /// Makes a policy by name for the episode of an instance; `random` draws from `generator`.
     ///
-    /// A planner is lifelong if agents get new goals, or if there is no one-shot planner of the name.
+    /// The planner is lifelong if agents get new goals, or if no one-shot planner has this name.
     ///
     /// # Errors
     /// [`Error::Argument`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
@@ -88,7 +88,7 @@ impl NamedPolicy {
             return Err(Error::Request { reason });
         }
         if single_attempt && (lifelong.is_some() || one_shot.is_none()) {
-            let reason = format!("`{name}` does not use a single attempt; only one-shot planners do");
+            let reason = format!("`{name}` does not support a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
         }
         if let Some(planner) = lifelong {

@@ -21,9 +21,9 @@ pub struct PomapfObservation<'a> {
 #[derive(Clone, Debug)]
 pub struct PomapfObservations {
     side: usize,
-    /// Shape: `[agents, side, side]`, not 0 for an obstacle.
+    /// Shape: `[agents, side, side]`, nonzero for an obstacle.
     pub obstacles: Vec<f32>,
-    /// Shape: `[agents, side, side]`, not 0 for an agent.
+    /// Shape: `[agents, side, side]`, nonzero for an agent.
     pub agents: Vec<f32>,
     /// The cell of each agent, relative to its start.
     ///

@@ -13,8 +13,8 @@ use crate::problem::Problem;
 
 /// A one-shot planner that controls the agents of an environment.
 ///
-/// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave out
-/// inactive agents. An agent that leaves as planned does not trigger replanning.
+/// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave
+/// out inactive agents. An agent that leaves as planned does not trigger replanning.
 pub struct PlannerPolicy {
     planner: Box<dyn Planner>,
     budget: Budget,
@@ -38,7 +38,7 @@ struct CurrentPlan {
 }
 
 impl PlannerPolicy {
-    /// A policy with a budget for each plan, in episodes with a step limit.
+    /// Creates a policy with a budget for each plan, in episodes with a step limit.
     pub fn new(planner: Box<dyn Planner>, budget: Budget, max_steps: Option<u64>) -> Self {
         let (graph, current, outcomes) = (None, None, Vec::new());
         Self { planner, budget, max_steps, is_single_attempt: false, graph, current, outcomes }
@@ -115,7 +115,7 @@ impl PlannerPolicy {
 }
 
 impl CurrentPlan {
-    /// Whether agents and goals are as planned, and a partial plan has not ended.
+    /// Returns whether agents and goals are as planned, and a partial plan has not ended.
     fn is_followed(&self, now: State<'_>) -> bool {
         let Some(step) = now.step.checked_sub(self.start).map(|step| step as usize) else { return false };
         if self.is_partial && step >= self.plan.num_steps().max(1) {

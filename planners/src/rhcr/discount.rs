@@ -13,7 +13,7 @@ impl Discount {
     /// The loss of never arriving.
     const UNIT: u64 = 1 << 40;
 
-    /// A discount by a factor per step. A factor of at least 1, or NaN, means no discount.
+    /// Creates a discount by a factor per step. A factor of at least 1, or NaN, means no discount.
     pub fn new(factor: f64) -> Self {
         if factor.is_nan() || factor >= 1.0 {
             return Self { losses: Vec::new() };

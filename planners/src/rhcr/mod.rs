@@ -8,10 +8,10 @@
 //! | w, planning window | [`RhcrParams::planning_window`] |
 //! | windowed MAPF solver | [`RhcrParams::solver`] |
 //!
-//! In the paper, agents know their next goals. Here only [`Lifelong::next_with_future_goals`] provides them. Otherwise agents plan
-//! to their current goals, keep out of the way afterwards, and replan when one of them gets a new goal. If the solver of
-//! the paper fails, agents wait or keep parts of their plans. Here they continue the last plan, which PIBT extends without
-//! conflicts.
+//! In the paper, agents know their next goals. Here only [`Lifelong::next_with_future_goals`] provides them. Otherwise
+//! agents plan to their current goals, keep out of the way afterwards, and replan when one of them gets a new goal. If
+//! the solver of the paper fails, agents wait or keep parts of their plans. Here they continue the last plan, which
+//! PIBT extends without conflicts.
 
 mod discount;
 mod lns;
@@ -84,8 +84,8 @@ impl Default for RhcrParams {
     }
 }
 
-/// The lifelong planner RHCR. A node of its budget is one single-agent search, or with [`WindowSolver::Ecbs`] one node of
-/// the constraint tree.
+/// The lifelong planner RHCR. A node of its budget is one single-agent search, or with [`WindowSolver::Ecbs`] one node
+/// of the constraint tree.
 #[derive(Debug)]
 pub struct Rhcr {
     params: RhcrParams,
@@ -107,7 +107,7 @@ impl Rhcr {
     /// The limit on the planning window. Units: steps.
     pub const MAX_WINDOW: usize = 1000;
 
-    /// A planner for a map.
+    /// Creates a planner for a map.
     pub fn new(graph: Arc<Graph>, mut params: RhcrParams) -> Self {
         params.planning_window = params.planning_window.clamp(1, Self::MAX_WINDOW);
         Self {
@@ -240,7 +240,10 @@ impl Lifelong for Rhcr {
         check_agents(num_vertices, now, &present)?;
         for (agent, goals) in goals.iter().enumerate() {
             if let Some(goal) = goals.iter().find(|&&goal| goal as usize >= num_vertices) {
-                return Err(Error::agent(agent, format!("goal {goal} is none of {num_vertices} vertices")));
+                return Err(Error::agent(
+                    agent,
+                    format!("goal is vertex {goal}, expected a vertex below {num_vertices}"),
+                ));
             }
         }
         self.set_discount(now.len(), true);

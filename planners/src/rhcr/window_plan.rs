@@ -29,7 +29,7 @@ pub(crate) struct WindowPlan {
 }
 
 impl WindowPlan {
-    /// An empty plan for a number of steps.
+    /// Creates an empty plan for a number of steps.
     pub(crate) fn new(graph: Arc<Graph>, num_steps: usize, seed: u64) -> Self {
         let num_vertices = graph.num_vertices();
         Self {
@@ -134,12 +134,12 @@ impl Costs for Target<'_> {
     }
 }
 
-/// Number of goals that a path reaches.
+/// Returns the number of goals that a path reaches.
 pub(super) fn num_reached(path: &[Vertex], legs: &[Leg]) -> usize {
     path.iter().fold(0, |phase, &vertex| phase_at(vertex, phase, legs))
 }
 
-/// Number of goals reached after a visit to a vertex, of which `phase` were reached before.
+/// Returns the number of goals reached after a visit to a vertex; `phase` goals were reached before.
 fn phase_at(vertex: Vertex, phase: usize, legs: &[Leg]) -> usize {
     phase + legs[phase..].iter().take_while(|leg| leg.to_go[vertex as usize] == 0).count()
 }

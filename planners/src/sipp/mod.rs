@@ -14,8 +14,8 @@
 //! | g, h, f | `cost`, `to_go`, their sum |
 //! | soft obstacle, c-value | [`Task::avoided`], `conflicts` |
 //!
-//! This SIPP supports soft constraints, several goals and windows. The large neighbourhood search of LaCAM* needs none of
-//! them and has a search of its own, which is 1.9 to 2.5 times as fast on its tasks (measured in one run, five crowds).
+//! This SIPP supports soft constraints, several goals and windows. The large neighbourhood search of LaCAM* needs none
+//! of them and has its own search, which is 1.9 to 2.5 times as fast on its tasks (measured in one run, five crowds).
 
 mod node;
 mod search;

@@ -1,4 +1,4 @@
-//! The nodes of SIPP, and what a task says about them.
+//! The nodes of SIPP, and how a task evaluates them.
 
 use crate::bfs::UNREACHABLE;
 use crate::graph::Vertex;
@@ -20,7 +20,8 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// Whether this node dominates another: same interval and phase, no later, no more expensive, no more conflicts.
+    /// Returns whether this node dominates another: same interval and phase, no later, no more expensive, no more
+    /// conflicts.
     #[inline]
     pub fn dominates(&self, other: &Self) -> bool {
         self.vertex == other.vertex
@@ -52,7 +53,7 @@ impl Task<'_> {
         (bound <= max_steps.min(max_cost)).then_some(bound)
     }
 
-    /// Whether a node ends the path.
+    /// Returns whether a node ends the path.
     #[inline]
     pub(super) fn is_end(&self, node: &Node) -> bool {
         let is_finished = node.phase as usize == self.legs.len();
@@ -62,7 +63,7 @@ impl Task<'_> {
         }
     }
 
-    /// Whether a step is beyond the window.
+    /// Returns whether a step is beyond the window.
     #[inline]
     pub(super) fn is_beyond(&self, time: u32) -> bool {
         matches!(self.horizon, Horizon::Window(last) if time > last)
@@ -75,7 +76,7 @@ impl Task<'_> {
         if is_finished { node.cost } else { node.cost + time - node.time }
     }
 
-    /// Whether a move is forbidden or swaps with a reserved path.
+    /// Returns whether a move is forbidden or swaps with a reserved path.
     #[inline]
     pub(super) fn is_barred(&self, from: Vertex, to: Vertex, time: u32) -> bool {
         self.banned.contains(&(from, to, time)) || self.reserved.num_swaps(from, to, time) > 0

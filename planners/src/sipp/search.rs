@@ -26,13 +26,13 @@ pub struct Sipp {
 }
 
 impl Sipp {
-    /// A search of a graph.
+    /// Creates a search of a graph.
     pub fn new(graph: Arc<Graph>) -> Self {
         let latest = vec![(0, NONE); graph.num_vertices()];
         Self { graph, nodes: Vec::new(), queue: BinaryHeap::new(), latest, round: 0 }
     }
 
-    /// Finds the best path, if there is one.
+    /// Finds the best path, if any path exists.
     pub fn find(&mut self, task: &Task<'_>) -> Option<TimedPath> {
         self.nodes.clear();
         self.queue.clear();
@@ -145,8 +145,8 @@ impl Sipp {
                         .free_after(node.vertex, node.time)
                         .is_some_and(|(since, until)| since <= node.time && until == FOREVER)
                 {
-                    let to_come = |avoided: &Reservations| avoided.num_after(node.vertex, node.time);
-                    let conflicts = node.conflicts + task.avoided.map_or(0, to_come);
+                    let num_later = |avoided: &Reservations| avoided.num_after(node.vertex, node.time);
+                    let conflicts = node.conflicts + task.avoided.map_or(0, num_later);
                     self.insert(task, Node { phase: 1, conflicts, ..node });
                 }
             }
@@ -179,12 +179,12 @@ impl Sipp {
         self.queue.push(Reverse(u128::from(high) << 64 | u128::from(low)));
     }
 
-    /// Whether an earlier node dominates a new one.
+    /// Returns whether an earlier node dominates a new one.
     fn is_dominated_by_earlier(&self, node: &Node) -> bool {
         self.siblings(node).any(|other| other.dominates(node))
     }
 
-    /// Whether a later node dominates a queued one.
+    /// Returns whether a later node dominates a queued one.
     fn is_dominated_by_later(&self, node: &Node, index: u32) -> bool {
         let latest = self.latest[node.vertex as usize].1;
         let mut at = latest;

@@ -17,9 +17,9 @@ pub struct Task<'a> {
     pub avoided: Option<&'a Reservations>,
     /// Forbidden moves: from a vertex, to a vertex, in the step that ends at this step.
     pub banned: &'a [(Vertex, Vertex, u32)],
-    /// When the path ends.
+    /// The condition that ends the path.
     pub horizon: Horizon,
-    /// What the search minimises.
+    /// The objective of the search.
     pub order: Order,
     /// Seed of tie-breaking.
     pub salt: u32,
@@ -35,13 +35,13 @@ pub struct Leg {
 }
 
 impl Leg {
-    /// The leg to the last goal.
+    /// Creates the leg to the last goal.
     pub fn last(to_go: CostToGo) -> Self {
         Self { to_go, then: 0 }
     }
 }
 
-/// When a path ends.
+/// The condition that ends a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Horizon {
     /// At the only goal, where the agent can stay forever.
@@ -53,7 +53,7 @@ pub enum Horizon {
     Window(u32),
 }
 
-/// What a search minimises.
+/// The objective of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// The cost, then the number of conflicts with soft constraints.

@@ -1,12 +1,12 @@
-//! Plans of conflict-based search, against a search through all joint places.
+//! Conflict-based search against a search through all joint states.
 
 use crate::common::joint_oracle::oracle;
-use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use crate::common::{Case, check_degenerate_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_planners::{Budget, Cbs, CbsParams, Outcome, Planner, Solvability};
 
 #[test]
-fn no_plan_costs_less() {
+fn plans_are_optimal() {
     let mut counts = [0; 3];
     for seed in 0..2500 {
         let num_agents = 2 + (seed % 3) as usize;
@@ -36,7 +36,7 @@ fn no_plan_costs_less() {
 }
 
 #[test]
-fn what_cannot_be_done_in_so_many_steps_is_proved() {
+fn cbs_proves_that_a_step_limit_is_too_low() {
     let case = Case::new(&["...", "#.#"], &[[(0, 0), (0, 2)], [(0, 2), (0, 0)]]);
     let plan = |most| Cbs::default().plan(&case.problem().within(most), &Budget::default());
     let shortest = (2..9).find(|&most| plan(most).solution().is_some()).unwrap();
@@ -54,7 +54,7 @@ fn open_maps_with_more_agents_are_solved() {
 }
 
 #[test]
-fn bounds_hold_however_soon_the_search_ends() {
+fn lower_bounds_hold_for_every_budget() {
     let (mut num_unsolved, mut num_raised) = (0, 0);
     for seed in 0..300 {
         let case = Case::random(&mut rng(seed), 4, 5, 4);
@@ -79,8 +79,8 @@ fn bounds_hold_however_soon_the_search_ends() {
 }
 
 #[test]
-fn rooms_apart_are_searched_one_by_one() {
-    // Three rooms, in each of which two agents have to find a way past each other.
+fn separate_rooms_are_searched_independently() {
+    // Three rooms, in each of which two agents have to pass each other.
     let rows = ["....#....#....", ".##.#.##.#.##.", "....#....#...."];
     let in_room = |col: u16| [[(0, col), (0, col + 3)], [(0, col + 3), (0, col)]];
     let agents: Vec<_> = [0, 5, 10].into_iter().flat_map(in_room).collect();
@@ -98,12 +98,12 @@ fn rooms_apart_are_searched_one_by_one() {
 }
 
 #[test]
-fn agents_find_the_shortest_way_past_each_other_in_a_long_corridor() {
-    // One has to go back to where it came from, or to the only bay.
+fn agents_pass_each_other_optimally_in_a_long_corridor() {
+    // One agent has to back out of the corridor or into the only bay.
     for bay in [1, 5, 11] {
         let length = 24;
-        let beside: String = (0..length).map(|col| if col == bay { '.' } else { '#' }).collect();
-        let rows = [".".repeat(length), beside];
+        let bay_row: String = (0..length).map(|col| if col == bay { '.' } else { '#' }).collect();
+        let rows = [".".repeat(length), bay_row];
         let last = length as u16 - 1;
         let rows = rows.each_ref().map(String::as_str);
         let case = Case::new(&rows, &[[(0, 0), (0, last)], [(0, last), (0, 0)]]);
@@ -119,7 +119,7 @@ fn agents_find_the_shortest_way_past_each_other_in_a_long_corridor() {
 }
 
 #[test]
-fn the_tree_takes_no_more_than_it_may() {
+fn cbs_gives_up_if_the_tree_exceeds_its_byte_budget() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
     let params = CbsParams { max_bytes: 200_000, ..CbsParams::default() };
     let outcome = Cbs::new(params).plan(&case.problem(), &Budget::default());
@@ -127,8 +127,8 @@ fn the_tree_takes_no_more_than_it_may() {
 }
 
 #[test]
-fn odd_problems_have_outcomes() {
-    check_odd_problems(&mut Cbs::default());
+fn degenerate_problems_have_outcomes() {
+    check_degenerate_problems(&mut Cbs::default());
 }
 
 #[test]

@@ -1,7 +1,7 @@
-//! Plans within a bound, against a search through all joint places.
+//! Bounded-suboptimal plans against a search through all joint states.
 
 use crate::common::joint_oracle::oracle;
-use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use crate::common::{Case, check_degenerate_problems, check_repeats, check_spent_budgets, rng};
 use pogema_core::OnGoal;
 use pogema_planners::{Budget, Ecbs, EcbsParams, Outcome, Planner, Solvability};
 
@@ -10,8 +10,8 @@ fn planner(weight: f64) -> Ecbs {
 }
 
 #[test]
-fn plans_keep_their_bounds() {
-    let mut num_late = 0;
+fn plans_cost_at_most_the_weight_times_the_optimum() {
+    let mut num_timed_out = 0;
     for seed in 0..1200 {
         let weight = [1.0, 1.1, 1.5, 3.0][(seed % 4) as usize];
         let (height, width) = [(2, 3), (3, 3), (4, 3)][(seed / 4 % 3) as usize];
@@ -22,7 +22,7 @@ fn plans_keep_their_bounds() {
             Solvability::Solvable { sum_of_costs } => {
                 let Outcome::Solved { lower_bound, .. } = outcome else {
                     assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome} in {case:?}");
-                    num_late += 1;
+                    num_timed_out += 1;
                     continue;
                 };
                 let cost = plan.unwrap().sum_of_costs() as u64;
@@ -32,24 +32,24 @@ fn plans_keep_their_bounds() {
             _ => assert!(matches!(outcome, Outcome::Impossible { .. }), "{outcome} in {case:?}"),
         }
     }
-    assert!(num_late < 30, "{num_late}");
+    assert!(num_timed_out < 30, "{num_timed_out}");
 }
 
 #[test]
-fn a_weight_lets_more_agents_plan() {
+fn a_higher_weight_solves_problems_with_more_agents() {
     let num_solved = (0..10)
         .filter(|&seed| {
             let case = Case::random(&mut rng(seed), 16, 16, 20);
             let outcome = planner(1.5).plan(&case.problem(), &Budget::of_nodes(3000));
-            let is_off = matches!(outcome, Outcome::Impossible { .. });
-            is_off || case.check(&outcome).is_some()
+            let is_impossible = matches!(outcome, Outcome::Impossible { .. });
+            is_impossible || case.check(&outcome).is_some()
         })
         .count();
     assert!(num_solved >= 8, "{num_solved}");
 }
 
 #[test]
-fn odd_weights_are_weights_of_one() {
+fn invalid_weights_count_as_one() {
     let case = Case::new(&["...", "#.#"], &[[(0, 0), (0, 2)], [(0, 2), (0, 1)]]);
     let best = planner(1.0).plan(&case.problem(), &Budget::default());
     for weight in [f64::NAN, 0.0, -3.0] {
@@ -59,7 +59,7 @@ fn odd_weights_are_weights_of_one() {
 }
 
 #[test]
-fn the_tree_takes_no_more_than_it_may() {
+fn ecbs_gives_up_if_the_tree_exceeds_its_byte_budget() {
     let case = Case::random(&mut rng(1), 12, 12, 40);
     let params = EcbsParams { weight: 1.0, max_bytes: 200_000, ..EcbsParams::default() };
     let outcome = Ecbs::new(params).plan(&case.problem(), &Budget::default());
@@ -67,8 +67,8 @@ fn the_tree_takes_no_more_than_it_may() {
 }
 
 #[test]
-fn odd_problems_have_outcomes() {
-    check_odd_problems(&mut Ecbs::default());
+fn degenerate_problems_have_outcomes() {
+    check_degenerate_problems(&mut Ecbs::default());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Joint A* against an independent search through joint states, and the scenario figures that use it.
+//! Joint A* against an independent search through joint states, and the scenario statistics that use it.
 
 use crate::common::joint_oracle::oracle;
 use pogema_core::{Cell, Map, OnGoal};
@@ -30,26 +30,26 @@ fn verdict(rows: &[&str], agents: &[[(u16, u16); 2]], on_goal: OnGoal) -> Solvab
 }
 
 #[test]
-fn two_in_a_corridor_cannot_pass_unless_one_leaves() {
+fn two_agents_in_a_corridor_cannot_pass_unless_one_leaves() {
     let crossing = [[(0, 0), (0, 4)], [(0, 4), (0, 0)]];
     assert_eq!(verdict(&["....."], &crossing, OnGoal::Nothing), Solvability::Unsolvable);
     assert_eq!(verdict(&["....."], &crossing, OnGoal::Finish), Solvability::Unsolvable);
-    // The second is gone before the first comes by.
+    // The second agent leaves the map before the first one passes its goal.
     let behind = [[(0, 0), (0, 4)], [(0, 2), (0, 1)]];
     assert_eq!(verdict(&["....."], &behind, OnGoal::Nothing), Solvability::Unsolvable);
     assert_eq!(verdict(&["....."], &behind, OnGoal::Finish), Solvability::Solvable { sum_of_costs: 6 });
 }
 
 #[test]
-fn a_bay_costs_what_it_takes_to_let_pass() {
+fn the_detour_into_a_bay_counts_as_cost() {
     let crossing = [[(0, 0), (0, 4)], [(0, 4), (0, 0)]];
     let bay = [".....", "##.##"];
-    // One goes into the bay and out again.
+    // One agent moves into the bay and out again.
     assert_eq!(verdict(&bay, &crossing, OnGoal::Nothing), Solvability::Solvable { sum_of_costs: 11 });
 }
 
 #[test]
-fn a_full_ring_turns_and_two_do_not_swap() {
+fn a_full_ring_rotates_but_two_agents_cannot_swap() {
     let ring = [[(0, 0), (0, 1)], [(0, 1), (1, 1)], [(1, 1), (1, 0)], [(1, 0), (0, 0)]];
     assert_eq!(verdict(&["..", ".."], &ring, OnGoal::Nothing), Solvability::Solvable { sum_of_costs: 4 });
     let pair = [[(0, 0), (0, 1)], [(0, 1), (0, 0)]];
@@ -58,8 +58,8 @@ fn a_full_ring_turns_and_two_do_not_swap() {
 }
 
 #[test]
-fn an_agent_may_have_to_leave_its_goal_for_another() {
-    // The second starts on its goal, lets the first one pass and comes right back.
+fn an_agent_leaves_its_goal_to_let_another_pass() {
+    // The second agent starts on its goal, lets the first one pass and returns.
     let blocked = [[(0, 0), (0, 2)], [(0, 1), (0, 1)]];
     assert_eq!(
         verdict(&["...", "#.#"], &blocked, OnGoal::Nothing),
@@ -68,7 +68,7 @@ fn an_agent_may_have_to_leave_its_goal_for_another() {
 }
 
 #[test]
-fn a_search_that_is_too_large_says_so() {
+fn a_search_beyond_its_state_limit_is_unknown() {
     let rows = ["........"; 8];
     let agents: Vec<[(u16, u16); 2]> = (0..6).map(|at| [(0, at), (7, 7 - at)]).collect();
     let map = Map::from_rows(&rows).unwrap();
@@ -79,8 +79,8 @@ fn a_search_that_is_too_large_says_so() {
 }
 
 #[test]
-fn a_pocket_in_which_two_are_locked() {
-    // A street corner, cut off from the rest of the city.
+fn two_agents_locked_in_a_small_component_are_reported() {
+    // The top left corner is cut off from the rest of the map.
     let rows = ["..#...", ".##...", "##....", "......"];
     let agents = [[(0, 1), (1, 0)], [(1, 0), (0, 1)], [(3, 0), (0, 5)]];
     let stats = judge(&rows, &agents, OnGoal::Nothing);
@@ -96,7 +96,7 @@ fn a_pocket_in_which_two_are_locked() {
 }
 
 #[test]
-fn puzzles_are_proven_solvable_where_the_proof_is_cheap() {
+fn most_puzzles_are_proven_solvable() {
     let mut num_proven = 0;
     for puzzle in &PUZZLES {
         let text = puzzle.text().unwrap();
@@ -105,11 +105,11 @@ fn puzzles_are_proven_solvable_where_the_proof_is_cheap() {
         assert!(stats.sum_of_distances <= puzzle.sum_of_costs, "{}", puzzle.name);
         num_proven += usize::from(stats.is_proven_solvable);
     }
-    assert!(num_proven > PUZZLES.len() / 2, "only {num_proven}");
+    assert!(num_proven > PUZZLES.len() / 2, "proved only {num_proven} puzzles");
 }
 
 #[test]
-fn what_is_proven_is_what_a_search_through_everything_finds() {
+fn verdicts_agree_with_an_exhaustive_search() {
     let mut rng = Generator::seeded(5);
     let mut seen = [0; 2];
     for _ in 0..400 {
@@ -123,16 +123,16 @@ fn what_is_proven_is_what_a_search_through_everything_finds() {
         rng.shuffle(&mut free);
         let goals = free[..num_agents].to_vec();
         for on_goal in [OnGoal::Nothing, OnGoal::Finish] {
-            let judged = scenario(&map, &starts, &goals, on_goal);
+            let stats = scenario(&map, &starts, &goals, on_goal);
             let truth = oracle(&map, &starts, &goals, on_goal, usize::MAX);
             assert_eq!(solvability(&map, &starts, &goals, on_goal, usize::MAX).unwrap(), truth);
             let is_solvable = truth != Solvability::Unsolvable;
             assert_eq!(
-                judged.infeasibilities.is_empty(),
+                stats.infeasibilities.is_empty(),
                 is_solvable,
                 "{map:?} {starts:?} {goals:?} {on_goal:?}"
             );
-            assert_eq!(judged.is_proven_solvable, is_solvable);
+            assert_eq!(stats.is_proven_solvable, is_solvable);
             seen[usize::from(is_solvable)] += 1;
         }
     }
@@ -140,7 +140,7 @@ fn what_is_proven_is_what_a_search_through_everything_finds() {
 }
 
 #[test]
-fn puzzles_cost_what_the_catalogue_says() {
+fn puzzles_have_the_costs_of_the_catalogue() {
     assert!(PUZZLES.len() >= 20);
     for puzzle in &PUZZLES {
         let text = puzzle.text().unwrap();

@@ -1,4 +1,4 @@
-//! LaCAM* against brute force, against bad input and against its own seed.
+//! LaCAM* against brute force, with invalid input, and with equal seeds.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
     random.next_u32() as usize % bound
 }
 
-/// Agents at random on a map with obstacles at random, which may well be unsolvable.
+/// Draws a random map with random starts and goals, which may be unsolvable.
 fn random_problem(
     random: &mut Pcg64Mcg,
     height: usize,
@@ -39,17 +39,17 @@ fn draw(random: &mut Pcg64Mcg, mut cells: Vec<Cell>, count: usize) -> Vec<Cell> 
     (0..count).map(|_| cells.swap_remove(below(random, cells.len()))).collect()
 }
 
-/// A step of everybody: all configurations that one leads to.
+/// Returns all successors of a configuration.
 fn steps(problem: &Problem, now: &[u32]) -> Vec<Vec<u32>> {
     let mut found: Vec<Vec<u32>> = vec![Vec::new()];
     for (agent, &here) in now.iter().enumerate() {
         let mut longer = Vec::new();
         for next in &found {
             for &place in problem.graph.neighbours(here).iter().chain([&here]) {
-                let meets = next.iter().enumerate().any(|(other, &there)| {
+                let conflicts = next.iter().enumerate().any(|(other, &there)| {
                     there == place || (there == here && now[other] == place && other != agent)
                 });
-                if !meets {
+                if !conflicts {
                     longer.push(next.iter().copied().chain([place]).collect());
                 }
             }
@@ -59,7 +59,7 @@ fn steps(problem: &Problem, now: &[u32]) -> Vec<Vec<u32>> {
     found
 }
 
-/// The least number of steps of any plan, by breadth first search over all configurations.
+/// Returns the least makespan of any plan, by breadth-first search over all configurations.
 fn least_steps(problem: &Problem) -> Option<usize> {
     let mut known = HashMap::from([(problem.starts.clone(), 0)]);
     let mut queue = VecDeque::from([problem.starts.clone()]);
@@ -78,8 +78,8 @@ fn least_steps(problem: &Problem) -> Option<usize> {
     None
 }
 
-/// The least sum of costs of any plan: agents that are at their goals may say that they stay there, and cost nothing
-/// from then on.
+/// Returns the least sum of costs of any plan. An agent at its goal may decide to rest there; from then on, it adds no
+/// cost.
 fn least_cost(problem: &Problem) -> Option<u64> {
     type State = (Vec<u32>, u32);
     let num_agents = problem.num_agents() as u32;
@@ -125,7 +125,7 @@ fn lacam(seed: u64) -> Lacam {
 }
 
 #[test]
-fn what_is_solvable_is_solved_and_what_is_not_is_proved_impossible() {
+fn every_problem_is_solved_or_proved_impossible() {
     let mut random = Pcg64Mcg::seed_from_u64(1);
     let mut num_solved = 0;
     for case in 0..3000 {
@@ -152,7 +152,7 @@ fn what_is_solvable_is_solved_and_what_is_not_is_proved_impossible() {
 }
 
 #[test]
-fn sums_of_costs_come_to_the_least_and_bounds_never_exceed_it() {
+fn most_plans_are_optimal_and_lower_bounds_hold() {
     let mut random = Pcg64Mcg::seed_from_u64(2);
     let (mut num_solved, mut num_optimal) = (0, 0);
     for case in 0..400 {
@@ -176,30 +176,33 @@ fn sums_of_costs_come_to_the_least_and_bounds_never_exceed_it() {
 }
 
 #[test]
-fn a_plan_keeps_to_the_cap_or_there_is_none() {
+fn the_step_limit_is_met_or_proved_too_low() {
     let mut random = Pcg64Mcg::seed_from_u64(3);
-    let mut num_late = 0;
+    let mut num_proved = 0;
     for case in 0..150 {
         let (map, starts, goals) = random_problem(&mut random, 3, 3, 3);
         let problem = Problem::new(&map, &starts, &goals).unwrap();
         let Some(least) = least_steps(&problem) else {
             continue;
         };
-        for cap in [least, least.saturating_sub(1)] {
-            let outcome = lacam(case).plan(&problem.clone().within(cap), &Budget::of_nodes(200_000));
-            if cap == least {
+        for limit in [least, least.saturating_sub(1)] {
+            let outcome = lacam(case).plan(&problem.clone().within(limit), &Budget::of_nodes(200_000));
+            if limit == least {
                 let plan = outcome.solution();
                 assert!(
-                    plan.is_some_and(|plan| plan.num_steps() <= cap),
-                    "case {case}, cap {cap}: {outcome}"
+                    plan.is_some_and(|plan| plan.num_steps() <= limit),
+                    "case {case}, limit {limit}: {outcome}"
                 );
             } else if least > 0 {
-                assert!(matches!(outcome, Outcome::Impossible { .. }), "case {case}, cap {cap}: {outcome}");
-                num_late += 1;
+                assert!(
+                    matches!(outcome, Outcome::Impossible { .. }),
+                    "case {case}, limit {limit}: {outcome}"
+                );
+                num_proved += 1;
             }
         }
     }
-    assert!(num_late > 30);
+    assert!(num_proved > 30);
 }
 
 fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Problem {
@@ -209,44 +212,44 @@ fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Proble
 }
 
 #[test]
-fn bad_input_has_an_answer() {
-    let told = |problem: Problem| lacam(0).plan(&problem, &Budget::default()).to_string();
+fn degenerate_problems_have_outcomes() {
+    let outcome_text = |problem: Problem| lacam(0).plan(&problem, &Budget::default()).to_string();
     let solved = |costs: &str| format!("solved: sum of costs {costs}");
-    assert!(told(problem(&[".."], &[], &[])).starts_with(&solved("0, at least 0")));
-    assert!(told(problem(&[".."], &[(0, 1)], &[(0, 1)])).starts_with(&solved("0, at least 0")));
+    assert!(outcome_text(problem(&[".."], &[], &[])).starts_with(&solved("0, at least 0")));
+    assert!(outcome_text(problem(&[".."], &[(0, 1)], &[(0, 1)])).starts_with(&solved("0, at least 0")));
     assert_eq!(
-        told(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),
-        "impossible: all that the agents can do was tried"
+        outcome_text(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),
+        "impossible: the search exhausted all configurations"
     );
     assert_eq!(
-        told(problem(&[".#."], &[(0, 0)], &[(0, 2)])),
+        outcome_text(problem(&[".#."], &[(0, 0)], &[(0, 2)])),
         "impossible: no path leads agent 0 from (0, 0) to (0, 2)"
     );
     assert_eq!(
-        told(problem(&["..."], &[(0, 0), (0, 1)], &[(0, 2), (0, 2)])),
-        "impossible: agents 0 and 1 both want to stay at (0, 2)"
+        outcome_text(problem(&["..."], &[(0, 0), (0, 1)], &[(0, 2), (0, 2)])),
+        "impossible: agents 0 and 1 have the same goal (0, 2)"
     );
     assert_eq!(
-        told(problem(&["."], &[(0, 0), (0, 0)], &[(0, 0), (0, 0)])),
-        "impossible: agents 0 and 1 both start at (0, 0)"
+        outcome_text(problem(&["."], &[(0, 0), (0, 0)], &[(0, 0), (0, 0)])),
+        "impossible: agents 0 and 1 have the same start (0, 0)"
     );
 }
 
 #[test]
-fn who_is_stuck_in_a_part_of_the_map_is_found_among_many() {
+fn agents_locked_in_a_small_component_are_found_among_many() {
     let rows = ["..#.......", "##........", ".........."];
     let starts: Vec<(u16, u16)> = (3..10).map(|col| (1, col)).chain([(0, 0), (0, 1)]).collect();
     let mut goals: Vec<(u16, u16)> = (3..10).map(|col| (2, 12 - col)).chain([(0, 1), (0, 0)]).collect();
     assert_eq!(
         lacam(0).plan(&problem(&rows, &starts, &goals), &Budget::default()).to_string(),
-        "impossible: all that agents [7, 8] can do in their part of the map was tried"
+        "impossible: the search exhausted all configurations of agents [7, 8] in their component"
     );
     goals.swap(7, 8);
     assert!(lacam(0).plan(&problem(&rows, &starts, &goals), &Budget::default()).solution().is_some());
 }
 
 #[test]
-fn a_budget_of_nothing_is_timed_out_with_a_valid_beginning() {
+fn a_spent_budget_times_out_with_a_valid_partial_plan() {
     let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
     let map = Map::from_rows(&["....", "...."]).unwrap();
     let (start, goal) = (Cell { row: 0, col: 0 }, Cell { row: 1, col: 3 });
@@ -262,12 +265,12 @@ fn a_budget_of_nothing_is_timed_out_with_a_valid_beginning() {
     }
 }
 
-/// A crowd on an open map with some obstacles.
+/// Draws a crowd on an open map with some obstacles.
 fn crowd(seed: u64, side: usize, num_agents: usize) -> (Map, Vec<Cell>, Vec<Cell>) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let obstacles = (0..side * side).map(|_| below(&mut random, 12) == 0).collect();
     let map = Map::new(side, side, obstacles).unwrap();
-    let problem_free = |&cell: &Cell| {
+    let is_passable = |&cell: &Cell| {
         let around = [(0, 1), (1, 0), (0, -1), (-1, 0)];
         let is_open = around.iter().filter(|(down, right)| {
             let (row, col) = (i32::from(cell.row) + down, i32::from(cell.col) + right);
@@ -276,7 +279,7 @@ fn crowd(seed: u64, side: usize, num_agents: usize) -> (Map, Vec<Cell>, Vec<Cell
         });
         !map.is_obstacle(cell) && is_open.count() >= 3
     };
-    let free: Vec<Cell> = (0..side * side).map(|index| map.cell_at(index)).filter(problem_free).collect();
+    let free: Vec<Cell> = (0..side * side).map(|index| map.cell_at(index)).filter(is_passable).collect();
     let starts = draw(&mut random, free.clone(), num_agents);
     let goals = draw(&mut random, free, num_agents);
     (map, starts, goals)
@@ -294,7 +297,7 @@ fn the_same_seed_and_nodes_give_the_same_plan() {
 }
 
 #[test]
-fn more_nodes_give_no_worse_plans() {
+fn more_nodes_give_better_plans() {
     let (map, starts, goals) = crowd(6, 16, 60);
     let problem = Problem::new(&map, &starts, &goals).unwrap().within(100);
     let cost = |nodes| {
@@ -319,7 +322,7 @@ fn two_threads_make_one_valid_plan() {
 }
 
 #[test]
-fn every_rule_may_be_left_out() {
+fn every_pibt_rule_can_be_disabled() {
     let (map, starts, goals) = crowd(8, 12, 30);
     let problem = Problem::new(&map, &starts, &goals).unwrap();
     for (swap, hindrance) in [(false, false), (false, true), (true, false)] {
@@ -330,7 +333,7 @@ fn every_rule_may_be_left_out() {
 }
 
 #[test]
-fn a_thousand_agents_find_their_way_in_a_city() {
+fn a_thousand_agents_on_a_large_map_are_solved() {
     let (map, starts, goals) = crowd(9, 256, 1000);
     let problem = Problem::new(&map, &starts, &goals).unwrap();
     let params = LacamParams { max_bytes: 64 << 20, ..LacamParams::default() };

@@ -1,4 +1,4 @@
-//! Tests of the planners, in one program, which is soon linked.
+//! Tests of the planners, in one program, which links faster than several.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

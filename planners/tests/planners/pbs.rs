@@ -1,11 +1,11 @@
-//! Plans of priority-based search.
+//! Priority-based search against a search through all joint states.
 
 use crate::common::joint_oracle::oracle;
-use crate::common::{Case, check_odd_problems, check_repeats, check_spent_budgets, rng};
+use crate::common::{Case, check_degenerate_problems, check_repeats, check_spent_budgets, rng};
 use pogema_planners::{Budget, Outcome, Pbs, PbsParams, Planner, Solvability};
 
 #[test]
-fn plans_are_valid_and_cost_no_less_than_the_best() {
+fn plans_are_valid_and_cost_at_least_the_optimum() {
     let mut num_solved = 0;
     for seed in 0..500 {
         let case = Case::random(&mut rng(seed), 4, 4, 2 + (seed % 2) as usize);
@@ -23,7 +23,7 @@ fn plans_are_valid_and_cost_no_less_than_the_best() {
 }
 
 #[test]
-fn most_of_the_larger_problems_are_solved() {
+fn most_larger_problems_are_solved() {
     let solves = |seed: &u64| {
         let case = Case::random(&mut rng(*seed), 20, 20, 30);
         let outcome = Pbs::default().plan(&case.problem(), &Budget::of_nodes(20_000));
@@ -39,8 +39,8 @@ fn most_of_the_larger_problems_are_solved() {
 }
 
 #[test]
-fn odd_problems_have_outcomes() {
-    check_odd_problems(&mut Pbs::default());
+fn degenerate_problems_have_outcomes() {
+    check_degenerate_problems(&mut Pbs::default());
 }
 
 #[test]

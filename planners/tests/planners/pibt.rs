@@ -1,4 +1,4 @@
-//! PIBT: valid steps whatever happens, for one goal each and for goals without end.
+//! PIBT: steps are always valid, one-shot and lifelong.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -22,8 +22,8 @@ fn rules() -> impl Strategy<Value = PibtRules> {
     (any::<bool>(), any::<bool>()).prop_map(|(swap, hindrance)| PibtRules { swap, hindrance })
 }
 
-/// A map with some obstacles, places of agents on it, and where each wants to go again and again.
-fn scenes() -> impl Strategy<Value = (Map, Vec<Cell>, Vec<Vec<Cell>>)> {
+/// Generates a map with some obstacles, the starts of agents, and four goals for each agent, visited in turn.
+fn problems() -> impl Strategy<Value = (Map, Vec<Cell>, Vec<Vec<Cell>>)> {
     (2..9_usize, 2..9_usize, 1..30_usize).prop_flat_map(|(height, width, num_agents)| {
         let obstacles = prop::collection::vec(prop::bool::weighted(0.2), height * width);
         obstacles.prop_flat_map(move |mut obstacles| {
@@ -43,8 +43,8 @@ fn scenes() -> impl Strategy<Value = (Map, Vec<Cell>, Vec<Vec<Cell>>)> {
 
 proptest! {
     #[test]
-    fn plans_are_valid_even_if_they_do_not_arrive(
-        (map, starts, goals) in scenes(),
+    fn plans_are_valid_even_if_agents_do_not_arrive(
+        (map, starts, goals) in problems(),
         rules in rules(),
         seed: u64,
     ) {
@@ -55,7 +55,7 @@ proptest! {
                 prop_assert_eq!(validate(&map, &starts, Some(&goals), &plan), Ok(()));
                 prop_assert!(lower_bound <= plan.sum_of_costs() as u64 && plan.num_steps() <= 60);
             }
-            Outcome::TimedOut { .. } => prop_assert!(false, "there was time without end"),
+            Outcome::TimedOut { .. } => prop_assert!(false, "timed out with an unlimited budget"),
             Outcome::GaveUp { best, .. } => {
                 prop_assert_eq!(validate(&map, &starts, None, &best.unwrap()), Ok(()));
             }
@@ -69,8 +69,8 @@ proptest! {
     }
 
     #[test]
-    fn lifelong_steps_are_valid_whatever_the_goals(
-        (map, starts, goals) in scenes(),
+    fn lifelong_steps_are_valid_for_any_goals(
+        (map, starts, goals) in problems(),
         rules in rules(),
         is_guided: bool,
         seed: u64,
@@ -102,29 +102,29 @@ fn two_agents_pass_each_other_beside_a_corridor() {
 }
 
 #[test]
-fn bad_input_has_an_answer() {
-    let told = |problem: Problem| Pibt::default().plan(&problem, &Budget::default()).to_string();
-    assert_eq!(told(problem(&[".."], &[], &[])), "solved: sum of costs 0, at least 0; makespan 0");
+fn degenerate_problems_have_outcomes() {
+    let outcome_text = |problem: Problem| Pibt::default().plan(&problem, &Budget::default()).to_string();
+    assert_eq!(outcome_text(problem(&[".."], &[], &[])), "solved: sum of costs 0, at least 0; makespan 0");
     assert_eq!(
-        told(problem(&[".."], &[(0, 1)], &[(0, 1)])),
+        outcome_text(problem(&[".."], &[(0, 1)], &[(0, 1)])),
         "solved: sum of costs 0, at least 0; makespan 0"
     );
     assert_eq!(
-        told(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),
+        outcome_text(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),
         "gave up; sum of costs at least 2"
     );
     assert_eq!(
-        told(problem(&[".#."], &[(0, 0)], &[(0, 2)])),
+        outcome_text(problem(&[".#."], &[(0, 0)], &[(0, 2)])),
         "impossible: no path leads agent 0 from (0, 0) to (0, 2)"
     );
     assert_eq!(
-        told(problem(&["."], &[(0, 0), (0, 0)], &[(0, 0), (0, 0)])),
-        "impossible: agents 0 and 1 both start at (0, 0)"
+        outcome_text(problem(&["."], &[(0, 0), (0, 0)], &[(0, 0), (0, 0)])),
+        "impossible: agents 0 and 1 have the same start (0, 0)"
     );
 }
 
 #[test]
-fn a_budget_of_nothing_is_timed_out() {
+fn a_spent_budget_times_out() {
     let problem = problem(&["..."], &[(0, 0)], &[(0, 2)]);
     let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
     for (budget, num_steps) in [(Budget::of_nodes(0), 0), (Budget::of_nodes(1), 1), (cancelled, 0)] {
@@ -136,15 +136,15 @@ fn a_budget_of_nothing_is_timed_out() {
 }
 
 #[test]
-fn lifelong_agents_are_checked() {
+fn invalid_positions_and_goals_are_rejected() {
     let graph = Arc::new(Graph::new(&Map::from_rows(&["..."]).unwrap()));
     let mut pibt = PibtLifelong::new(graph, PibtParams::default());
     let mut error = |now: &[Vertex], goals: &[Vertex]| pibt.step(now, goals).unwrap_err().to_string();
     assert_eq!(error(&[0], &[0, 1]), "goals has length 2, expected 1");
     assert_eq!(error(&[0, 1], &[0]), "goals has length 1, expected 2");
-    assert_eq!(error(&[0, 3], &[0, 1]), "instance: agent 1: the map has 3 free cells");
-    assert_eq!(error(&[0, 1], &[0, 9]), "instance: agent 1: the map has 3 free cells");
-    assert_eq!(error(&[1, 1], &[0, 2]), "instance: agent 1: it is in one cell with another");
+    assert_eq!(error(&[0, 3], &[0, 1]), "instance: agent 1: position or goal is not a vertex below 3");
+    assert_eq!(error(&[0, 1], &[0, 9]), "instance: agent 1: position or goal is not a vertex below 3");
+    assert_eq!(error(&[1, 1], &[0, 2]), "instance: agent 1: it shares its cell with another agent");
     assert_eq!(pibt.step(&[0, 1], &[0, 2]).unwrap(), [0, 2]);
 }
 
@@ -160,7 +160,7 @@ fn the_same_seed_gives_the_same_plan() {
 }
 
 #[test]
-fn agents_led_around_the_traffic_reach_more_goals() {
+fn guidance_around_traffic_increases_throughput() {
     let shelves = format!(".{}.", ".########".repeat(4));
     let rows: Vec<String> =
         (0..16).map(|row| if row % 4 == 2 { shelves.clone() } else { ".".repeat(38) }).collect();
@@ -185,5 +185,5 @@ fn agents_led_around_the_traffic_reach_more_goals() {
         draws
     };
     let (shortest, guided) = (reached(None), reached(Some(GuidanceParams::default())));
-    assert!(guided > shortest, "{guided} with guidance, {shortest} without");
+    assert!(guided > shortest, "reached {guided} goals with guidance, {shortest} without");
 }

@@ -1,4 +1,4 @@
-//! Plans as text, written and read.
+//! Plans as text: a plan reads back as it was written.
 
 use pogema_core::{Cell, Map};
 use pogema_planners::{Outcome, Plan, PlanText, Problem, write_plan, write_result};
@@ -13,7 +13,7 @@ fn plan() -> Plan {
 }
 
 #[test]
-fn a_plan_is_read_as_it_was_written() {
+fn a_plan_reads_back_as_it_was_written() {
     assert_eq!(write_plan(&plan()), "0: (0,0) (2,1)\n1: (0,1) (2,1)\n2: (1,1) (2,0)\n");
     assert_eq!(PlanText::read(&write_plan(&plan())).unwrap().plan, plan());
     let loose = "# two agents\n\n(0, 0), (2, 1),\n  (0,1)(2,1)\n2 : ( 1 , 1 ) , (2,0)";
@@ -21,7 +21,7 @@ fn a_plan_is_read_as_it_was_written() {
 }
 
 #[test]
-fn a_result_is_read_as_it_was_written() {
+fn a_result_reads_back_as_it_was_written() {
     let map = Map::from_rows(&["..", "..", ".."]).unwrap();
     let problem = Problem::new(&map, &plan().cells()[0], &plan().cells()[2]).unwrap();
     let outcome = Outcome::Solved { plan: plan(), lower_bound: 3 };
@@ -36,15 +36,15 @@ fn a_result_is_read_as_it_was_written() {
     assert_eq!((read.starts, read.goals), (Some(plan().cells()[0].clone()), Some(plan().cells()[2].clone())));
     let none = write_result("small.map", "none", &problem, &Outcome::TimedOut { best: None, lower_bound: 0 });
     assert!(none.contains("solved=0\n"));
-    assert_eq!(PlanText::read(&none).unwrap_err().to_string(), "the result holds no solution");
+    assert_eq!(PlanText::read(&none).unwrap_err().to_string(), "the result contains no solution");
 }
 
 #[test]
-fn what_is_no_plan_is_told_with_its_line() {
+fn invalid_plans_are_reported_with_line_numbers() {
     for (text, expected) in [
         ("", "instance: the plan has no start"),
-        ("0: (0,0)\n\n2: (0,1)", "line 3: found `2`, expected the step 1"),
-        ("(0,0) (1,1)\n(0,0)", "line 2: 1 cells, expected 2, as at the start"),
+        ("0: (0,0)\n\n2: (0,1)", "line 3: found `2`, expected step 1"),
+        ("(0,0) (1,1)\n(0,0)", "line 2: found 1 cells, expected 2, as in the first step"),
         ("(0,0) 7", "line 1: found `7`, expected a cell such as `(3,4)`"),
         ("(0,0", "line 1: found `(0,0`, expected a cell such as `(3,4)`"),
         ("(0;0)", "line 1: found `0;0`, expected two whole numbers such as `3,4`"),

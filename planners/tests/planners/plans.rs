@@ -1,4 +1,4 @@
-//! Plans, their checks and the costs that planners count on.
+//! Plans, their validation, and the distances that planners use.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ fn map() -> Map {
 }
 
 #[test]
-fn agents_may_follow_each_other_round_in_a_circle() {
+fn agents_may_follow_each_other_in_a_ring() {
     let around = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)];
     let mut next = around;
     next.rotate_left(1);
@@ -36,7 +36,7 @@ fn agents_may_follow_each_other_round_in_a_circle() {
 }
 
 #[test]
-fn each_conflict_is_told_with_its_step_and_agents() {
+fn each_conflict_is_reported_with_its_step_and_agents() {
     let check = |steps: &[&[(u16, u16)]], ends: &[(u16, u16)]| {
         let plan = plan(steps);
         let starts = cells(&[(0, 0), (0, 2)]);
@@ -74,7 +74,7 @@ fn each_conflict_is_told_with_its_step_and_agents() {
         check(&[stay, &[(1, 0), (0, 2)]], &[(1, 0), (0, 1)]),
         of(ConflictKind::Goal, 1, &[1], "agent 1 ends at (0, 2), which is not its goal")
     );
-    assert_eq!(check(&[&[(0, 0)]], &[(0, 0)]).map_err(|told| told.0), Err(ConflictKind::Start));
+    assert_eq!(check(&[&[(0, 0)]], &[(0, 0)]).map_err(|found| found.0), Err(ConflictKind::Start));
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn costs_count_the_steps_until_an_agent_stays() {
 }
 
 #[test]
-fn a_plan_has_as_many_agents_in_every_step() {
+fn every_step_of_a_plan_has_the_same_number_of_agents() {
     let error = Plan::new(vec![cells(&[(0, 0), (0, 1)]), cells(&[(0, 0)])]).unwrap_err();
     assert_eq!(error.to_string(), "cells of a step has length 1, expected 2");
     assert_eq!(Plan::new(Vec::new()).unwrap_err().to_string(), "instance: the plan has no start");
@@ -110,7 +110,7 @@ fn costs_to_go_are_exact() {
 }
 
 #[test]
-fn only_so_many_costs_are_kept_but_none_that_is_held() {
+fn the_cache_evicts_tables_except_those_in_use() {
     let graph = Arc::new(Graph::new(&Map::new(4, 4, vec![false; 16]).unwrap()));
     let mut distances = Distances::new(graph, 3 * 16 * size_of::<u32>());
     let held = distances.to(0);
@@ -122,13 +122,17 @@ fn only_so_many_costs_are_kept_but_none_that_is_held() {
 }
 
 #[test]
-fn what_makes_a_problem_impossible_is_told() {
+fn impossible_problems_are_reported_with_the_reason() {
     type Case<'a> = (&'a [&'a str], [&'a [(u16, u16)]; 2], &'a str);
     let cases: [Case<'_>; 4] = [
-        (&["..", ".."], [&[(0, 0), (0, 0)], &[(0, 1), (1, 1)]], "agents 0 and 1 both start at (0, 0)"),
-        (&["..", ".."], [&[(0, 0), (0, 1)], &[(1, 1), (1, 1)]], "agents 0 and 1 both want to stay at (1, 1)"),
+        (&["..", ".."], [&[(0, 0), (0, 0)], &[(0, 1), (1, 1)]], "agents 0 and 1 have the same start (0, 0)"),
+        (&["..", ".."], [&[(0, 0), (0, 1)], &[(1, 1), (1, 1)]], "agents 0 and 1 have the same goal (1, 1)"),
         (&[".#."], [&[(0, 0)], &[(0, 2)]], "no path leads agent 0 from (0, 0) to (0, 2)"),
-        (&["....."], [&[(0, 0)], &[(0, 4)]], "agent 0 needs 4 steps from (0, 0) to (0, 4), of 3"),
+        (
+            &["....."],
+            [&[(0, 0)], &[(0, 4)]],
+            "agent 0 needs 4 steps from (0, 0) to (0, 4), but the step limit is 3",
+        ),
     ];
     for name in PlannerName::all() {
         for (rows, [starts, goals], reason) in cases {
@@ -141,13 +145,13 @@ fn what_makes_a_problem_impossible_is_told() {
 }
 
 #[test]
-fn problems_are_read_with_care() {
+fn invalid_problems_are_rejected() {
     let map = Map::from_rows(&[".#", ".."]).unwrap();
     let error = |starts: &[(u16, u16)], goals: &[(u16, u16)]| {
         Problem::new(&map, &cells(starts), &cells(goals)).unwrap_err().to_string()
     };
     assert_eq!(error(&[(0, 0)], &[]), "goals has length 0, expected 1");
-    assert_eq!(error(&[(0, 1)], &[(0, 0)]), "instance: agent 0: start (0, 1) is no free cell of the map");
-    assert_eq!(error(&[(0, 0)], &[(0, 2)]), "instance: agent 0: goal (0, 2) is no free cell of the map");
-    assert_eq!(error(&[(0, 0)], &[(9, 9)]), "instance: agent 0: goal (9, 9) is no free cell of the map");
+    assert_eq!(error(&[(0, 1)], &[(0, 0)]), "instance: agent 0: start (0, 1) is not a free cell of the map");
+    assert_eq!(error(&[(0, 0)], &[(0, 2)]), "instance: agent 0: goal (0, 2) is not a free cell of the map");
+    assert_eq!(error(&[(0, 0)], &[(9, 9)]), "instance: agent 0: goal (9, 9) is not a free cell of the map");
 }

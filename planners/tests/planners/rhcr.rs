@@ -1,4 +1,4 @@
-//! Lifelong planning: every step is one that agents may take, whatever happens to them.
+//! RHCR: every step is valid, even after agents were displaced or the budget ran out.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -17,8 +17,9 @@ struct World {
     map: Map,
     graph: Arc<Graph>,
     now: Vec<Vertex>,
-    /// For each agent all its goals, and how many it has reached.
+    /// For each agent, all its goals.
     goals: Vec<Vec<Vertex>>,
+    /// For each agent, the number of goals it has reached.
     reached: Vec<usize>,
 }
 
@@ -33,11 +34,11 @@ impl World {
         Self { map: case.map, reached: vec![0; now.len()], graph, now, goals }
     }
 
-    fn present_goals(&self) -> Vec<Vertex> {
+    fn current_goals(&self) -> Vec<Vertex> {
         self.goals.iter().zip(&self.reached).map(|(goals, &reached)| goals[reached]).collect()
     }
 
-    fn go(&mut self, next: Vec<Vertex>) {
+    fn advance(&mut self, next: Vec<Vertex>) {
         let cells =
             |places: &[Vertex]| places.iter().map(|&place| self.graph.cell(place)).collect::<Vec<_>>();
         let plan = Plan::new(vec![cells(&self.now), cells(&next)]).unwrap();
@@ -66,7 +67,7 @@ fn displace(world: &mut World, rng: &mut Pcg64Mcg) {
 }
 
 #[test]
-fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
+fn every_step_is_valid_even_after_agents_were_displaced() {
     for (seed, solver) in (0..24).zip(SOLVERS.into_iter().cycle()) {
         let mut world = World::new(seed, 7, 4 + (seed % 12) as usize);
         let planning_window = [0, 1, 3, 8, 20][(seed % 5) as usize];
@@ -74,9 +75,9 @@ fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
         let mut planner = Rhcr::new(world.graph.clone(), params);
         let mut rng = rng(seed);
         for step in 0..60 {
-            let goals = world.present_goals();
+            let goals = world.current_goals();
             let next = planner.next(&world.now, &goals, &Budget::of_nodes(100)).unwrap();
-            world.go(next);
+            world.advance(next);
             if step % 7 == 6 {
                 displace(&mut world, &mut rng);
             }
@@ -85,21 +86,21 @@ fn every_step_can_be_taken_even_by_agents_that_were_displaced() {
 }
 
 #[test]
-fn agents_reach_goals_again_and_again() {
+fn agents_reach_many_goals() {
     for solver in SOLVERS {
         let mut world = World::new(5, 10, 20);
         let mut planner = Rhcr::new(world.graph.clone(), params(solver));
         for _ in 0..100 {
-            let goals = world.present_goals();
+            let goals = world.current_goals();
             let next = planner.next(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
-            world.go(next);
+            world.advance(next);
         }
         assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());
     }
 }
 
 #[test]
-fn agents_that_know_their_next_goals_need_not_plan_every_step() {
+fn future_goals_allow_a_longer_simulation_window() {
     for solver in SOLVERS {
         let mut world = World::new(5, 10, 20);
         let mut planner =
@@ -108,21 +109,21 @@ fn agents_that_know_their_next_goals_need_not_plan_every_step() {
             let ahead = |(goals, &reached): (&Vec<Vertex>, &usize)| goals[reached..].to_vec();
             let goals: Vec<Vec<Vertex>> = world.goals.iter().zip(&world.reached).map(ahead).collect();
             let next = planner.next_with_future_goals(&world.now, &goals, &Budget::of_nodes(200)).unwrap();
-            world.go(next);
+            world.advance(next);
         }
         assert!(world.num_reached() > 150, "{solver:?}: {}", world.num_reached());
     }
 }
 
 #[test]
-fn the_same_seed_gives_the_same_steps_after_a_reset_too() {
+fn the_same_seed_gives_the_same_steps_also_after_a_reset() {
     for solver in SOLVERS {
         let run = |planner: &mut Rhcr| {
             let mut world = World::new(3, 8, 12);
             for _ in 0..40 {
-                let goals = world.present_goals();
+                let goals = world.current_goals();
                 let next = planner.next(&world.now, &goals, &Budget::of_nodes(60)).unwrap();
-                world.go(next);
+                world.advance(next);
             }
             world.now
         };
@@ -136,16 +137,16 @@ fn the_same_seed_gives_the_same_steps_after_a_reset_too() {
 }
 
 #[test]
-fn without_a_budget_agents_still_step_in_turn() {
+fn agents_reach_goals_even_with_a_spent_budget() {
     for solver in SOLVERS {
         let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
         for budget in [Budget::of_nodes(0), Budget::of_time(Duration::ZERO), cancelled] {
             let mut world = World::new(4, 8, 12);
             let mut planner = Rhcr::new(world.graph.clone(), params(solver));
             for _ in 0..40 {
-                let goals = world.present_goals();
+                let goals = world.current_goals();
                 let next = planner.next(&world.now, &goals, &budget).unwrap();
-                world.go(next);
+                world.advance(next);
             }
             assert!(world.num_reached() > 10, "{solver:?}: {}", world.num_reached());
         }
@@ -153,7 +154,7 @@ fn without_a_budget_agents_still_step_in_turn() {
 }
 
 #[test]
-fn odd_worlds_have_steps_too() {
+fn degenerate_problems_have_steps_or_errors() {
     for solver in SOLVERS {
         let graph = |rows: &[&str]| Arc::new(Graph::new(&Case::new(rows, &[]).map));
         let next = |rows: &[&str], now: &[Vertex], goals: &[Vertex]| {
@@ -165,8 +166,8 @@ fn odd_worlds_have_steps_too() {
         assert_eq!(next(&["..."], &[0, 2], &[2, 2]).unwrap()[1], 2);
         let text = |now: &[Vertex], goals: &[Vertex]| next(&[".."], now, goals).unwrap_err().to_string();
         assert_eq!(text(&[0], &[]), "goals has length 0, expected 1");
-        assert_eq!(text(&[0, 0], &[1, 1]), "instance: agent 1: it is where agent 0 is, at vertex 0");
-        assert_eq!(text(&[2], &[0]), "instance: agent 0: place 2 is none of 2 vertices");
-        assert_eq!(text(&[0], &[2]), "instance: agent 0: goal 2 is none of 2 vertices");
+        assert_eq!(text(&[0, 0], &[1, 1]), "instance: agent 1: it shares vertex 0 with agent 0");
+        assert_eq!(text(&[2], &[0]), "instance: agent 0: position is vertex 2, expected a vertex below 2");
+        assert_eq!(text(&[0], &[2]), "instance: agent 0: goal is vertex 2, expected a vertex below 2");
     }
 }

@@ -1,4 +1,4 @@
-//! The best way of one agent past others, against a search through all cells and steps.
+//! SIPP against a search through all cells and steps.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -9,10 +9,10 @@ use pogema_planners::{Distances, Graph, Reservations, UNREACHABLE, Vertex};
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
-/// Steps after which nothing changes any more.
-const LONGEST: usize = 40;
+/// The number of steps after which the other agents no longer move.
+const LAST_CHANGE: usize = 40;
 
-/// Others who wander about and in the end stay.
+/// Other agents, which follow random walks and may stay at their ends.
 struct Others {
     paths: Vec<Vec<Vertex>>,
     stays: bool,
@@ -20,7 +20,7 @@ struct Others {
 
 impl Others {
     fn random(rng: &mut Pcg64Mcg, graph: &Graph, count: usize, stays: bool) -> Self {
-        let wander = |rng: &mut Pcg64Mcg| {
+        let random_walk = |rng: &mut Pcg64Mcg| {
             let mut path = vec![rng.next_u32() % graph.num_vertices() as u32];
             for _ in 0..rng.next_u32() % 12 {
                 let at = path[path.len() - 1];
@@ -30,7 +30,7 @@ impl Others {
             }
             path
         };
-        Self { paths: (0..count).map(|_| wander(rng)).collect(), stays }
+        Self { paths: (0..count).map(|_| random_walk(rng)).collect(), stays }
     }
 
     fn reserved(&self, graph: &Graph) -> Reservations {
@@ -45,7 +45,7 @@ impl Others {
         path.get(step).or(path.last().filter(|_| self.stays)).copied()
     }
 
-    /// Conflicts of a move that ends at a step; a move from nowhere is the start.
+    /// Counts the conflicts of a move that ends at a step; without `from`, the agent starts there.
     fn conflicts(&self, from: Option<Vertex>, to: Vertex, step: usize) -> usize {
         let meets = |path: &&Vec<Vertex>| {
             let swaps = from.is_some_and(|from| {
@@ -57,9 +57,9 @@ impl Others {
     }
 }
 
-/// The least steps to the goal, or what they are in a window, by looking at all cells step by step.
+/// Returns the least cost of a path to the goal, or of a path within a window, by searching all cells step by step.
 fn least(graph: &Graph, start: Vertex, to_go: &[u32], others: &Others, window: Option<usize>) -> Option<u32> {
-    // For each cell, whether the goal was reached before, and when.
+    // The keys are cells and whether the agent has reached the goal; the values are the steps at which it did.
     let mut now: HashMap<(Vertex, bool), u32> = HashMap::new();
     if others.conflicts(None, start, 0) > 0 {
         return None;
@@ -67,13 +67,14 @@ fn least(graph: &Graph, start: Vertex, to_go: &[u32], others: &Others, window: O
     let reaches = |at: Vertex| window.is_some() && to_go[at as usize] == 0;
     now.insert((start, reaches(start)), 0);
     let mut best = None;
-    for step in 0..=LONGEST {
+    for step in 0..=LAST_CHANGE {
         for (&(at, reached), &cost) in &now {
             let open_end = window == Some(step) && (reached || to_go[at as usize] != UNREACHABLE);
             let beyond = if reached { cost } else { step as u32 + to_go[at as usize].min(1 << 20) };
-            let is_free = (step..LONGEST + 20).all(|step| others.conflicts(Some(at), at, step.max(1)) == 0);
-            let parked = window.is_none() && to_go[at as usize] == 0 && is_free;
-            if open_end || parked {
+            let is_free =
+                (step..LAST_CHANGE + 20).all(|step| others.conflicts(Some(at), at, step.max(1)) == 0);
+            let can_stay = window.is_none() && to_go[at as usize] == 0 && is_free;
+            if open_end || can_stay {
                 best = Some(best.map_or(beyond, |best: u32| best.min(beyond)));
             }
         }
@@ -96,19 +97,19 @@ fn least(graph: &Graph, start: Vertex, to_go: &[u32], others: &Others, window: O
     best
 }
 
-fn check_way(graph: &Graph, others: &Others, start: Vertex, path: &[Vertex]) -> usize {
+fn check_path(graph: &Graph, others: &Others, start: Vertex, path: &[Vertex]) -> usize {
     assert_eq!(path[0], start);
-    let mut met = HashSet::new();
+    let mut conflict_steps = HashSet::new();
     for (step, pair) in path.windows(2).enumerate() {
         assert!(pair[0] == pair[1] || graph.neighbours(pair[0]).contains(&pair[1]));
         if others.conflicts(Some(pair[0]), pair[1], step + 1) > 0 {
-            met.insert(step);
+            conflict_steps.insert(step);
         }
     }
-    met.len()
+    conflict_steps.len()
 }
 
-fn check_against_all_steps(window: Option<usize>) {
+fn check_against_full_search(window: Option<usize>) {
     for seed in 0..1500 {
         let mut rng = rng(seed);
         let case = Case::random(&mut rng, 4, 5, 1);
@@ -116,7 +117,7 @@ fn check_against_all_steps(window: Option<usize>) {
         let others = Others::random(&mut rng, &graph, (seed % 5) as usize, window.is_none() && seed % 2 == 0);
         let (start, goal) = (case.problem().starts[0], case.problem().goals[0]);
         let to_go = Distances::new(graph.clone(), 0).to(goal);
-        let want = least(&graph, start, &to_go, &others, window);
+        let expected = least(&graph, start, &to_go, &others, window);
         let reserved = others.reserved(&graph);
         let horizon = window.map_or(Horizon::Stay { max_steps: 60 }, |steps| Horizon::Window(steps as u32));
         let task = Task {
@@ -130,32 +131,32 @@ fn check_against_all_steps(window: Option<usize>) {
             salt: seed as u32,
         };
         let mut sipp = Sipp::new(graph.clone());
-        let way = sipp.find(&task);
+        let found = sipp.find(&task);
         let avoided = Others::random(&mut rng, &graph, 3, window.is_none()).reserved(&graph);
-        let careful = sipp.find(&Task { avoided: Some(&avoided), ..task });
-        assert_eq!(careful.map(|way| way.cost), want, "seed {seed}");
+        let with_soft_constraints = sipp.find(&Task { avoided: Some(&avoided), ..task });
+        assert_eq!(with_soft_constraints.map(|found| found.cost), expected, "seed {seed}");
         assert_eq!(
-            way.as_ref().map(|way| way.cost),
-            want,
-            "seed {seed}: {case:?} {way:?} {:?}",
+            found.as_ref().map(|found| found.cost),
+            expected,
+            "seed {seed}: {case:?} {found:?} {:?}",
             others.paths
         );
-        if let Some(way) = way {
-            assert_eq!(check_way(&graph, &others, start, &way.path), 0);
-            assert!(window.is_none_or(|steps| way.path.len() == steps + 1));
+        if let Some(found) = found {
+            assert_eq!(check_path(&graph, &others, start, &found.path), 0);
+            assert!(window.is_none_or(|steps| found.path.len() == steps + 1));
         }
     }
 }
 
 #[test]
-fn no_way_to_stay_is_shorter() {
-    check_against_all_steps(None);
+fn paths_to_a_goal_are_shortest() {
+    check_against_full_search(None);
 }
 
 #[test]
-fn no_way_through_a_window_is_better() {
+fn paths_through_a_window_are_shortest() {
     for steps in [1, 4, 9] {
-        check_against_all_steps(Some(steps));
+        check_against_full_search(Some(steps));
     }
 }
 
@@ -182,7 +183,7 @@ fn banned_moves_are_not_made() {
 }
 
 #[test]
-fn what_should_be_avoided_is_if_the_cost_allows() {
+fn soft_constraints_are_avoided_within_the_cost_limit() {
     for seed in 0..500 {
         let mut rng = rng(seed);
         let case = Case::random(&mut rng, 4, 5, 1);
@@ -211,13 +212,13 @@ fn what_should_be_avoided_is_if_the_cost_allows() {
         assert_eq!(sipp.find(&task).unwrap().cost, least);
         for slack in 0..6 {
             let order = Order::Conflicts { max_cost: least + slack };
-            let way = sipp.find(&Task { order, ..task }).unwrap();
-            assert!(way.cost <= least + slack && way.cost >= least);
-            assert_eq!(way.path.len() as u32, way.cost + 1);
-            assert!(way.conflicts <= fewest, "seed {seed}");
-            let met = check_way(&graph, &others, start, &way.path);
-            assert!(met == 0 || way.conflicts > 0);
-            fewest = way.conflicts;
+            let found = sipp.find(&Task { order, ..task }).unwrap();
+            assert!(found.cost <= least + slack && found.cost >= least);
+            assert_eq!(found.path.len() as u32, found.cost + 1);
+            assert!(found.conflicts <= fewest, "seed {seed}");
+            let conflict_steps = check_path(&graph, &others, start, &found.path);
+            assert!(conflict_steps == 0 || found.conflicts > 0);
+            fewest = found.conflicts;
         }
     }
 }

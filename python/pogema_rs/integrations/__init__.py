@@ -1,1 +1,1 @@
-"""Environments for the frameworks that train on them."""
+"""Adapters of environments for training frameworks."""

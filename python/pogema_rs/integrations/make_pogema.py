@@ -1,4 +1,4 @@
-"""The way to an environment."""
+"""Factories of environments."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ __all__ = ["SingleAgentWrapper", "make_pogema", "make_single_agent_gym", "pogema
 
 
 class SingleAgentWrapper(Wrapper):
-    """Agent 0 alone; the others act at random, by the action space's own random numbers.
+    """An environment with agent 0 alone; the other agents take random actions from the action space.
 
-    Under the semantics "2.0" `reset(seed=...)` chooses those too.
+    With the semantics "2.0" `reset(seed=...)` also seeds the action space.
     """
 
     def reset(
         self, *, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
     ) -> Any:
-        """Begins an episode: the observation and info of agent 0."""
+        """Begins an episode and returns the observation and info of agent 0."""
         environment = self.unwrapped
         if seed is not None and environment.semantics.reset_takes_seed:
             environment.action_space.seed(seed)
@@ -38,7 +38,7 @@ class SingleAgentWrapper(Wrapper):
         return (observations[0], infos[0]) if return_info else observations[0]
 
     def step(self, action: int) -> Any:
-        """Plays one step: what it brought agent 0."""
+        """Plays one step and returns the results of agent 0."""
         environment = self.unwrapped
         others = [environment.action_space.sample() for _ in range(environment.get_num_agents() - 1)]
         return tuple(values[0] for values in self.env.step([action, *others]))
@@ -55,7 +55,7 @@ def make_single_agent_gym(
     semantics: Union[str, Semantics] = Semantics.RELEASED,
     **_: Any,
 ) -> SingleAgentWrapper:
-    """An environment for agents that are alone, as `gymnasium.make("Pogema-v0")` makes it."""
+    """Makes an environment for a single agent, like `gymnasium.make("Pogema-v0")`."""
     return SingleAgentWrapper(_make_pogema(_config(grid_config), semantics))
 
 
@@ -65,13 +65,13 @@ def make_pogema(
     semantics: Union[str, Semantics] = Semantics.RELEASED,
     **kwargs: Any,
 ) -> Any:
-    """An environment of a config, for the framework that its `integration` names.
+    """Makes an environment from a config, for the framework that its `integration` names.
 
-    `semantics` is "1.4.0", or "2.0" for what that line changed: every agent is seen, `reset(seed=...)` chooses the
-    episode, and metrics begin anew with each reset.
+    `semantics` is "1.4.0" [default] or "2.0", in which every agent is seen, `reset(seed=...)` chooses the episode, and
+    each reset clears the metrics.
 
     Errors: `KeyError` for `auto_reset` without Sample Factory, and for an unknown integration; `NotImplementedError`
-    for `rllib`, as POGEMA has it.
+    for `rllib`, as in POGEMA.
 
     Source: POGEMA 1.4.0, `integrations/make_pogema.py`
     """

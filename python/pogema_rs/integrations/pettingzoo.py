@@ -23,15 +23,16 @@ __all__ = ["PogemaParallel", "parallel_env"]
 def parallel_env(
     grid_config: Optional[GridConfig] = None, semantics: Union[str, Semantics] = Semantics.RELEASED
 ) -> PogemaParallel:
-    """An environment of agents `player_0`, `player_1` and so on."""
+    """Makes an environment with the agents `player_0`, `player_1` and so on."""
     return PogemaParallel(grid_config or GridConfig(), semantics=semantics)
 
 
 class PogemaParallel(ParallelEnv):
-    """An environment as dictionaries by the agents' names.
+    """An environment whose values are dictionaries keyed by agent names.
 
-    What a step returns is about the agents that took part before it. As in POGEMA the metrics are with `player_0`, and
-    lost if it has left before the end; `metrics` always holds those of the last step, or None.
+    A step returns values of the agents that were active before it. As in POGEMA, the metrics are in the infos of
+    `player_0`, and lost if it finished before the end of the episode. The attribute `metrics` always holds the metrics
+    of the last step, or None.
 
     Source: POGEMA 1.4.0, `integrations/pettingzoo.py`
     """
@@ -58,26 +59,26 @@ class PogemaParallel(ParallelEnv):
 
     @functools.cached_property
     def action_spaces(self) -> dict[str, gymnasium.Space]:
-        """The space of each agent's actions, each with random numbers of its own."""
+        """The space of each agent's actions, each with its own random generator."""
         return {name: gymnasium.spaces.Discrete(self.pogema.action_space.n) for name in self.possible_agents}
 
     def observation_space(self, agent: str) -> gymnasium.Space:
-        """The space of an agent's observations."""
+        """Returns the space of an agent's observations."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> gymnasium.Space:
-        """The space of an agent's actions."""
+        """Returns the space of an agent's actions."""
         return self.action_spaces[agent]
 
     def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
-        """Begins an episode: observations and infos by name."""
+        """Begins an episode and returns observations and infos by name."""
         observations, infos = self.pogema.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
         self.num_moves, self.metrics = 0, None
         return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
-        """Plays one step; an agent without an action stays, and names that there are not are ignored."""
+        """Plays one step; agents without an action stay, and unknown names are ignored."""
         result = self.pogema.step([actions.get(name, 0) for name in self.possible_agents])
         present = [(name, self.agent_name_mapping[name]) for name in self.agents]
         observations, rewards, terminated, truncated, infos = (
@@ -102,5 +103,5 @@ class PogemaParallel(ParallelEnv):
 
     @property
     def unwrapped(self) -> PogemaParallel:
-        """Itself."""
+        """This environment."""
         return self

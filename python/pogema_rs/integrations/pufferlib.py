@@ -1,4 +1,4 @@
-"""Environments for PufferLib, written into its own buffers."""
+"""Environments for PufferLib that write into its buffers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class PogemaPuffer(PufferEnv):
     """A `VecEnv` as a native environment of PufferLib: every agent of every environment is one row of its buffers.
 
     Row `env * agents + agent` of `observations` `(num_agents, 3, side, side)`, `rewards`, `terminals` and
-    `truncations` is what the step brought that agent; `masks` is False from the step after the one in which it left,
-    until the next episode begins, which it does in the step that ends the last. `infos` holds the metrics of each
+    `truncations` belongs to that agent. `masks` is False from the step after the one in which the agent finished until
+    the next episode begins. The step that ends an episode also begins the next one. `infos` holds the metrics of each
     episode that ended.
 
-    Hand the class to `pufferlib.vector.make`, and config and numbers as `env_kwargs`. As it is it steps
-    `num_envs` environments on `num_threads`; several processes want `num_threads=1` each.
+    Pass the class to `pufferlib.vector.make`, and its arguments as `env_kwargs`. One instance steps `num_envs`
+    environments on `num_threads` threads; if you run several processes, set `num_threads=1`.
     """
 
     def __init__(
@@ -41,9 +41,9 @@ class PogemaPuffer(PufferEnv):
         buf: Any = None,
         seed: Optional[int] = None,
     ) -> None:
-        """See `VecEnv`; `buf` is PufferLib's, and `seed` that of the first reset without one.
+        """Makes the environments like `VecEnv`; `buf` is PufferLib's, and a first reset without a seed uses `seed`.
 
-        Errors: ValueError or TypeError naming what was expected.
+        Errors: ValueError or TypeError for wrong arguments.
         """
         self.envs = VecEnv(
             {} if grid_config is None else grid_config,
@@ -62,7 +62,7 @@ class PogemaPuffer(PufferEnv):
         self._seed = seed
 
     def reset(self, seed: Optional[int] = None) -> tuple[np.ndarray, list[dict[str, float]]]:
-        """Begins the first episodes of a seed, or the next ones: observations, and no infos."""
+        """Begins the first episodes of a seed, or the next ones, and returns observations and an empty list."""
         seed, self._seed = self._seed if seed is None else seed, None
         _, infos = self.envs.reset(seed=seed, out=self._observations())
         self.rewards[:] = 0
@@ -75,13 +75,13 @@ class PogemaPuffer(PufferEnv):
     def step(
         self, actions: Any
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
-        """Plays one step: observations, rewards, terminals and truncations as they stand in the buffers, and infos.
+        """Plays one step and returns the buffers of observations, rewards, terminals and truncations, and infos.
 
-        Errors: those of `VecEnv.step`; nothing is played.
+        Errors: those of `VecEnv.step`; the state does not change.
         """
         numbers = np.asarray(actions)
         if numbers.shape != (self.num_agents,):
-            raise ValueError(f"actions have the shape {numbers.shape}, expected ({self.num_agents},), one per agent")
+            raise ValueError(f"actions have shape {numbers.shape}, expected ({self.num_agents},), one per agent")
         _, rewards, terminated, truncated, infos = self.envs.step(
             numbers.reshape(self._by_env), out=self._observations()
         )
@@ -93,16 +93,16 @@ class PogemaPuffer(PufferEnv):
         return self.observations, self.rewards, self.terminals, self.truncations, _episodes(infos)
 
     def close(self) -> None:
-        """Lets go of environments and threads."""
+        """Frees the environments and their threads."""
         self.envs.close()
 
     def _observations(self) -> np.ndarray:
-        """PufferLib's buffer with the axes of a `VecEnv`."""
+        """Returns PufferLib's buffer with the axes of a `VecEnv`."""
         return self.observations.reshape(*self._by_env, *self.single_observation_space.shape)
 
 
 def _episodes(infos: dict[str, Any]) -> list[dict[str, float]]:
-    """The metrics of each episode that ended."""
+    """Returns the metrics of each episode that ended."""
     if "metrics" not in infos:
         return []
     metrics = {name: values for name, values in infos["metrics"].items() if not name.startswith("_")}

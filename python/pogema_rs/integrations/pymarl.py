@@ -15,7 +15,7 @@ __all__ = ["PyMarlPogema"]
 
 
 class PyMarlPogema:
-    """An environment with PyMARL's interface: one reward for all agents, one state.
+    """An environment with PyMARL's interface: all agents share one reward and one state.
 
     Source: POGEMA 1.4.0, `integrations/pymarl.py`
     """
@@ -37,30 +37,30 @@ class PyMarlPogema:
 
     @property
     def unwrapped(self) -> PyMarlPogema:
-        """Itself."""
+        """This environment."""
         return self
 
     def reset(self) -> np.ndarray:
-        """Begins an episode; the observations of all agents in one flat array."""
+        """Begins an episode and returns the observations of all agents in one flat array."""
         self._observations, _ = self.env.reset()
         return np.array(self._observations).flatten()
 
     def step(self, actions: Sequence[int]) -> tuple[float, bool, dict]:
-        """Plays one step: the sum of rewards, whether the episode ended, and then its metrics."""
+        """Plays one step and returns the sum of rewards, whether the episode ended, and if so its metrics."""
         self._observations, rewards, terminated, truncated, infos = self.env.step(actions)
         done = all(terminated) or all(truncated)
         return sum(rewards), done, dict(infos[0]["metrics"]) if done else {}
 
     def get_obs(self) -> np.ndarray:
-        """The observations of all agents, `(agents, 3 * side * side)`."""
+        """Returns the observations of all agents, `(agents, 3 * side * side)`."""
         return np.array([self.get_obs_agent(agent) for agent in range(self.n_agents)])
 
     def get_obs_agent(self, agent_id: int) -> np.ndarray:
-        """The observation of one agent, flat."""
+        """Returns the observation of one agent as a flat array."""
         return np.array(self._observations[agent_id]).flatten()
 
     def get_obs_size(self) -> int:
-        """Number of values in the observation of one agent."""
+        """Returns the number of values in the observation of one agent."""
         return len(self.get_obs_agent(0))
 
     def get_state(self) -> np.ndarray:
@@ -68,25 +68,25 @@ class PyMarlPogema:
         return self.env.get_state()
 
     def get_state_size(self) -> int:
-        """Number of values in the state."""
+        """Returns the number of values in the state."""
         return len(self.get_state())
 
     def get_avail_actions(self) -> list[list[int]]:
-        """All actions for each agent."""
+        """Returns all actions for each agent."""
         return [self.get_avail_agent_actions(agent) for agent in range(self.n_agents)]
 
     @staticmethod
     def get_avail_agent_actions(agent_id: int) -> list[int]:
-        """All actions."""
+        """Returns all actions."""
         return list(range(PyMarlPogema.get_total_actions()))
 
     @staticmethod
     def get_total_actions() -> int:
-        """Number of actions."""
+        """Returns the number of actions."""
         return 5
 
     def get_env_info(self) -> dict[str, int]:
-        """The sizes that PyMARL asks for."""
+        """Returns the sizes that PyMARL requires."""
         return {
             "state_shape": self.get_state_size(),
             "obs_shape": self.get_obs_size(),
@@ -97,11 +97,11 @@ class PyMarlPogema:
 
     @staticmethod
     def get_stats() -> dict:
-        """None are kept."""
+        """Returns an empty dictionary, because no statistics are kept."""
         return {}
 
     def sample_actions(self) -> np.ndarray:
-        """A random action for each agent."""
+        """Returns a random action for each agent."""
         return self.env.sample_actions()
 
     def render(self, *args: Any, **kwargs: Any) -> Optional[str]:
@@ -109,7 +109,7 @@ class PyMarlPogema:
         return self.env.render(*args, **kwargs)
 
     def save_replay(self) -> None:
-        """Does nothing, as in POGEMA; `env.save_replay` draws a film."""
+        """Does nothing, as in POGEMA; `env.save_replay` writes a replay."""
 
     def close(self) -> None:
         """Does nothing."""

@@ -20,11 +20,11 @@ __all__ = ["PogemaMultiAgentEnv"]
 
 
 class PogemaMultiAgentEnv(MultiAgentEnv):
-    """An environment as RLlib's dictionaries, agents `player_0`, `player_1` and so on.
+    """An environment with RLlib's dictionaries, keyed by agents `player_0`, `player_1` and so on.
 
-    Made by RLlib from its `env_config`: the fields of a `GridConfig`, and `semantics`, by default "2.0", since RLlib
-    chooses episodes by `reset(seed=...)`. The metrics of an episode are in the infos of the agents that see its end,
-    under `metrics`.
+    RLlib makes it from an `env_config` with the fields of a `GridConfig` and `semantics` [default: "2.0", because RLlib
+    chooses episodes with `reset(seed=...)`]. When an episode ends, the infos of the agents that were active until then
+    hold its metrics under `metrics`.
     """
 
     def __init__(self, env_config: Optional[Mapping[str, Any]] = None) -> None:
@@ -39,13 +39,16 @@ class PogemaMultiAgentEnv(MultiAgentEnv):
         super().__init__()
 
     def reset(self, *, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
-        """Begins an episode: observations and infos by name."""
+        """Begins an episode and returns observations and infos by name."""
         observations, infos = self.pogema.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
         return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
 
     def step(self, action_dict: Mapping[str, int]) -> tuple[dict, dict, dict, dict, dict]:
-        """Plays one step; an agent without an action stays. What comes back is about those that took part before it."""
+        """Plays one step and returns the values of the agents that were active before it.
+
+        Agents without an action stay.
+        """
         result = self.pogema.step([action_dict.get(name, 0) for name in self.possible_agents])
         present = [(agent, name) for agent, name in enumerate(self.possible_agents) if name in self.agents]
         by_name: list[dict[str, Any]] = [{name: values[agent] for agent, name in present} for values in result]

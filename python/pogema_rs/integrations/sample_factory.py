@@ -11,7 +11,7 @@ __all__ = ["AutoResetWrapper", "IsMultiAgentWrapper", "MetricsForwardingWrapper"
 
 
 class IsMultiAgentWrapper(Wrapper):
-    """Says that there are several agents, and how many."""
+    """Adds the attributes `is_multiagent` and `num_agents`."""
 
     is_multiagent = True
 
@@ -22,10 +22,10 @@ class IsMultiAgentWrapper(Wrapper):
 
 
 class MetricsForwardingWrapper(Wrapper):
-    """Puts a copy of the metrics where Sample Factory looks for them, `episode_extra_stats`."""
+    """Copies the metrics to `episode_extra_stats`, where Sample Factory reads them."""
 
     def step(self, action: Any) -> Any:
-        """As the environment inside."""
+        """Plays one step of the inner environment."""
         result = self.env.step(action)
         for info in result[4]:
             if "metrics" in info:
@@ -34,10 +34,10 @@ class MetricsForwardingWrapper(Wrapper):
 
 
 class AutoResetWrapper(Wrapper):
-    """Begins the next episode in the step that ends one: the observations are those of the new episode."""
+    """Begins the next episode in the step that ends one, and returns the new episode's observations."""
 
     def step(self, action: Any) -> Any:
-        """As the environment inside, but for the observations of a step that ends an episode."""
+        """Plays one step of the inner environment, and replaces the observations if it ends an episode."""
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         if all(terminated) or all(truncated):
             observations, _ = self.env.reset()

@@ -1,4 +1,4 @@
-"""Environments for TorchRL, which reads them through its wrapper of PettingZoo."""
+"""Environments for TorchRL, which reads them through its PettingZoo wrapper."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pogema_rs.semantics import Semantics
 
 __all__ = ["PogemaTorchRL"]
 
-# POGEMA's names of the figures of an episode, by what becomes of agents at their goals.
+# POGEMA's metrics of an episode, by `on_target`.
 _METRICS = {
     "finish": ("ISR", "CSR", "ep_length"),
     "nothing": ("ISR", "CSR", "ep_length", "SoC", "makespan"),
@@ -21,12 +21,16 @@ _METRICS = {
 
 
 class PogemaTorchRL(PogemaParallel):
-    """What `torchrl.envs.PettingZooWrapper(..., use_mask=True)` takes: infos of the same flat fields at every step.
+    """An environment for `torchrl.envs.PettingZooWrapper(..., use_mask=True)`.
 
-    These are `is_active`; `action_mask`, which TorchRL gives to its specs and policies: 5 flags, True for staying and
-    for a move whose cell is on the map and free of obstacles; and the metrics under POGEMA's names, the same for all
-    agents, NaN before the step that ends the episode. By default with the semantics "2.0", since TorchRL chooses
-    episodes by `reset(seed=...)`.
+    The infos of every step have the same flat fields:
+
+    - `is_active`
+    - `action_mask`, which TorchRL passes to its specs and policies: 5 flags, True for staying and for a move whose cell
+      is on the map and not an obstacle
+    - the metrics under POGEMA's names, the same for all agents, NaN before the step that ends the episode
+
+    The default semantics are "2.0", because TorchRL chooses episodes with `reset(seed=...)`.
     """
 
     def __init__(
@@ -38,12 +42,12 @@ class PogemaTorchRL(PogemaParallel):
         super().__init__(grid_config or GridConfig(), render_mode, semantics)
 
     def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
-        """Begins an episode: observations and infos by name."""
+        """Begins an episode and returns observations and infos by name."""
         observations, infos = super().reset(seed=seed, options=options)
         return observations, self._flat(observations, infos)
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
-        """Plays one step; an agent without an action stays."""
+        """Plays one step; agents without an action stay."""
         observations, rewards, terminated, truncated, infos = super().step(actions)
         return observations, rewards, terminated, truncated, self._flat(observations, infos)
 
@@ -57,7 +61,7 @@ class PogemaTorchRL(PogemaParallel):
 
 
 def _free_moves(observation: Any) -> np.ndarray:
-    """Which moves no obstacle forbids: staying, up, down, left, right."""
+    """Returns the mask of actions that no obstacle blocks: staying, up, down, left, right."""
     obstacles = observation["obstacles"] if isinstance(observation, dict) else observation[0]
     center = len(obstacles) // 2
     around = [(center, center), (center - 1, center), (center + 1, center), (center, center - 1), (center, center + 1)]

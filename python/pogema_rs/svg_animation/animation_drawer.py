@@ -1,4 +1,4 @@
-"""How an episode is drawn, and the drawing."""
+"""Drawing options and SVG drawings of episodes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["AnimationConfig", "SvgAnimation"]
 
 @dataclass
 class AnimationConfig:
-    """How an episode is drawn.
+    """Options for drawing an episode.
 
     `static` with `frame_idx`, or `static_frame_idx` alone, draws one frame; 0 is the state after the reset.
-    `egocentric_idx` draws what one agent sees. `directory` and `save_every_idx_episode` are for `AnimationMonitor`.
+    `egocentric_idx` draws the view of one agent. `AnimationMonitor` uses `directory` and `save_every_idx_episode`.
     """
 
     directory: str = "renders/"
@@ -38,13 +38,13 @@ class AnimationConfig:
 
 
 class SvgAnimation:
-    """A drawing, which notebooks show."""
+    """A drawing that notebooks display."""
 
     def __init__(self, text: str) -> None:
         self._text = text
 
     def render(self) -> str:
-        """The text of the SVG."""
+        """Returns the text of the SVG."""
         return self._text
 
     def save(self, name: Union[str, PathLike]) -> None:
@@ -53,13 +53,13 @@ class SvgAnimation:
             file.write(self._text)
 
     def _repr_html_(self) -> str:
-        # As an image of its own, so that the names in two drawings on one page do not meet.
+        # An <img> isolates the ids of the drawing from those of other drawings on the page.
         data = base64.b64encode(self._text.encode()).decode()
         return f'<img src="data:image/svg+xml;base64,{data}" alt="animation of an episode">'
 
 
 def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:
-    """Draws the episode that an engine has filmed."""
+    """Draws the episode that an engine has recorded."""
     text = engine.draw_svg(
         egocentric=config.egocentric_idx,
         static_frame=config._frame(),

@@ -14,10 +14,10 @@ __all__ = ["AnimationConfig", "AnimationMonitor"]
 
 
 class AnimationMonitor(Wrapper):
-    """Films an environment and saves the episodes that its config asks for.
+    """Records the episodes of an environment and saves those that its config selects.
 
-    As in POGEMA, episode k of those begun is saved unless k + 1 is a multiple of `save_every_idx_episode`, and each
-    one if that is 1.
+    As in POGEMA, the k-th episode begun is saved unless k + 1 is a multiple of `save_every_idx_episode`. If that field
+    is 1, every episode is saved.
 
     Source: POGEMA 1.4.0, `svg_animation/animation_wrapper.py`, `AnimationMonitor`
     """
@@ -29,13 +29,13 @@ class AnimationMonitor(Wrapper):
         env.unwrapped.enable_animation()
 
     def reset(self, **kwargs: Any) -> Any:
-        """As the environment inside."""
+        """Resets the inner environment."""
         result = self.env.reset(**kwargs)
         self._episode_idx += 1
         return result
 
     def step(self, action: Any) -> Any:
-        """As the environment inside; saves the episode that ends with it, if it is one of those wanted."""
+        """Plays one step of the inner environment, and saves the episode if it ends and is selected."""
         result = self.env.step(action)
         _, _, terminated, truncated, _ = result
         if _all(terminated) or _all(truncated):
@@ -48,7 +48,7 @@ class AnimationMonitor(Wrapper):
 
     @staticmethod
     def pick_name(grid_config: Optional[GridConfig], episode_idx: Optional[int] = None, zfill_ep: int = 5) -> str:
-        """The file name of an episode: its number, map and seed."""
+        """Returns the file name of an episode, which contains its number, map and seed."""
         parts = ["pogema"]
         if episode_idx is not None:
             parts.append(f"ep{str(episode_idx).zfill(zfill_ep)}")

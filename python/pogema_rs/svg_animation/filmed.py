@@ -1,4 +1,4 @@
-"""Drawings of an environment's own episodes."""
+"""Drawings of an environment's episodes."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["Filmed"]
 
 
 class Filmed:
-    """What an environment offers to draw its episodes."""
+    """The methods of an environment that record and draw its episodes."""
 
     _engine: Engine
 
     def enable_animation(self) -> None:
-        """Films the episodes from the next reset on."""
+        """Records the episodes from the next reset on."""
         self._engine.film(True)
 
     def render_animation(self, animation_config: Optional[AnimationConfig] = None) -> SvgAnimation:
-        """The episode so far as an animation, which notebooks show.
+        """Returns the episode so far as an animation that notebooks display.
 
-        Errors: `StateError` if the episode is not filmed, or has no such agent or frame.
+        Errors: `StateError` if the episode is not recorded, or has no such agent or frame.
         """
         return draw(self._engine, animation_config or AnimationConfig())
 

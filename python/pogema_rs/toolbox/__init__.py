@@ -1,10 +1,10 @@
-"""Evaluations: many episodes of many algorithms, from one YAML file to results that can be resumed.
+"""Evaluations: plays the episodes of all algorithms of one YAML file, and resumes interrupted runs.
 
     from pogema_rs.toolbox.evaluator import evaluation
     from pogema_rs.toolbox.registry import ToolboxRegistry
 
-The modules have the names and the interface of pogema-toolbox 0.1.1, over the engine, the suites and the results of
-`pogema evaluate`.
+The modules have the names and the interface of pogema-toolbox 0.1.1. They use the engine of `pogema evaluate`, and its
+formats of suites and results.
 """
 
 from __future__ import annotations

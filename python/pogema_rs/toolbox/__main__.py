@@ -13,32 +13,32 @@ __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Plays what is not played yet, and shows it.
+    """Plays the missing episodes of a suite and shows its views.
 
-    Errors: SystemExit with one line for anything that is wrong.
+    Errors: SystemExit with a one-line message for any error.
     """
     parser = argparse.ArgumentParser(prog="python -m pogema_rs.toolbox", description="Play all episodes of a suite.")
-    parser.add_argument("suite", help="a YAML file with environments, algorithms and views")
-    parser.add_argument("--out", required=True, metavar="FOLDER", help="the folder for the results")
-    parser.add_argument("--register", action="append", default=[], metavar="FILE", help="a script that registers policies")
-    parser.add_argument("--maps", action="append", default=[], metavar="PATH", help="a file or folder with maps")
-    parser.add_argument("--dask", metavar="ADDRESS", help="a scheduler for backends of Dask, such as tcp://host:8786")
+    parser.add_argument("suite", help="YAML file with environments, algorithms and views")
+    parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the results")
+    parser.add_argument("--register", action="append", default=[], metavar="FILE", help="script that registers policies")
+    parser.add_argument("--maps", action="append", default=[], metavar="PATH", help="file or folder with maps")
+    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler for Dask backends, e.g. tcp://host:8786")
     parser.add_argument("--html", metavar="FILE", help="write a page with tables, plots and replays")
     begin = parser.add_mutually_exclusive_group()
-    begin.add_argument("--resume", action="store_const", dest="begin", const="resume", help="go on with earlier results")
+    begin.add_argument("--resume", action="store_const", dest="begin", const="resume", help="continue an earlier run")
     begin.add_argument("--force", action="store_const", dest="begin", const="anew", help="delete earlier results")
-    wanted = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     ToolboxRegistry.setup_logger("INFO")
     try:
-        for script in wanted.register:
+        for script in options.register:
             runpy.run_path(script)
         evaluation(
-            wanted.suite,
-            wanted.out,
-            begin=wanted.begin or "new",
-            maps=wanted.maps,
-            dask=wanted.dask,
-            html=wanted.html,
+            options.suite,
+            options.out,
+            begin=options.begin or "new",
+            maps=options.maps,
+            dask=options.dask,
+            html=options.html,
         )
     except (EvaluationError, ValueError, OSError) as error:
         sys.exit(f"error: {error}")

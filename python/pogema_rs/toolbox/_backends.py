@@ -1,4 +1,4 @@
-"""Where episodes are played: here, in processes, or on the workers of Dask."""
+"""Backends that play episodes: in this process, in a process pool, or on Dask workers."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from typing import Any, Optional
 from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
-#: Episodes that wait for each process, so that none is idle.
+#: Episodes submitted per process, so that no process is idle.
 _AHEAD = 2
-#: A process that ends by itself so often takes its episode with it each time.
-_MOST_DEATHS = 3
+#: Process deaths after which the lost episodes are reported as failed; also the retries on Dask.
+_MAX_DEATHS = 3
 
 
-def here(tasks: Iterable[Task]) -> Iterator[Outcome]:
-    """Plays one episode after the other in this process."""
+def sequential(tasks: Iterable[Task]) -> Iterator[Outcome]:
+    """Plays episodes one after the other in this process."""
     return map(play, tasks)
 
 
 def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
-    """Plays episodes in processes; those of a process that died are played again."""
+    """Plays episodes in processes, and replays the episodes lost when a process dies."""
     waiting, deaths = list(tasks), 0
     waiting.reverse()
     while waiting:
         state = ToolboxRegistry.get_state()
         under_way: dict[Future[Outcome], Task] = {}
         try:
-            with ProcessPoolExecutor(num_processes, initializer=_take_over, initargs=(state,)) as pool:
+            with ProcessPoolExecutor(num_processes, initializer=_initialize, initargs=(state,)) as pool:
                 while waiting or under_way:
                     while waiting and len(under_way) < _AHEAD * num_processes:
                         task = waiting.pop()
@@ -43,9 +43,9 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
         except BrokenProcessPool:
             deaths += 1
             lost = list(under_way.values())
-            ToolboxRegistry.warning(f"a process died; {len(lost)} episodes are played again")
-            if deaths >= _MOST_DEATHS:
-                reason = f"its process died, or one beside it, {deaths} times"
+            ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
+            if deaths >= _MAX_DEATHS:
+                reason = f"its process, or another process of the pool, died {deaths} times"
                 yield from (Outcome(task.index, error=reason) for task in lost)
                 deaths = 0
             else:
@@ -53,8 +53,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
 
 
 def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> Iterator[Outcome]:
-    """Plays episodes on the workers of a scheduler, by default of one of our own; Dask plays those of a worker that
-    died again."""
+    """Plays episodes on the workers of a scheduler [default: a local cluster]; Dask replays those of a dead worker."""
     from distributed import Client, LocalCluster, as_completed
 
     if address is None:
@@ -66,7 +65,7 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
         state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
         rest = iter(tasks)
         num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        submit = {"pure": False, "retries": _MOST_DEATHS}
+        submit = {"pure": False, "retries": _MAX_DEATHS}
         names: dict[Any, int] = {}
 
         def send(task: Task) -> Any:
@@ -89,7 +88,7 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
             cluster.close()
 
 
-def _take_over(state: dict[str, Any]) -> None:
-    # Without this every process of NumPy takes all cores.
+def _initialize(state: dict[str, Any]) -> None:
+    # Otherwise NumPy uses all cores in every process.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     ToolboxRegistry.recreate_from_state(state)

@@ -1,4 +1,4 @@
-"""One episode in any process: what it needs, and what comes of it."""
+"""Plays one episode in any process: its task and its outcome."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 
 @dataclass(frozen=True)
 class Task:
-    """An episode that is to be played."""
+    """An episode to play."""
 
     index: int
     algorithm: str
@@ -23,32 +23,32 @@ class Task:
     environment: dict[str, Any]
     #: The map that the environment names.
     maps: dict[str, str] = field(default_factory=dict)
-    #: Whether nobody registered the algorithm.
+    #: Whether the algorithm is built in, rather than registered in Python.
     is_built_in: bool = False
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of an episode: metrics, or why there are none."""
+    """The outcome of an episode: its metrics, or an error."""
 
     index: int
     metrics: Optional[dict[str, Any]] = None
-    #: Units: seconds, of the policy alone where the environment measures that.
+    #: Time of the policy alone if the environment measures it, otherwise of the whole episode. Units: seconds
     runtime: float = 0.0
-    #: Where it was played.
+    #: The machine that played it.
     machine: str = ""
     error: str = ""
     traceback: str = ""
-    #: The episode, packed for a page that replays it, if that was asked for.
+    #: The episode, packed for a page that replays it, if requested.
     film: str = ""
 
 
-#: The algorithm that this process played last: one may take minutes to load.
+#: Cache of the algorithm that this process played last, because loading one may take minutes.
 _ready: dict[str, tuple[dict[str, Any], Any, Any]] = {}
 
 
 def play(task: Task, is_filmed: bool = False) -> Outcome:
-    """Plays an episode; whatever the policy or the environment raises is part of what comes of it."""
+    """Plays an episode; an exception of the policy or the environment becomes part of the outcome."""
     try:
         return _play(task, is_filmed)
     except Exception as error:  # noqa: BLE001 - a policy may raise anything
@@ -57,7 +57,7 @@ def play(task: Task, is_filmed: bool = False) -> Outcome:
 
 
 def play_with(state: dict[str, Any], task: Task) -> Outcome:
-    """The same where nothing is registered yet."""
+    """Plays an episode in a process in which nothing is registered yet."""
     if not _ready:
         ToolboxRegistry.recreate_from_state(state)
     return play(task)
@@ -66,8 +66,8 @@ def play_with(state: dict[str, Any], task: Task) -> Outcome:
 def _play(task: Task, is_filmed: bool) -> Outcome:
     if task.is_built_in:
         content = {"environment": task.environment, "algorithms": {task.algorithm: task.settings}}
-        figures, runtime = play_built_in(json.dumps(content), list(task.maps.items()))
-        return Outcome(task.index, json.loads(figures), runtime, machine())
+        metrics_json, runtime = play_built_in(json.dumps(content), list(task.maps.items()))
+        return Outcome(task.index, json.loads(metrics_json), runtime, machine())
     ToolboxRegistry.register_maps(task.maps)
     algorithm, settings = _algorithm(task)
     env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)
@@ -103,5 +103,5 @@ def _draw(env: Any, task: Task) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number of Python's own in the place of one of NumPy."""
+    """Converts a NumPy number to a Python number."""
     return value.item() if hasattr(value, "item") else value

@@ -1,4 +1,4 @@
-"""What every algorithm of a suite may say of itself."""
+"""The settings that all algorithms of a suite share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["AlgoBase"]
 
 
 class AlgoBase(BaseModel):
-    """The settings of an algorithm; one that has more extends this class.
+    """The settings of an algorithm; extend this class to add settings.
 
     Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase`
     """

@@ -1,4 +1,4 @@
-"""The environment of suites: POGEMA on maps by name."""
+"""The environment of suites: POGEMA on named maps."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ class Environment(GridConfig):
 
 
 class ProvideGlobalObstacles(Wrapper):
-    """Tells planners of the whole map."""
+    """Gives planners access to the whole map."""
 
     def get_global_obstacles(self) -> list[list[int]]:
-        """The map with its border, 1 for an obstacle."""
+        """Returns the map with its border, 1 for an obstacle."""
         return self.grid.get_obstacles().astype(int).tolist()
 
     def get_global_agents_xy(self) -> Any:
-        """Where each agent is on that map."""
+        """Returns the cell of each agent on that map."""
         return self.grid.get_agents_xy()
 
     def get_global_targets_xy(self) -> Any:
-        """Where each agent's goal is on that map."""
+        """Returns the goal of each agent on that map."""
         return self.grid.get_targets_xy()
 
 
 class MultiMapWrapper(Wrapper):
-    """Chooses, at each reset, one of the maps whose names the config's `map_name` matches; the seed says which.
+    """Chooses at each reset, by the seed, one of the maps whose names match the pattern `map_name` of the config.
 
     Errors: KeyError if no name matches.
 
@@ -64,7 +64,7 @@ class MultiMapWrapper(Wrapper):
                 raise KeyError(f"No map matching: {pattern}")
 
     def reset(self, *, seed: Optional[int] = None, **kwargs: Any) -> tuple[Any, Any]:
-        """Begins an episode, by default with the seed of the config."""
+        """Begins an episode; the default seed is that of the config."""
         config = self.env.unwrapped.grid_config
         seed = config.seed if seed is None else seed
         if self._names:
@@ -76,7 +76,7 @@ class MultiMapWrapper(Wrapper):
 
 
 def create_env_base(config: Environment) -> Any:
-    """The environment of a suite, which measures all that results hold.
+    """Makes the environment of a suite, which measures all metrics of the results.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `create_env_base`
     """

@@ -1,4 +1,4 @@
-"""Runs suites: all episodes of all algorithms, kept one by one."""
+"""Runs suites: plays all episodes of all algorithms and stores each one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _Path = Union[str, os.PathLike[str]]
 
 
 class EvaluationError(RuntimeError):
-    """Some episodes could not be played; their files `<algorithm>.failed.jsonl` say why, and `resume` tries again."""
+    """Some episodes failed; the files `<algorithm>.failed.jsonl` hold the errors, and `resume` tries again."""
 
 
 def evaluation(
@@ -38,21 +38,21 @@ def evaluation(
     dask: Optional[str] = None,
     html: Optional[_Path] = None,
 ) -> list[dict[str, Any]]:
-    """Plays what is not played yet of a suite, and returns all results, in the layout of pogema-toolbox.
+    """Plays the missing episodes of a suite and returns all results in the layout of pogema-toolbox.
 
-    `evaluation_config` is a YAML file or what it holds. `begin` says what may be in the folder `eval_dir`: no results
-    (`new`), those of a run of the same suite that broke off (`resume`), or any, which are deleted (`anew`). `maps` are
-    files and folders with maps besides those that are registered. `dask` is the address of a scheduler, for
-    algorithms whose `parallel_backend` is one of Dask; without one, and without `dask` in the suite, they get a
-    cluster of processes on this machine. Tables of `results_views` are printed in the end, and plots written to
-    `views` in the folder; `html` is the file for a page with all that, and with replays of the worst and best episodes,
-    which are played again for it.
+    `evaluation_config` is a YAML file or its content. `begin` says how to treat earlier results in the folder
+    `eval_dir`: `new` rejects them, `resume` continues an interrupted run of the same suite, `anew` deletes them
+    [default: `new`]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
+    of a scheduler for algorithms with a Dask `parallel_backend` [default: the one in the suite, otherwise a cluster of
+    processes on this machine]. At the end the tables of `results_views` are printed, and plots are written to `views`
+    in the folder. `html` is the file for a page with both, and with replays of the worst and best episodes, which are
+    played again for it.
 
-    An algorithm that nobody registered is the planner or policy of that name that is built in, played by threads, or
-    on Dask if that is its `parallel_backend` and there is an address.
+    If an algorithm is not registered, its name selects a built-in planner or policy. Threads play it, or Dask if that
+    is its `parallel_backend` and an address is given.
 
-    Errors: ValueError for a suite that is wrong, with its line; OSError for a folder that cannot be used;
-    `EvaluationError` if episodes could not be played, after all others were.
+    Errors: ValueError for a wrong suite, with its line; OSError for a folder that cannot be used; `EvaluationError` if
+    episodes failed, after all other episodes were played.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
     """
@@ -81,7 +81,7 @@ def evaluation(
 
 
 def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:
-    """The settings of the algorithms of a suite, by the names of their results."""
+    """Returns the settings of the algorithms of a suite, by the names of their results."""
     algorithms = {}
     for key, name, parameters, num_processes, backend in suite.algorithms():
         algorithms[key] = {"name": name, **json.loads(parameters), "parallel_backend": backend}
@@ -95,7 +95,7 @@ def _is_registered(settings: dict[str, Any]) -> bool:
 
 
 def _write_page(suite: Evaluation, path: _Path) -> None:
-    """Writes the page of the results; what is played in Python is played again here."""
+    """Writes the page of the results, and replays the episodes of policies in Python for it."""
     algorithms = _algorithms(suite)
     again: list[Optional[tuple[str, str, str]]] = []
     for key, index in suite.picks():
@@ -108,7 +108,7 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
 
 
 def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str]) -> int:
-    """Plays what is to be played of an algorithm; the number of episodes that could not be."""
+    """Plays the missing episodes of an algorithm and returns the number of failed ones."""
     progress = _Progress(key, suite.num_episodes())
     is_remote = settings["parallel_backend"].endswith("dask") and address is not None
     if not _is_registered(settings) and not is_remote:
@@ -140,7 +140,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
 def _outcomes(tasks: Iterable[Task], config: Any, address: Optional[str]) -> Generator[Outcome, None, None]:
     backend, num_processes = config.parallel_backend, min(config.num_process, num_cores())
     if backend == "sequential":
-        yield from _backends.here(tasks)
+        yield from _backends.sequential(tasks)
     elif backend.endswith("dask"):
         yield from _backends.dask(tasks, num_processes, address)
     else:
@@ -159,7 +159,7 @@ def _task(
 
 
 def _map_text(grid: Any) -> str:
-    """A registered map as text: of rows as lists, 0 is free."""
+    """Returns a registered map as text; in rows given as lists, 0 is free."""
     if isinstance(grid, str):
         return grid
     return "\n".join(row if isinstance(row, str) else "".join("#" if cell else "." for cell in row) for row in grid)
@@ -176,21 +176,21 @@ def _results(folder: Path, key: str) -> list[dict[str, Any]]:
 
 
 def _versions() -> list[tuple[str, str]]:
-    """The releases of what plays in Python, as far as it is loaded."""
+    """Returns the versions of Python and of the loaded packages that policies use."""
     loaded = [(name, sys.modules.get(name)) for name in ("numpy", "gymnasium", "torch", "onnxruntime", "distributed")]
     known = [(name, str(getattr(module, "__version__", ""))) for name, module in loaded if module is not None]
     return [("Python", platform.python_version()), *known]
 
 
 class _Progress:
-    """How far an algorithm is, told now and then."""
+    """Logs the progress of an algorithm at intervals."""
 
-    #: Units: seconds.
+    #: Interval between messages. Units: seconds
     EVERY = 10.0
 
     def __init__(self, key: str, total: int) -> None:
         self._key, self._total = key, total
-        self._began = self._told = time.monotonic()
+        self._began = self._last_message = time.monotonic()
         self._done = self._before = 0
 
     def begin(self, num_left: int) -> None:
@@ -205,8 +205,8 @@ class _Progress:
         if error:
             ToolboxRegistry.error(f"{self._key}: episode {index}: {error}")
         now = time.monotonic()
-        if now - self._told >= self.EVERY:
-            self._told = now
+        if now - self._last_message >= self.EVERY:
+            self._last_message = now
             played = self._done - self._before
             left = (now - self._began) / played * (self._total - self._done)
             ToolboxRegistry.info(f"{self._key}: {self._done} of {self._total} episodes, {left:.0f} s left")

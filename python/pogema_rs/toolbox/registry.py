@@ -1,4 +1,4 @@
-"""What suites name: algorithms, environments, maps, and ways to run an episode."""
+"""The registry of algorithms, environments, maps and episode runners that suites name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FORMAT = "%(asctime)s | Toolbox %(levelname)s | %(message)s"
 
 
 class ToolboxRegistry:
-    """Algorithms, environments, maps and ways to run an episode, by the names that suites have for them.
+    """Algorithms, environments, maps and episode runners, keyed by their names in suites.
 
     Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry`
     """
@@ -30,7 +30,7 @@ class ToolboxRegistry:
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:
-        """Lets messages from a level on go to a stream, or to a file."""
+        """Sends messages of at least a level to a stream or a file [default: stderr]."""
         is_file = isinstance(sink, str) or hasattr(sink, "__fspath__")
         handler = logging.FileHandler(sink) if is_file else logging.StreamHandler(sink or sys.stderr)
         handler.setFormatter(logging.Formatter(_FORMAT))
@@ -40,32 +40,32 @@ class ToolboxRegistry:
 
     @classmethod
     def debug(cls, message: str) -> None:
-        """Tells what only those want to know who look for a fault."""
+        """Logs a debug message."""
         _LOGGER.debug(message)
 
     @classmethod
     def info(cls, message: str) -> None:
-        """Tells how it goes."""
+        """Logs a progress message."""
         _LOGGER.info(message)
 
     @classmethod
     def success(cls, message: str) -> None:
-        """Tells that something went well."""
+        """Logs a success."""
         _LOGGER.info(message)
 
     @classmethod
     def warning(cls, message: str) -> None:
-        """Tells of something that may be wrong."""
+        """Logs a warning."""
         _LOGGER.warning(message)
 
     @classmethod
     def error(cls, message: str) -> None:
-        """Tells of something that is wrong."""
+        """Logs an error."""
         _LOGGER.error(message)
 
     @classmethod
     def get_state(cls) -> dict[str, Any]:
-        """All that is registered, for another process."""
+        """Returns everything registered, for another process."""
         return {
             "maps": cls._maps,
             "algorithms": cls._algorithms,
@@ -75,7 +75,7 @@ class ToolboxRegistry:
 
     @classmethod
     def recreate_from_state(cls, state: Mapping[str, Any]) -> None:
-        """Takes over what is registered in another process."""
+        """Replaces the registry by that of another process."""
         cls._maps = dict(state.get("maps", {}))
         cls._algorithms = dict(state.get("algorithms", {}))
         cls._envs = dict(state.get("envs", {}))
@@ -89,31 +89,31 @@ class ToolboxRegistry:
         config_make_func: Optional[_Make] = None,
         preprocessing_make_func: Optional[_Make] = None,
     ) -> None:
-        """Registers an algorithm: a class with `act` and `reset_states`, its settings, and a wrapper for environments."""
-        cls._told_twice("algorithm", name, cls._algorithms)
+        """Registers an algorithm: a class with `act` and `reset_states`, settings, and an environment wrapper."""
+        cls._warn_if_registered("algorithm", name, cls._algorithms)
         cls._algorithms[name] = make_func, config_make_func, preprocessing_make_func
 
     @classmethod
     def create_algorithm(cls, algo_name: str, **kwargs: Any) -> Any:
-        """An algorithm of some settings.
+        """Makes an algorithm from settings.
 
-        Errors: KeyError with the names that there are.
+        Errors: KeyError for an unknown name, with the known ones.
         """
         make, make_config, _ = cls._known("algorithm", algo_name, cls._algorithms)
         return make(cls.create_algorithm_config(algo_name, **kwargs)) if make_config else make()
 
     @classmethod
     def create_algorithm_config(cls, algo_name: str, **kwargs: Any) -> Any:
-        """The settings of an algorithm."""
+        """Makes the settings of an algorithm."""
         make_config = cls._known("algorithm", algo_name, cls._algorithms)[1]
         return (make_config or AlgoBase)(**kwargs)
 
     @classmethod
     def create_algorithm_preprocessing(cls, env_to_wrap: Any, algo_name: str, **kwargs: Any) -> Any:
-        """The environment as an algorithm wants it."""
+        """Wraps an environment in the preprocessing of an algorithm."""
         _, make_config, preprocess = cls._known("algorithm", algo_name, cls._algorithms)
         if preprocess is None:
-            raise KeyError(f"`{algo_name}` is registered without a preprocessing")
+            raise KeyError(f"`{algo_name}` is registered without preprocessing")
         if make_config is None:
             return preprocess(env_to_wrap)
         return preprocess(env_to_wrap, cls.create_algorithm_config(algo_name, **kwargs))
@@ -121,14 +121,14 @@ class ToolboxRegistry:
     @classmethod
     def register_env(cls, name: str, make_func: _Make, config_make_func: Optional[_Make] = None) -> None:
         """Registers an environment and its settings."""
-        cls._told_twice("environment", name, cls._envs)
+        cls._warn_if_registered("environment", name, cls._envs)
         cls._envs[name] = make_func, config_make_func
 
     @classmethod
     def create_env(cls, env_name: str, **kwargs: Any) -> Any:
-        """An environment of some settings.
+        """Makes an environment from settings.
 
-        Errors: KeyError with the names that there are.
+        Errors: KeyError for an unknown name, with the known ones.
         """
         if env_name == "Environment" and env_name not in cls._envs:
             from pogema_rs.toolbox.create_env import Environment, create_env_base
@@ -139,32 +139,32 @@ class ToolboxRegistry:
 
     @classmethod
     def get_maps(cls) -> dict[str, Any]:
-        """The registered maps, by name."""
+        """Returns the registered maps, by name."""
         return cls._maps
 
     @classmethod
     def register_maps(cls, maps: Mapping[str, Any]) -> None:
-        """Registers maps: texts, or lists of rows."""
+        """Registers maps, each as text or as a list of rows."""
         for name, grid in maps.items():
             if cls._maps.get(name, grid) != grid:
-                cls.warning(f"a second map named {name} takes the place of the first")
+                cls.warning(f"a second map named {name} replaces the first one")
             cls._maps[name] = grid
 
     @classmethod
     def register_run_func(cls, name: str, run_func: Callable[[Any, Any], dict[str, Any]]) -> None:
-        """Registers a way to run an episode: from an environment and an algorithm to metrics."""
-        cls._told_twice("way to run an episode", name, cls._run_episode_funcs)
+        """Registers an episode runner: a function from an environment and an algorithm to metrics."""
+        cls._warn_if_registered("episode runner", name, cls._run_episode_funcs)
         cls._run_episode_funcs[name] = run_func
 
     @classmethod
     def run_episode(cls, env: Any, algo: Any, run_func_name: str = "default") -> dict[str, Any]:
-        """The metrics of an episode."""
-        return cls._known("way to run an episode", run_func_name, cls._run_episode_funcs)(env, algo)
+        """Runs an episode and returns its metrics."""
+        return cls._known("episode runner", run_func_name, cls._run_episode_funcs)(env, algo)
 
     @classmethod
-    def _told_twice(cls, what: str, name: str, known: Mapping[str, Any]) -> None:
+    def _warn_if_registered(cls, what: str, name: str, known: Mapping[str, Any]) -> None:
         if name in known:
-            cls.warning(f"a second {what} named {name} takes the place of the first")
+            cls.warning(f"a second {what} named {name} replaces the first one")
 
     @staticmethod
     def _known(what: str, name: str, known: Mapping[str, Any]) -> Any:

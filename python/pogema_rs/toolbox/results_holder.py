@@ -1,4 +1,4 @@
-"""What an environment tells of an episode."""
+"""Collects the metrics of an episode."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ __all__ = ["ResultsHolder"]
 
 
 class ResultsHolder:
-    """Collects the metrics that the infos of an episode hold."""
+    """A collector of the metrics in the infos of an episode."""
 
     def __init__(self) -> None:
         self.results: dict[str, Any] = {}
 
     def after_step(self, infos: Sequence[dict[str, Any]]) -> None:
-        """Takes in the infos of a step."""
+        """Adds the metrics in the infos of a step."""
         self.results.update(infos[0].get("metrics", {}))
 
     def get_final(self) -> dict[str, Any]:
-        """The metrics by name."""
+        """Returns the metrics by name."""
         return self.results

@@ -1,4 +1,4 @@
-"""One episode, played by an algorithm."""
+"""The default episode runner."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["run_episode"]
 
 
 def run_episode(env: Any, algo: Any) -> dict[str, Any]:
-    """Plays an episode of the environment's own seed to its end; the metrics by name.
+    """Plays an episode with the seed of the environment's config, and returns its metrics by name.
 
     Source: pogema-toolbox 0.1.1, `run_episode.py`, `run_episode`
     """

@@ -18,10 +18,10 @@ _Path = Union[str, os.PathLike[str]]
 
 @dataclass(frozen=True)
 class Shown:
-    """What came of a view."""
+    """The output of a view."""
 
     name: str
-    #: Its tables as text, with its name above them.
+    #: Its tables as text, each below the view's name.
     tables: list[str]
     #: The files of its plots.
     files: list[Path]
@@ -38,14 +38,14 @@ def show(
     out: Optional[_Path] = None,
     six: Optional[Literal["published", "paper"]] = None,
 ) -> list[Shown]:
-    """Shows the results in folders, all together: makes the tables of their views, and writes the plots.
+    """Makes the tables and writes the plots of the combined results in folders.
 
-    The views are those of the suite that is with the results, or of the file `config`; `names` chooses among them.
-    `table_format` and `plot_format` have precedence over what views say. Plots go to the folder `out`, by default to
-    `views` in the first folder. `six` is the definition of the six metrics for radar charts. What was left out is also
-    told by `ToolboxRegistry.warning`, and so is a view that cannot be shown.
+    The views are those in the file `config` [default: the suite stored with the results], and `names` selects some of
+    them [default: all]. `table_format` and `plot_format` override the formats in the views. Plots go to the folder
+    `out` [default: `views` in the first folder]. `six` is the definition of the six metrics for radar charts.
+    `ToolboxRegistry.warning` also logs what was left out, and views that cannot be shown.
 
-    Errors: ValueError for views or an option that is wrong; OSError for files that cannot be read or written.
+    Errors: ValueError for wrong views or options; OSError for files that cannot be read or written.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """

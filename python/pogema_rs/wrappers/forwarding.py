@@ -1,4 +1,4 @@
-"""A wrapper that passes on what it does not have."""
+"""A wrapper that forwards unknown attributes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ __all__ = ["Wrapper"]
 
 
 class Wrapper(gymnasium.Wrapper):
-    """A `gymnasium.Wrapper` whose unknown attributes are those of the environment inside.
+    """A `gymnasium.Wrapper` that forwards unknown attributes to the inner environment.
 
-    Gymnasium's own wrappers did so before its release 1.0, and POGEMA's users rely on it.
+    Gymnasium's own wrappers did so before release 1.0, and POGEMA's users rely on it.
     """
 
     if TYPE_CHECKING:
-        # Gymnasium's types are those of one agent, and know nothing of what is inside.
+        # Gymnasium's types describe one agent and hide the class of the inner environment.
         env: Any
 
         @property

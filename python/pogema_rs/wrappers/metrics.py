@@ -1,4 +1,4 @@
-"""Metrics that an environment does not measure by itself."""
+"""Metrics that environments do not measure themselves."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pogema_rs.wrappers.forwarding import Wrapper
 __all__ = ["AgentsDensityWrapper", "RuntimeMetricWrapper"]
 
 
-def _add(infos: list[dict], **figures: float) -> None:
-    infos[0].setdefault("metrics", {}).update(figures)
+def _add(infos: list[dict], **metrics: float) -> None:
+    infos[0].setdefault("metrics", {}).update(metrics)
 
 
 class AgentsDensityWrapper(Wrapper):
-    """Adds `avg_agents_density`: agents per free cell of a window, the mean over agents and over observations.
+    """Adds `avg_agents_density`: agents per free cell of a window, averaged over agents and over observations.
 
-    Needs observations of the type `POMAPF` or `MAPF`.
+    It needs observations of type `POMAPF` or `MAPF`.
 
     Rule: metrics/density
     """
@@ -34,14 +34,14 @@ class AgentsDensityWrapper(Wrapper):
         self._means.append(np.mean(shares))
 
     def reset(self, **kwargs: Any) -> Any:
-        """As the environment inside; the mean begins anew."""
+        """Resets the inner environment and the mean."""
         observations, infos = self.env.reset(**kwargs)
         self._means = []
         self._count(observations)
         return observations, infos
 
     def step(self, action: Any) -> Any:
-        """As the environment inside; the figure is added in the step that ends the episode."""
+        """Plays one step of the inner environment, and adds the metric if it ends the episode."""
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         self._count(observations)
         if all(terminated) or all(truncated):
@@ -50,19 +50,19 @@ class AgentsDensityWrapper(Wrapper):
 
 
 class RuntimeMetricWrapper(Wrapper):
-    """Adds `runtime`: the time from the reset to the end of the episode without the environment's steps.
+    """Adds `runtime`: the time from the reset to the end of the episode, minus the time in the environment's steps.
 
     Units: seconds.
     """
 
     def reset(self, **kwargs: Any) -> Any:
-        """As the environment inside; the clock begins anew."""
+        """Resets the inner environment and the clock."""
         result = self.env.reset(**kwargs)
         self._began, self._in_steps = time.monotonic(), 0.0
         return result
 
     def step(self, action: Any) -> Any:
-        """As the environment inside; the figure is added in the step that ends the episode."""
+        """Plays one step of the inner environment, and adds the metric if it ends the episode."""
         began = time.monotonic()
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         now = time.monotonic()

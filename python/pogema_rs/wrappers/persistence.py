@@ -1,4 +1,4 @@
-"""What an environment with `persistent` in its config has kept of its steps."""
+"""The history of an environment with `persistent` in its config."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pogema_rs import _engine
 
 __all__ = ["AgentState", "PersistentWrapper"]
 
-# A goal that was drawn since the reset is of NumPy's type, as in POGEMA.
+# A goal drawn since the reset consists of NumPy integers, as in POGEMA.
 _Whole = Union[int, np.int64]
 
 
 class AgentState:
-    """Where an agent is and wants to go, from a step on; places are (row, col) and count the border.
+    """The cell, goal and activity of an agent from a step on; cells are (row, col) and include the border.
 
-    Two states are equal if all but their steps is.
+    Two states are equal if they differ at most in their steps.
 
     Rule: history/changes
     """
@@ -32,26 +32,26 @@ class AgentState:
         self.active = active
 
     def get_xy(self) -> tuple[int, int]:
-        """Where the agent is."""
+        """Returns the cell of the agent."""
         return self.x, self.y
 
     def get_target_xy(self) -> tuple[_Whole, _Whole]:
-        """Where it wants to go."""
+        """Returns the goal of the agent."""
         return self.tx, self.ty
 
     def is_active(self) -> bool:
-        """Whether it takes part."""
+        """Returns whether the agent is active."""
         return self.active
 
     def get_step(self) -> int:
-        """Steps since the reset."""
+        """Returns the number of steps since the reset."""
         return self.step
 
-    def _what(self) -> tuple:
+    def _key(self) -> tuple:
         return self.x, self.y, self.tx, self.ty, self.active
 
     def __eq__(self, other: object) -> bool:
-        return self._what() == other._what() if isinstance(other, AgentState) else NotImplemented
+        return self._key() == other._key() if isinstance(other, AgentState) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -67,7 +67,7 @@ History = list[list[AgentState]]
 
 
 def kept(engine: _engine.Engine, shift: int) -> History:
-    """For each agent its first state and each later one that differs from the one before."""
+    """Returns for each agent its first state and each later state that differs from the one before."""
     return [[_state(shift, *change) for change in changes] for changes in engine.history()]
 
 
@@ -80,7 +80,7 @@ def _state(shift: int, row: int, col: int, goal_row: int, goal_col: int, *rest: 
 
 
 def at_every_step(changes: Iterable[AgentState], num_steps: int) -> list[AgentState]:
-    """The state of one agent at each of the steps from 0 to `num_steps`, both included."""
+    """Returns the state of one agent at each step from 0 to `num_steps`, both included."""
     first, *rest = changes
     states = [first]
     for step in range(1, num_steps + 1):
@@ -92,13 +92,13 @@ def at_every_step(changes: Iterable[AgentState], num_steps: int) -> list[AgentSt
 
 
 class PersistentWrapper:
-    """The two functions of POGEMA's class that need no environment; an environment keeps its steps itself."""
+    """The two static methods of POGEMA's class; the environment itself keeps the history."""
 
     agent_state_to_full_list = staticmethod(at_every_step)
 
     @staticmethod
     def decompress_history(history: History) -> History:
-        """The state of each agent at each step, up to the last one at which anything changed.
+        """Returns the state of each agent at each step, up to the last step with a change.
 
         Rule: history/changes
         """

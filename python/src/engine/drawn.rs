@@ -1,4 +1,4 @@
-//! Which goals POGEMA holds as NumPy's numbers, which a user can see.
+//! Tracks which goals POGEMA stores as NumPy integers, because users see the type.
 
 use std::ffi::CString;
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Engine;
 
-/// Whether each agent's goal was drawn since the reset, now and at each change that persistent mode keeps.
+/// Flags of the goals drawn since the reset: the current goals, and those at each change kept in persistent mode.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drawn {
@@ -25,29 +25,29 @@ impl Drawn {
         self.kept = if is_kept { vec![vec![false]; num_agents] } else { Vec::new() };
     }
 
-    /// Whether it is about so many agents, and keeps changes where they are kept.
+    /// Returns whether the flags match the number of agents, and hold changes exactly if changes are kept.
     pub fn fits(&self, num_agents: usize, is_kept: bool) -> bool {
         self.now.len() == num_agents && self.kept.len() == if is_kept { num_agents } else { 0 }
     }
 
-    /// Whether each agent's present goal was drawn.
+    /// Returns for each agent whether its current goal was drawn.
     pub fn now(&self) -> &[bool] {
         &self.now
     }
 
-    /// Whether the goal of an agent was drawn, at each of its changes.
+    /// Returns for each kept change of an agent whether its goal was drawn.
     pub fn kept(&self, agent: usize) -> &[bool] {
         self.kept.get(agent).map_or(&[], |kept| kept)
     }
 
-    /// Takes in that agents got new goals.
+    /// Marks the new goals of agents as drawn.
     pub fn note(&mut self, got_new: &[bool]) {
         for (is_drawn, &is_new) in self.now.iter_mut().zip(got_new) {
             *is_drawn |= is_new;
         }
     }
 
-    /// Takes in a step that was kept.
+    /// Keeps the flag of each agent that the last step changed.
     pub fn remember(&mut self, past: &[Snapshot]) {
         for (agent, (kept, &now)) in self.kept.iter_mut().zip(&self.now).enumerate() {
             if has_changed(past, agent) {
@@ -56,7 +56,7 @@ impl Drawn {
         }
     }
 
-    /// Goes back with the last step, which is still in the past.
+    /// Takes the last step back; `past` still has to contain it.
     pub fn take_back(&mut self, past: &[Snapshot]) {
         for (agent, (kept, now)) in self.kept.iter_mut().zip(&mut self.now).enumerate() {
             if has_changed(past, agent) {
@@ -74,7 +74,7 @@ fn has_changed(past: &[Snapshot], agent: usize) -> bool {
 }
 
 impl Engine {
-    /// Takes in which goals are new: drawn ones are of NumPy's type in POGEMA, and given ones are not.
+    /// Records which goals are new. In POGEMA drawn goals are NumPy integers and given goals are not.
     pub(crate) fn note_goals(&mut self) {
         let config = self.source.config();
         let is_lifelong = config.on_target == OnGoal::Restart;
@@ -87,8 +87,9 @@ impl Engine {
         }
     }
 
-    /// Warns of goal sequences that have just come round to their first goals; the step is done, whatever becomes
-    /// of the warnings.
+    /// Warns about goal sequences that have just wrapped around to their first goals.
+    ///
+    /// The step is complete even if Python turns a warning into an error.
     ///
     /// Rule: goal/restart/sequence
     pub(crate) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
@@ -99,8 +100,8 @@ impl Engine {
         for (agent, stream) in streams.iter().enumerate().filter(|(agent, _)| on_goal[*agent]) {
             if let Some((num_goals, 0)) = stream.turn() {
                 let text = format!(
-                    "agent {agent} has reached all {num_goals} goals of its sequence, which goes round to the first \
-                     one; an episode has {} steps, so give it more goals",
+                    "agent {agent} has reached all {num_goals} goals of its sequence, which wraps around to the \
+                     first one; an episode has {} steps, so give the agent more goals",
                     self.source.config().max_episode_steps
                 );
                 let category = py.get_type::<PyUserWarning>();

@@ -18,22 +18,22 @@ use crate::fields::Fields;
 use crate::lists::{Pairs, infos, pairs, read_actions};
 use crate::{config, errors};
 
-/// Row, column, goal's row and column, step, whether the agent takes part, whether the goal was drawn.
+/// Row, column, goal's row and column, step, whether the agent is active, whether the goal was drawn.
 type Change = (u16, u16, u16, u16, u64, bool, bool);
-/// What a step returns.
+/// Observations, rewards, terminated, truncated and infos of a step.
 type Stepped<'py> = (Bound<'py, PyList>, Vec<f64>, Vec<bool>, Vec<bool>, Bound<'py, PyList>);
 
-/// One environment with its config.
+/// An environment with its config.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct Engine {
     pub(crate) source: InstanceSource,
     pub(crate) exact: bool,
-    /// Steps after which an episode is cut off, whatever a later config says.
+    /// Steps after which an episode is truncated; a later config does not change this limit.
     pub(crate) time_limit: i64,
     pub(crate) episode: Episode<pogema_fast::Engine>,
     /// Whether the episodes from the next reset on are recorded.
     pub(crate) is_filmed: bool,
-    /// Whether density and collisions are measured from the next reset on.
+    /// Whether density and collisions are measured in the episodes from the next reset on.
     pub(crate) is_measured: bool,
     pub(crate) drawn: Drawn,
     actions: Vec<Action>,
@@ -41,8 +41,9 @@ pub struct Engine {
 
 #[pymethods]
 impl Engine {
-    /// An environment for the fields of a config; `registered` is the text of the map that its `map_name` names, and
-    /// `exact` chooses exact occupancy.
+    /// Makes an environment from the fields of a config.
+    ///
+    /// `registered` is the text of the map that `map_name` names, and `exact` selects exact occupancy.
     #[new]
     #[pyo3(signature = (config, registered=None, exact=false))]
     fn new(py: Python<'_>, config: Fields, registered: Option<&str>, exact: bool) -> PyResult<Self> {
@@ -51,8 +52,9 @@ impl Engine {
         Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
 
-    /// Begins an episode; returns what the maker of the instance warns of. A new config takes the place of the old
-    /// one with it, or not at all.
+    /// Begins an episode and returns the warnings of the instance source.
+    ///
+    /// A new config replaces the old one only if the reset succeeds.
     #[pyo3(signature = (config=None, registered=None))]
     fn reset(
         this: &Bound<'_, Self>,
@@ -64,19 +66,21 @@ impl Engine {
         this.begin(py, config.as_ref(), registered)
     }
 
-    /// Takes the field `seed` for the episodes from the next reset on; what resets did to pools stays.
+    /// Sets the seed for the episodes from the next reset on to the field `seed`.
+    ///
+    /// The pools stay in the order to which resets have shuffled them.
     fn reseed(&mut self, py: Python<'_>, fields: Fields) -> PyResult<()> {
         let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
         self.source.reseed(config.seed);
         Ok(())
     }
 
-    /// Forgets what the metrics counted so far.
+    /// Clears the counters of the metrics.
     fn clear_metrics(&mut self) {
         self.episode.meters_mut().episode.reset();
     }
 
-    /// Plays one step: observations, rewards, terminated, truncated, infos.
+    /// Plays one step and returns observations, rewards, terminated, truncated and infos.
     #[pyo3(signature = (actions, has_metrics=true))]
     fn step<'py>(
         this: &Bound<'py, Self>,
@@ -88,7 +92,7 @@ impl Engine {
         this.play(py, actions, has_metrics)
     }
 
-    /// The observations of all agents, of the type that the config names.
+    /// Returns the observations of all agents, in the type that the config names.
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.check_started(py)?;
         match self.episode.config().observation {
@@ -98,12 +102,12 @@ impl Engine {
         }
     }
 
-    /// A dictionary for each agent that says whether it takes part.
+    /// Returns a dictionary for each agent that says whether it is active.
     fn infos<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         infos(py, self.episode.state().active)
     }
 
-    /// Takes the last step back; says whether there was one.
+    /// Takes the last step back and returns whether there was one.
     fn step_back(this: &Bound<'_, Self>) -> PyResult<bool> {
         let py = this.py();
         let mut this = this.try_borrow_mut().map_err(|_| errors::busy(py))?;
@@ -117,7 +121,7 @@ impl Engine {
         Ok(went_back)
     }
 
-    /// Chooses how many steps count towards the time limit so far.
+    /// Sets the number of steps that count towards the time limit so far.
     #[setter]
     fn set_elapsed(&mut self, py: Python<'_>, elapsed: u64) -> PyResult<()> {
         if self.episode.instance().is_err() {
@@ -128,52 +132,52 @@ impl Engine {
         restored.map_err(|error| errors::call(py, &error))
     }
 
-    /// Whether agents take part.
+    /// Returns for each agent whether it is active.
     #[getter]
     fn active(&self) -> Vec<bool> {
         self.episode.state().active.to_vec()
     }
 
-    /// Which active agents stood on their goals after the last move, before goals changed.
+    /// Returns for each agent whether it was active and on its goal after the last move, before goals changed.
     #[getter]
     fn on_goal(&self) -> Vec<bool> {
         self.episode.state().on_goal.to_vec()
     }
 
-    /// Steps since the reset.
+    /// Returns the number of steps since the reset.
     #[getter]
     fn num_steps(&self) -> u64 {
         self.episode.num_steps()
     }
 
-    /// Size of the map without its border: rows, columns.
+    /// Returns the size of the map without its border: rows, columns.
     #[getter]
     fn size(&self) -> (usize, usize) {
         self.episode.engine().size()
     }
 
-    /// Where each agent is, so many rows and columns further down and right.
+    /// Returns the cell of each agent, with `shift` added to both coordinates.
     fn cells(&self, shift: i64) -> Pairs {
         pairs(self.episode.state().cells, shift)
     }
 
-    /// Where each agent started.
+    /// Returns the start of each agent, with `shift` added to both coordinates.
     fn starts(&self, shift: i64) -> Pairs {
         self.episode.instance().map_or_else(|_| Vec::new(), |instance| pairs(instance.starts(), shift))
     }
 
-    /// Where each agent wants to go.
+    /// Returns the goal of each agent, with `shift` added to both coordinates.
     fn goals(&self, shift: i64) -> Pairs {
         pairs(self.episode.state().goals, shift)
     }
 
-    /// Whether each agent's goal was drawn since the reset.
+    /// Returns for each agent whether its goal was drawn since the reset.
     #[getter]
     fn is_drawn(&self) -> Vec<bool> {
         self.drawn.now().to_vec()
     }
 
-    /// The map with its border, 1 for an obstacle.
+    /// Returns the map with its border, 1 for an obstacle.
     ///
     /// Shape: `(height + 2 * radius, width + 2 * radius)`, uint8
     fn obstacles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
@@ -181,31 +185,33 @@ impl Engine {
         Ok(padded)
     }
 
-    /// The cells that are marked as occupied, in the coordinates of the map with its border.
+    /// Returns the marked cells of the occupancy grid, in the coordinates of the map with its border.
     fn occupied(&self) -> Pairs {
         pairs(&self.episode.engine().occupied(), self.episode.config().radius as i64)
     }
 
-    /// Whether what lies beyond the wall is free.
+    /// Returns whether the area beyond the wall is free.
     #[getter]
     pub(crate) fn is_free_outside(&self) -> bool {
         self.episode.instance().map_or(true, |instance| *instance.outside() == Outside::Free)
     }
 
-    /// The goals that each agent is going to get, as POGEMA foretells them; none if the list would never end.
+    /// Returns the future goals of each agent as POGEMA predicts them, or `None` if the list would be infinite.
     fn foretold_goals(&self) -> Option<Vec<Pairs>> {
         let (instance, state) = (self.episode.instance().ok()?, self.episode.state());
         let goals = foretold_from(self.source.config(), instance, state.cells, state.goals)?;
         Some(goals.iter().map(|goals| pairs(goals, 0)).collect())
     }
 
-    /// The pools in the order to which resets have shuffled them.
+    /// Returns the pools in the order to which resets have shuffled them.
     fn pools(&self) -> Option<(Pairs, Pairs)> {
         self.source.pools().map(|(starts, goals)| (pairs(starts, 0), pairs(goals, 0)))
     }
 
-    /// For each agent its first state and each later one that differs: row, column, goal's row and column, step,
-    /// whether it takes part, whether the goal was drawn.
+    /// Returns for each agent its first state and each later state that differs from the one before.
+    ///
+    /// A state holds row, column, goal's row and column, step, whether the agent is active, and whether the goal was
+    /// drawn.
     fn history(&self) -> Vec<Vec<Change>> {
         let changes = pogema_core::changes(self.episode.past());
         let of_agent = |(agent, changes): (usize, Vec<pogema_core::Change>)| {
@@ -219,17 +225,17 @@ impl Engine {
         changes.into_iter().enumerate().map(of_agent).collect()
     }
 
-    /// Chooses whether the episodes from the next reset on are filmed.
+    /// Sets whether the episodes from the next reset on are recorded.
     fn film(&mut self, is_wanted: bool) {
         self.is_filmed = is_wanted;
     }
 
-    /// Measures density and collisions in the episodes from the next reset on, whatever else is measured.
+    /// Measures density and collisions, in addition to other metrics, in the episodes from the next reset on.
     fn measure(&mut self) {
         self.is_measured = true;
     }
 
-    /// The film as an animated SVG, or one frame of it.
+    /// Draws the recorded episode as an animated SVG, or one frame of it.
     #[pyo3(signature = (egocentric=None, static_frame=None, show_agents=true, show_lines=true))]
     fn draw_svg(
         &self,
@@ -244,24 +250,24 @@ impl Engine {
         self.drawn_by(py, |trace| pogema_render::svg::draw(trace, &style))
     }
 
-    /// What pickles and copies it: a function, and the bytes for it.
+    /// Supports pickling and copying: returns the restoring function and the bytes to pass to it.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         Ok((py.import("pogema_rs._engine")?.getattr("restore_engine")?, (state::save(self, py)?,)))
     }
 
-    /// The film as a page with many replays wants it.
+    /// Packs the recorded episode for a page with many replays.
     fn pack_film(&self, py: Python<'_>) -> PyResult<String> {
         self.drawn_by(py, pogema_render::html::pack)
     }
 
-    /// The film as a page that replays it.
+    /// Draws the recorded episode as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
         self.drawn_by(py, |trace| pogema_render::html::replay(trace, title))
     }
 }
 
 impl Engine {
-    /// An environment that wants a reset.
+    /// Makes an environment that needs a reset before its first step.
     pub(crate) fn of(source: InstanceSource, exact: bool, time_limit: i64) -> Result<Self, Error> {
         let rules = rules(&source, exact, time_limit);
         Ok(Self {
@@ -276,7 +282,7 @@ impl Engine {
         })
     }
 
-    /// Draws the film.
+    /// Draws the recorded episode with `draw`.
     fn drawn_by(
         &self,
         py: Python<'_>,
@@ -307,7 +313,9 @@ impl Engine {
         Ok(generated.warnings)
     }
 
-    /// Starts an episode on the same engine if the rules allow that. POGEMA 1.4.0 does not clear its metrics at a reset.
+    /// Starts an episode, on the same engine if the rules have not changed.
+    ///
+    /// POGEMA 1.4.0 does not clear its metrics at a reset, so the counters carry over.
     fn start(&mut self, rules: Config, instance: Instance) -> Result<(), Error> {
         let counted = self.episode.meters().episode.clone();
         let mut fresh = if rules == *self.episode.config() {
@@ -364,7 +372,7 @@ impl Engine {
         self.episode.instance().map(|_| ()).map_err(|error| errors::call(py, &error))
     }
 
-    /// The figures of an episode that the last step ended; without POGEMA's own, only what is measured besides.
+    /// Returns the metrics if the last step ended the episode; without `has_metrics` only density and collisions.
     fn metrics(&self, has_metrics: bool) -> Option<Metrics> {
         let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
         if has_metrics {
@@ -375,7 +383,7 @@ impl Engine {
         (measured != Metrics::default()).then_some(measured)
     }
 
-    /// POGEMA's figures; whole numbers where its are.
+    /// Returns metrics under POGEMA's names, as integers where POGEMA's are integers.
     fn named<'py>(&self, py: Python<'py>, metrics: &Metrics) -> PyResult<Bound<'py, PyDict>> {
         let named = PyDict::new(py);
         let is_nothing = self.episode.config().on_goal == OnGoal::Nothing;

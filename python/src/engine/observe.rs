@@ -61,7 +61,7 @@ impl Engine {
         Ok(all)
     }
 
-    /// Tuples of goals, of NumPy's integers where they were drawn.
+    /// Returns goals as tuples; drawn goals consist of NumPy integers.
     fn goal_tuples<'py>(&self, py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py, PyList>> {
         let list = tuples(py, pairs)?;
         for agent in (0..pairs.len()).filter(|&agent| self.drawn.now()[agent]) {
@@ -72,7 +72,7 @@ impl Engine {
         Ok(list)
     }
 
-    /// The map with its border, and all cells and goals in its coordinates.
+    /// Returns the map with its border, and the cells and goals of all agents in its coordinates.
     pub(crate) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
         self.check_started(py)?;
         let config = self.episode.config();
@@ -99,7 +99,7 @@ impl Engine {
     }
 }
 
-/// The parts of an array, one per agent.
+/// Splits an array into one part per agent.
 fn split<'py>(py: Python<'py>, array: &Bound<'py, PyAny>, num_agents: usize) -> PyResult<Bound<'py, PyList>> {
     let parts = PyList::empty(py);
     for agent in 0..num_agents {

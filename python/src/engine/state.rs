@@ -1,4 +1,4 @@
-//! An environment as bytes, so that it can be pickled and copied in the middle of an episode.
+//! Serializes an environment, so that it can be pickled and copied in the middle of an episode.
 
 use pogema_core::{
     CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, Map, Recording, Snapshot, StreamState,
@@ -16,7 +16,7 @@ use crate::errors;
 const FORMAT: &str = "pogema-rs environment";
 const VERSION: u32 = 1;
 
-/// Everything that an environment's future depends on.
+/// The complete saved state: everything that an environment's future depends on.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Saved {
@@ -51,7 +51,7 @@ struct SavedEpisode {
     streams: Vec<StreamState>,
 }
 
-/// The environment that [`save`] made these bytes of.
+/// Restores the environment that [`save`] turned into these bytes.
 ///
 /// # Errors
 /// `ValueError` for any other bytes.
@@ -60,7 +60,7 @@ pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
     restored(saved).map_err(|error| errors::call(py, &error))
 }
 
-/// The whole state, as versioned JSON.
+/// Returns the complete state as versioned JSON.
 pub fn save<'py>(engine: &Engine, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
     let saved = engine.saved().map_err(|error| errors::call(py, &error))?;
     Ok(PyBytes::new(py, saved.as_bytes()))
@@ -69,7 +69,7 @@ pub fn save<'py>(engine: &Engine, py: Python<'py>) -> PyResult<Bound<'py, PyByte
 impl Engine {
     fn saved(&self) -> Result<String, Error> {
         let mut config = self.source.config().to_value();
-        // The pools go on from where resets have shuffled them to.
+        // Pools keep the order to which resets have shuffled them.
         if let Some((starts, goals)) = self.source.pools() {
             config["possible_agents_xy"] = json!(starts);
             config["possible_targets_xy"] = json!(goals);
@@ -106,7 +106,7 @@ impl Engine {
 }
 
 fn foreign(reason: &str) -> Error {
-    Error::Corrupt { what: "these bytes are no saved environment".into(), reason: reason.to_owned() }
+    Error::Corrupt { what: "these bytes are not a saved environment".into(), reason: reason.to_owned() }
 }
 
 fn restored(saved: &[u8]) -> Result<Engine, Error> {
@@ -121,7 +121,7 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
     let fits = saved.meter.num_agents() == rules.num_agents
         && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent);
     if !fits {
-        return Err(foreign("the number of agents is another one than the config's"));
+        return Err(foreign("the number of agents differs from the config's"));
     }
     engine.drawn = saved.drawn;
     (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);

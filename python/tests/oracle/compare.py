@@ -1,4 +1,4 @@
-"""What of two outcomes has to be equal, and where they differ."""
+"""Compares outcomes of POGEMA with ours, and reports where they differ."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Difference:
 
 
 class Comparison:
-    """Compares cases, and counts."""
+    """Compares cases, and counts calls and known differences."""
 
     def __init__(self) -> None:
         self.num_calls = 0
@@ -45,7 +45,7 @@ class Comparison:
         self.known: dict[str, int] = {}
 
     def compare(self, case: Case, theirs: list[Outcome], ours: list[Outcome]) -> Difference | None:
-        """The first difference that nobody wants."""
+        """Returns the first difference that is not intended, or None."""
         self.has_vanished = self.was_reset = False
         for index, (call, their, our) in enumerate(zip(case.script, theirs, ours)):
             self.num_calls += 1
@@ -67,8 +67,8 @@ class Comparison:
             if reason:
                 return Difference(case, index, reason, their, our)
             if call[0] == "reset" and "error" in their and self.was_reset:
-                # POGEMA's time limit begins anew, though nothing else does; here nothing changes.
-                self.known["a reset that fails"] = self.known.get("a reset that fails", 0) + 1
+                # In POGEMA a failed reset restarts the time limit and nothing else; here it changes nothing.
+                self.known["failed reset"] = self.known.get("failed reset", 0) + 1
                 return None
             self.was_reset |= call[0] == "reset" and "value" in their
         if len(theirs) != len(ours):
@@ -87,46 +87,46 @@ class Comparison:
         expected = _EXPECTED[case.surprise]
         for side, outcome, error in (("POGEMA", their, expected.theirs), ("ours", our, expected.ours)):
             if _classes(outcome)[:1] != ([error] if error else []):
-                reason = f"{case.surprise}: {side} was to give {error or 'a value'}"
+                reason = f"{case.surprise}: expected {error or 'a value'} from {side}"
                 return Difference(case, index, reason, their, our)
         if "value" in our and their.get("value") == our["value"]:
-            return Difference(case, index, f"{case.surprise}: no difference any more", their, our)
+            return Difference(case, index, f"{case.surprise}: the difference no longer exists", their, our)
         self.known[case.surprise] = self.known.get(case.surprise, 0) + 1
         return None
 
     def _known(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:
-        """The name of a difference by decision, and whether the rest of the case cannot be compared."""
+        """Returns the name of an intended difference, and whether the rest of the case cannot be compared."""
         if _is_masked(call, their) and "ValidationError" in _classes(our):
             # docs/spec/defects.md, Instances and seeds: a KeyError hides what is wrong with the starts.
             return "malformed starts", False
         if "timeout" in their and call[1:2] == ("get_lifelong_targets_xy",) and "would never end" in _text(our):
-            # docs/spec/differences.md, Starts and goals: a pool of which one goal alone can be drawn.
-            return "goals foretold for ever", True
+            # docs/spec/differences.md, Starts and goals: a pool of which only one goal can be drawn.
+            return "endless list of goals", True
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
             # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, once that has become smaller.
             return "pool outside the map", True
         if call[0] in ("reset", "grid") and "map_name" in case.fields and "has room" in _text(our) and "value" in their:
             # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.
             return "registered map without room", True
-        return self._known_of_play(case, call, their, our)
+        return self._known_in_episode(case, call, their, our)
 
-    def _known_of_play(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:
+    def _known_in_episode(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:
         is_soft = "soft" in repr(case.script)
         wrote = "does not support item assignment" in _text(their)
         if call[0] == "step" and is_soft and wrote and call[2] == "tuple" and "value" in our:
-            # docs/spec/defects.md, Collisions and occupancy: the caller's actions stay the caller's.
+            # docs/spec/defects.md, Collisions and occupancy: the caller's actions stay unchanged.
             return "soft writes into a tuple", True
         if call == ("left",) and is_soft and their.get("value") != our.get("value"):
             return "soft writes into the actions", False
         if call[0] == "back" and case.fields.get("persistent") and self.has_vanished:
             # docs/spec/differences.md, Metrics and history: POGEMA loses marks, or raises.
-            return "a step back after agents have vanished", True
+            return "step back after agents have vanished", True
         if call[0] == "back" and is_soft and "already occupied" in _text(their) and "value" in our:
-            # The same, of an agent that finished where another one had just left: it vanished in that very step.
-            return "a step back of an agent that followed and finished", True
+            # The same for an agent that finished on a cell that another agent left in the same step.
+            return "step back of an agent that followed and finished", True
         if call[0] == "back" and "Can't force agent to blocked position" in _text(their) and _has_pools(case.fields):
             # docs/spec/differences.md, Metrics and history: the start was an obstacle.
-            return "a step back onto an obstacle", True
+            return "step back onto an obstacle", True
         return "", False
 
 
@@ -136,7 +136,7 @@ def _is_masked(call: Call, their: Outcome) -> bool:
 
 
 def _has_pools(fields: Fields) -> bool:
-    """Whether agents may start on obstacles."""
+    """Returns whether a config has a pool of starts, which may lie on obstacles."""
     return "possible_agents_xy" in fields
 
 
@@ -149,14 +149,14 @@ def _classes(outcome: Outcome) -> list[str]:
 
 
 def _difference(call: Call, their: Outcome, our: Outcome) -> str:
-    """What is wrong with ours; nothing if all is well."""
+    """Returns how our outcome is wrong, or an empty string."""
     if "timeout" in their or "timeout" in our:
         return "" if their.keys() == our.keys() else "one of them does not end"
     if ("error" in their) != ("error" in our):
         return "one of them raises"
     if "error" in their:
-        wanted = _classes(their)[0]
-        return "" if wanted in _classes(our) else f"ours is no {wanted}"
+        expected = _classes(their)[0]
+        return "" if expected in _classes(our) else f"our error is not a {expected}"
     if _value(call, their) != _value(call, our):
         return f"the values differ at {_place(_value(call, their), _value(call, our))}"
     if _warned(their) != _warned(our):
@@ -165,14 +165,14 @@ def _difference(call: Call, their: Outcome, our: Outcome) -> str:
 
 
 def _value(call: Call, outcome: Outcome) -> Any:
-    """The value as far as it must be equal."""
+    """Returns the part of a value that must be equal."""
     value = outcome["value"]
-    if call[0] in ("told", "update"):
-        # The caller's lists stay in their order here, where POGEMA shuffles them in place.
+    if call[0] in ("dump", "update"):
+        # POGEMA shuffles the caller's lists in place; ours keep their order.
         fields = ((name, (one[0], sorted(one[1])) if _is_pool(name, one) else one) for name, one in value[1])
         return (value[0], tuple(fields))
     if call[0] == "call" and call[1] in ("grid.positions", "grid.obstacles"):
-        # A grid is a view that cannot be written to.
+        # Our grid is a read-only view.
         return (*value[:3], value[3][0], value[4])
     return value
 
@@ -182,10 +182,10 @@ def _is_pool(name: Any, value: Any) -> bool:
 
 
 def _warned(outcome: Outcome) -> list[str]:
-    """The warnings that both give, without the words: POGEMA's own are told by what they speak of."""
+    """Returns the kinds of the warnings that both packages give, recognized by words of their texts."""
     marks = (
         ("cycling back", "round"),
-        ("goes round", "round"),
+        ("wraps around", "round"),
         ("obstacle on a", "obstacle"),
         ("is on an obstacle", "obstacle"),
     )
@@ -194,7 +194,7 @@ def _warned(outcome: Outcome) -> list[str]:
 
 
 def _place(one: Any, other: Any, path: str = "") -> str:
-    """The innermost place where two descriptions differ."""
+    """Returns the innermost place where two descriptions differ."""
     if not (isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other)):
         return f"{path or 'the top'}: {_shown(one)} and {_shown(other)}"
     for index, (left, right) in enumerate(zip(one, other)):

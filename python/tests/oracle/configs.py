@@ -1,4 +1,4 @@
-"""Configs drawn at random, each a pure function of the generator it is given, and the kinds of thing that it covers."""
+"""Random configs, each a pure function of its generator, and the kinds of features that they cover."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PLACES = ("drawn", "drawn", "explicit", "sequences", "pools", "half")
 
 
 class Draw:
-    """Draws with one generator, and notes what it drew."""
+    """Draws configs with one generator, and records the kinds of features drawn."""
 
     def __init__(self, generator: np.random.Generator) -> None:
         self.generator = generator
@@ -25,23 +25,23 @@ class Draw:
         self.registered: tuple[str, str] | None = None
 
     def chance(self, probability: float) -> bool:
-        """True with a probability."""
+        """Returns True with a probability."""
         return bool(self.generator.random() < probability)
 
     def number(self, low: int, high: int) -> int:
-        """A whole number from low to high, both included."""
+        """Returns an integer from low to high, both included."""
         return int(self.generator.integers(low, high + 1))
 
     def one(self, choices: Any) -> Any:
-        """One of a sequence."""
+        """Returns a random element of a sequence."""
         return choices[self.number(0, len(choices) - 1)]
 
     def note(self, kind: str) -> None:
-        """Counts a kind of thing as covered."""
+        """Records a kind of feature as covered."""
         self.kinds.add(kind)
 
     def config(self) -> Fields:
-        """The fields of a config that is meant to be playable."""
+        """Returns the fields of a config that is intended to be playable."""
         fields: Fields = {"on_target": self.one(ON_TARGET), "obs_radius": self.number(1, 6)}
         for name, choices in (("collision_system", COLLISIONS), ("observation_type", OBSERVATIONS)):
             fields[name] = self.one(choices)
@@ -56,15 +56,15 @@ class Draw:
         if self.chance(0.3):
             fields["persistent"] = True
             self.note("persistent")
-        rows = self._ground(fields)
+        rows = self._map(fields)
         self._places(fields, rows)
         if self.chance(0.04) and fields["on_target"] != "restart":
             fields["max_episode_steps"] = self.one((0, -3))
             self.note("no steps")
         return fields
 
-    def _ground(self, fields: Fields) -> list[str]:
-        """Chooses the map; its rows, or for one that is drawn by the package rows without obstacles."""
+    def _map(self, fields: Fields) -> list[str]:
+        """Chooses the map and returns its rows; if the package draws the map, the rows have no obstacles."""
         kind = self.one(MAPS)
         self.note(f"map {kind}")
         if kind in ("size", "rectangle", "default"):
@@ -121,36 +121,36 @@ class Draw:
         else:
             fields["num_agents"] = num_agents
         if kind in ("explicit", "sequences"):
-            fields["agents_xy"] = self._formed(cells[:num_agents])
+            fields["agents_xy"] = self._in_container(cells[:num_agents])
             is_single = kind == "explicit" and fields["on_target"] != "restart"
             fields["targets_xy"] = self._goals(cells, num_agents, is_single)
         elif kind == "half":
             self._half(fields, cells, num_agents)
         elif kind == "pools":
             count = min(len(cells), num_agents + self.number(0, 4))
-            fields["possible_agents_xy"] = self._formed(cells[:count])
+            fields["possible_agents_xy"] = self._in_container(cells[:count])
             self.generator.shuffle(cells)
-            fields["possible_targets_xy"] = self._formed(cells[: max(count, min(len(cells), 2))])
+            fields["possible_targets_xy"] = self._in_container(cells[: max(count, min(len(cells), 2))])
 
     def _half(self, fields: Fields, cells: Cells, num_agents: int) -> None:
-        """Gives starts or goals alone, which places agents at random."""
+        """Sets only starts or only goals, so that agents are placed at random."""
         what = self.one(("agents_xy", "targets_xy", "possible_targets_xy", "possible_agents_xy"))
         self.note(f"{what} alone")
         if what == "targets_xy":
             fields[what] = self._goals(cells, num_agents, fields["on_target"] != "restart")
         elif what == "possible_targets_xy":
-            fields[what] = self._formed(cells[:5])
+            fields[what] = self._in_container(cells[:5])
         else:
-            fields[what] = self._formed(cells[:num_agents])
+            fields[what] = self._in_container(cells[:num_agents])
 
     def _goals(self, cells: Cells, num_agents: int, is_single: bool) -> list:
         if is_single:
-            return self._formed([self.one(cells) for _ in range(num_agents)])
+            return self._in_container([self.one(cells) for _ in range(num_agents)])
         self.note("goal sequences")
-        return [self._formed([self.one(cells) for _ in range(self.number(2, 4))]) for _ in range(num_agents)]
+        return [self._in_container([self.one(cells) for _ in range(self.number(2, 4))]) for _ in range(num_agents)]
 
-    def _formed(self, cells: Cells) -> list:
-        """The cells as lists or as tuples."""
+    def _in_container(self, cells: Cells) -> list:
+        """Returns the cells as lists or as tuples."""
         if self.chance(0.5):
             self.note("cells as tuples")
             return [(int(row), int(col)) for row, col in cells]

@@ -1,4 +1,4 @@
-"""POGEMA's functions that draw instances, called by hand on either side."""
+"""Direct calls of POGEMA's functions that draw instances, for both packages."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ NUM_CASES = 40
 
 
 def drawn(generator: ModuleType, config_class: Any, number: int) -> list[Described]:
-    """Everything that the functions give for a config of this number."""
+    """Returns all results of the functions for the config of a number."""
     rng = np.random.default_rng([11, number])
     size, density = int(rng.integers(2, 9)), float(rng.choice([0.0, 0.2, 0.5, 0.9]))
     config = config_class(size=size, density=density, seed=number, num_agents=int(rng.integers(1, 5)))
     obstacles = generator.generate_obstacles(config)
-    told = [described(obstacles), described(generator.generate_obstacles(config, np.random.default_rng(number + 1)))]
+    results = [described(obstacles), described(generator.generate_obstacles(config, np.random.default_rng(number + 1)))]
     grid = obstacles.copy()
-    told += [described(generator.bfs(grid, tuple(config.MOVES), 2, 0)), described(grid)]
+    results += [described(generator.bfs(grid, tuple(config.MOVES), 2, 0)), described(grid)]
     starts, goals = generator.generate_positions_and_targets_fast(obstacles, config)
-    told.append(described([starts, goals]))
+    results.append(described([starts, goals]))
     points, labels = generator.get_components(config, obstacles, starts, goals)
-    told += [described(dict(points)), described(labels)]
+    results += [described(dict(points)), described(labels)]
     rnd = np.random.default_rng(number)
     for start, goal in zip(starts, goals):
         if goal != (-1, -1):
-            told.append(described(generator.generate_new_target(rnd, labels, points, start)))
+            results.append(described(generator.generate_new_target(rnd, labels, points, start)))
     cells = [(row, col) for row in range(size) for col in range(size)]
-    told.append(described(generator.generate_from_possible_targets(rnd, cells, (0, 0))))
+    results.append(described(generator.generate_from_possible_targets(rnd, cells, (0, 0))))
     config.possible_agents_xy, config.possible_targets_xy = list(cells), [list(cell) for cell in cells]
-    told.append(described(generator.generate_from_possible_positions(config)))
-    return [*told, described([config.possible_agents_xy, config.possible_targets_xy])]
+    results.append(described(generator.generate_from_possible_positions(config)))
+    return [*results, described([config.possible_agents_xy, config.possible_targets_xy])]

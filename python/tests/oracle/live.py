@@ -1,4 +1,4 @@
-"""Both sides of the comparison, at work at the same time."""
+"""Runs cases on POGEMA and on the package under test at the same time."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ VARIABLE = "POGEMA_ORACLE_PYTHON"
 
 
 class Oracle:
-    """POGEMA 1.4.0 in a process of its own."""
+    """POGEMA 1.4.0 in a separate process."""
 
     def __init__(self) -> None:
         python = os.environ.get(VARIABLE)
         if not python:
             raise RuntimeError(
                 f"{VARIABLE} is not set: `python3.11 conformance/oracle/install.py target/oracle/venv` "
-                "installs POGEMA 1.4.0 and prints what it has to be"
+                "installs POGEMA 1.4.0 and prints the value to set"
             )
         self.process = subprocess.Popen(
             [python, str(HERE / "theirs.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -35,11 +35,11 @@ class Oracle:
         self.version = receive(self.process.stdout)
 
     def ask(self, script: list[Call] | int) -> None:
-        """Gives a script to play, or the number of a config to draw an instance of; the result comes by `answer`."""
+        """Sends a script to play, or the number of a config to draw instances for; `answer` returns the result."""
         send(self.process.stdin, script)
 
     def answer(self) -> list[Outcome]:
-        """The outcomes of the oldest script asked for."""
+        """Returns the outcomes of the oldest request without an answer."""
         return receive(self.process.stdout)
 
     def close(self) -> None:
@@ -50,7 +50,7 @@ class Oracle:
 
 
 def ours() -> Package:
-    """The package under test."""
+    """Returns the package under test."""
     from pogema_rs import grid_registry
     from pogema_rs.envs import _make_pogema
     from pogema_rs.grid import Grid
@@ -61,7 +61,7 @@ def ours() -> Package:
 
 @contextmanager
 def oracle() -> Iterator[Oracle]:
-    """POGEMA 1.4.0, ended in the end."""
+    """Runs POGEMA 1.4.0 until the context ends."""
     pogema = Oracle()
     try:
         if pogema.version != "1.4.0":
@@ -72,7 +72,7 @@ def oracle() -> Iterator[Oracle]:
 
 
 class Run:
-    """Cases played on both sides, one after the other, while the next one is played by POGEMA."""
+    """Cases played on both sides in order, while POGEMA already plays the next one."""
 
     def __init__(self, seed: int, numbers: range) -> None:
         self.seed, self.numbers = seed, numbers
@@ -81,7 +81,7 @@ class Run:
         self.differences: list[Difference] = []
 
     def play(self, most_differences: int = 5) -> None:
-        """Plays all, or until so many differ."""
+        """Plays all cases, but stops after `most_differences` differences."""
         package = ours()
         with oracle() as pogema:
             waiting: list[Case] = []
@@ -97,7 +97,7 @@ class Run:
 
     @staticmethod
     def surprise(surprise: Surprise) -> Difference | None:
-        """What is wrong with a difference by decision."""
+        """Plays an intended difference and returns how it deviates from its description, or None."""
         one = Case(0, surprise.fields, list(surprise.script), set(), surprise.name)
         with oracle() as pogema:
             pogema.ask(one.script)
@@ -114,6 +114,6 @@ class Run:
         counts = self.comparison
         return (
             f"{len(self.numbers)} cases with seed {self.seed}: {counts.num_calls} calls compared, {counts.num_steps} "
-            f"of them steps, {counts.num_ends} of these the end of an episode ({counts.num_metrics} with metrics), and "
-            f"{counts.num_errors} errors; {sum(counts.known.values())} differences by decision"
+            f"of them steps, of which {counts.num_ends} end an episode ({counts.num_metrics} with metrics), and "
+            f"{counts.num_errors} errors; {sum(counts.known.values())} intended differences"
         )

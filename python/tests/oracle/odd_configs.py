@@ -1,4 +1,4 @@
-"""Configs that POGEMA refuses, or takes though they are odd."""
+"""Configs that POGEMA rejects, and odd configs that it accepts."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ REFUSED: tuple[Fields, ...] = (
     {"on_target": "restart", "targets_xy": [[0, 1]], "agents_xy": [[0, 0]]},
     {"on_target": "restart", "targets_xy": [[[0, 1], [8, 8]]], "agents_xy": [[0, 0]]},
 )
-"""What both refuse with the config."""
+"""Configs that both packages reject on construction."""
 
 UNPLAYABLE: tuple[Fields, ...] = (
     {"size": 3, "num_agents": 5, "density": 0.0},
@@ -49,7 +49,7 @@ UNPLAYABLE: tuple[Fields, ...] = (
     {"map": "@.$", "num_agents": 3},
     {"map": "...", "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 1]], "num_agents": 2},
 )
-"""What both refuse at the reset."""
+"""Configs that both packages reject at the reset."""
 
 ACCEPTED: tuple[Fields, ...] = (
     {"seed": "5", "size": "4", "num_agents": "2", "density": "0.2", "obs_radius": "2"},
@@ -91,18 +91,18 @@ ACCEPTED: tuple[Fields, ...] = (
     {"map": "..#..", "agents_xy": [[0, 0]], "targets_xy": [[[0, 4], [0, 3]]], "on_target": "restart", "seed": 1},
     {"integration": None, "auto_reset": None, "map_name": None, "seed": 1, "size": 3, "density": 0.0},
     {"integration": "SampleFactory", "auto_reset": "yes", "seed": 1, "size": 3, "density": 0.0},
-    {"map_name": "nobody knows it", "seed": 1, "size": 3, "density": 0.0},
+    {"map_name": "not registered", "seed": 1, "size": 3, "density": 0.0},
     {"map_name": 17, "seed": 1, "size": 3, "density": 0.0},
     {"unheard_of": 3, "seed": 1, "size": 3, "density": 0.0},
     {"density": 1e-300, "size": 3, "seed": 8},
     {"seed": None, "map": "a.A", "obs_radius": 1},
     {"seed": None, "map": "...", "agents_xy": [[0, 1]], "targets_xy": [[[0, 0], [0, 2]]], "on_target": "restart"},
 )
-"""What both take, some of it in an odd form."""
+"""Odd configs that both packages accept."""
 
 
-def spoiled(draw: Draw) -> Fields:
-    """A config with one group of fields from the list of the refused."""
+def rejected(draw: Draw) -> Fields:
+    """Returns a config with one group of fields from `REFUSED`."""
     draw.note("refused config")
     odd: dict[str, Any] = dict(draw.one(REFUSED))
     if draw.chance(0.5):

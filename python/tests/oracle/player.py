@@ -1,7 +1,7 @@
-"""Plays a script on one of the two packages and tells everything that a user of it would see.
+"""Plays a script on one of the two packages and returns everything that a user sees.
 
-What comes back is built of plain tuples and strings, so that both sides can be compared by `==`. This file runs in
-either package's interpreter and imports neither.
+The outcomes consist of plain tuples and strings, so that `==` can compare both sides. This file runs in the
+interpreters of both packages and imports neither package.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 
 
 class Timeout(BaseException):
-    """A call does not end; no Exception, so that no handler takes it for its own."""
+    """A call exceeds its time limit; not an Exception, so that the called code cannot catch it."""
 
 
 def _expire(*_: Any) -> None:
@@ -35,7 +35,7 @@ def _expire(*_: Any) -> None:
 
 @dataclass
 class Package:
-    """What a script needs of a package."""
+    """The classes and functions of a package that a script uses."""
 
     config_class: Any
     make: Any
@@ -44,7 +44,7 @@ class Package:
 
 
 def described(value: Any) -> Described:
-    """A value with its type, and all values in it with theirs."""
+    """Returns a value with its type, and recursively all values in it with their types."""
     if isinstance(value, np.ndarray):
         flags = (value.flags.c_contiguous, value.flags.writeable)
         return ("array", value.dtype.str, value.shape, flags, value.tobytes())
@@ -66,7 +66,7 @@ def described(value: Any) -> Described:
 
 
 class Player:
-    """One environment at work, and the script's calls on it."""
+    """An environment, and the calls that a script makes on it."""
 
     def __init__(self, package: Package) -> None:
         self.package = package
@@ -74,7 +74,7 @@ class Player:
         self.registered: list[str] = []
 
     def play(self, script: list[tuple]) -> list[Outcome]:
-        """The outcome of each call; after one that does not end, no more."""
+        """Returns the outcome of each call; stops after a timeout or a failed `make`."""
         outcomes: list[Outcome] = []
         signal.signal(signal.SIGALRM, _expire)
         for call in script:
@@ -115,31 +115,31 @@ class Player:
 
     def _make(self, fields: dict[str, Any]) -> Described:
         config = self.package.config_class(**copy.deepcopy(fields))
-        told = config.dict()
+        fields = config.dict()
         self.env = self.package.make(config)
-        return described([told, self.env.action_space, self.env.observation_space, self.env.get_num_agents()])
+        return described([fields, self.env.action_space, self.env.observation_space, self.env.get_num_agents()])
 
     def _reset(self, seed: int | None) -> Described:
         return described(self.env.reset() if seed is None else self.env.reset(seed=seed))
 
     def _step(self, plan: list[Any], form: str) -> Described:
         if any(isinstance(action, int) and action == GREEDY for action in plan):
-            wanted = self._greedy()
-            plan = [wanted[i] if action == GREEDY and i < len(wanted) else action for i, action in enumerate(plan)]
-        actions = contained(plan, form)
+            greedy = self._greedy()
+            plan = [greedy[i] if action == GREEDY and i < len(greedy) else action for i, action in enumerate(plan)]
+        actions = in_container(plan, form)
         try:
             return (described(self.env.step(actions)), self._has_vanished())
         finally:
             self.left = described(actions)
 
     def _has_vanished(self) -> bool:
-        """Whether an agent that takes part is not marked where it stands."""
+        """Returns whether an active agent has no mark on its cell."""
         grid = self.env.unwrapped.grid
         marks, active = grid.positions, grid.is_active
         return any(active[agent] and not marks[cell] for agent, cell in enumerate(grid.positions_xy))
 
     def _left(self) -> Described:
-        """What the last step made of the caller's actions."""
+        """Returns the caller's actions after the last step."""
         return self.left
 
     def _greedy(self) -> list[int]:
@@ -155,8 +155,8 @@ class Player:
 
     def _sample(self) -> Described:
         drawn = self.env.sample_actions()
-        told = described(drawn)
-        return (described(self.env.step(drawn)), self._has_vanished(), told)
+        actions = described(drawn)
+        return (described(self.env.step(drawn)), self._has_vanished(), actions)
 
     def _back(self) -> Described:
         return described(self.env.step_back())
@@ -182,7 +182,7 @@ class Player:
         self.env.unwrapped.grid_config = config
         return described(config.dict())
 
-    def _told(self) -> Described:
+    def _dump(self) -> Described:
         return described(self.env.grid_config.dict())
 
     def _call(self, path: str, arguments: tuple, keywords: dict[str, Any]) -> Described:
@@ -198,8 +198,8 @@ class Player:
         return described([result, out.getvalue()])
 
 
-def contained(plan: list[Any], form: str) -> Any:
-    """Actions in one of the containers that a caller may use."""
+def in_container(plan: list[Any], form: str) -> Any:
+    """Returns actions in one of the containers that a caller may use."""
     if form in ("int64", "int32", "uint8"):
         return np.array(plan, dtype=form)
     if form == "numbers":

@@ -1,4 +1,4 @@
-"""The cases: a config and the calls to make on it, each a pure function of a seed and a number."""
+"""The cases: configs with the calls to make on them, each a pure function of a seed and a number."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from configs import COLLISIONS, OBSERVATIONS, Draw, Fields
-from odd_configs import ACCEPTED, UNPLAYABLE, spoiled
+from odd_configs import ACCEPTED, UNPLAYABLE, rejected
 from player import GREEDY
 from surprises import SURPRISES
 
@@ -29,7 +29,7 @@ _OF_AGENT = ("get_obstacles_for_agent", "get_positions", "get_square_target", "g
 
 @dataclass
 class Case:
-    """One script, what it covers, and the config that its environment is made of."""
+    """A script, the kinds of features that it covers, and the config of its environment."""
 
     number: int
     fields: Fields
@@ -39,16 +39,16 @@ class Case:
 
 
 def case(seed: int, number: int) -> Case:
-    """The case of a number."""
+    """Returns the case of a number."""
     draw = Draw(np.random.default_rng([seed, number]))
     kind = draw.number(0, 99)
     if kind < 15:
-        fields = spoiled(draw)
+        fields = rejected(draw)
         return Case(number, fields, [("config", fields), ("make", fields)], draw.kinds)
     if kind < 21:
         fields = dict(draw.one(UNPLAYABLE))
         draw.note("refused at the reset")
-        script: list[Call] = [("make", fields), ("reset", None), ("told",), ("reset", None)]
+        script: list[Call] = [("make", fields), ("reset", None), ("dump",), ("reset", None)]
         return Case(number, fields, script, draw.kinds)
     if kind < 26:
         surprise = draw.one(SURPRISES)
@@ -63,7 +63,7 @@ def case(seed: int, number: int) -> Case:
 
 
 def look(fields: Fields, num_agents: int) -> list[Call]:
-    """A call of everything that tells the present state."""
+    """Returns calls of everything that shows the current state."""
     calls: list[Call] = [("call", name, (), {}) for name in (*_BOTH, *_PLAIN)]
     calls += [("call", name, (), {"ignore_borders": True}) for name in _BOTH]
     calls.append(("call", "get_state", (), {"as_dict": True}))
@@ -76,7 +76,7 @@ def look(fields: Fields, num_agents: int) -> list[Call]:
 
 
 class _Episodes:
-    """Episodes on one environment, with whatever a user may do between the steps."""
+    """Episodes of one environment, with other calls of a user between the steps."""
 
     def __init__(self, draw: Draw, fields: Fields) -> None:
         self.draw, self.fields = draw, fields
@@ -111,7 +111,7 @@ class _Episodes:
         if draw.chance(0.4):
             self._reset()
             self._step()
-        self.calls.append(("told",))
+        self.calls.append(("dump",))
         return self.calls
 
     def _reset(self) -> None:
@@ -186,7 +186,7 @@ class _Episodes:
             self.calls.append(("step", plan + [0] if draw.chance(0.5) else plan[:-1], "list"))
             return
         plan[draw.number(0, self.num_agents - 1)] = draw.one(WRONG_ACTIONS)
-        # POGEMA's state is then half stepped, so the script begins anew.
+        # A failed step leaves POGEMA with half a step, so the script resets.
         self.calls += [("step", plan, draw.one(("list", "tuple"))), ("reset", None)]
 
     def _render(self) -> None:

@@ -1,4 +1,4 @@
-"""Where pogema_rs does otherwise than POGEMA 1.4.0 on purpose: a script each, with what each side must do."""
+"""Intended differences between pogema_rs and POGEMA 1.4.0: scripts with the expected error of each side."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ _PAIR = {"map": "abAB", "obs_radius": 1}
 
 @dataclass(frozen=True)
 class Surprise:
-    """The last call of the script is the one that differs; an empty string is for a value, not an error.
+    """An intended difference in the last call of a script.
 
-    What is a line `differences` names the table in docs/spec/differences.md that tells of it.
+    `theirs` and `ours` are error classes; an empty string stands for a value. A comment `differences, X` refers to
+    table X in docs/spec/differences.md.
     """
 
     name: str
@@ -39,7 +40,7 @@ SURPRISES = (
         theirs="",
         ours="InstanceError",
     ),
-    # differences, Starts and goals: a start of a pool outside the map.
+    # differences, Starts and goals: a pool has a start outside the map.
     _surprise(
         "pool start outside",
         {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 5]], "possible_targets_xy": [[0, 1]]},
@@ -47,7 +48,7 @@ SURPRISES = (
         theirs="ValueError",
         ours="InstanceError",
     ),
-    # differences, Starts and goals: a goal of a pool outside the map.
+    # differences, Starts and goals: a pool has a goal outside the map.
     _surprise(
         "pool goal outside",
         {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 9]]},
@@ -55,9 +56,9 @@ SURPRISES = (
         theirs="",
         ours="InstanceError",
     ),
-    # differences, Starts and goals: a pool of one goal that draws for ever.
+    # differences, Starts and goals: a pool of one goal makes POGEMA draw forever.
     _surprise(
-        "pool goal for ever",
+        "pool goal drawn forever",
         {
             **{"map": "....\n....", "num_agents": 1, "on_target": "restart", "obs_radius": 1, "seed": 1},
             **{"possible_targets_xy": [[1, 1]]},
@@ -74,7 +75,7 @@ SURPRISES = (
         theirs="",
         ours="InstanceError",
     ),
-    # differences, Config: letters with goals that are to follow each other.
+    # differences, Config: letters with `on_target: restart`.
     _surprise("letters and restart", {**_PAIR, "on_target": "restart"}, theirs="", ours="ValidationError"),
     # differences, Config: other MOVES.
     _surprise("other moves", {**_SMALL, "MOVES": [[0, 0], [0, 1]]}, theirs="", ours="ValidationError"),
@@ -102,9 +103,9 @@ SURPRISES = (
         theirs="",
         ours="",
     ),
-    # docs/spec/defects.md, The Python package: the text is thrown away.
+    # docs/spec/defects.md, The Python package: POGEMA discards the text.
     _surprise("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
-    # A wrapped environment of 1.4.0 takes no return_info; its own classes do.
+    # A wrapped environment of 1.4.0 does not accept return_info; its own classes do.
     _surprise("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
     # docs/spec/defects.md, Collisions: `soft` writes into the actions, which a tuple does not allow.
     _surprise(
@@ -149,14 +150,14 @@ SURPRISES = (
         theirs="ValueError",
         ours="",
     ),
-    # Coordinates are kept as plain numbers, whatever kind of number they came as; POGEMA refuses NumPy's.
+    # Coordinates of any number type are stored as plain integers; POGEMA rejects NumPy's.
     _surprise(
         "flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""
     ),
     _surprise(
         "numpy coordinates", {"num_agents": 1, "agents_xy": [[np.int64(1), 1]]}, theirs="ValidationError", ours=""
     ),
-    # A grid is a view of the environment: what it returns is not to be written to.
+    # A grid is a read-only view of the environment.
     _surprise(
         "write-protected grid", _SMALL, _RESET, ("call", "grid.hide_agent", (0,), {}), theirs="", ours="StateError"
     ),

@@ -1,7 +1,7 @@
-"""Drawn configs and calls, played by POGEMA 1.4.0 and by pogema_rs: everything returned must be equal.
+"""Tests that pogema_rs and POGEMA 1.4.0 return equal values for random configs and calls.
 
-`POGEMA_ORACLE_PYTHON` names the interpreter that has POGEMA 1.4.0; `POGEMA_ORACLE_CASES` and `POGEMA_ORACLE_SEED`
-choose how many cases are drawn, and which.
+`POGEMA_ORACLE_PYTHON` names the interpreter with POGEMA 1.4.0. `POGEMA_ORACLE_CASES` is the number of cases [default:
+1000], and `POGEMA_ORACLE_SEED` their seed [default: 1].
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ KINDS = (
     *("step", "odd action", "wrong action", "sampled actions", "seed changed", "config updated", "config replaced"),
     *("grid of a config", "render", "history", "no history", "step back", "elapsed steps"),
 )
-"""What the drawn cases have to cover; each at least once in 250 cases."""
+"""The kinds that the drawn cases must cover, each at least once in 250 cases."""
 
 
 @pytest.fixture(scope="module")
@@ -51,16 +51,16 @@ def run() -> Iterator[Run]:
 
 
 def test_everything_is_equal(run: Run) -> None:
-    """No call differs, but for those that are meant to."""
+    """No call differs, except for the intended differences."""
     assert not run.differences, "\n\n".join(str(difference) for difference in run.differences)
 
 
 @pytest.mark.skipif(NUM_CASES < 1000, reason="too few cases to cover everything")
-def test_the_cases_cover_everything(run: Run) -> None:
-    """Every kind of thing is among the cases, and often enough to mean something."""
+def test_cases_cover_everything(run: Run) -> None:
+    """Every kind occurs often enough to be meaningful."""
     rare = {kind: run.kinds[kind] for kind in KINDS if run.kinds[kind] < NUM_CASES / 250}
-    assert not rare, f"of {NUM_CASES} cases too few have these: {rare}"
-    assert not set(run.kinds) - set(KINDS), "a kind that is drawn is not asked for"
+    assert not rare, f"too few of {NUM_CASES} cases have these kinds: {rare}"
+    assert not set(run.kinds) - set(KINDS), "a drawn kind is missing in KINDS"
     assert run.comparison.num_steps > NUM_CASES
     assert run.comparison.num_ends > NUM_CASES / 20
     assert run.comparison.num_warnings > NUM_CASES / 100
@@ -68,33 +68,33 @@ def test_the_cases_cover_everything(run: Run) -> None:
 
 
 @pytest.mark.parametrize("surprise", SURPRISES, ids=lambda surprise: surprise.name)
-def test_differences_by_decision(surprise: object) -> None:
-    """Each difference is one, and of the kind that is told."""
+def test_intended_differences(surprise: object) -> None:
+    """Each intended difference exists, and has the described errors."""
     assert Run.surprise(surprise) is None
 
 
-def test_the_generators_draw_the_same() -> None:
-    """The functions that draw instances give the same, and take as much from their random numbers."""
+def test_generators_draw_the_same() -> None:
+    """The functions that draw instances return the same values and consume as many random numbers."""
     with oracle() as pogema:
         for number in range(generators.NUM_CASES):
             pogema.ask(number)
             assert generators.drawn(generator, GridConfig, number) == pogema.answer(), number
 
 
-def test_a_case_is_a_function_of_its_number() -> None:
-    """The same case comes again, whatever was drawn before."""
+def test_case_is_a_function_of_its_number() -> None:
+    """A case does not depend on earlier draws."""
     assert repr(case(SEED, 17)) == repr(case(SEED, 17)) != repr(case(SEED + 1, 17))
 
 
-def test_the_oracle_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without POGEMA the tests fail; they are not passed over."""
+def test_missing_oracle_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without POGEMA the tests fail; they are not skipped."""
     monkeypatch.delenv("POGEMA_ORACLE_PYTHON", raising=False)
     with pytest.raises(RuntimeError, match="POGEMA_ORACLE_PYTHON is not set"), oracle():
         pass
 
 
-def test_a_difference_is_found() -> None:
-    """A value of another type, a missing error and a changed array are told."""
+def test_differences_are_found() -> None:
+    """A value of another type, an extra error and a changed value are reported."""
     some = case(SEED, next(number for number in range(99) if "step" in case(SEED, number).kinds))
     with oracle() as pogema:
         pogema.ask(some.script)

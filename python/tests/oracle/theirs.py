@@ -1,4 +1,4 @@
-"""POGEMA 1.4.0's side: plays the scripts that come in, each preceded by its length, and sends the outcomes back."""
+"""Plays scripts with POGEMA 1.4.0: reads them from stdin and writes outcomes to stdout, both with their lengths."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def send(pipe: BinaryIO, value: Any) -> None:
 
 
 def receive(pipe: BinaryIO) -> Any:
-    """Reads one value; EOFError at the end."""
+    """Reads one value; raises EOFError at the end of the input."""
     head = pipe.read(8)
     if len(head) < 8:
         raise EOFError

@@ -1,4 +1,4 @@
-"""Lets the unmodified pogema-toolbox evaluate its A* agent; prints the results as JSON.
+"""Evaluates the A* agent with the unmodified pogema-toolbox, and prints the results as JSON.
 
 python evaluate.py pogema|pogema_rs FOLDER_OF_THE_TOOLBOX
 """
@@ -15,7 +15,7 @@ if package == "pogema_rs":
 
     pogema_rs.install_as_pogema()
 
-from pogema import BatchAStarAgent  # noqa: E402 - after the package is chosen
+from pogema import BatchAStarAgent  # noqa: E402 - imported after the package is chosen
 from pogema_toolbox.create_env import Environment, create_env_base  # noqa: E402
 from pogema_toolbox.evaluator import evaluation  # noqa: E402
 from pogema_toolbox.registry import ToolboxRegistry  # noqa: E402

@@ -13,39 +13,39 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 
 
 class SlowConfig(AlgoBase):
-    """How slow it is."""
+    """Settings of `Slow`."""
 
     seconds: float = 0.0
 
 
 class Slow(BatchAStarAgent):
-    """POGEMA's A*, slowly."""
+    """POGEMA's A* with a delay in each step."""
 
     def __init__(self, config):
         super().__init__()
         self.seconds = config.seconds
 
     def act(self, observations):
-        """Sleeps, then walks."""
+        """Sleeps, then returns the actions of A*."""
         time.sleep(self.seconds)
         return super().act(observations)
 
 
 class MortalConfig(AlgoBase):
-    """Where it is noted that a process died."""
+    """Settings of `Mortal`: the file that marks the death of a process."""
 
     mark: str
 
 
 class Mortal(BatchAStarAgent):
-    """POGEMA's A*, of which the first process dies."""
+    """POGEMA's A*, whose first process kills itself."""
 
     def __init__(self, config):
         super().__init__()
         self.mark = Path(config.mark)
 
     def act(self, observations):
-        """Dies, or walks."""
+        """Kills its process, or returns the actions of A*."""
         if not self.mark.exists():
             self.mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -53,20 +53,20 @@ class Mortal(BatchAStarAgent):
 
 
 class Crowded:
-    """Stays, and fails where there are many."""
+    """A policy that stays, and fails with more than 6 agents."""
 
     def reset_states(self):
-        """Forgets nothing."""
+        """Does nothing."""
 
     def act(self, observations):
-        """Stays."""
+        """Returns the action to stay for each agent."""
         if len(observations) > 6:
             raise ValueError(f"{len(observations)} are\ntoo many")
         return [0] * len(observations)
 
 
 def register():
-    """Registers all of them, and a map."""
+    """Registers the policies and a map."""
     ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
     ToolboxRegistry.register_algorithm("Mortal", Mortal, MortalConfig)
     ToolboxRegistry.register_algorithm("Crowded", Crowded)

@@ -1,4 +1,4 @@
-"""The unmodified pogema-toolbox gets the same results from POGEMA 1.4.0 and from us."""
+"""Tests that the unmodified pogema-toolbox gets the same results from POGEMA 1.4.0 and from pogema_rs."""
 
 import json
 import os
@@ -21,7 +21,7 @@ def results(python, package):
     return json.loads(run.stdout)
 
 
-def test_the_astar_agent_is_judged_alike():
+def test_astar_agent_has_equal_results():
     theirs = results(os.environ["POGEMA_ORACLE_PYTHON"], "pogema")
     ours = results(sys.executable, "pogema_rs")
     assert len(theirs) == 120

@@ -1,7 +1,7 @@
-//! Makes the pages that the browser tests drive, and tells how saved maps are read.
+//! Makes the pages for the browser tests, and parses maps that the editor saved.
 //!
-//! `pages DIR` writes replay pages, what each must show, and the editor; `pages check FILE...` prints what the
-//! map text (`.txt`, `.map`) or config (else) says, as one line of JSON each.
+//! `pages DIR` writes replay pages, the expected content of each, and the editor. `pages check FILE...` parses each
+//! file as a map text (`.txt`, `.map`) or else as a config, and prints its content as one line of JSON.
 
 mod play;
 
@@ -22,7 +22,7 @@ fn main() -> Result<(), Error> {
     }
 }
 
-/// Name, title, config, and the share of moves made at random.
+/// Name, title, config, and the fraction of random moves.
 const EPISODES: [(&str, &str, &str, f64); 5] = [
     (
         "finish",
@@ -32,7 +32,7 @@ const EPISODES: [(&str, &str, &str, f64); 5] = [
     ),
     (
         "restart",
-        "Eight agents, one goal after the other",
+        "Eight lifelong agents",
         "{size: 12, num_agents: 8, seed: 1, density: 0.25, on_target: restart, collision_system: block_both}",
         0.15,
     ),
@@ -44,7 +44,7 @@ const EPISODES: [(&str, &str, &str, f64); 5] = [
     ),
     (
         "nothing",
-        "All on their goals at once",
+        "All on their goals together",
         "{size: 6, num_agents: 5, seed: 2, density: 0.1, on_target: nothing, reward: shared, empty_outside: false}",
         0.1,
     ),
@@ -73,7 +73,7 @@ fn write(path: &Path, text: &str) -> Result<(), Error> {
     std::fs::write(path, text).map_err(|error| Error::io(path, error))
 }
 
-/// What the page of a trace must show: its states, and for each step why moves were reverted and what was seen.
+/// Returns what the page of a trace must show: its states, reverted moves and observations.
 fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     let states: Vec<Value> =
         std::iter::once(json!(trace.start)).chain(trace.steps.iter().map(|step| json!(step))).collect();
@@ -84,7 +84,7 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
         reasons.push(
             blocked_moves(config, map, before, &step.actions, &step.state)
                 .into_iter()
-                .map(told)
+                .map(to_json)
                 .collect::<Value>(),
         );
         before = &step.state;
@@ -96,7 +96,7 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     Ok(all.to_string())
 }
 
-fn told(reverted: BlockedMove) -> Value {
+fn to_json(reverted: BlockedMove) -> Value {
     let (blocker, other) = match reverted.blocker {
         Blocker::Wall => ("wall", None),
         Blocker::Obstacle(_) => ("obstacle", None),
@@ -106,22 +106,22 @@ fn told(reverted: BlockedMove) -> Value {
     json!({"agent": reverted.agent, "rule": reverted.rule, "cause": blocker, "other": other})
 }
 
-/// Prints what a saved map says, or what is wrong with it.
+/// Prints the content of a saved map, or the error in it.
 fn check_file(path: &str) -> Result<(), Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
     let is_text = [".txt", ".map"].iter().any(|end| path.ends_with(end));
-    let said = if is_text { said_by_text(&text) } else { said_by_config(&text) };
-    println!("{}", said.unwrap_or_else(|error| json!({"error": error.to_string()})));
+    let content = if is_text { read_map_text(&text) } else { read_config(&text) };
+    println!("{}", content.unwrap_or_else(|error| json!({"error": error.to_string()})));
     Ok(())
 }
 
-fn said_by_text(text: &str) -> Result<Value, Error> {
+fn read_map_text(text: &str) -> Result<Value, Error> {
     let MapText { map, starts, goals, pools } = parse_map_text(text)?;
     Ok(json!({"rows": map.rows(), "agents": starts, "goals": goals, "pools": pools}))
 }
 
-/// The config is played from, too, since not all that can be read can be played.
-fn said_by_config(text: &str) -> Result<Value, Error> {
+/// Reads a config, and generates an instance of it, because some readable configs cannot be played.
+fn read_config(text: &str) -> Result<Value, Error> {
     let config = GridConfig::from_yaml(text)?;
     let value = config.to_value();
     let rows = config.map.as_ref().map(pogema_core::Map::rows);

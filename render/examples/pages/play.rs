@@ -1,4 +1,4 @@
-//! Plays an episode to make a page of, or to test with.
+//! Plays episodes for pages and tests.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -7,14 +7,14 @@ use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::{Generator, NumpyError};
 use pogema_reference::Reference;
 
-/// The episode of a config, up to its end; each agent walks to its goal, or at random with the chance `stray`.
+/// Plays an episode of a config to its end. Agents take shortest paths, and a random action with probability `stray`.
 pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
     let config = GridConfig::from_yaml(yaml)?;
     let (seed, rules) = (config.seed.unwrap_or_default(), config.rules());
     let instance = InstanceSource::new(config, None)?.generate()?.instance;
     let mut episode = Episode::new(Reference::new(rules)?).with_recording();
     episode.start(instance)?;
-    let mut walkers = Walkers { generator: Generator::seeded(seed), stray, ways: HashMap::new() };
+    let mut walkers = Walkers { generator: Generator::seeded(seed), stray, distances: HashMap::new() };
     while !episode.is_over() {
         let actions = walkers.act(episode.instance()?.map(), &episode.snapshot());
         episode.step(&actions.map_err(|error| Error::external("random numbers", error))?)?;
@@ -22,9 +22,9 @@ pub fn play(yaml: &str, stray: f64) -> Result<Trace, Error> {
     episode.trace()
 }
 
-/// What the reference observes after the reset and each step of an episode: for each agent its three windows, one
-/// after the other, as zeros and ones.
-#[allow(dead_code, reason = "the unit tests, which share this file, observe nothing")]
+/// Returns the reference engine's observations after the reset and after each step of an episode: for each agent its
+/// three windows, one after the other, as zeros and ones.
+#[allow(dead_code, reason = "the unit tests share this file and use no observations")]
 pub fn observe(trace: &Trace) -> Result<Vec<Vec<String>>, Error> {
     let config = trace.header.config;
     let mut episode = Episode::new(Reference::new(config)?);
@@ -43,12 +43,12 @@ pub fn observe(trace: &Trace) -> Result<Vec<Vec<String>>, Error> {
     Ok(all)
 }
 
-/// Agents that know the way.
+/// Agents on shortest paths, with random actions in between.
 struct Walkers {
     generator: Generator,
     stray: f64,
-    /// For each goal, how far every cell is from it.
-    ways: HashMap<Cell, Vec<u32>>,
+    /// For each goal, the distance of every cell.
+    distances: HashMap<Cell, Vec<u32>>,
 }
 
 impl Walkers {
@@ -57,10 +57,10 @@ impl Walkers {
         for (&cell, &goal) in state.cells.iter().zip(&state.goals) {
             let strays = self.generator.random() < self.stray;
             let first = self.generator.integers(0, 5)? as usize;
-            let way = self.ways.entry(goal).or_insert_with(|| distances(map, goal));
+            let to_goal = self.distances.entry(goal).or_insert_with(|| distances(map, goal));
             let length =
-                |action: &Action| neighbour(map, cell, *action).map_or(u32::MAX, |at| way[map.index(at)]);
-            // Begun anywhere, so that of two ways of one length either can be taken.
+                |action: &Action| neighbour(map, cell, *action).map_or(u32::MAX, |at| to_goal[map.index(at)]);
+            // Start with a random action, so that ties between shortest paths break at random.
             let choices = (0..5).map(|add| Action::ALL[(first + add) % 5]);
             let best = choices.min_by_key(length).unwrap_or_default();
             actions.push(if strays { Action::ALL[first] } else { best });

@@ -1,4 +1,4 @@
-//! Every reverted move of drawn episodes has a reason, and the states bear it out.
+//! Every reverted move of random episodes has a reason that is consistent with the states.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use super::*;
 const SYSTEMS: [&str; 3] = ["priority", "block_both", "soft"];
 const MODES: [&str; 3] = ["finish", "nothing", "restart"];
 
-/// Small and crowded, so that every rule has its say.
-fn drawn(collision: &str, mode: &str, seed: u64) -> Trace {
+/// Returns a random episode, small and crowded, so that every rule applies.
+fn random_trace(collision: &str, mode: &str, seed: u64) -> Trace {
     let (size, num_agents) = (5 + seed % 4, 5 + seed % 4);
     let yaml = format!(
         "{{size: {size}, num_agents: {num_agents}, density: 0.1, seed: {seed}, max_episode_steps: 40, \
@@ -20,7 +20,7 @@ fn drawn(collision: &str, mode: &str, seed: u64) -> Trace {
     play(&yaml, 0.6).unwrap()
 }
 
-/// What must be true of the states if `blocked` is the reason.
+/// Returns whether the states are consistent with the reason `blocked`.
 fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMove) -> bool {
     let (map, after, agent) = (&trace.header.map, &step.state, blocked.agent);
     let own = before.cells[agent];
@@ -37,25 +37,25 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMov
     };
     let was_there = at(before.cells[other]) == aim(agent);
     let stayed = before.cells[other] == after.cells[other];
-    let came = !stayed && at(after.cells[other]) == aim(agent);
-    let nobody_was_there =
+    let arrived = !stayed && at(after.cells[other]) == aim(agent);
+    let was_empty =
         (0..before.cells.len()).all(|third| !before.active[third] || at(before.cells[third]) != aim(agent));
-    let wants_mine = aim(other) == at(own);
+    let aims_at_own = aim(other) == at(own);
     let fits = match blocked.rule {
-        "collide/priority/contest" | "collide/soft/contest" => came && other < agent,
+        "collide/priority/contest" | "collide/soft/contest" => arrived && other < agent,
         "collide/priority/follow" => was_there && !stayed && other > agent,
-        "collide/priority/swap" => was_there && stayed && turns(before, &step.actions, agent),
+        "collide/priority/swap" => was_there && stayed && is_in_ring(before, &step.actions, agent),
         "collide/block-both/occupied" => was_there,
-        "collide/block-both/contest" => nobody_was_there && stayed && aim(other) == aim(agent),
-        "collide/soft/swap" => was_there && stayed && wants_mine,
-        "collide/priority" | "collide/soft/chain" => was_there && stayed && !wants_mine,
+        "collide/block-both/contest" => was_empty && stayed && aim(other) == aim(agent),
+        "collide/soft/swap" => was_there && stayed && aims_at_own,
+        "collide/priority" | "collide/soft/chain" => was_there && stayed && !aims_at_own,
         _ => false,
     };
     fits && other != agent && before.active[other]
 }
 
-/// Whether the agents from this one on form a ring, found by looking at all of them in turn.
-fn turns(before: &Snapshot, actions: &[Action], agent: usize) -> bool {
+/// Returns whether the agent is part of a ring, by following the aims from agent to agent.
+fn is_in_ring(before: &Snapshot, actions: &[Action], agent: usize) -> bool {
     let mut place = before.cells[agent];
     for _ in 0..before.cells.len() {
         let here = (0..before.cells.len()).find(|&at| before.active[at] && before.cells[at] == place);
@@ -80,7 +80,7 @@ fn every_reverted_move_has_one_true_reason() {
         .flat_map(|system| MODES.map(|mode| (system, mode)))
         .flat_map(|(system, mode)| (0..40).map(move |seed| (system, mode, seed)))
     {
-        let trace = drawn(collision, mode, seed);
+        let trace = random_trace(collision, mode, seed);
         let mut before = &trace.start.state;
         for step in &trace.steps {
             let got =
@@ -130,7 +130,7 @@ fn a_ring_under_priority_is_a_swap() {
 }
 
 #[test]
-fn steps_of_other_rules_have_no_known_reason() {
+fn steps_under_other_rules_have_an_unknown_cause() {
     let trace = play("{map: \"a.A\"}", 0.0).unwrap();
     let state = &trace.start.state;
     let got = blocked_moves(&trace.header.config, &trace.header.map, state, &[Action::Right], state);

@@ -1,4 +1,4 @@
-//! Pages with replays of many episodes, each opened when it is asked for.
+//! Pages with replays of many episodes. A replay is built when a reader opens it.
 
 use pogema_core::Error;
 use serde_json::{Value, json};
@@ -6,28 +6,28 @@ use serde_json::{Value, json};
 use super::page::Page;
 use super::{SHARED, replay_page, script};
 
-/// What stands in the page of a replay where its own title and data go.
+/// Placeholders for the title and the data in the page of a replay.
 const TITLE: &str = "@title@";
 const DATA: &str = "@data@";
 
-/// A page whose body may have buttons with `data-replay`, the place of a replay in the album.
+/// A page with replays. Buttons of its body open them by `data-replay`, the index of a replay in the album.
 #[derive(Clone, Debug, Default)]
 pub struct Album {
     /// Plain text.
     pub title: String,
-    /// Rules of style besides those of all pages.
+    /// CSS rules, in addition to those of all pages.
     pub style: String,
-    /// HTML without any style or script of its own.
+    /// HTML without style or script elements.
     pub body: String,
-    /// For each replay its title, and what [`super::pack`] made of the episode.
+    /// The title and the output of [`super::pack`] for each replay.
     pub replays: Vec<(String, String)>,
 }
 
 impl Album {
-    /// The page as one file, the page of a replay in it once.
+    /// Returns the page as one file, which contains the replay page once.
     ///
     /// # Errors
-    /// If a replay is not what was packed.
+    /// [`Error::Corrupt`] if a replay is not valid JSON.
     pub fn text(&self) -> Result<String, Error> {
         let read = |(title, data): &(String, String)| {
             let film = serde_json::from_str::<Value>(data);

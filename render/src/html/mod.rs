@@ -1,6 +1,6 @@
-//! Pages that need nothing but a browser: a replay of an episode, an editor of maps, and albums of replays.
+//! Pages for the browser: a replay of an episode, a map editor, and albums of replays.
 //!
-//! A page is one file with everything inside, and its content security policy forbids it any network.
+//! A page is one self-contained file, and its content security policy forbids all network access.
 
 mod album;
 mod pack;
@@ -41,16 +41,16 @@ const EDITOR: [&str; 8] = [
     include_str!("editor/main.js"),
 ];
 
-/// The page that replays an episode.
+/// Returns the page that replays an episode.
 ///
 /// # Errors
-/// If the lists of a step are not as long as there are agents, if a cell is off the map, or if an agent is not next
-/// to where it was a step before.
+/// If the length of a list differs from the number of agents, if a cell is off the map, or if an agent moves farther
+/// than to a neighbouring cell in one step.
 pub fn replay(trace: &Trace, title: &str) -> Result<String, Error> {
     Ok(replay_page(title, &pack(trace)?).text())
 }
 
-/// A replay page of what [`pack`] made.
+/// Returns the replay page for the output of [`pack`].
 fn replay_page<'a>(title: &'a str, data: &'a str) -> Page<'a> {
     static SCRIPT: LazyLock<String> = LazyLock::new(|| script(&[&SHARED, &REPLAY]));
     Page {
@@ -63,7 +63,7 @@ fn replay_page<'a>(title: &'a str, data: &'a str) -> Page<'a> {
     }
 }
 
-/// The page that edits maps, as text and as POGEMA's config.
+/// Returns the map editor, which reads and writes map text and POGEMA configs.
 pub fn editor() -> String {
     let page = Page {
         title: "Map editor",
@@ -76,7 +76,7 @@ pub fn editor() -> String {
     page.text()
 }
 
-/// One script, none of whose names can be seen from outside.
+/// Joins files to one script whose names are not global.
 fn script(parts: &[&[&str]]) -> String {
     format!("(() => {{\n\"use strict\";\n{}}})();\n", parts.concat().concat())
 }

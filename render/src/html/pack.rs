@@ -1,7 +1,7 @@
-//! An episode as JSON for a page: a header one can read, and everything that is long as packed bytes.
+//! An episode as JSON for a page: a readable header, and all long data as packed bytes.
 //!
-//! The bytes are the map, the noise beyond its wall if there is any, and the parts of [`Parts`], one after the other, integers in little endian, deflated, in base64;
-//! `film.js` reads them.
+//! The bytes are the map, the noise outside its wall if any, and the byte fields of [`Parts`] in order, with integers in
+//! little endian, compressed by zlib and encoded in base64. `film.js` reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::blocked_moves::{BlockedMove, Blocker, blocked_moves};
 use crate::check::check;
 
-/// Levels above this take longer and save nearly nothing.
+/// Compression level; higher levels take longer and save almost nothing.
 const LEVEL: u8 = 7;
 
 #[derive(Serialize)]
@@ -24,7 +24,7 @@ struct Header<'a> {
     has_noise: bool,
     config: Config,
     metrics: Option<&'a Metrics>,
-    /// Why moves were reverted, as far as it happened; the packed reasons are places in this list.
+    /// The distinct reasons of reverted moves; the packed reasons are indices into this list.
     reasons: Vec<Reason>,
     num_goals: usize,
     num_reverted: usize,
@@ -39,34 +39,34 @@ struct Reason {
     cause: &'static str,
 }
 
-/// What is packed, each part by step, then by agent.
+/// The packed data. Each part is ordered by step, then by agent.
 #[derive(Default)]
 struct Parts {
     /// For each agent: start row and col, first goal's row and col (u16).
     starts: Vec<u8>,
-    /// For each agent: 1 active, 2 on goal, after the reset.
+    /// For each agent after the reset: 1 active, 2 on goal.
     flags: Vec<u8>,
     /// For each step and agent: action, 8 · move, 64 active, 128 on goal.
     moves: Vec<u8>,
-    /// For each step and agent, f32.
+    /// For each step and agent: reward (f32).
     rewards: Vec<u8>,
     /// For each step and agent: 1 terminated, 2 truncated.
     ended: Vec<u8>,
     /// Goals that changed: step, agent (u32), row, col (u16).
     goals: Vec<u8>,
-    /// For each reverted move, its place among the reasons.
+    /// For each reverted move: index of its reason.
     reverted: Vec<u8>,
-    /// For each reverted move that an agent caused, that agent (u32).
+    /// For each reverted move with an agent as its cause: that agent (u32).
     others: Vec<u8>,
-    /// Cells where the occupancy grid is not what the active agents' cells say: step (u32), row, col (u16).
+    /// Cells where the occupancy grid differs from the active agents' cells: step (u32), row, col (u16).
     marks: Vec<u8>,
     reasons: Vec<Reason>,
 }
 
-/// The episode as JSON without any `<`.
+/// Returns the episode as JSON that contains no `<`.
 ///
 /// # Errors
-/// As [`super::replay`].
+/// Those of [`super::replay`].
 pub fn pack(trace: &Trace) -> Result<String, Error> {
     let num_agents = trace.header.config.num_agents;
     check(trace)?;
@@ -82,11 +82,11 @@ pub fn pack(trace: &Trace) -> Result<String, Error> {
     }
     let mut bytes = bits(trace.header.map.obstacles());
     let Parts { starts, flags, moves, rewards, ended, goals, reverted, others, marks, reasons } = parts;
-    let beyond = match &trace.header.outside {
+    let noise_bits = match &trace.header.outside {
         Outside::Free => Vec::new(),
         Outside::Noise(noise) => bits(noise.obstacles()),
     };
-    for part in [&beyond, &starts, &flags, &moves, &rewards, &ended, &goals, &reverted, &others, &marks] {
+    for part in [&noise_bits, &starts, &flags, &moves, &rewards, &ended, &goals, &reverted, &others, &marks] {
         bytes.extend_from_slice(part);
     }
     let header = Header {
@@ -94,7 +94,7 @@ pub fn pack(trace: &Trace) -> Result<String, Error> {
         width: trace.header.map.width(),
         num_agents,
         num_steps: trace.steps.len(),
-        has_noise: !beyond.is_empty(),
+        has_noise: !noise_bits.is_empty(),
         config: trace.header.config,
         metrics: trace.steps.iter().rev().find_map(|step| step.metrics.as_ref()),
         reasons,
@@ -125,7 +125,7 @@ impl Parts {
         for (agent, &action) in step.actions.iter().enumerate() {
             let moved = direction(before.cells[agent], after.cells[agent]).ok_or_else(|| {
                 let (from, to) = (before.cells[agent], after.cells[agent]);
-                wrong(at, format!("agent {agent} is on {to}, expected {from} or a cell next to it"))
+                trace_error(at, format!("agent {agent} is on {to}, expected {from} or a cell next to it"))
             })?;
             let flags = u8::from(after.active[agent]) << 6 | u8::from(after.on_goal[agent]) << 7;
             self.moves.push(action as u8 | (moved as u8) << 3 | flags);
@@ -152,11 +152,11 @@ impl Parts {
             Blocker::Unknown => "unknown",
         };
         let reason = Reason { rule: blocked.rule, cause };
-        let place = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
+        let reason_index = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
             self.reasons.push(reason);
             self.reasons.len() - 1
         });
-        self.reverted.push(place as u8);
+        self.reverted.push(reason_index as u8);
         if let Blocker::Agent(other) = blocked.blocker {
             self.others.extend((other as u32).to_le_bytes());
         }
@@ -179,7 +179,7 @@ impl Parts {
     }
 }
 
-/// The action that leads from one cell to another.
+/// Returns the action that leads from one cell to another.
 fn direction(from: Cell, to: Cell) -> Option<Action> {
     let to = (i32::from(to.row), i32::from(to.col));
     Action::ALL.into_iter().find(|&action| from.toward(action) == to)
@@ -190,14 +190,14 @@ fn put_cell(bytes: &mut Vec<u8>, cell: Cell) {
     bytes.extend(cell.col.to_le_bytes());
 }
 
-/// Eight flags to a byte, the first one in the lowest bit.
+/// Packs eight flags into a byte, the first flag in the lowest bit.
 fn bits(flags: &[bool]) -> Vec<u8> {
     let byte = |flags: &[bool]| flags.iter().rev().fold(0, |byte, &flag| byte << 1 | u8::from(flag));
     flags.chunks(8).map(byte).collect()
 }
 
-/// An error at a step, by the line of the trace it stands on.
-fn wrong(step: u32, reason: String) -> Error {
+/// Returns the error for a step, with its line in the trace.
+fn trace_error(step: u32, reason: String) -> Error {
     Error::Trace { line: step as usize + 2, reason }
 }
 

@@ -1,26 +1,28 @@
-//! The frame that all pages share.
+//! The skeleton that all pages share.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::HtmlEscape;
 use sha2::{Digest, Sha256};
 
-/// What goes into a page.
+/// The parts of a page.
 pub struct Page<'a> {
-    /// Plain text, from wherever.
+    /// Plain text from any source.
     pub title: &'a str,
     pub style: &'a str,
     pub body: &'a str,
-    /// JSON for the script, in which no `<` may stand.
+    /// JSON for the script; must not contain `<`.
     pub data: &'a str,
     pub script: &'a str,
-    /// The page that it may show inside of itself, whose style and script are allowed too.
+    /// A page that this page may show in a frame; its style and script are also allowed.
     pub inner: Option<&'a Self>,
 }
 
 impl Page<'_> {
-    /// The page as one file. Its policy names its own style and script by their hashes, so that nothing else runs,
-    /// whatever a title or a map might smuggle in.
+    /// Returns the page as one file.
+    ///
+    /// The page's policy allows only its own style and script, by their hashes, so that code hidden in a title or a map
+    /// never runs.
     pub fn text(&self) -> String {
         let all = |of: fn(&Self) -> &str| {
             let pages = std::iter::once(self).chain(self.inner);

@@ -1,4 +1,4 @@
-//! Text from templates in which everything is escaped.
+//! Templates with escaped values.
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
@@ -6,20 +6,20 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use pogema_core::Error;
 use serde::Serialize;
 
-/// Fills in a template of HTML or SVG, in the language of Jinja.
+/// Fills in a Jinja template of HTML or SVG, with all values escaped.
 ///
 /// # Errors
-/// If the template is wrong, or names what is not there.
-pub fn fill(template: &str, holes: impl Serialize) -> Result<String, Error> {
+/// If the template is invalid or names a missing value.
+pub fn fill(template: &str, values: impl Serialize) -> Result<String, Error> {
     let fill = || {
         let mut environment = Environment::new();
         environment.set_auto_escape_callback(|_| AutoEscape::Html);
-        // A key that is misspelt is an error, not nothing.
+        // A misspelt key is an error, not an empty text.
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
-        environment.render_str(template, Serde(holes))
+        environment.render_str(template, Serde(values))
     };
     let text = fill().map_err(|error: minijinja::Error| Error::external("page", error))?;
-    // Slashes are escaped too, without need; a reader of the file wants to find a name as it is.
+    // The library also escapes slashes, without need. Undo it, so that names can be found in the file.
     Ok(text.replace("&#x2f;", "/"))
 }

@@ -1,4 +1,4 @@
-//! What can be told of the pages without a browser.
+//! Tests of the pages without a browser.
 
 use pogema_core::{Cell, Error, Trace};
 
@@ -10,24 +10,24 @@ fn trace() -> Trace {
         .unwrap()
 }
 
-fn reason(trace: &Trace) -> String {
-    replay(trace, "wrong").unwrap_err().to_string()
+fn replay_error(trace: &Trace) -> String {
+    replay(trace, "t").unwrap_err().to_string()
 }
 
 #[test]
-fn titles_stay_text() {
+fn titles_are_escaped() {
     let page = replay(&trace(), "</title><script>alert(1)</script>&\"").unwrap();
     let title = "&lt;&#x2f;title&gt;&lt;script&gt;alert(1)&lt;&#x2f;script&gt;&amp;&quot;";
     assert!(page.contains(&format!("<title>{title}</title>")), "{}", &page[..600]);
     assert!(page.contains(&format!("<h1 id=\"title\">{title}</h1>")));
-    assert_eq!(page.matches("<script").count(), 2, "the data and the page's own");
+    assert_eq!(page.matches("<script").count(), 2, "the data and the page's script");
 }
 
 #[test]
-fn pages_name_no_other_place() {
+fn pages_contain_no_external_addresses() {
     for page in [editor(), replay(&trace(), "t").unwrap()] {
-        for place in ["http:", "https:", "//www", "@import", "url("] {
-            assert!(!page.contains(place), "{place}");
+        for address in ["http:", "https:", "//www", "@import", "url("] {
+            assert!(!page.contains(address), "{address}");
         }
         assert!(page.contains("default-src 'none'"));
         assert!(!page.contains("unsafe-"));
@@ -35,7 +35,7 @@ fn pages_name_no_other_place() {
 }
 
 #[test]
-fn a_film_without_steps_is_shown() {
+fn an_episode_without_steps_is_shown() {
     let mut trace = trace();
     trace.steps.clear();
     let page = replay(&trace, "start").unwrap();
@@ -43,7 +43,7 @@ fn a_film_without_steps_is_shown() {
 }
 
 #[test]
-fn lists_of_another_length_are_refused() {
+fn lists_of_wrong_length_are_rejected() {
     let mut short = trace();
     short.steps[2].rewards.pop();
     assert_eq!(replay(&short, "t"), Err(Error::Length { what: "rewards", want: 3, got: 2 }));
@@ -53,19 +53,22 @@ fn lists_of_another_length_are_refused() {
 }
 
 #[test]
-fn cells_off_the_map_are_refused() {
+fn cells_off_the_map_are_rejected() {
     let mut off = trace();
     off.steps[1].state.goals[2] = Cell::new(6, 0);
     assert_eq!(
-        reason(&off),
+        replay_error(&off),
         "a cell of frame 2 is `(6, 0)`, expected a cell of the map of 6 rows and 6 columns"
     );
 }
 
 #[test]
-fn jumps_are_refused() {
+fn jumps_are_rejected() {
     let mut jump = trace();
     jump.start.state.cells[1] = Cell::new(0, 0);
     jump.steps[0].state.cells[1] = Cell::new(5, 5);
-    assert_eq!(reason(&jump), "trace: line 3: agent 1 is on (5, 5), expected (0, 0) or a cell next to it");
+    assert_eq!(
+        replay_error(&jump),
+        "trace: line 3: agent 1 is on (5, 5), expected (0, 0) or a cell next to it"
+    );
 }

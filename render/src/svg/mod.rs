@@ -1,7 +1,8 @@
-//! Pictures and animations as SVG, as POGEMA's users know them.
+//! Pictures and animations as SVG, in the style of POGEMA's.
 //!
-//! One unit is one cell, and the centre of the cell (0, 0) is the origin. All obstacles of one kind are one path,
-//! and an agent moves along one path with one list of times, so that a file is a fraction of POGEMA's own.
+//! One unit is one cell, and the centre of the cell (0, 0) is the origin. Obstacles that are first seen at the same
+//! frame share one path, and an agent moves along one path with one list of times, so files are much smaller than
+//! POGEMA's.
 
 mod timing;
 
@@ -13,7 +14,7 @@ use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::Style;
 use timing::{Timing, number};
 
-/// The longer side of a picture, where the viewer sets no other. Units: pixels.
+/// The longer side of a picture unless the viewer sets another. Units: pixels.
 const LONGER_SIDE: f64 = 512.0;
 
 /// Draws an episode, or one frame of it.
@@ -21,7 +22,7 @@ const LONGER_SIDE: f64 = 512.0;
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `AnimationDrawer`
 ///
 /// # Errors
-/// If the style names an agent or frame that there is not, or an agent is not on the map.
+/// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
 pub fn draw(trace: &Trace, style: &Style) -> Result<String, Error> {
     let scene = Scene::new(trace, style)?;
     let timing =
@@ -41,7 +42,7 @@ pub fn draw(trace: &Trace, style: &Style) -> Result<String, Error> {
 
 struct Picture<'a> {
     scene: &'a Scene<'a>,
-    /// None if nothing moves.
+    /// None for a still picture.
     timing: Option<Timing>,
     text: String,
 }
@@ -63,7 +64,7 @@ impl Picture<'_> {
         ));
     }
 
-    /// Lines between the cells and around them, half a cell longer at both ends.
+    /// Draws the lines between and around the cells, half a cell longer at both ends.
     fn lines(&mut self) {
         let [left, top, width, height] = self.scene.view_box();
         let mut path = String::new();
@@ -80,7 +81,7 @@ impl Picture<'_> {
         ));
     }
 
-    /// An obstacle is a small square, widened by a stroke with round corners.
+    /// Draws each obstacle as a small square, widened by a stroke with round corners.
     fn obstacles(&mut self) {
         let color = self.scene.style.colors.obstacle;
         let side = number(size::OBSTACLE - 2.0 * size::CORNER);
@@ -137,7 +138,7 @@ impl Picture<'_> {
         self.animate("circle", look);
     }
 
-    /// The dashed square around the cells that the agent sees.
+    /// Draws the dashed square around the cells that the agent sees.
     fn window(&mut self) {
         let Some(agent) = self.scene.window() else { return };
         let (first, color) = (self.scene.agent(agent, 0), self.scene.style.colors.own);
@@ -155,7 +156,7 @@ impl Picture<'_> {
         self.animate("rect", |scene, frame| scene.agent(agent, frame));
     }
 
-    /// Ends the element that was begun, with all that changes about it inside.
+    /// Closes the open element, with its animations inside.
     fn animate(&mut self, tag: &str, look: impl Fn(&Scene<'_>, usize) -> Look) {
         let Some(timing) = &self.timing else { return self.close(tag, &[]) };
         let look = |frame| look(self.scene, frame);

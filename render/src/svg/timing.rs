@@ -1,4 +1,4 @@
-//! When what changes.
+//! The times at which elements change.
 
 use std::fmt::Write as _;
 
@@ -6,27 +6,27 @@ use pogema_core::Cell;
 
 /// The clock of an animation.
 ///
-/// Time is counted in slots, one more than there are steps: the first frame is reached at slot 1, the next at slot
-/// 2 and so on, and the last is held for one slot more. So POGEMA's animations go.
+/// Time is counted in slots: the first frame is reached at slot 1, the next at slot 2 and so on, and the last is held
+/// for one more slot. POGEMA's animations use the same timing.
 pub struct Timing {
     num_frames: usize,
-    /// What every element that animates ends with.
+    /// The end of every animation element.
     tail: String,
-    /// Decimals of a fraction that are enough for a hundredth of a cell.
+    /// Decimals of a fraction, enough for a precision of a hundredth of a cell.
     decimals: usize,
 }
 
 impl Timing {
-    /// The clock of so many frames; none if there is but one.
+    /// Returns the clock for this number of frames; none for a single frame.
     pub fn new(num_frames: usize, step_time: f64) -> Option<Self> {
-        // An animation that takes no time is not played.
+        // Viewers do not play an animation of duration 0.
         let duration = number_to((num_frames as f64 * step_time).max(1e-3), 4);
         let decimals = 3 + num_frames.checked_ilog10()? as usize;
         let tail = format!("dur=\"{duration}s\" repeatCount=\"indefinite\"/>");
         (num_frames > 1).then_some(Self { num_frames, tail, decimals })
     }
 
-    /// The way from cell to cell, relative to the first; none if there is none.
+    /// Returns the animated path from cell to cell, relative to the first; none if the cell never changes.
     pub fn motion(&self, cell: impl Fn(usize) -> Cell) -> Option<String> {
         let (mut path, mut length) = (Path::default(), 0.0);
         let lengths = self.frames(|at| {
@@ -46,7 +46,7 @@ impl Timing {
         ))
     }
 
-    /// An attribute that goes evenly from value to value; none if it never changes.
+    /// Returns the animation of an attribute that changes linearly between frames; none if it never changes.
     pub fn numbers(&self, attribute: &str, value: impl Fn(usize) -> f64) -> Option<String> {
         let values = self.frames(value);
         if values.iter().all(|value| *value == values[0]) {
@@ -59,7 +59,7 @@ impl Timing {
         ))
     }
 
-    /// Whether a thing is to be seen, from frame to frame; none if that never changes.
+    /// Returns the animation of an element's visibility; none if it never changes.
     pub fn visibility(&self, is_visible: impl Fn(usize) -> bool) -> Option<String> {
         let word = |at: usize| if is_visible(at) { "visible" } else { "hidden" };
         let (mut values, mut times) = (word(0).to_owned(), "0".to_owned());
@@ -79,7 +79,7 @@ impl Timing {
         (0..self.num_frames).map(&mut value).collect()
     }
 
-    /// Times and values at the corners of the line through the values of all frames.
+    /// Returns the times and values at the corners of the line through the values of all frames.
     fn keys(&self, frames: &[f64], text: impl Fn(f64) -> String) -> (String, String) {
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let slots: Vec<f64> = [&[first], frames, &[last]].concat();
@@ -95,7 +95,7 @@ impl Timing {
         (times, values)
     }
 
-    /// A slot as a fraction of the whole time.
+    /// Returns a slot as a fraction of the whole duration.
     fn time(&self, slot: usize) -> String {
         number_to(slot as f64 / (self.num_frames + 1) as f64, self.decimals)
     }
@@ -105,32 +105,32 @@ impl Timing {
     }
 }
 
-/// A path of straight pieces, each as long as it can be.
+/// A path of straight segments, each as long as possible.
 #[derive(Default)]
 struct Path {
     text: String,
-    /// (rows, cols) of the piece that is not yet written.
-    piece: (i64, i64),
+    /// The (rows, cols) of the segment that is not yet written.
+    segment: (i64, i64),
 }
 
 impl Path {
-    /// Goes from one cell to the next; the distance. Units: cells.
+    /// Extends the path from one cell to the next and returns the distance. Units: cells.
     fn go(&mut self, from: Cell, to: Cell) -> f64 {
         let (down, right) =
             (i32::from(to.row) - i32::from(from.row), i32::from(to.col) - i32::from(from.col));
         let distance = f64::from(down).hypot(f64::from(right));
         let (down, right) = (i64::from(down), i64::from(right));
-        let (rows, cols) = self.piece;
+        let (rows, cols) = self.segment;
         let is_straight = rows * right == cols * down && rows * down >= 0 && cols * right >= 0;
         if !is_straight {
             self.flush();
         }
-        self.piece = (self.piece.0 + down, self.piece.1 + right);
+        self.segment = (self.segment.0 + down, self.segment.1 + right);
         distance
     }
 
     fn flush(&mut self) {
-        let _ = match std::mem::take(&mut self.piece) {
+        let _ = match std::mem::take(&mut self.segment) {
             (0, 0) => Ok(()),
             (0, cols) => write!(self.text, "h{cols}"),
             (rows, 0) => write!(self.text, "v{rows}"),
@@ -144,7 +144,7 @@ impl Path {
     }
 }
 
-/// A number in as few characters as it needs.
+/// Formats a number with at most three decimals in as few characters as possible.
 pub fn number(value: f64) -> String {
     number_to(value, 3)
 }

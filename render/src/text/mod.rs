@@ -1,4 +1,4 @@
-//! Frames of text for the terminal.
+//! Text frames for the terminal.
 
 mod viewport;
 
@@ -10,20 +10,20 @@ use crate::check::check_agent;
 use crate::ground::{Border, Ground};
 use viewport::Viewport;
 
-/// Up to so many agents are letters; more are numbers, since digits have no capitals for goals.
+/// Maximum number of agents that are drawn as letters; if there are more, all are numbers.
 const MOST_LETTERS: usize = 26;
 
-/// How a frame of text is drawn.
+/// The appearance of a text frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Style {
-    /// Draw what this agent sees and its own goal; all else is blank.
+    /// Draw only the cells that this agent sees, and its own goal.
     pub view: Option<usize>,
-    /// How much of the border is drawn; the thin one is a frame of lines.
+    /// The part of the border that is drawn; the thin border is a frame of lines.
     pub border: Border,
     /// Whether colours are used.
     pub is_colored: bool,
-    /// The most rows and columns of characters; a larger map is cut around the agent whose view it is, or around
-    /// the first that takes part.
+    /// Maximum number of rows and columns of characters. A larger map is cropped around the viewing agent, or around
+    /// the first active agent.
     pub most: Option<(usize, usize)>,
 }
 
@@ -33,13 +33,15 @@ impl Default for Style {
     }
 }
 
-/// Draws a state as lines of text. The first line gives the step and, if the map is cut off, which part is shown.
+/// Draws a state as lines of text. The first line gives the step and, if the map is cropped, the drawn rows and
+/// columns.
 ///
-/// Agents are letters and their goals the same letters in capitals; of more than 26 agents all are numbers, and
-/// their goals have a `*`.
+/// Agents are lower-case letters, and their goals are the same letters in upper case. With more than 26 agents, agents
+/// are numbers, and their goals are the same numbers after a `*`.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] if there is no such agent; [`Error::Length`] if the state's lists do not fit each other.
+/// [`Error::OutOfRange`] if the viewing agent does not exist or `most` has a 0; [`Error::Length`] if the state's lists
+/// differ in length.
 pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -> Result<String, Error> {
     let num_agents = state.cells.len();
     Error::check_length("goals", num_agents, state.goals.len())?;
@@ -63,7 +65,7 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
         .join("\n"))
 }
 
-/// What a cell shows.
+/// The content of a drawn cell.
 #[derive(Clone, Copy)]
 enum Mark {
     Unseen,
@@ -87,7 +89,7 @@ impl Drawing<'_> {
         let viewport = &self.viewport;
         let edge = "─".repeat(viewport.cols.len() * (self.cell_width + 1) + 1);
         let is_framed = self.style.border == Border::Thin;
-        let mut lines = vec![format!("step {}{}", self.step, viewport.cut())];
+        let mut lines = vec![format!("step {}{}", self.step, viewport.crop())];
         if is_framed {
             lines.push(format!("┌{edge}┐"));
         }
@@ -102,7 +104,8 @@ impl Drawing<'_> {
         lines
     }
 
-    /// What each cell of the viewport shows, row by row; an agent hides a goal, a lower index a higher one.
+    /// Returns the content of each cell of the viewport, row by row. An agent hides a goal, and a lower index hides a
+    /// higher one.
     fn marks(&self) -> Vec<Mark> {
         let Viewport { rows, cols, .. } = &self.viewport;
         let ground = |row, col| match (self.is_seen(row, col), self.ground.is_obstacle(row, col)) {
@@ -119,7 +122,7 @@ impl Drawing<'_> {
             }
         };
         for agent in (0..self.state.cells.len()).rev() {
-            // An agent knows where its own goal is, whether it sees the cell or not.
+            // An agent knows the cell of its own goal even if it does not see the cell.
             if self.style.view.is_none_or(|own| own == agent) {
                 put(agent, self.state.goals[agent], Mark::Goal(agent));
             }
@@ -163,7 +166,7 @@ impl Drawing<'_> {
     }
 }
 
-/// Six colours that can be told apart on black and on white.
+/// Styles an agent in one of six colours that are distinct on black and on white.
 fn colored(paint: Paint, agent: usize) -> Paint {
     const COLORS: [u8; 6] = [196, 33, 40, 208, 129, 220];
     paint.color256(COLORS[agent % COLORS.len()])

@@ -1,4 +1,4 @@
-//! Which part of a map fits the terminal.
+//! The part of a map that fits the terminal.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use crate::ground::{Border, Ground};
 pub struct Viewport {
     pub rows: Range<i32>,
     pub cols: Range<i32>,
-    /// All rows and columns there are.
+    /// All rows and all columns that could be drawn.
     whole: [Range<i32>; 2],
 }
 
@@ -25,7 +25,7 @@ impl Viewport {
             return Self { rows: whole[0].clone(), cols: whole[1].clone(), whole };
         };
         let frame = if style.border == Border::Thin { 2 } else { 0 };
-        // The first line tells the step. The last cell of a row needs no gap, the frame one more.
+        // The first line gives the step. The last cell of a row needs no gap; the frame needs one more.
         let fitting_rows = most_rows.saturating_sub(1 + frame);
         let fitting_cols = (most_cols + 1).saturating_sub(2 * frame) / (cell_width + 1);
         let is_active = |&agent: &usize| state.active[agent];
@@ -35,8 +35,8 @@ impl Viewport {
         Self { rows: around(row, &whole[0], fitting_rows), cols: around(col, &whole[1], fitting_cols), whole }
     }
 
-    /// Which rows and columns are drawn, if not all are.
-    pub fn cut(&self) -> String {
+    /// Describes the drawn rows and columns, if not all are drawn.
+    pub fn crop(&self) -> String {
         let mut text = String::new();
         for (name, shown, whole) in
             [("rows", &self.rows, &self.whole[0]), ("columns", &self.cols, &self.whole[1])]
@@ -50,7 +50,7 @@ impl Viewport {
     }
 }
 
-/// So many of a range, around one of it; at least one.
+/// Returns at most `fitting` numbers of a range, around `centre`; at least one.
 fn around(centre: i32, whole: &Range<i32>, fitting: usize) -> Range<i32> {
     let length = fitting.clamp(1, whole.len()) as i32;
     let start = (centre - length / 2).clamp(whole.start, whole.end - length);

@@ -1,10 +1,10 @@
-//! A reader of our SVG that knows nothing of how it was written.
+//! A reader of SVG drawings, independent of the writer.
 
 use std::collections::BTreeSet;
 
 use roxmltree::{Document, Node};
 
-/// What a drawing says of one circle.
+/// One circle of a drawing, with its animations.
 pub struct Circle {
     pub color: String,
     cell: [f64; 2],
@@ -21,7 +21,7 @@ struct Motion {
     key_times: Vec<f64>,
 }
 
-/// All elements of a tag inside the group of a class.
+/// Returns all elements with a tag inside the group with a class.
 pub fn elements<'a>(document: &'a Document<'_>, class: &str, tag: &str) -> Vec<Node<'a, 'a>> {
     let is_class = |node: &Node<'_, '_>| node.attribute("class") == Some(class);
     let group = document.descendants().find(is_class).unwrap();
@@ -59,7 +59,7 @@ impl Circle {
         }
     }
 
-    /// Row and column at a share of the whole time.
+    /// Returns (row, col) at a fraction of the duration.
     pub fn cell_at(&self, time: f64) -> [f64; 2] {
         let Some(motion) = &self.motion else { return self.cell };
         let [down, right] = motion.at(between(&motion.key_points, &motion.key_times, time));
@@ -86,7 +86,7 @@ impl Motion {
         }
     }
 
-    /// The point at a share of the path's length.
+    /// Returns the point at a fraction of the path's length.
     fn at(&self, share: f64) -> [f64; 2] {
         let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
         let mut left = share * self.points.windows(2).map(length).sum::<f64>();
@@ -102,28 +102,29 @@ impl Motion {
     }
 }
 
-/// The corners of a path of straight pieces, each as (row, col).
+/// Returns the corners of a path of straight segments, each as (row, col).
 pub fn points(path: &str) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     let begins: Vec<usize> =
         path.char_indices().filter(|(_, it)| it.is_alphabetic()).map(|(at, _)| at).collect();
     let ends = begins.iter().skip(1).copied().chain([path.len()]);
-    for piece in begins.iter().zip(ends).map(|(&from, to)| &path[from..to]) {
+    for segment in begins.iter().zip(ends).map(|(&from, to)| &path[from..to]) {
         let [row, col] = points.last().copied().unwrap_or_default();
-        let numbers: Vec<f64> = piece[1..].split_whitespace().map(|number| number.parse().unwrap()).collect();
-        points.push(match (&piece[..1], &numbers[..]) {
+        let numbers: Vec<f64> =
+            segment[1..].split_whitespace().map(|number| number.parse().unwrap()).collect();
+        points.push(match (&segment[..1], &numbers[..]) {
             ("M", &[x, y]) => [y, x],
             ("h", &[right]) => [row, col + right],
             ("v", &[down]) => [row + down, col],
             ("l", &[right, down]) => [row + down, col + right],
             ("z", &[]) => continue,
-            _ => unreachable!("{piece}"),
+            _ => unreachable!("{segment}"),
         });
     }
     points
 }
 
-/// The cells whose centre is the middle of a closed square of a path.
+/// Returns the centres of the closed squares of a path.
 pub fn squares(path: &str) -> Vec<[f64; 2]> {
     let squares = path.split_inclusive('z').map(|square| {
         let corners = points(square);
@@ -133,7 +134,7 @@ pub fn squares(path: &str) -> Vec<[f64; 2]> {
     squares.collect()
 }
 
-/// The ids of all elements that have one.
+/// Returns the ids of all elements with an id.
 pub fn ids(document: &Document<'_>) -> BTreeSet<String> {
     document.descendants().filter_map(|node| node.attribute("id")).map(str::to_owned).collect()
 }

@@ -1,4 +1,4 @@
-//! The border is the one that agents see.
+//! The drawn border is the one that agents see.
 
 use pogema_core::Environment;
 use pogema_reference::Reference;
@@ -7,7 +7,7 @@ use pogema_render::{Border, Ground};
 use crate::common::{Policy, config, trace};
 
 #[test]
-fn the_full_border_is_the_one_of_the_engine() {
+fn the_full_border_matches_the_engine() {
     for outside in ["true", "false"] {
         for radius in [1, 2, 5] {
             let text = format!(

@@ -1,4 +1,4 @@
-//! Every kind of picture, held against the episode it was drawn of.
+//! Compares pictures of every kind with the drawn episode.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -16,17 +16,17 @@ mod text_frames;
 use common::{Policy, config, trace};
 use pogema_core::{Cell, Config, Instance, Map, Outside, Snapshot, Trace};
 
-/// An episode of POGEMA's A*, from a YAML text.
+/// Plays an episode of POGEMA's A* from a config in YAML.
 fn played(text: &str) -> Trace {
     trace(&config(text), Policy::AStar)
 }
 
-/// A trace of one frame: a map, and for each agent its cell and its goal.
+/// Returns a trace of one frame with a map and the cell and goal of each agent.
 fn still(rows: &[&str], agents: &[([u16; 2], [u16; 2])]) -> Trace {
     let config = Config { num_agents: agents.len(), radius: 2, ..Config::default() };
-    let nobody = Instance::new(Map::from_rows(rows).unwrap(), Outside::Free, Vec::new(), Vec::new()).unwrap();
-    let mut trace = Trace::still(config, &nobody);
-    // Also what no instance can be.
+    let empty = Instance::new(Map::from_rows(rows).unwrap(), Outside::Free, Vec::new(), Vec::new()).unwrap();
+    let mut trace = Trace::still(config, &empty);
+    // Set the state directly, because no instance allows some of these states.
     trace.start.state = Snapshot {
         cells: agents.iter().map(|&(cell, _)| Cell::from(cell)).collect(),
         goals: agents.iter().map(|&(_, goal)| Cell::from(goal)).collect(),

@@ -1,4 +1,4 @@
-//! GIFs show every state at its time.
+//! GIFs show every state at the right time.
 
 use gif::{ColorOutput, DecodeOptions};
 use pogema_core::Trace;
@@ -6,7 +6,7 @@ use pogema_render::{Color, Colors, Ground, Style, gif as gifs};
 
 use crate::{played, still};
 
-/// Every picture of a GIF as a viewer shows it, with how long. Units: hundredths of a second.
+/// Every frame of a GIF as a viewer shows it, with its delay. Units: hundredths of a second.
 struct Shown {
     width: usize,
     frames: Vec<(Vec<u8>, u16)>,
@@ -35,7 +35,7 @@ impl Shown {
         Self { width, frames }
     }
 
-    /// The picture shown at a time, in hundredths of a second.
+    /// Returns the frame at a time. Units: hundredths of a second.
     fn at(&self, time: u32) -> &[u8] {
         let mut until = 0;
         let frame = self.frames.iter().find(|(_, delay)| {
@@ -53,12 +53,12 @@ impl Shown {
 }
 
 fn encode(trace: &Trace, style: &Style, width: u32) -> Shown {
-    let (mut told, mut all) = (0, 0);
-    let bytes = gifs::encode(trace, style, width, &mut |done, of| {
-        assert_eq!(done, told + 1);
-        (told, all) = (done, of);
+    let (mut last_done, mut last_total) = (0, 0);
+    let bytes = gifs::encode(trace, style, width, &mut |done, total| {
+        assert_eq!(done, last_done + 1);
+        (last_done, last_total) = (done, total);
     });
-    assert_eq!(told, all);
+    assert_eq!(last_done, last_total);
     Shown::of(&bytes.unwrap())
 }
 
@@ -89,7 +89,7 @@ fn every_state_is_shown_at_its_time() {
 }
 
 #[test]
-fn agents_go_smoothly_from_cell_to_cell() {
+fn agents_move_smoothly_between_cells() {
     let mut trace = still(&["..", ".."], &[([0, 0], [1, 0])]);
     let mut state = trace.start.state.clone();
     state.cells[0] = [0, 1].into();
@@ -103,7 +103,7 @@ fn agents_go_smoothly_from_cell_to_cell() {
         metrics: None,
     });
     let shown = encode(&trace, &Style { show_lines: false, ..Style::default() }, 100);
-    // Five frames to a step, of which the first and the last are held: the start, four between, and the end.
+    // A step takes five frames. The frames are the start, which is held, four between, and the end, which is held.
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [30, 5, 5, 5, 5, 25]);
     let centre = |time: u32| {
         let is_red = |col: &usize| shown.pixel(time, 40, *col) == Colors::default().agents[0];
@@ -114,14 +114,14 @@ fn agents_go_smoothly_from_cell_to_cell() {
 }
 
 #[test]
-fn what_stands_still_is_one_frame() {
+fn a_still_episode_is_one_frame() {
     let trace = played("{size: 5, num_agents: 2, seed: 1}").part(0..=0).unwrap();
     let shown = encode(&trace, &Style::default(), 100);
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [50]);
 }
 
 #[test]
-fn every_agent_may_have_a_color_of_its_own() {
+fn every_agent_may_have_its_own_color() {
     let agents: Vec<_> = (0..64).map(|at| (([at / 8, at % 8]), [0, 0])).collect();
     let trace = still(&["........"; 8], &agents);
     let colors = (0..64_u8).map(|at| Color([at * 4, 255 - at * 4, 128])).collect();
@@ -130,12 +130,12 @@ fn every_agent_may_have_a_color_of_its_own() {
     for (agent, expected) in style.colors.agents.iter().enumerate() {
         let found = shown.pixel(0, (agent / 8 + 2) * 20, (agent % 8 + 2) * 20);
         let distance = (0..3).map(|at| found.0[at].abs_diff(expected.0[at])).max().unwrap();
-        assert!(distance <= 8, "agent {agent} is {found}, not {expected}");
+        assert!(distance <= 8, "agent {agent} is {found}, expected {expected}");
     }
 }
 
 #[test]
-fn a_view_keeps_what_it_has_seen() {
+fn a_view_keeps_seen_obstacles_visible() {
     let trace = played(
         "{size: 12, num_agents: 3, seed: 3, obs_radius: 2, on_target: restart, max_episode_steps: 20}",
     );
@@ -151,9 +151,12 @@ fn a_view_keeps_what_it_has_seen() {
         for &(row, col) in obstacles {
             let [y, x] = [row, col].map(|at| (at + 2) as usize * 20);
             let Color([red, ..]) = shown.pixel((frame + 1) as u32 * 25, y, x);
-            // The obstacles' red is 132, and a fifth of it on white 230; the palette has even steps between.
+            // Red is 132 for an obstacle and 230 for a shaded one, at opacity 0.2 on white; the palette rounds both.
             let expected: u8 = if sees(row, col) { 132 } else { 230 };
-            assert!(red.abs_diff(expected) < 8, "({row}, {col}) at frame {frame} is {red}, not {expected}");
+            assert!(
+                red.abs_diff(expected) < 8,
+                "({row}, {col}) at frame {frame} is {red}, expected {expected}"
+            );
             count += usize::from(sees(row, col));
         }
         num_seen.push(count);

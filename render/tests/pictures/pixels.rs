@@ -1,4 +1,4 @@
-//! PNG shows what the state says, and looks like the SVG.
+//! PNG pictures show the state and look like the SVG.
 
 use pogema_core::{Cell, Trace};
 use pogema_render::{Border, Color, Colors, Ground, Style, raster, svg};
@@ -29,7 +29,7 @@ impl Picture {
     }
 }
 
-/// Pixels of a cell.
+/// Side of a cell. Units: pixels.
 const CELL: f64 = 20.0;
 
 fn draw(trace: &Trace, style: &Style) -> Picture {
@@ -38,7 +38,7 @@ fn draw(trace: &Trace, style: &Style) -> Picture {
 }
 
 #[test]
-fn the_middle_of_a_cell_and_its_edge_tell_what_is_there() {
+fn pixels_show_the_content_of_each_cell() {
     for (seed, frame) in [(1, 0), (2, 3), (3, 9)] {
         let trace = played(&format!("{{size: 9, num_agents: 12, seed: {seed}, density: 0.2}}"));
         let style = Style { static_frame: Some(frame), ..Style::default() };
@@ -47,7 +47,7 @@ fn the_middle_of_a_cell_and_its_edge_tell_what_is_there() {
         let colors = Colors::default();
         let color_of = |agent: usize| colors.agents[agent % 7];
         for (row, col) in (-1..10).flat_map(|row| (-1..10).map(move |col| (row, col))) {
-            // The margin is half a cell and the border one.
+            // The margin is half a cell and the border one cell.
             let (y, x) = ((f64::from(row) + 2.0) * CELL, (f64::from(col) + 2.0) * CELL);
             let here = |cells: &[Cell]| {
                 let is_here = |agent: &usize| {
@@ -76,7 +76,7 @@ fn the_middle_of_a_cell_and_its_edge_tell_what_is_there() {
     }
 }
 
-/// The SVG, drawn by a renderer of SVG, on white.
+/// Renders an SVG on white with an independent library.
 fn rendered(svg: &str, width: u32, height: u32) -> Vec<u8> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).unwrap();
     let mut canvas = Pixmap::new(width, height).unwrap();
@@ -104,7 +104,7 @@ fn png_and_svg_look_alike() {
                 );
                 let far =
                     picture.data.iter().zip(&other).filter(|(one, other)| one.abs_diff(**other) > 40).count();
-                // Edges are smoothed a little differently.
+                // The two renderers smooth edges differently.
                 assert!(far * 500 < other.len(), "{far} of {} for {style:?}", other.len());
             }
         }
@@ -121,7 +121,7 @@ fn one_cell_and_no_agents_can_be_drawn() {
 }
 
 #[test]
-fn a_picture_is_as_wide_as_asked_and_as_high_as_its_map() {
+fn a_picture_has_the_requested_width_and_the_proportions_of_its_map() {
     let trace = still(&["....", "...."], &[([0, 0], [0, 1])]);
     for width in [1, 7, 700] {
         let picture = Picture::of(&raster::png(&trace, &Style::default(), width).unwrap());

@@ -1,4 +1,4 @@
-//! What cannot be drawn is refused in one line.
+//! Errors for invalid requests are one line.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ fn refused(trace: &Trace, style: Style) -> String {
 }
 
 #[test]
-fn agents_frames_and_times_that_are_not_there() {
+fn invalid_agents_frames_times_and_colors() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let usual = Style::default;
     assert_eq!(refused(&trace, Style { egocentric: Some(1), ..usual() }), "agent is `1`, expected 0 to 0");
@@ -29,7 +29,7 @@ fn agents_frames_and_times_that_are_not_there() {
 }
 
 #[test]
-fn parts_that_are_not_there() {
+fn invalid_parts_of_an_episode() {
     let trace = played("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
     let refused = |first: usize, last: usize| trace.part(first..=last).unwrap_err().to_string();
     assert_eq!(refused(2, 1), "range of steps is `2..1`, expected first..last");
@@ -38,7 +38,7 @@ fn parts_that_are_not_there() {
 }
 
 #[test]
-fn agents_off_the_map_and_lists_that_do_not_fit() {
+fn agents_off_the_map_and_lists_of_wrong_length() {
     let trace = still(&[".."], &[([0, 5], [0, 1])]);
     let text = refused(&trace, Style::default());
     assert_eq!(text, "a cell of frame 0 is `(0, 5)`, expected a cell of the map of 1 rows and 2 columns");
@@ -48,7 +48,7 @@ fn agents_off_the_map_and_lists_that_do_not_fit() {
 }
 
 #[test]
-fn pictures_of_no_pixels_or_too_many() {
+fn pictures_with_no_or_too_many_pixels() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let draw = |width| raster::png(&trace, &Style::default(), width).unwrap_err().to_string();
     assert_eq!(
@@ -73,20 +73,23 @@ fn pictures_of_no_pixels_or_too_many() {
 }
 
 #[test]
-fn videos_of_unknown_kinds() {
+fn unknown_video_formats() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     for name in ["a.avi", "a", "mp4"] {
         let error =
             video::write(&trace, &Style::default(), 100, Path::new(name), &mut |_, _| ()).unwrap_err();
-        assert_eq!(error, Error::io(name, "the name of a video ends in `.mp4` or `.webm`"));
+        assert_eq!(
+            error,
+            Error::io(name, "unknown video format, expected a name ending in `.mp4` or `.webm`")
+        );
     }
 }
 
 #[test]
-fn texts_that_are_no_colors() {
+fn invalid_colors() {
     for text in ["", "red", "#12345", "#1234567", "#+12345", "#gggggg", "#€€"] {
         let error = text.parse::<Color>().unwrap_err().to_string();
-        assert_eq!(error, format!("colour is `{text}`, expected one such as `#c1433c`"));
+        assert_eq!(error, format!("colour is `{text}`, expected a colour such as `#c1433c`"));
     }
     let color: Color = "#c1433C".parse().unwrap();
     assert_eq!((color, color.to_string().as_str()), (Color([0xc1, 0x43, 0x3c]), "#c1433c"));

@@ -1,4 +1,4 @@
-//! Small pictures, to be looked at when they change.
+//! Snapshots of small pictures, for review by eye after changes.
 
 use pogema_render::{Border, Ground, Style, svg, text};
 

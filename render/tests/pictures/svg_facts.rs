@@ -1,4 +1,4 @@
-//! What an SVG shows at every frame is what the episode's states say.
+//! An SVG shows the states of its episode at every frame.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::common::{Policy, config, trace};
 use crate::drawn::{Circle, attribute, elements, ids, squares};
 use crate::{played, still};
 
-/// Digits of a drawing are enough for so much. Units: cells.
+/// Tolerance for rounded coordinates in a drawing. Units: cells.
 const NEAR: f64 = 0.02;
 
 fn episodes() -> Vec<Trace> {
@@ -27,12 +27,12 @@ fn episodes() -> Vec<Trace> {
             }
         }
     }
-    // The shortest that moves.
+    // The shortest episode with a step.
     traces.push(traces[0].part(0..=1).unwrap());
     traces
 }
 
-/// The time of a frame as a share of the whole.
+/// Returns the time of a frame as a fraction of the duration.
 fn time_of(frame: usize, num_frames: usize) -> f64 {
     (frame + 1) as f64 / (num_frames + 1) as f64
 }
@@ -43,14 +43,14 @@ fn assert_follows(circle: &Circle, states: &[&Snapshot], cell: impl Fn(&Snapshot
         let Cell { row, col } = cell(state);
         let [at_row, at_col] = circle.cell_at(time);
         let is_near = (at_row - f64::from(row)).abs() < NEAR && (at_col - f64::from(col)).abs() < NEAR;
-        assert!(is_near, "agent {agent} frame {frame}: ({at_row}, {at_col}), not ({row}, {col})");
-        // A little later, since times are rounded.
+        assert!(is_near, "agent {agent} frame {frame}: ({at_row}, {at_col}), expected ({row}, {col})");
+        // Slightly later, because times are rounded.
         assert_eq!(circle.is_visible_at(time + 1e-3), state.active[agent], "agent {agent} frame {frame}");
     }
 }
 
 #[test]
-fn agents_and_goals_are_where_the_states_say() {
+fn agents_and_goals_follow_the_states() {
     for trace in episodes() {
         let text = svg::draw(&trace, &Style::default()).unwrap();
         let document = Document::parse(&text).unwrap();
@@ -75,7 +75,7 @@ fn agents_and_goals_are_where_the_states_say() {
 }
 
 #[test]
-fn every_animation_repeats_forever_and_takes_as_long() {
+fn every_animation_repeats_forever_with_the_same_duration() {
     for trace in episodes() {
         let text = svg::draw(&trace, &Style { egocentric: Some(0), ..Style::default() }).unwrap();
         let document = Document::parse(&text).unwrap();
@@ -129,7 +129,7 @@ fn obstacles_are_those_of_the_map_and_its_border() {
     }
 }
 
-/// The states that the view of an agent shows.
+/// Returns the states that the view of an agent shows.
 fn states_of(trace: &Trace, own: usize) -> Vec<&Snapshot> {
     let mut states: Vec<_> = trace.states().collect();
     if trace.header.config.on_goal == OnGoal::Finish
@@ -173,7 +173,7 @@ fn a_view_shades_obstacles_until_its_agent_sees_them() {
         let states = states_of(trace, own);
         for path in elements(&document, "obstacles", "path") {
             let fade = path.children().find(|child| child.has_tag_name("animate"));
-            let told = fade.map(|node| {
+            let shown_from = fade.map(|node| {
                 let times = node.attribute("keyTimes").unwrap().split(';').rev().nth(1).unwrap();
                 (times.parse::<f64>().unwrap() * (states.len() + 1) as f64).round() as usize - 1
             });
@@ -182,14 +182,14 @@ fn a_view_shades_obstacles_until_its_agent_sees_them() {
                 let [row, col] = at.map(|middle| (middle - 0.2).round() as i32);
                 let first =
                     states.iter().position(|state| Ground::of(trace).sees(state.cells[own], row, col));
-                assert_eq!(told.or((!is_shaded).then_some(0)), first, "({row}, {col})");
+                assert_eq!(shown_from.or((!is_shaded).then_some(0)), first, "({row}, {col})");
             }
         }
     }
 }
 
 #[test]
-fn a_frame_stands_still_and_shows_its_state() {
+fn a_static_frame_shows_its_state() {
     for trace in episodes() {
         let frame = trace.steps.len() / 2;
         let style = Style { static_frame: Some(frame), ..Style::default() };
@@ -208,7 +208,7 @@ fn a_frame_stands_still_and_shows_its_state() {
 }
 
 #[test]
-fn a_frame_of_a_view_shows_all_that_was_seen_until_then() {
+fn a_static_frame_of_a_view_shows_all_obstacles_seen_so_far() {
     for trace in episodes() {
         let frame = trace.steps.len() / 2;
         let style = Style { static_frame: Some(frame), egocentric: Some(2), ..Style::default() };
@@ -226,7 +226,7 @@ fn a_frame_of_a_view_shows_all_that_was_seen_until_then() {
 }
 
 #[test]
-fn agents_keep_their_colors_though_others_have_finished() {
+fn agents_keep_their_colors_after_others_have_finished() {
     let mut trace = still(&["..."], &[([0, 0], [0, 1]), ([0, 1], [0, 2]), ([0, 2], [0, 0])]);
     trace.start.state.active[0] = false;
     let text = svg::draw(&trace, &Style::default()).unwrap();
@@ -237,7 +237,7 @@ fn agents_keep_their_colors_though_others_have_finished() {
 }
 
 #[test]
-fn agents_lines_and_colors_can_be_chosen() {
+fn the_style_selects_agents_lines_and_colors() {
     let trace = played("{size: 6, num_agents: 3, seed: 1}");
     let none =
         svg::draw(&trace, &Style { show_agents: false, egocentric: Some(1), ..Style::default() }).unwrap();

@@ -1,4 +1,4 @@
-//! Frames of text show the state, and fit.
+//! Text frames show the state and fit the terminal.
 
 use pogema_core::{Error, Trace};
 use pogema_render::{Border, Ground, text};
@@ -34,7 +34,7 @@ fn many_agents_are_numbers_and_their_goals_have_a_star() {
 }
 
 #[test]
-fn colors_change_nothing_but_colors() {
+fn colors_do_not_change_the_text() {
     let trace = played("{size: 8, num_agents: 4, seed: 2}");
     let plain = frame(&trace, text::Style::default());
     let colored = frame(&trace, text::Style { is_colored: true, ..text::Style::default() });
@@ -65,7 +65,7 @@ fn a_frame_is_never_larger_than_the_terminal() {
 }
 
 #[test]
-fn a_cut_map_says_so_and_shows_the_agent_it_is_about() {
+fn a_cropped_map_names_its_part_and_shows_the_viewing_agent() {
     let trace = played("{size: 64, num_agents: 20, seed: 2}");
     for view in 0..20 {
         let style = text::Style { view: Some(view), most: Some((12, 40)), ..text::Style::default() };
@@ -79,8 +79,8 @@ fn a_cut_map_says_so_and_shows_the_agent_it_is_about() {
 }
 
 #[test]
-fn a_view_shows_its_window_and_its_own_goal_alone() {
-    // The radius is 2: agent 1 is just seen, agent 2 and its goal are not.
+fn a_view_shows_only_its_window_and_its_own_goal() {
+    // The radius is 2: agent 0 sees agent 1 at the edge of its window, but neither agent 2 nor its goal.
     let trace = still(&[".......#", "........"], &[([0, 0], [1, 6]), ([0, 2], [1, 0]), ([0, 3], [1, 1])]);
     let style = text::Style { view: Some(0), border: Border::None, ..text::Style::default() };
     assert_eq!(frame(&trace, style), "step 0\na · b          \n· · ·       A  ");
@@ -94,7 +94,7 @@ fn an_agent_hides_a_goal_and_a_lower_index_a_higher_one() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_in_one_line() {
+fn invalid_requests_are_rejected_with_one_line() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let refused = |style: text::Style| {
         text::frame(Ground::of(&trace), 0, &trace.start.state, &style).unwrap_err().to_string()

@@ -1,6 +1,6 @@
-//! Our drawings beside those that POGEMA 1.4.0 itself makes of the same episodes.
+//! Compares the size of drawings with POGEMA 1.4.0's drawings of the same episodes.
 //!
-//! The environment variable `POGEMA_ORACLE_PYTHON` names a Python that has it.
+//! The environment variable `POGEMA_ORACLE_PYTHON` names a Python with POGEMA 1.4.0.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,36 +14,36 @@ use common::{Policy, config, trace};
 use pogema_core::Trace;
 use pogema_render::{Style, svg};
 
-/// Plays the actions on standard input, and prints its drawing below the cells and goals at the end.
+/// Plays the actions on standard input, and prints the final cells and goals, then the drawing.
 const SCRIPT: &str = r#"
 import json, sys, tempfile, warnings
 warnings.filterwarnings("ignore")
 from pogema import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
-asked = json.load(sys.stdin)
-env = AnimationMonitor(pogema_v0(GridConfig(**asked["config"])), AnimationConfig(save_every_idx_episode=None))
+request = json.load(sys.stdin)
+env = AnimationMonitor(pogema_v0(GridConfig(**request["config"])), AnimationConfig(save_every_idx_episode=None))
 env.reset()
-for actions in asked["actions"]:
+for actions in request["actions"]:
     env.step(actions)
 grid = env.unwrapped.grid
 print(json.dumps([grid.get_agents_xy(ignore_borders=True), grid.get_targets_xy(ignore_borders=True)], default=int))
 with tempfile.NamedTemporaryFile("r") as file:
-    env.save_animation(file.name, AnimationConfig(egocentric_idx=asked["egocentric"]))
+    env.save_animation(file.name, AnimationConfig(egocentric_idx=request["egocentric"]))
     print(file.read())
 "#;
 
-/// POGEMA's drawing of an episode, which is checked to be the same one.
+/// Returns POGEMA's drawing of an episode, after checking that it played the same episode.
 fn drawn_by_pogema(text: &str, trace: &Trace, egocentric: Option<usize>) -> String {
     let python = std::env::var("POGEMA_ORACLE_PYTHON").unwrap();
     let actions: Vec<_> = trace.steps.iter().map(|step| &step.actions).collect();
     let config = pogema_maps::value_from_yaml(text).unwrap();
-    let asked = serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric });
+    let request = serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric });
     let mut process = Command::new(python)
         .args(["-c", SCRIPT])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    process.stdin.take().unwrap().write_all(asked.to_string().as_bytes()).unwrap();
+    process.stdin.take().unwrap().write_all(request.to_string().as_bytes()).unwrap();
     let output = process.wait_with_output().unwrap();
     assert!(output.status.success(), "{text}");
     let output = String::from_utf8(output.stdout).unwrap();

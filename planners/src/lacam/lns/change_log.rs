@@ -22,7 +22,7 @@ pub(crate) struct ChangeLog {
 }
 
 impl ChangeLog {
-    /// An empty log.
+    /// Creates an empty log.
     pub fn new(is_alone: bool) -> Self {
         Self { is_alone, num_changes: AtomicUsize::new(0), changes: Mutex::new(Vec::new()) }
     }

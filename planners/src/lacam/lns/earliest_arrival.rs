@@ -31,7 +31,7 @@ pub(crate) struct Query<'a> {
     pub costs: &'a [u32],
     /// The latest accepted arrival.
     pub latest: u32,
-    /// Bits that break ties.
+    /// Random bits that break ties.
     pub dice: u32,
 }
 
@@ -60,7 +60,7 @@ impl EarliestArrival {
         Self { labels: Vec::new(), buckets: Vec::new(), num_vertices, best, epoch: 0, num_expanded: 0 }
     }
 
-    /// Number of labels expanded so far.
+    /// Returns the number of labels expanded so far.
     pub fn num_expanded(&self) -> u64 {
         self.num_expanded
     }

@@ -1,4 +1,4 @@
-//! The destroy heuristics: selects the agents to be replanned together.
+//! The destroy heuristics, which select the agents to replan together.
 //!
 //! Papers: Li, Chen, Harabor, Stuckey, Koenig, "Anytime Multi-Agent Path Finding via Large Neighborhood Search",
 //! IJCAI 2021: agent-based, map-based and random neighbourhoods, with adaptive weights.
@@ -33,7 +33,7 @@ const REACTION: f64 = 0.02;
 /// The least weight, as a share of the highest one.
 const LEAST: f64 = 0.05;
 
-/// Selects neighbourhoods, and learns which heuristics and sizes pay.
+/// Selects neighbourhoods, and learns which heuristics and sizes pay off.
 #[derive(Debug)]
 pub(crate) struct NeighbourhoodSelector {
     weights: [f64; HEURISTICS.len() * SIZES.len()],
@@ -48,7 +48,7 @@ pub(crate) struct NeighbourhoodSelector {
 }
 
 impl NeighbourhoodSelector {
-    /// A selector for a number of agents and vertices.
+    /// Creates a selector for a number of agents and vertices.
     pub fn new(num_agents: usize, num_vertices: usize) -> Self {
         Self {
             weights: [1.0; HEURISTICS.len() * SIZES.len()],
@@ -61,7 +61,7 @@ impl NeighbourhoodSelector {
         }
     }
 
-    /// Selects the agents to be replanned.
+    /// Selects the agents to replan.
     pub fn select(&mut self, solution: &Solution<'_>, random: &mut Pcg64Mcg) -> &[Agent] {
         self.round = self.round.wrapping_add(1);
         self.agents.clear();

@@ -13,7 +13,7 @@ use crate::lacam::lns::time_table::{Path, TimeTable};
 use crate::problem::{Agent, Problem};
 use crate::random::{below, shuffle};
 
-/// A worker that refines a plan, alone or beside others.
+/// A worker that refines a plan, alone or in parallel with others.
 #[derive(Debug)]
 pub(crate) struct Refiner<'a> {
     solution: Solution<'a>,
@@ -41,16 +41,16 @@ pub(crate) fn num_bytes(problem: &Problem, num_steps: usize) -> usize {
     TimeTable::num_bytes(num_vertices, span) + EarliestArrival::num_bytes(num_vertices, span)
 }
 
-/// Whether the number of agents is supported.
+/// Returns whether the number of agents is supported.
 pub(crate) fn supports(problem: &Problem) -> bool {
     (1..TimeTable::MAX_AGENTS).contains(&problem.num_agents())
 }
 
-/// Number of priority orders in which all agents are replanned first.
+/// Number of priority orders in which all agents are initially replanned.
 const NUM_ORDERS: usize = 4;
 
 impl<'a> Refiner<'a> {
-    /// A worker that starts with a valid plan; all workers start with the same one.
+    /// Creates a worker that starts with a valid plan; all workers start with the same one.
     pub fn new(
         problem: &'a Problem,
         costs: &'a [CostToGo],
@@ -217,7 +217,7 @@ impl<'a> Refiner<'a> {
         true
     }
 
-    /// Puts the old paths of the neighbourhood back, in place of the new paths of its first agents.
+    /// Restores the old paths of the neighbourhood, whose first `num_new` agents have new paths.
     fn restore(&mut self, num_new: usize) {
         self.agents[..num_new].iter().for_each(|&agent| self.solution.remove(agent));
         for (&agent, path) in self.agents.iter().zip(&self.old) {

@@ -20,7 +20,7 @@ pub(crate) struct Solution<'a> {
 }
 
 impl<'a> Solution<'a> {
-    /// A solution of conflict-free paths, for times below `span`.
+    /// Creates a solution of conflict-free paths, for times below `span`.
     pub fn new(problem: &'a Problem, costs: &'a [CostToGo], paths: &[Path], span: usize) -> Self {
         let table = TimeTable::new(problem.graph.num_vertices(), span);
         let mut solution = Self {
@@ -42,7 +42,7 @@ impl<'a> Solution<'a> {
         &self.problem.graph
     }
 
-    /// Number of agents.
+    /// Returns the number of agents.
     pub fn num_agents(&self) -> usize {
         self.paths.len()
     }
@@ -77,7 +77,7 @@ impl<'a> Solution<'a> {
         &self.table
     }
 
-    /// Number of time steps.
+    /// Returns the number of time steps.
     pub fn span(&self) -> u32 {
         self.table.span()
     }

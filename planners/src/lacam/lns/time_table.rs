@@ -20,7 +20,7 @@ pub(crate) struct TimeTable {
     busy: Vec<u64>,
     /// Shape: `[vertices, span]`; the agent that passes, without agents that rest.
     passing: Vec<u16>,
-    /// For each vertex, the agent that rests there in the end.
+    /// For each vertex, the agent whose path ends there.
     resting: Vec<u16>,
 }
 
@@ -33,7 +33,7 @@ impl TimeTable {
         num_vertices * (span * size_of::<u16>() + span.div_ceil(64) * size_of::<u64>() + size_of::<u16>())
     }
 
-    /// An empty table for times below `span`.
+    /// Creates an empty table for times below `span`.
     pub fn new(num_vertices: usize, span: usize) -> Self {
         let words = span.div_ceil(64);
         Self {
@@ -45,7 +45,7 @@ impl TimeTable {
         }
     }
 
-    /// Number of time steps.
+    /// Returns the number of time steps.
     pub fn span(&self) -> u32 {
         self.span as u32
     }
@@ -94,7 +94,7 @@ impl TimeTable {
         (agent != NO_AGENT).then_some(Agent::from(agent))
     }
 
-    /// Whether a vertex is occupied at a time.
+    /// Returns whether a vertex is occupied at a time.
     #[inline]
     pub fn is_busy(&self, vertex: Vertex, time: u32) -> bool {
         self.busy[vertex as usize * self.words + time as usize / 64] >> (time % 64) & 1 == 1
@@ -147,14 +147,14 @@ impl TimeTable {
         0
     }
 
-    /// Whether a move that ends at a time swaps with another agent.
+    /// Returns whether a move that ends at a time swaps with another agent.
     #[inline]
     pub fn is_swap(&self, from: Vertex, to: Vertex, time: u32) -> bool {
         let before = self.passing[to as usize * self.span + time as usize - 1];
         before != NO_AGENT && before == self.passing[from as usize * self.span + time as usize]
     }
 
-    /// Whether a path is free of conflicts.
+    /// Returns whether a path is free of conflicts.
     pub fn is_free(&self, path: &[Vertex]) -> bool {
         let passes = path.iter().enumerate().all(|(time, &vertex)| {
             let before = path[time.saturating_sub(1)];

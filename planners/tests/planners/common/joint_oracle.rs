@@ -9,8 +9,8 @@ use pogema_planners::Solvability;
 
 /// Finds the least sum of costs of a scenario.
 ///
-/// Agents move as under `soft`. With [`OnGoal::Finish`], an agent leaves the map on its goal. At most `max_states` states
-/// are expanded.
+/// Agents move as under `soft`. With [`OnGoal::Finish`], an agent leaves the map on its goal. At most `max_states`
+/// states are expanded.
 pub fn oracle(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal, max_states: usize) -> Solvability {
     let Some(mut search) = Search::new(map, starts, goals, on_goal, max_states) else {
         return Solvability::Unknown;
@@ -18,7 +18,7 @@ pub fn oracle(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal, max_s
     search.run()
 }
 
-/// Cells of all agents, and which of them are done: at their goals to stay, or gone.
+/// The cells of all agents, and the set of agents that are done: resting on their goals, or gone.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct State {
     cells: Vec<u32>,
@@ -32,13 +32,13 @@ struct Search<'a> {
     max_states: usize,
     /// For each agent, the steps from each cell to its goal.
     distances: Vec<Vec<u32>>,
-    /// The least cost known of each state.
+    /// The least known cost of each state.
     costs: HashMap<State, u64>,
     queue: BinaryHeap<Reverse<(u64, Reverse<u64>, State)>>,
 }
 
 impl<'a> Search<'a> {
-    /// None for more agents than a set of them has bits.
+    /// Creates the search; returns `None` for more agents than the set of done agents has bits.
     fn new(
         map: &'a Map,
         starts: &[Cell],
@@ -57,7 +57,7 @@ impl<'a> Search<'a> {
             costs: HashMap::new(),
             queue: BinaryHeap::new(),
         };
-        // An agent that starts on its goal does not leave before a step.
+        // An agent that starts on its goal does not leave before the first step.
         search.reach(State { cells: starts.iter().map(index).collect(), done: 0 }, 0, false);
         Some(search)
     }
@@ -81,7 +81,7 @@ impl<'a> Search<'a> {
         Solvability::Unsolvable
     }
 
-    /// Chooses a move for an agent and those after it.
+    /// Assigns moves to an agent and to those after it.
     fn move_agents(&mut self, from: &State, agent: usize, to: &mut Vec<u32>, cost: u64) {
         if agent == to.len() {
             let next = State { cells: to.clone(), done: from.done };
@@ -99,14 +99,14 @@ impl<'a> Search<'a> {
         to[agent] = from.cells[agent];
     }
 
-    /// The cell itself and its free neighbours.
+    /// Returns a cell and its free neighbours.
     fn targets(&self, cell: u32) -> Vec<u32> {
         let at = self.map.cell_at(cell as usize);
         let neighbours = free_neighbours(self.map, at).map(|next| self.map.index(next) as u32);
         std::iter::once(cell).chain(neighbours).collect()
     }
 
-    /// Whether the agents before this one, and those that are done, leave a cell to it.
+    /// Returns whether a cell is free for an agent, given the moves of earlier agents and the agents that are done.
     fn is_open(&self, from: &State, agent: usize, to: &[u32], target: u32) -> bool {
         (0..to.len()).filter(|&other| other != agent).all(|other| {
             let is_done = from.done >> other & 1 == 1;
@@ -119,18 +119,18 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Takes a state in, and those in which agents on their goals are done.
+    /// Adds a state, and the states in which agents on their goals are done.
     fn reach(&mut self, state: State, cost: u64, has_moved: bool) {
         let on_goal = (0..state.cells.len()).filter(|&agent| state.cells[agent] == self.goals[agent]);
         let arrived = on_goal.fold(0, |arrived, agent| arrived | 1 << agent) & !state.done;
         if self.leaves {
             let done = if has_moved { state.done | arrived } else { state.done };
-            return self.take(State { done, ..state }, cost);
+            return self.add(State { done, ..state }, cost);
         }
-        // Every set of those that arrived may be there to stay.
+        // Any subset of the arrived agents may rest.
         let mut staying = arrived;
         loop {
-            self.take(State { cells: state.cells.clone(), done: state.done | staying }, cost);
+            self.add(State { cells: state.cells.clone(), done: state.done | staying }, cost);
             if staying == 0 {
                 return;
             }
@@ -138,7 +138,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn take(&mut self, state: State, cost: u64) {
+    fn add(&mut self, state: State, cost: u64) {
         let mut bound = cost;
         for (agent, &cell) in state.cells.iter().enumerate() {
             if state.done >> agent & 1 == 0 {

@@ -1,6 +1,6 @@
-//! Small random problems, and what every outcome must be.
+//! Small random problems, and checks that every planner must pass.
 
-#![allow(dead_code, reason = "not every test file needs all of it")]
+#![allow(dead_code, reason = "not every test file uses every item")]
 
 pub mod joint_oracle;
 
@@ -13,7 +13,7 @@ use pogema_planners::{Budget, Outcome, Plan, Planner, Problem, validate};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// A map with starts and goals, all of them different.
+/// A map with distinct starts and distinct goals.
 #[derive(Clone, Debug)]
 pub struct Case {
     pub map: Map,
@@ -31,7 +31,7 @@ impl Case {
         }
     }
 
-    /// A map of so many rows and columns, a fifth of it obstacles, and so many agents, or as many as have room.
+    /// Draws a map with an obstacle density of one fifth, and agents, fewer if the map has fewer free cells.
     pub fn random(rng: &mut Pcg64Mcg, height: usize, width: usize, num_agents: usize) -> Self {
         let obstacles = (0..height * width).map(|_| rng.next_u32().is_multiple_of(5)).collect();
         let map = Map::new(height, width, obstacles).unwrap();
@@ -52,7 +52,7 @@ impl Case {
         Problem::new(&self.map, &self.starts, &self.goals).unwrap()
     }
 
-    /// The plan of an outcome, which must be valid and cost no less than its bound.
+    /// Returns the plan of an outcome; checks that it is valid and costs at least the lower bound.
     pub fn check<'a>(&self, outcome: &'a Outcome) -> Option<&'a Plan> {
         let goals = outcome.solution().map(|_| &self.goals[..]);
         if let Outcome::Solved { plan, lower_bound } = outcome {
@@ -69,12 +69,18 @@ pub fn rng(seed: u64) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(seed)
 }
 
-/// What every planner owes on problems that are none, or hardly.
-pub fn check_odd_problems(planner: &mut dyn Planner) {
-    let nobody = Case::new(&[".."], &[]);
-    assert_eq!(nobody.check(&planner.plan(&nobody.problem(), &Budget::default())).unwrap().sum_of_costs(), 0);
-    let at_home = Case::new(&[".."], &[[(0, 0), (0, 0)], [(0, 1), (0, 1)]]);
-    assert_eq!(at_home.check(&planner.plan(&at_home.problem(), &Budget::default())).unwrap().num_steps(), 0);
+/// Checks the outcomes of trivial and impossible problems.
+pub fn check_degenerate_problems(planner: &mut dyn Planner) {
+    let no_agents = Case::new(&[".."], &[]);
+    assert_eq!(
+        no_agents.check(&planner.plan(&no_agents.problem(), &Budget::default())).unwrap().sum_of_costs(),
+        0
+    );
+    let on_goals = Case::new(&[".."], &[[(0, 0), (0, 0)], [(0, 1), (0, 1)]]);
+    assert_eq!(
+        on_goals.check(&planner.plan(&on_goals.problem(), &Budget::default())).unwrap().num_steps(),
+        0
+    );
     let apart = Case::new(&[".#."], &[[(0, 0), (0, 2)]]);
     let same_goal = Case::new(&["..."], &[[(0, 0), (0, 1)], [(0, 2), (0, 1)]]);
     let crowded = Case::new(&[".."], &[[(0, 0), (0, 1)], [(0, 1), (0, 0)], [(0, 0), (0, 0)]]);
@@ -88,7 +94,7 @@ pub fn check_odd_problems(planner: &mut dyn Planner) {
     assert!(planner.plan(&late.problem().within(4), &Budget::default()).solution().is_some());
 }
 
-/// What every planner owes when it may not think, or no longer.
+/// Checks that a spent budget times out, and that an unsolvable problem has no solution.
 pub fn check_spent_budgets(planner: &mut dyn Planner) {
     let case = Case::new(&["....", ".##.", "...."], &[[(0, 0), (2, 3)], [(2, 3), (0, 0)], [(0, 3), (2, 0)]]);
     let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };
@@ -97,13 +103,13 @@ pub fn check_spent_budgets(planner: &mut dyn Planner) {
         assert!(matches!(outcome, Outcome::TimedOut { .. }), "{outcome}");
         case.check(&outcome);
     }
-    // Nobody can pass here.
+    // The agents cannot pass each other.
     let stuck = Case::new(&["....."], &[[(0, 0), (0, 4)], [(0, 4), (0, 0)]]);
     let outcome = planner.plan(&stuck.problem(), &Budget::of_nodes(2000));
     assert!(outcome.solution().is_none(), "{outcome}");
 }
 
-/// Whether the same seed and budget give the same outcome.
+/// Checks that the same seed and budget give the same outcome.
 pub fn check_repeats(mut make: impl FnMut() -> Box<dyn Planner>) {
     for seed in 0..20 {
         let case = Case::random(&mut rng(seed), 6, 6, 6);

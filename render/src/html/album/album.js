@@ -1,4 +1,4 @@
-// Opens replays inside of the page.
+// Opens replays inside the page.
 
 const escaped = { "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&#39;" };
 const escape = (text) => text.replace(/[&<>"']/g, (letter) => escaped[letter]);
@@ -18,24 +18,24 @@ class Album {
     document.body.classList.add("ready");
   }
 
-  open(number) {
-    const { title } = this.films[number];
-    const address = this.address(number);
-    tell(byId("player-title"), title);
+  open(index) {
+    const { title } = this.films[index];
+    const address = this.address(index);
+    setText(byId("player-title"), title);
     byId("player-tab").href = address;
     this.dialog.append(make("iframe", { src: address, title }));
     this.dialog.showModal();
   }
 
-  // Where the page of a replay is to be found, which is made when it is asked for first.
-  address(number) {
-    if (!this.addresses.has(number)) {
-      const { title, film } = this.films[number];
-      const holes = { title: escape(title), data: JSON.stringify(film).replaceAll("<", "\\u003c") };
-      const page = this.frame.replace(/@(title|data)@/g, (_, name) => holes[name]);
-      this.addresses.set(number, URL.createObjectURL(new Blob([page], { type: "text/html" })));
+  // The address of a replay page, which is built on first use.
+  address(index) {
+    if (!this.addresses.has(index)) {
+      const { title, film } = this.films[index];
+      const values = { title: escape(title), data: JSON.stringify(film).replaceAll("<", "\\u003c") };
+      const page = this.frame.replace(/@(title|data)@/g, (_, name) => values[name]);
+      this.addresses.set(index, URL.createObjectURL(new Blob([page], { type: "text/html" })));
     }
-    return this.addresses.get(number);
+    return this.addresses.get(index);
   }
 }
 

@@ -1,4 +1,4 @@
-// Draws the map that is edited. Coordinates are (x, y) in cells, the corner of the map being (0, 0).
+// Draws the edited map. Coordinates are (x, y) in cells, with the corner of the map as (0, 0).
 
 class Canvas {
   constructor(grid, view, ground, actors) {
@@ -6,7 +6,7 @@ class Canvas {
     this.renew();
   }
 
-  // To be called when cells have changed.
+  // Call this after cells have changed.
   renew() {
     this.isObstacle = this.grid.cells.map((kind) => (kind === OBSTACLE ? 1 : 0));
     this.bitmap = null;
@@ -28,7 +28,7 @@ class Canvas {
     if (cursor) this.drawBox(context, [cursor, cursor]);
   }
 
-  // One pale colour for each component.
+  // Colours each component in its own pale colour.
   tint({ labels }) {
     const { height, width } = this.grid;
     this.tints = make("canvas", { width, height });

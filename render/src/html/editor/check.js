@@ -1,6 +1,6 @@
-// What there is to say about a map: its components, and agents that cannot get to their goals.
+// Checks of a map: its components, and agents that cannot reach their goals.
 
-// Numbers the components; 0 is an obstacle.
+// Numbers the components from 1; obstacles get 0.
 function componentsOf({ height, width, cells }) {
   const labels = new Int32Array(cells.length);
   const queue = new Int32Array(cells.length);
@@ -36,16 +36,16 @@ function check(grid) {
   const label = ([row, col]) => labels[row * grid.width + col];
   grid.agents.forEach(({ start, goal }, agent) => {
     const add = (reason) => issues.push({ agent, reason: `agent ${agent} ${reason}` });
-    if (starts.has(String(start))) add(`starts on ${place(start)}, as agent ${starts.get(String(start))} does`);
+    if (starts.has(String(start))) add(`starts on ${place(start)}, like agent ${starts.get(String(start))}`);
     starts.set(String(start), agent);
-    if (label(start) === 0) add("starts on an obstacle, which POGEMA takes away");
+    if (label(start) === 0) add("starts on an obstacle, which POGEMA removes");
     if (goal === null) return add("has no goal yet");
-    if (label(goal) === 0) return add("has its goal on an obstacle, which POGEMA takes away");
+    if (label(goal) === 0) return add("has its goal on an obstacle, which POGEMA removes");
     if (label(start) !== 0 && label(start) !== label(goal)) add("cannot reach its goal: it is in another component");
   });
   const restarts = grid.blocks.some(({ name, lines }) => name === "on_target" && /restart/.test(lines[0]));
   if (restarts && grid.agents.some((agent) => agent.more.length === 0)) {
-    issues.push({ agent: null, reason: "on_target is restart, which needs two goals or more for each agent" });
+    issues.push({ agent: null, reason: "on_target is restart, expected at least two goals for each agent" });
   }
   return { labels, number, free, density: 1 - free / grid.cells.length, issues };
 }

@@ -1,6 +1,6 @@
-// Files in and out.
+// Loads and saves files.
 
-// Whether a text is a config rather than a bare map.
+// Returns whether a text is a config rather than map text.
 const isConfig = (name, text) =>
   /\.(ya?ml|json)$/i.test(name) || (!/\.(txt|map)$/i.test(name) && /^\s*\{|^---|^["']?[A-Za-z_]\w*["']?\s*:(\s|$)/m.test(text));
 
@@ -43,7 +43,7 @@ class Files {
       text.value = this.write(kind) ?? text.value;
     };
     byId("edit-source").addEventListener("click", () => {
-      tell(byId("source-error"), "");
+      setText(byId("source-error"), "");
       show(this.grid.agents.length > 0 || this.grid.blocks.length > 0 ? "yaml" : "txt");
       dialog.showModal();
     });
@@ -52,10 +52,10 @@ class Files {
     byId("source-close").addEventListener("click", () => dialog.close());
     byId("source-load").addEventListener("click", () => {
       if (this.read("pasted", text.value)) return dialog.close();
-      tell(byId("source-error"), byId("message").textContent);
+      setText(byId("source-error"), byId("message").textContent);
       this.pointAt(text);
     });
-    // Pasting anywhere else loads what is pasted.
+    // Pasting anywhere else loads the pasted text.
     addEventListener("paste", (event) => {
       if (event.target.closest("textarea, input")) return;
       const pasted = event.clipboardData.getData("text/plain");
@@ -63,27 +63,27 @@ class Files {
     });
   }
 
-  // Puts the mark where the last error is.
+  // Selects the character of the last error.
   pointAt(text) {
-    if (!this.wrong) return;
-    const before = text.value.split("\n").slice(0, this.wrong.line - 1).reduce((sum, line) => sum + line.length + 1, 0);
+    if (!this.lastError) return;
+    const before = text.value.split("\n").slice(0, this.lastError.line - 1).reduce((sum, line) => sum + line.length + 1, 0);
     text.focus();
-    text.setSelectionRange(before + this.wrong.column - 1, before + this.wrong.column);
+    text.setSelectionRange(before + this.lastError.column - 1, before + this.lastError.column);
   }
 
-  // The file that was given last is the one that stays, however long another takes to be read.
+  // Loads a file. If several files are read at the same time, only the last one is loaded.
   async take(file) {
-    this.taking = file;
+    this.loading = file;
     document.body.setAttribute("aria-busy", "true");
     const text = await file.text().catch(() => null);
-    if (this.taking !== file) return;
+    if (this.loading !== file) return;
     document.body.removeAttribute("aria-busy");
-    if (text === null) this.say(`${file.name}: cannot be read`, true);
+    if (text === null) this.showMessage(`${file.name}: cannot be read`, true);
     else this.read(file.name, text);
   }
 
   read(name, text) {
-    this.wrong = null;
+    this.lastError = null;
     try {
       const map = isConfig(name, text) ? parseConfig(text) : parseMapText(text);
       if (name !== "pasted") this.name = name.replace(/\.[^.]*$/, "") || "map";
@@ -92,20 +92,20 @@ class Files {
       this.onLoad(`${name}: ${what}`);
       return true;
     } catch (error) {
-      if (!(error instanceof Wrong)) throw error;
-      this.wrong = error;
-      this.say(`${name}: ${error.message}`, true);
+      if (!(error instanceof ParseError)) throw error;
+      this.lastError = error;
+      this.showMessage(`${name}: ${error.message}`, true);
       return false;
     }
   }
 
-  // The map as it would be saved, or null after telling why it cannot be.
+  // Returns the map as text or YAML. If that is impossible, shows the reason and returns null.
   write(kind) {
     const { grid } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);
     const reason = unfinished >= 0 ? `agent ${unfinished} has no goal yet` : kind === "txt" ? unfitForText(grid) : null;
     if (reason) {
-      this.say(`not saved: ${reason}`, true);
+      this.showMessage(`not saved: ${reason}`, true);
       return null;
     }
     return kind === "txt" ? formatMapText(grid) : formatConfig(grid, grid.blocks);
@@ -119,12 +119,12 @@ class Files {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
     const isLost = kind === "txt" && hasSettings(this.grid);
-    this.say(`saved ${link.download}${isLost ? "; the settings of the config are in the YAML alone" : ""}`, false);
+    this.showMessage(`saved ${link.download}${isLost ? "; only YAML keeps the other settings of the config" : ""}`, false);
   }
 
-  say(text, isBad) {
+  showMessage(text, isBad) {
     const message = byId("message");
-    tell(message, text);
+    setText(message, text);
     message.classList.toggle("bad", isBad);
   }
 }

@@ -1,6 +1,6 @@
-// The map that is edited, and how to take changes back.
+// The edited map, with undo and redo.
 
-// Older steps are forgotten beyond this. Units: cells kept.
+// Maximum size of the undo history; older states are dropped. Units: cells.
 const LONGEST_MEMORY = 4e7;
 
 class Grid {
@@ -19,7 +19,7 @@ class Grid {
     return { height, width, cells: cells.slice(), agents: structuredClone(agents), blocks };
   }
 
-  // To be called before a change.
+  // Stores the state for undo. Call this before a change.
   remember() {
     this.past.push(this.snapshot());
     this.future = [];
@@ -28,7 +28,7 @@ class Grid {
     this.past.splice(0, first + 1);
   }
 
-  // Takes back what `remember` has kept, as if nothing had been begun.
+  // Restores the last stored state, without redo.
   forget() {
     this.restore(this.past.pop());
   }
@@ -61,14 +61,14 @@ class Grid {
     return this.cells[row * this.width + col];
   }
 
-  // Obstacles do not go onto starts and goals.
+  // Sets a cell, but never places an obstacle on a start or a goal.
   put([row, col], kind) {
     if (!this.contains([row, col])) return;
     if (kind === OBSTACLE && this.agentOn([row, col])) return;
     this.cells[row * this.width + col] = kind;
   }
 
-  // All cells on a straight line, so that a fast stroke has no holes.
+  // Sets all cells on a straight line, so that a fast stroke has no gaps.
   line([fromRow, fromCol], [toRow, toCol], kind) {
     const length = Math.max(Math.abs(toRow - fromRow), Math.abs(toCol - fromCol), 1);
     for (let at = 0; at <= length; at += 1) {
@@ -83,7 +83,7 @@ class Grid {
     }
   }
 
-  // All cells of one kind that hang together with this one.
+  // Fills the connected cells of the same kind.
   fill(from, kind) {
     const old = this.at(from);
     if (old === kind) return;
@@ -99,7 +99,7 @@ class Grid {
     }
   }
 
-  // The agent whose start or goal is on a cell, starts first: { agent, part } or null.
+  // Returns the agent whose start or goal is on a cell, starts first, as { agent, part }, or null.
   agentOn(cell) {
     const isHere = (other) => other !== null && other[0] === cell[0] && other[1] === cell[1];
     for (const part of ["start", "goal"]) {
@@ -115,7 +115,7 @@ class Grid {
     return this.agents.length - 1;
   }
 
-  // Two agents may share a goal, but not a start.
+  // Moves a start or a goal. Two agents may share a goal, but not a start.
   moveAgent(agent, part, cell) {
     const isTaken = (other, index) => index !== agent && String(other.start) === String(cell);
     if (part === "start" && this.agents.some(isTaken)) return;
@@ -127,7 +127,7 @@ class Grid {
     if (this.at(cell) === OBSTACLE) this.put(cell, FREE);
   }
 
-  // Keeps what fits; returns how many agents did not.
+  // Resizes the map, removes agents outside it and returns their number.
   resize(height, width) {
     const cells = new Uint8Array(height * width);
     for (let row = 0; row < Math.min(height, this.height); row += 1) {

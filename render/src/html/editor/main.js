@@ -1,16 +1,16 @@
-// Puts the page together.
+// Connects the parts of the page.
 
-// As many as POGEMA accepts.
+// The longest side that POGEMA accepts. Units: cells.
 const LONGEST_SIDE = 4096;
 
 class Page {
   constructor() {
-    this.isAsked = false;
+    this.isDrawRequested = false;
     this.grid = new Grid((what) => this.changed(what));
     const { grid } = this;
     const canvases = [byId("ground"), byId("actors")];
     watchTheme(() => this.changed("cells"));
-    this.view = new View(byId("stage"), canvases, grid.height, grid.width, () => this.ask());
+    this.view = new View(byId("stage"), canvases, grid.height, grid.width, () => this.requestDraw());
     this.canvas = new Canvas(grid, this.view, ...canvases);
     this.tools = new Tools(grid, this.view, (what) => this.changed(what));
     this.view.listen(this.tools);
@@ -37,7 +37,7 @@ class Page {
     press("zoom-out", () => view.zoom(1 / 1.5));
     press("fit", () => view.fit());
     press("new", () => this.resize((height, width) => this.makeNew(height, width)));
-    press("resize", () => this.resize((height, width) => this.cut(height, width)));
+    press("resize", () => this.resize((height, width) => this.applySize(height, width)));
     byId("tint").addEventListener("change", () => this.changed("done"));
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("beforeunload", (event) => {
@@ -56,7 +56,7 @@ class Page {
     const [height, width] = ["height", "width"].map((id) => Number(byId(id).value));
     const isSide = (side) => Number.isInteger(side) && side >= 1 && side <= LONGEST_SIDE;
     if (!isSide(height) || !isSide(width)) {
-      this.files.say(`rows and columns are whole numbers from 1 to ${LONGEST_SIDE}`, true);
+      this.files.showMessage(`rows and columns must be whole numbers from 1 to ${LONGEST_SIDE}`, true);
       return;
     }
     this.grid.remember();
@@ -66,19 +66,19 @@ class Page {
   makeNew(height, width) {
     Object.assign(this.grid, { height, width, cells: new Uint8Array(height * width), agents: [], blocks: [], numListed: null });
     this.changed("size");
-    this.files.say(`a new map of ${height} × ${width}`, false);
+    this.files.showMessage(`new map of ${height} × ${width}`, false);
   }
 
-  cut(height, width) {
-    const gone = this.grid.resize(height, width);
-    const left = gone > 0 ? `; ${count(gone, "agent")} outside it went` : "";
-    this.files.say(`the map is ${height} × ${width} now${left}`, false);
+  applySize(height, width) {
+    const numRemoved = this.grid.resize(height, width);
+    const removed = numRemoved > 0 ? `; removed ${count(numRemoved, "agent")} outside it` : "";
+    this.files.showMessage(`resized the map to ${height} × ${width}${removed}`, false);
   }
 
   loaded(message) {
     this.tools.chosen = this.tools.cursor = null;
     this.tools.dropUnfinished();
-    this.files.say(message, false);
+    this.files.showMessage(message, false);
   }
 
   key(event) {
@@ -121,10 +121,11 @@ class Page {
   leave() {
     this.tools.dropUnfinished();
     this.tools.cursor = this.tools.chosen = null;
-    this.ask();
+    this.requestDraw();
   }
 
-  // `what` is size, cells, done (cells, and the stroke is over) or nothing (only what is shown).
+  // Updates the page. `what` is "size", "cells", "done" (cells changed and the stroke ended) or undefined (only the
+  // display changed).
   changed(what) {
     if (!this.canvas) return;
     const { grid, view, canvas } = this;
@@ -135,9 +136,9 @@ class Page {
       byId("width").value = grid.width;
       view.fit();
     }
-    // In the middle of a stroke there is no time to look for components.
+    // Finding components is too slow for every move of a stroke.
     if (what && !this.tools.stroke) this.examine();
-    this.ask();
+    this.requestDraw();
   }
 
   examine() {
@@ -146,11 +147,11 @@ class Page {
     canvas.report = report;
     canvas.tints = null;
     if (byId("tint").checked) canvas.tint(report);
-    tell(byId("size"), `${grid.height} rows, ${grid.width} columns`);
-    tell(byId("free"), `${report.free.toLocaleString("en")} of ${grid.cells.length.toLocaleString("en")}`);
-    tell(byId("density"), report.density.toFixed(3));
-    tell(byId("components"), report.number.toLocaleString("en"));
-    tell(byId("num-agents"), String(grid.agents.length));
+    setText(byId("size"), `${grid.height} rows, ${grid.width} columns`);
+    setText(byId("free"), `${report.free.toLocaleString("en")} of ${grid.cells.length.toLocaleString("en")}`);
+    setText(byId("density"), report.density.toFixed(3));
+    setText(byId("components"), report.number.toLocaleString("en"));
+    setText(byId("num-agents"), String(grid.agents.length));
     const shown = report.issues.slice(0, 50).map((issue) => this.issue(issue));
     if (report.issues.length > 50) shown.push(make("li", {}, `and ${report.issues.length - 50} more`));
     byId("issues").replaceChildren(...shown);
@@ -163,16 +164,16 @@ class Page {
     button.addEventListener("click", () => {
       this.tools.chosen = agent;
       this.view.show(...this.grid.agents[agent].start);
-      this.ask();
+      this.requestDraw();
     });
     return make("li", {}, button);
   }
 
-  ask() {
-    if (this.isAsked) return;
-    this.isAsked = true;
+  requestDraw() {
+    if (this.isDrawRequested) return;
+    this.isDrawRequested = true;
     requestAnimationFrame(() => {
-      this.isAsked = false;
+      this.isDrawRequested = false;
       this.draw();
     });
   }
@@ -190,7 +191,7 @@ class Page {
     byId("redo").disabled = grid.future.length === 0;
   }
 
-  // For tests and scripts: everything can be read, nothing changed.
+  // A read-only interface for tests and scripts.
   expose() {
     const { grid, view, canvas } = this;
     window.editor = Object.freeze({

@@ -1,19 +1,19 @@
-// Maps as text, as POGEMA reads them.
+// Map text, with POGEMA's syntax.
 
-// What is wrong with a file, and where; lines and columns are counted from 1.
-class Wrong extends Error {
+// An error in a file, with its position; lines and columns count from 1.
+class ParseError extends Error {
   constructor(line, column, reason) {
     super(`line ${line}, column ${column}: ${reason}`);
     Object.assign(this, { line, column });
   }
 }
 
-// What a cell can be, by the character that stands for it.
+// One character for each kind of cell.
 const MATERIALS = ".#@$!";
 const FREE = 0;
 const OBSTACLE = 1;
 
-// Rows are separated by white space of any kind. `lineAt` and `columnAt` say where the text stands in its file.
+// Parses map text; any whitespace separates rows. `lineAt` and `columnAt` are the position of the text in its file.
 function parseMapText(text, lineAt = 1, columnAt = 1) {
   const rows = [];
   const letters = new Map();
@@ -25,7 +25,7 @@ function parseMapText(text, lineAt = 1, columnAt = 1) {
       [...word[0]].forEach((character, col) => {
         const kind = MATERIALS.indexOf(character);
         if (kind < 0 && !/[a-zA-Z]/.test(character)) {
-          throw new Wrong(...here(col), `unknown character "${character}", expected one of .#@$!, a-z or A-Z`);
+          throw new ParseError(...here(col), `unknown character "${character}", expected one of .#@$!, a-z or A-Z`);
         }
         if (kind < 0) letters.set(character, { cell: [rows.length, col], at: here(col) });
         if (kind > OBSTACLE) pool ??= here(col);
@@ -34,17 +34,17 @@ function parseMapText(text, lineAt = 1, columnAt = 1) {
       const [{ cells: first } = row] = rows;
       if (row.cells.length !== first.length) {
         const at = here(Math.min(row.cells.length, first.length));
-        throw new Wrong(...at, `the row has ${row.cells.length} cells, expected ${first.length} as in the first row`);
+        throw new ParseError(...at, `the row has ${row.cells.length} cells, expected ${first.length} as in the first row`);
       }
       rows.push(row);
     }
   });
-  if (rows.length === 0) throw new Wrong(lineAt, columnAt, "the map has no cell, expected some of .#@$!, a-z and A-Z");
+  if (rows.length === 0) throw new ParseError(lineAt, columnAt, "the map has no cell, expected some of .#@$!, a-z and A-Z");
   const cells = Uint8Array.from(rows.flatMap((row) => row.cells));
   return { height: rows.length, width: rows[0].cells.length, cells, agents: pairLetters(letters, pool) };
 }
 
-// Starts and goals are paired in the order of the alphabet: the first small letter with the first capital.
+// Pairs starts and goals in alphabetical order: the first lower-case letter with the first upper-case letter.
 function pairLetters(letters, pool) {
   const sorted = [...letters].sort(([one], [other]) => (one < other ? -1 : 1));
   const starts = sorted.filter(([letter]) => letter >= "a");
@@ -52,10 +52,10 @@ function pairLetters(letters, pool) {
   if (starts.length !== goals.length) {
     const [, { at }] = (starts.length > goals.length ? starts : goals).at(-1);
     const reason = `the map has ${starts.length} starts (a-z) and ${goals.length} goals (A-Z), expected equal numbers`;
-    throw new Wrong(...at, reason);
+    throw new ParseError(...at, reason);
   }
   if (starts.length > 0 && pool) {
-    throw new Wrong(...pool, "the map has letters and one of @$!, expected exact starts and goals or possible ones");
+    throw new ParseError(...pool, "the map has letters and one of @$!, expected exact starts and goals or possible ones");
   }
   return starts.map(([, { cell }], agent) => ({ start: cell, goal: goals[agent][1].cell, more: [] }));
 }
@@ -65,19 +65,19 @@ function rowsOf({ height, width, cells }) {
   return Array.from({ length: height }, (_, row) => line(row));
 }
 
-// Why a map cannot be written as text, or null.
+// Returns the reason why a map cannot be written as text, or null.
 function unfitForText({ cells, agents }) {
-  if (agents.length > 26) return `text has letters for 26 agents, the map has ${agents.length}; save it as YAML`;
+  if (agents.length > 26) return `text has letters for 26 agents, but the map has ${agents.length}; save it as YAML`;
   if (agents.length === 0) return null;
-  if (agents.some((agent) => agent.more.length > 0)) return "text has one goal for each agent; save it as YAML";
+  if (agents.some((agent) => agent.more.length > 0)) return "text has only one goal for each agent; save it as YAML";
   const taken = new Set();
   for (const [index, { start, goal }] of agents.entries()) {
     for (const cell of [start, goal]) {
-      if (taken.has(String(cell))) return `two letters would stand on ${place(cell)} (agent ${index}); save it as YAML`;
+      if (taken.has(String(cell))) return `text has one letter for each cell, but ${place(cell)} needs two (agent ${index}); save it as YAML`;
       taken.add(String(cell));
     }
   }
-  if (cells.some((kind) => kind > OBSTACLE)) return "text cannot have both agents and @ $ !; save it as YAML";
+  if (cells.some((kind) => kind > OBSTACLE)) return "text cannot contain both agents and @ $ !; save it as YAML";
   return null;
 }
 

@@ -1,4 +1,4 @@
-// What a press on the map does, with a pointer or with the keyboard.
+// The tools of the editor, used by pointer or keyboard.
 
 class Tools {
   constructor(grid, view, onChange) {
@@ -12,7 +12,7 @@ class Tools {
     this.onChange();
   }
 
-  // A rectangle that was begun with the keyboard ends when something else is done.
+  // Cancels a rectangle that was started with the keyboard.
   dropUnfinished() {
     this.anchor = this.box = null;
   }
@@ -44,7 +44,7 @@ class Tools {
     else this.takeAgent(cell);
   }
 
-  // On a start or goal this takes hold of it; elsewhere it gives the unfinished agent its goal, or begins one.
+  // On a start or goal, holds it for dragging. Elsewhere, sets the missing goal of an agent, or else adds an agent.
   takeAgent(cell) {
     const { grid } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);
@@ -73,7 +73,7 @@ class Tools {
     if (String(cell) === String(stroke.last)) return;
     if (this.tool === "brush") grid.line(stroke.last, cell, stroke.kind);
     if (this.tool === "rectangle") this.box = [stroke.from, cell];
-    // From a new agent's start a goal is drawn out.
+    // Dragging from the start of a new agent places its goal.
     if (this.tool === "agents") grid.moveAgent(this.held.agent, this.held.part === "start" ? "start" : "goal", cell);
     stroke.last = cell;
     this.onChange("cells");
@@ -93,7 +93,7 @@ class Tools {
 
   hover(x, y) {
     const cell = this.view.cellAt(x, y);
-    tell(byId("where"), this.grid.contains(cell) ? this.describe(cell) : "");
+    setText(byId("where"), this.grid.contains(cell) ? this.describe(cell) : "");
   }
 
   describe(cell) {
@@ -102,19 +102,19 @@ class Tools {
     return `${place(cell)} ${hit ? `${hit.part} of agent ${hit.agent}` : names[this.grid.at(cell)]}`;
   }
 
-  // The cursor of the keyboard.
+  // Moves the keyboard cursor.
   walk(down, right) {
     const { grid, view } = this;
     if (!this.cursor) this.cursor = this.near(view.stageWidth / 2, view.stageHeight / 2);
     else this.cursor = [clamp(this.cursor[0] + down, 0, grid.height - 1), clamp(this.cursor[1] + right, 0, grid.width - 1)];
     if (this.anchor) this.box = [this.anchor, this.cursor];
     view.show(...this.cursor);
-    tell(byId("where"), this.describe(this.cursor));
-    tell(byId("spoken"), this.describe(this.cursor));
+    setText(byId("where"), this.describe(this.cursor));
+    setText(byId("spoken"), this.describe(this.cursor));
     this.onChange();
   }
 
-  // Does at the cursor what a press does; a rectangle takes two.
+  // Uses the tool at the cursor. A rectangle needs two calls, one for each corner.
   apply(kind = this.kind) {
     if (!this.cursor || this.tool === "pan") return;
     if (this.tool === "rectangle" && !this.anchor) {
@@ -127,7 +127,7 @@ class Tools {
     this.begin(this.cursor, kind);
     if (anchor) this.grid.rectangle(anchor, this.cursor, kind);
     this.dropUnfinished();
-    tell(byId("spoken"), this.describe(this.cursor));
+    setText(byId("spoken"), this.describe(this.cursor));
     this.onChange("done");
   }
 

@@ -1,8 +1,8 @@
-// POGEMA's config as YAML. The page reads the few fields that it edits, and keeps all other lines as they are.
+// POGEMA configs as YAML. The page reads only the fields that it edits, and keeps all other lines unchanged.
 
 const EDITED = ["map", "agents_xy", "targets_xy", "num_agents"];
 
-// The config as blocks: a field of the top level with the lines that belong to it, or lines of no field.
+// Splits a config into blocks: a top-level field with its lines, or other lines, such as comments.
 function splitConfig(text) {
   const blocks = [];
   const seen = new Map();
@@ -10,16 +10,16 @@ function splitConfig(text) {
     const field = /^(?:([A-Za-z_]\w*)|"([^"]*)"|'([^']*)')\s*:(?=\s|$)/.exec(line);
     if (field) {
       const name = field[1] ?? field[2] ?? field[3];
-      if (seen.has(name)) throw new Wrong(index + 1, 1, `"${name}" stands twice`);
+      if (seen.has(name)) throw new ParseError(index + 1, 1, `duplicate key "${name}"`);
       seen.set(name, true);
       blocks.push({ name, line: index + 1, column: field[0].length + 1, lines: [line] });
     } else if (/^(#|---|%|\.\.\.)/.test(line) || blocks.length === 0) {
       if (/^\S/.test(line) && !/^(#|---|%|\.\.\.)/.test(line)) {
-        throw new Wrong(index + 1, 1, "expected a field such as map: or a comment");
+        throw new ParseError(index + 1, 1, "expected a field such as map: or a comment");
       }
       blocks.push({ name: null, line: index + 1, lines: [line] });
     } else if (/^[^\s\-\]}]/.test(line)) {
-      throw new Wrong(index + 1, 1, "expected a field such as map: or a comment");
+      throw new ParseError(index + 1, 1, "expected a field such as map: or a comment");
     } else {
       blocks.at(-1).lines.push(line);
     }
@@ -27,29 +27,29 @@ function splitConfig(text) {
   return blocks;
 }
 
-// Browsers tell the place in words, each in its own.
-function whereInJson(text, message) {
-  const told = /line (\d+) column (\d+)/.exec(message);
-  if (told) return [Number(told[1]), Number(told[2])];
+// Returns [line, column] of a JSON error. The wording of its message depends on the browser.
+function positionInJson(text, message) {
+  const found = /line (\d+) column (\d+)/.exec(message);
+  if (found) return [Number(found[1]), Number(found[2])];
   const lines = text.slice(0, Number(/position (\d+)/.exec(message)?.[1] ?? 0)).split("\n");
   return [lines.length, lines.at(-1).length + 1];
 }
 
-// JSON is read too; its other fields become lines of YAML, which allows JSON as values.
+// Splits a JSON config into blocks. Its other fields become lines of YAML, in which JSON values are valid.
 function blocksOfJson(text) {
   let [object, tooLong] = [null, null];
-  // Scripts count to 2⁵³ exactly, seeds go up to 2⁶³.
-  const look = (name, value) => {
+  // JavaScript numbers are exact up to 2⁵³, but seeds go up to 2⁶³.
+  const findTooLong = (name, value) => {
     if (Number.isInteger(value) && !Number.isSafeInteger(value)) tooLong = name;
     return value;
   };
   try {
-    object = JSON.parse(text, look);
+    object = JSON.parse(text, findTooLong);
   } catch (error) {
-    throw new Wrong(...whereInJson(text, error.message), "a config in braces has to be JSON, and this is none");
+    throw new ParseError(...positionInJson(text, error.message), "invalid JSON, expected a config in braces to be JSON");
   }
   if (tooLong !== null) {
-    throw new Wrong(1, 1, `${tooLong} has too many digits to be kept from JSON, expected this config as YAML`);
+    throw new ParseError(1, 1, `${tooLong} has too many digits to be read exactly from JSON, expected a config in YAML`);
   }
   return Object.entries(object).map(([name, value]) => {
     const isText = name === "map" && typeof value === "string";
@@ -62,18 +62,18 @@ function parseConfig(text) {
   const blocks = /^\s*\{/.test(text) ? blocksOfJson(text) : splitConfig(text);
   const find = (name) => blocks.find((block) => block.name === name && !isNull(block));
   const mapBlock = find("map");
-  if (!mapBlock) throw new Wrong(1, 1, "the config has no map, and this page edits maps");
+  if (!mapBlock) throw new ParseError(1, 1, "the config has no map, expected the field map");
   const map = parseMapBlock(mapBlock);
   const [startsBlock, goalsBlock] = [find("agents_xy"), find("targets_xy")];
   if (map.agents.length > 0 && startsBlock && goalsBlock) {
-    const reason = "starts and goals stand in the map too, expected them in the map or in agents_xy and targets_xy";
-    throw new Wrong(startsBlock.line, 1, reason);
+    const reason = "the map has starts and goals too, expected them in the map or in agents_xy and targets_xy";
+    throw new ParseError(startsBlock.line, 1, reason);
   }
-  // With letters in the map, POGEMA lets the map win over a single list.
+  // If the map has letters, POGEMA ignores a single list.
   if (map.agents.length > 0) return { ...map, blocks };
   if (Boolean(startsBlock) !== Boolean(goalsBlock)) {
     const [given, missing] = startsBlock ? [startsBlock, "targets_xy"] : [goalsBlock, "agents_xy"];
-    throw new Wrong(given.line, 1, `${given.name} stands without ${missing}, and this page edits pairs`);
+    throw new ParseError(given.line, 1, `found ${given.name} without ${missing}, expected both`);
   }
   const agents = startsBlock ? pairLists(map, startsBlock, goalsBlock) : [];
   return { ...map, agents, blocks, numListed: agents.length };
@@ -90,7 +90,7 @@ function parseMapBlock(block) {
   const text = plainText(value);
   if (text !== null) return parseMapText(text, block.line, block.column + block.lines[0].slice(block.column - 1).indexOf(value));
   if (/^[^[\s#&*!|>%@`{]/.test(value)) {
-    // The name of the field made blank, so that columns are those of the file.
+    // Blank the name of the field, so that columns are those of the file.
     const blank = " ".repeat(block.column - 1) + block.lines[0].slice(block.column - 1);
     return parseMapText([blank, ...block.lines.slice(1)].join("\n"), block.line, 1);
   }
@@ -98,12 +98,12 @@ function parseMapBlock(block) {
   const isRow = (row) => Array.isArray(row) && row.length === rows[0].length && row.every((cell) => cell === 0 || cell === 1);
   const bad = rows.findIndex((row) => !isRow(row));
   if (rows.length === 0 || bad >= 0 || rows[0].length === 0) {
-    throw new Wrong(block.line, block.column + 1, `row ${Math.max(bad, 0)} of the map is no row of 0 and 1 as long as the first`);
+    throw new ParseError(block.line, block.column + 1, `row ${Math.max(bad, 0)} of the map is invalid, expected 0 and 1, as many as in the first row`);
   }
   return { height: rows.length, width: rows[0].length, cells: Uint8Array.from(rows.flat()), agents: [] };
 }
 
-// What stands between quotes on one line, or null.
+// Returns the text between quotes on one line, or null.
 function plainText(value) {
   if (/^'[^']*'$/.test(value)) return value.slice(1, -1);
   if (!/^".*"$/.test(value)) return null;
@@ -114,7 +114,7 @@ function plainText(value) {
   }
 }
 
-// A list in brackets, or one with a dash before each item in brackets; comments count for nothing.
+// Parses a list in brackets, or a list with a dash before each item in brackets; ignores comments.
 function parseList(block, expected) {
   const lines = [valueOf(block), ...block.lines.slice(1)].map((line) => line.replace(/(^|\s)#.*$/, ""));
   const items = lines.slice(1).filter((line) => line.trim() !== "");
@@ -124,9 +124,9 @@ function parseList(block, expected) {
     const list = JSON.parse(text.replace(/,\s*\]/g, "]"));
     if (Array.isArray(list)) return list;
   } catch {
-    // Told below, with the place.
+    // Reported below, with its position.
   }
-  throw new Wrong(block.line, block.column + 1, `${block.name} cannot be read, expected ${expected}`);
+  throw new ParseError(block.line, block.column + 1, `${block.name} cannot be read, expected ${expected}`);
 }
 
 function pairLists(map, startsBlock, goalsBlock) {
@@ -134,17 +134,17 @@ function pairLists(map, startsBlock, goalsBlock) {
   const check = (block, cell) => {
     if (!isCell(cell)) {
       const reason = `${block.name} has ${JSON.stringify(cell)}, expected [row, col]`;
-      throw new Wrong(block.line, block.column + 1, reason);
+      throw new ParseError(block.line, block.column + 1, reason);
     }
     if (cell[0] < map.height && cell[1] < map.width) return cell;
     const reason = `${block.name} has ${place(cell)}, which is outside the map of ${map.height} rows and ${map.width} columns`;
-    throw new Wrong(block.line, block.column + 1, reason);
+    throw new ParseError(block.line, block.column + 1, reason);
   };
   const starts = parseList(startsBlock, "a list of [row, col]").map((cell) => check(startsBlock, cell));
   const goals = parseList(goalsBlock, "a list of [row, col]");
   if (starts.length !== goals.length) {
-    const reason = `agents_xy has ${starts.length} cells and targets_xy ${goals.length}, expected as many`;
-    throw new Wrong(goalsBlock.line, goalsBlock.column + 1, reason);
+    const reason = `agents_xy has ${starts.length} cells and targets_xy has ${goals.length}, expected equal numbers`;
+    throw new ParseError(goalsBlock.line, goalsBlock.column + 1, reason);
   }
   return starts.map((start, agent) => {
     const isSequence = Array.isArray(goals[agent]?.[0]);
@@ -155,7 +155,7 @@ function pairLists(map, startsBlock, goalsBlock) {
 
 const listOf = (cells) => `[${cells.map(([row, col]) => `[${row}, ${col}]`).join(", ")}]`;
 
-// The lines of a field that the page edits, or none.
+// Returns the lines of an edited field, possibly none.
 function linesOf(name, map, hadCount) {
   const { agents } = map;
   if (name === "map") return ["map: |-", ...rowsOf(map).map((row) => `  ${row.join("")}`)];
@@ -172,7 +172,8 @@ function formatConfig(map, blocks) {
   const lines = blocks.flatMap((block) => {
     if (!EDITED.includes(block.name)) return block.lines;
     written.add(block.name);
-    // Without agents, their number is for others to place; of a longer list it takes the first so many.
+    // Keep num_agents if the page has not changed the number of agents: without listed agents, POGEMA places that many;
+    // otherwise it takes that many from a longer list.
     const isUntouched = map.agents.length === 0 || map.agents.length === map.numListed;
     if (block.name === "num_agents" && isUntouched) return block.lines;
     return linesOf(block.name, map, true);

@@ -1,4 +1,4 @@
-// The episode, unpacked once into typed arrays. `pack.rs` says what the bytes are.
+// The episode, unpacked once into typed arrays. `pack.rs` defines the bytes.
 
 async function unpack(header) {
   const packed = Uint8Array.from(atob(header.data), (letter) => letter.charCodeAt(0));
@@ -11,7 +11,7 @@ const ACTIONS = ["stay", "up", "down", "left", "right"];
 const ACTIVE = 1;
 const ON_GOAL = 2;
 
-// Everything by step, then by agent: what belongs to a step is at `step * numAgents + agent`.
+// Arrays are ordered by step, then by agent: the index is `step * numAgents + agent`.
 class Film {
   constructor(header, buffer) {
     Object.assign(this, { height: header.height, width: header.width, config: header.config });
@@ -19,7 +19,7 @@ class Film {
     this.reasons = header.reasons;
     const [agents, all] = [this.numAgents, this.numAgents * this.numSteps];
     let at = 0;
-    // Copies, because the parts begin anywhere and numbers of several bytes may not.
+    // Copy each part, because typed arrays of multi-byte numbers need aligned offsets, and the parts are not aligned.
     const take = (length, Kind = Uint8Array) => {
       const begin = at;
       at += length * Kind.BYTES_PER_ELEMENT;
@@ -28,8 +28,8 @@ class Film {
     const bits = take(Math.ceil((this.height * this.width) / 8));
     const unpacked = (packed, length) => new Uint8Array(length).map((_, index) => (packed[index >> 3] >> (index & 7)) & 1);
     this.isObstacle = unpacked(bits, this.height * this.width);
-    const numBeyond = (this.height + 2 * this.config.radius) * (this.width + 2 * this.config.radius);
-    this.noise = header.has_noise ? unpacked(take(Math.ceil(numBeyond / 8)), numBeyond) : null;
+    const numNoise = (this.height + 2 * this.config.radius) * (this.width + 2 * this.config.radius);
+    this.noise = header.has_noise ? unpacked(take(Math.ceil(numNoise / 8)), numNoise) : null;
     const starts = take(4 * agents, Uint16Array);
     const flags = take(agents);
     const moves = take(all);
@@ -43,7 +43,7 @@ class Film {
     this.readGoals(starts, new DataView(goals.buffer), header.num_goals);
     this.readReverted(reverted, others);
     this.readMarks(new DataView(marks.buffer), header.num_marks);
-    this.sumUp();
+    this.addTotals();
   }
 
   readStates(starts, flags, moves) {
@@ -92,7 +92,7 @@ class Film {
     }
   }
 
-  // The packed list has one entry for each move that led nowhere, in the same order.
+  // The packed list has one entry for each reverted move, in the same order.
   readReverted(reverted, others) {
     const { numAgents, numSteps } = this;
     this.reasonAt = new Uint8Array(numAgents * (numSteps + 1));
@@ -119,8 +119,8 @@ class Film {
     }
   }
 
-  // Totals for the list of agents and the strip of steps.
-  sumUp() {
+  // Adds up the totals for the list of agents and the strip of steps.
+  addTotals() {
     const { numAgents, numSteps } = this;
     this.agentReverted = new Uint32Array(numAgents);
     this.agentRewards = new Float64Array(numAgents);
@@ -133,14 +133,14 @@ class Film {
           this.agentReverted[agent] += 1;
           this.stepReverted[step] += 1;
         }
-        // Under `nothing` agents stand on their goals for long; what counts is that they came there.
-        const came = this.config.on_goal === "restart" || !(this.flags[index - numAgents] & ON_GOAL);
-        if (this.flags[index] & ON_GOAL && came) this.stepOnGoal[step] += 1;
+        // Unless goals restart, count only arrivals: under `nothing`, agents may stay on their goals for many steps.
+        const arrived = this.config.on_goal === "restart" || !(this.flags[index - numAgents] & ON_GOAL);
+        if (this.flags[index] & ON_GOAL && arrived) this.stepOnGoal[step] += 1;
       }
     }
   }
 
-  // The state of one agent after a step, and what the step was to it.
+  // Returns the state of one agent after a step, with its action, reward and reverted move in that step.
   agent(step, agent) {
     const index = step * this.numAgents + agent;
     const goal = step * this.goalStride + agent;
@@ -179,15 +179,15 @@ class Film {
     return all;
   }
 
-  // Which cells the occupancy grid marks; made anew only for another step.
+  // Returns the marks of the occupancy grid; keeps them until the step changes.
   marks(step) {
-    if (this.marksOf?.step === step) return this.marksOf.marks;
+    if (this.markCache?.step === step) return this.markCache.marks;
     const marks = new Uint8Array(this.height * this.width);
     for (let agent = 0, index = step * this.numAgents; agent < this.numAgents; agent += 1, index += 1) {
       if (this.flags[index] & ACTIVE) marks[this.rows[index] * this.width + this.cols[index]] = 1;
     }
     for (const cell of this.markAt.get(step) ?? []) marks[cell] ^= 1;
-    this.marksOf = { step, marks };
+    this.markCache = { step, marks };
     return marks;
   }
 
@@ -195,7 +195,7 @@ class Film {
     return Boolean(this.marks(step)[row * this.width + col]);
   }
 
-  // What an agent observes: three windows of zeros and ones, as lists of rows.
+  // Returns the observation of an agent: three windows of zeros and ones, as lists of rows.
   observe(step, agent) {
     const radius = this.config.radius;
     const side = 2 * radius + 1;
@@ -208,7 +208,7 @@ class Film {
       for (let right = 0; right < side; right += 1) {
         const [row, col] = [cell[0] - radius + down, cell[1] - radius + right];
         const isInside = row >= 0 && col >= 0 && row < this.height && col < this.width;
-        rows.obstacles[right] = isInside ? this.isObstacle[row * this.width + col] : this.isWall(row, col);
+        rows.obstacles[right] = isInside ? this.isObstacle[row * this.width + col] : this.isBorderObstacle(row, col);
         rows.agents[right] = isInside ? marks[row * this.width + col] : 0;
       }
       if (down === goalAt[0]) rows.goal[goalAt[1]] = 1;
@@ -217,8 +217,8 @@ class Film {
     return channels;
   }
 
-  // The ring of obstacles around the map, and what lies beyond it: nothing, or noise.
-  isWall(row, col) {
+  // Returns 1 for the wall around the map and for noise outside it, and 0 for other cells.
+  isBorderObstacle(row, col) {
     if (row >= -1 && col >= -1 && row <= this.height && col <= this.width) return 1;
     const radius = this.config.radius;
     return this.noise?.[(row + radius) * (this.width + 2 * radius) + col + radius] ?? 0;

@@ -1,4 +1,4 @@
-// Puts the page together.
+// Connects the parts of the page.
 
 async function start() {
   const header = JSON.parse(byId("data").textContent);
@@ -23,24 +23,24 @@ class Page {
     this.timeline = new Timeline(film, byId("scrub"), byId("strip"));
     this.view.listen({ click: (x, y) => this.select(this.scene.agentAt(x, y)) });
     this.help = wireHelp();
-    this.tellFilm();
+    this.showFacts();
     this.wire();
     addEventListener("keydown", (event) => this.key(event));
-    addEventListener("hashchange", () => this.follow());
-    this.follow();
+    addEventListener("hashchange", () => this.readAddress());
+    this.readAddress();
     this.expose();
     this.redraw();
     document.body.classList.add("ready");
   }
 
-  tellFilm() {
+  showFacts() {
     const { film } = this;
     const { collision, on_goal, radius } = film.config;
     const size = `${film.height} × ${film.width}`;
     const facts = [size, count(film.numAgents, "agent"), count(film.numSteps, "step"), collision, on_goal, `radius ${radius}`];
-    tell(byId("facts"), facts.join(" · "));
+    setText(byId("facts"), facts.join(" · "));
     const figures = Object.entries(film.metrics).map(([name, value]) => `${name} ${number(value)}`);
-    tell(byId("metrics"), figures.join(" · "));
+    setText(byId("metrics"), figures.join(" · "));
   }
 
   wire() {
@@ -82,10 +82,10 @@ class Page {
       f: () => view.fit(),
       g: () => tick("goals"),
       n: () => tick("numbers"),
-      "[": () => this.turn(-1),
-      "]": () => this.turn(1),
-      ",": () => this.turnSpeed(-1),
-      ".": () => this.turnSpeed(1),
+      "[": () => this.cycleAgent(-1),
+      "]": () => this.cycleAgent(1),
+      ",": () => this.changeSpeed(-1),
+      ".": () => this.changeSpeed(1),
       "/": () => byId("search").focus(),
       "?": () => this.help.toggle(),
       Escape: () => this.select(null),
@@ -97,10 +97,10 @@ class Page {
 
   toggle() {
     this.player.toggle();
-    this.tellPlaying();
+    this.updatePlayButton();
   }
 
-  tellPlaying() {
+  updatePlayButton() {
     const { isPlaying } = this.player;
     byId("play").setAttribute("aria-label", isPlaying ? "pause" : "play");
     byId("play").classList.toggle("playing", isPlaying);
@@ -110,13 +110,13 @@ class Page {
     this.player.jump(step);
   }
 
-  turn(by) {
+  cycleAgent(by) {
     const { numAgents } = this.film;
     const from = this.chosen ?? (by > 0 ? -1 : 0);
     this.select((from + by + numAgents) % numAgents);
   }
 
-  turnSpeed(by) {
+  changeSpeed(by) {
     const speed = byId("speed");
     speed.selectedIndex = clamp(speed.selectedIndex + by, 0, speed.options.length - 1);
     this.player.speed = Number(speed.value);
@@ -126,28 +126,28 @@ class Page {
     this.chosen = agent;
     this.panel.select(agent);
     if (agent !== null) this.view.show(...this.film.agent(this.player.step, agent).cell);
-    this.player.ask();
-    this.note();
+    this.player.requestDraw();
+    this.updateAddress();
   }
 
   stopped() {
-    this.tellPlaying();
-    this.note();
-    tell(byId("spoken"), `step ${this.player.step} of ${this.film.numSteps}`);
+    this.updatePlayButton();
+    this.updateAddress();
+    setText(byId("spoken"), `step ${this.player.step} of ${this.film.numSteps}`);
   }
 
-  // Writes the moment into the address, so that it can be sent to somebody.
-  note() {
+  // Writes the step and the agent into the address, so that readers can share it.
+  updateAddress() {
     const agent = this.chosen === null ? "" : `&agent=${this.chosen}`;
     const hash = `#step=${this.player.step}${agent}`;
     if (hash !== location.hash) history.replaceState(null, "", hash);
   }
 
-  // Goes where the address says; what is no number of a step or an agent is left as it is.
-  follow() {
-    const wanted = new URLSearchParams(location.hash.slice(1));
+  // Shows the step and the agent of the address; ignores invalid numbers.
+  readAddress() {
+    const fields = new URLSearchParams(location.hash.slice(1));
     const read = (name, most) => {
-      const text = wanted.get(name) ?? "";
+      const text = fields.get(name) ?? "";
       return /^\d{1,9}$/.test(text) && Number(text) <= most ? Number(text) : null;
     };
     const step = read("step", this.film.numSteps);
@@ -159,7 +159,7 @@ class Page {
   redraw() {
     this.isGroundOld = true;
     this.timeline?.drawStrip();
-    this.player.ask();
+    this.player.requestDraw();
   }
 
   draw(time) {
@@ -171,7 +171,7 @@ class Page {
     this.timeline.draw(this.player.step);
   }
 
-  // For tests and scripts: everything can be read, nothing changed.
+  // A read-only interface for tests and scripts.
   expose() {
     const { film, player, view } = this;
     const page = this;
@@ -187,7 +187,7 @@ class Page {
       state: (step, agent) => film.agent(step, agent),
       observe: (step, agent) => film.observe(step, agent),
       marks: (step) => film.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
-      // Where a cell is on the stage. Units: pixels.
+      // The centre of a cell on the stage. Units: pixels.
       center: (row, col) => view.center(row, col),
     });
   }
@@ -196,5 +196,5 @@ class Page {
 start().catch((error) => {
   const reason = error instanceof Error ? error.message : String(error);
   byId("broken").hidden = false;
-  tell(byId("broken"), `This episode cannot be shown: ${reason}`);
+  setText(byId("broken"), `This episode cannot be shown: ${reason}`);
 });

@@ -1,31 +1,31 @@
-// The list of agents, and all there is to tell about the chosen one.
+// The list of agents and the details of the selected agent.
 
 const WHY = {
   "move/actions": "an agent that aims at an obstacle or the wall stays",
   "collide/priority": "the cell was occupied",
   "collide/priority/contest": "a lower index got the cell",
   "collide/priority/follow": "a higher index had not left the cell yet",
-  "collide/priority/swap": "a swap, or a ring of agents",
-  "collide/block-both": "the cell was occupied or wanted by two",
-  "collide/block-both/contest": "another agent wanted the cell too",
+  "collide/priority/swap": "a swap or a ring of agents",
+  "collide/block-both": "the cell was occupied or requested by two agents",
+  "collide/block-both/contest": "another agent requested the same cell",
   "collide/block-both/occupied": "the cell held an agent before the step",
   "collide/soft": "the move was not possible",
   "collide/soft/stay": "an agent that aims at an obstacle or the wall stays",
-  "collide/soft/swap": "the two wanted each other's cells",
+  "collide/soft/swap": "the two agents requested each other's cells",
   "collide/soft/contest": "a lower index got the cell",
   "collide/soft/chain": "the agent ahead stayed",
 };
 
 const number = (value) => String(Math.round(value * 1000) / 1000);
 
-function inTheWay({ cause, cell, other }) {
+function describeCause({ cause, cell, other }) {
   if (cause === "agent") return `agent ${other}`;
-  if (cause === "unknown") return "no known reason";
+  if (cause === "unknown") return "unknown cause";
   return cause === "wall" ? "the wall" : `obstacle ${place(cell)}`;
 }
 
 class Panel {
-  // `choose(agent)` and `jump(step)` are called when something is picked.
+  // `choose(agent)` and `jump(step)` are called when an agent or a reverted move is selected.
   constructor(film, choose, jump) {
     Object.assign(this, { film, jump, choose, chosen: null, reverted: [], shown: "" });
     this.order = Array.from({ length: film.numAgents }, (_, agent) => agent);
@@ -46,17 +46,17 @@ class Panel {
     this.search();
   }
 
-  // Agents whose number begins with what is asked for, the number itself first.
+  // Lists the agents whose number starts with the searched digits, in the selected order.
   search() {
     const { film } = this;
-    const wanted = byId("search").value.trim();
+    const digits = byId("search").value.trim();
     const totals = { reverted: film.agentReverted, rewards: film.agentRewards }[byId("order").value];
     this.order = [];
     for (let agent = 0; agent < film.numAgents; agent += 1) {
-      if (String(agent).startsWith(wanted)) this.order.push(agent);
+      if (String(agent).startsWith(digits)) this.order.push(agent);
     }
     if (totals) this.order.sort((one, other) => totals[other] - totals[one] || one - other);
-    tell(byId("found"), this.order.length > 0 ? "" : `no agent ${wanted}; they are 0 to ${film.numAgents - 1}`);
+    setText(byId("found"), this.order.length > 0 ? "" : `no agent ${digits}, expected 0 to ${film.numAgents - 1}`);
     this.agents.set(this.order.length, this.order.indexOf(this.chosen));
   }
 
@@ -64,7 +64,7 @@ class Panel {
     const agent = this.order[index];
     const dot = make("span", { className: "dot" });
     dot.style.background = colorOf(agent);
-    const numbers = `${number(this.film.agentRewards[agent])} rewarded, ${this.film.agentReverted[agent]} reverted`;
+    const numbers = `reward ${number(this.film.agentRewards[agent])}, ${this.film.agentReverted[agent]} reverted`;
     row.append(dot, make("b", {}, `agent ${agent}`), make("span", { className: "soft" }, numbers));
   }
 
@@ -73,7 +73,7 @@ class Panel {
     row.title = WHY[move.rule] ?? "";
     row.append(
       make("b", {}, String(move.step)), make("span", {}, move.action), make("code", {}, move.rule),
-      make("span", { className: "soft" }, inTheWay(move)),
+      make("span", { className: "soft" }, describeCause(move)),
     );
   }
 
@@ -81,36 +81,36 @@ class Panel {
     this.chosen = agent;
     this.shown = "";
     this.agents.pick(this.order.indexOf(agent));
-    byId("nobody").hidden = agent !== null;
+    byId("no-agent").hidden = agent !== null;
     byId("agent").hidden = agent === null;
     if (agent === null) return;
     byId("agent-dot").style.background = colorOf(agent);
-    tell(byId("agent-name"), `Agent ${agent}`);
+    setText(byId("agent-name"), `Agent ${agent}`);
     this.reverted = this.film.revertedOf(agent);
-    tell(byId("moves-title"), count(this.reverted.length, "reverted move"));
+    setText(byId("moves-title"), count(this.reverted.length, "reverted move"));
     byId("moves").hidden = this.reverted.length === 0;
     this.moves.set(this.reverted.length, -1);
   }
 
-  // Called at every frame, and does something only for another step or agent.
+  // Called at every frame; draws only if the step or the agent has changed.
   draw(step) {
     const shown = `${step} ${this.chosen} ${theme.ground}`;
     if (this.chosen === null || shown === this.shown) return;
     this.shown = shown;
     const state = this.film.agent(step, this.chosen);
-    const standing = !state.isActive ? "finished" : state.isOnGoal ? "on its goal" : "on its way";
-    tell(byId("agent-standing"), state.isActive && !state.isMarked ? `${standing}, vanished` : standing);
-    tell(byId("agent-cell"), place(state.cell));
-    tell(byId("agent-goal"), place(state.goal));
-    tell(byId("agent-action"), state.action ?? "none yet");
-    tell(byId("agent-reward"), `${number(state.reward)} now, ${number(state.total)} so far`);
+    const status = !state.isActive ? "finished" : state.isOnGoal ? "on its goal" : "on its way";
+    setText(byId("agent-status"), state.isActive && !state.isMarked ? `${status}, vanished` : status);
+    setText(byId("agent-cell"), place(state.cell));
+    setText(byId("agent-goal"), place(state.goal));
+    setText(byId("agent-action"), state.action ?? "none yet");
+    setText(byId("agent-reward"), `${number(state.reward)} now, ${number(state.total)} so far`);
     const ends = [state.isTerminated && "terminated", state.isTruncated && "truncated"].filter(Boolean);
-    tell(byId("agent-end"), ends.join(", ") || "no");
+    setText(byId("agent-end"), ends.join(", ") || "no");
     const { reverted } = state;
     byId("why").hidden = !reverted;
     if (reverted) {
-      tell(byId("why-rule"), reverted.rule);
-      tell(byId("why-text"), `${WHY[reverted.rule] ?? ""}: ${inTheWay(reverted)}`);
+      setText(byId("why-rule"), reverted.rule);
+      setText(byId("why-text"), `${WHY[reverted.rule] ?? ""}: ${describeCause(reverted)}`);
     }
     this.moves.pick(this.reverted.findIndex((move) => move.step === step));
     this.drawWindows(step);
@@ -120,7 +120,7 @@ class Panel {
     for (const [name, rows] of Object.entries(this.film.observe(step, this.chosen))) {
       const canvas = byId(`channel-${name}`);
       const side = rows.length;
-      // As many pixels as the screen has, so that all lines between cells are equally sharp.
+      // One canvas pixel per screen pixel, so that all lines between cells are equally sharp.
       const across = Math.round((canvas.clientWidth || 96) * (devicePixelRatio || 1));
       canvas.width = canvas.height = across;
       const edge = (index) => Math.round((index * across) / side);

@@ -1,12 +1,12 @@
-// Time: what step is shown, and how it goes on.
+// The playback: the current time, playing and pausing.
 
 class Player {
-  // `onFrame(time)` draws; it is called only when something has changed.
+  // `onFrame(time)` draws a frame and is called only after a change; `onStop()` is called when playback stops.
   constructor(numSteps, onFrame, onStop) {
     Object.assign(this, { numSteps, onFrame, onStop, time: 0, speed: 4, isPlaying: false, isSmooth: true });
     this.drawTimes = new Float64Array(600);
     this.numDraws = 0;
-    this.isAsked = false;
+    this.isDrawRequested = false;
   }
 
   get step() {
@@ -18,14 +18,14 @@ class Player {
     if (this.step >= this.numSteps) this.time = 0;
     this.isPlaying = true;
     this.last = performance.now();
-    this.ask();
+    this.requestDraw();
   }
 
   pause() {
     if (!this.isPlaying) return;
     this.isPlaying = false;
     this.time = this.step;
-    this.ask();
+    this.requestDraw();
     this.onStop();
   }
 
@@ -34,10 +34,10 @@ class Player {
     else this.play();
   }
 
-  // Goes to a step. Playing goes on from there.
+  // Moves to a step. Playback continues from there.
   jump(step) {
     this.time = clamp(Math.round(step), 0, this.numSteps);
-    this.ask();
+    this.requestDraw();
     if (!this.isPlaying) this.onStop();
   }
 
@@ -46,25 +46,25 @@ class Player {
     this.jump(this.step + steps);
   }
 
-  // Asks for one frame, however often it is called before it comes.
-  ask() {
-    if (this.isAsked) return;
-    this.isAsked = true;
+  // Requests one frame; further calls before that frame have no effect.
+  requestDraw() {
+    if (this.isDrawRequested) return;
+    this.isDrawRequested = true;
     requestAnimationFrame((now) => this.frame(now));
   }
 
   frame(now) {
-    this.isAsked = false;
+    this.isDrawRequested = false;
     if (this.isPlaying) this.advance(now);
     const begin = performance.now();
     this.onFrame(this.isSmooth ? this.time : this.step);
     this.drawTimes[this.numDraws % this.drawTimes.length] = performance.now() - begin;
     this.numDraws += 1;
-    if (this.isPlaying) this.ask();
+    if (this.isPlaying) this.requestDraw();
   }
 
   advance(now) {
-    // A tab in the background gets no frames; it goes on where it was.
+    // A tab in the background gets no frames. Limit the time that passed, so that playback continues where it was.
     const passed = clamp(now - this.last, 0, 250);
     this.last = now;
     this.time += (passed / 1000) * this.speed;
@@ -74,7 +74,7 @@ class Player {
     this.onStop();
   }
 
-  // Units: milliseconds, over the last frames.
+  // Returns the median drawing time of the last frames. Units: milliseconds.
   medianDraw() {
     const times = this.drawTimes.slice(0, this.numDraws).sort();
     return times.length > 0 ? times[times.length >> 1] : 0;

@@ -1,4 +1,4 @@
-// Draws one moment of the episode. Coordinates are (x, y) in cells, the corner of the map being (0, 0).
+// Draws the episode at one time. Coordinates are (x, y) in cells, with the corner of the map as (0, 0).
 
 const LABELS_FROM = 20;
 
@@ -22,7 +22,7 @@ class Scene {
     paintMap(view.begin(this.ground), view, film.isObstacle, bitmap);
   }
 
-  // `time` is a step and how far the next one has come.
+  // The integer part of `time` is a step, and its fraction the progress of the next step.
   drawActors(time, agent, options) {
     const context = this.view.begin(this.actors);
     const step = Math.min(Math.floor(time), this.film.numSteps);
@@ -36,7 +36,7 @@ class Scene {
     if (agent !== null) this.drawChosen(context, step, agent);
   }
 
-  // Where every agent is drawn, and how large: 0 for those out of sight or out of the episode.
+  // Computes the position and the size of every agent; the size of invisible and finished agents is 0.
   place(step, part) {
     const { film, xs, ys, sizes } = this;
     const [top, bottom, left, right] = this.view.seen();
@@ -62,7 +62,7 @@ class Scene {
   }
 
   drawAgents(context, isCoarse) {
-    // From afar agents are drawn larger than they are, so that none is lost.
+    // Draw agents larger at small scales, so that all remain visible.
     const least = 1.6 / this.view.scale;
     this.teams.forEach((team, color) => {
       context.fillStyle = PALETTE[color];
@@ -119,7 +119,7 @@ class Scene {
     context.strokeRect(x - radius, y - radius, 2 * radius, 2 * radius);
   }
 
-  // The way so far in full, the way to come in dots.
+  // Draws the path so far as a line and the future path as dots.
   drawPath(context, step, agent) {
     const { film, view } = this;
     const width = Math.max(0.12, 1.5 / view.scale);
@@ -168,12 +168,12 @@ class Scene {
     ring(this.xs[agent], this.ys[agent], theme.text, 0.47, state.isActive ? [] : [0.15, 0.1]);
     if (!state.reverted) return;
     const { cell, other } = state.reverted;
-    // The one in the way, or the cell.
+    // Mark the blocking agent, or else the blocking cell.
     if (other === null) ring(cell[1] + 0.5, cell[0] + 0.5, theme.bad, 0.47, []);
     else ring(this.xs[other], this.ys[other], theme.bad, 0.47, []);
   }
 
-  // The agent nearest to a point, if one is near enough to be meant.
+  // Returns the agent nearest to a point, or null if none is near enough for a click.
   agentAt(x, y) {
     const { view, film } = this;
     const [column, row] = [(x - view.left) / view.scale, (y - view.top) / view.scale];

@@ -1,4 +1,4 @@
-// The strip of steps: how many agents came to their goals, how many moves were reverted, and where we are.
+// The strip of steps: the number of agents that reached their goals, the number of reverted moves, and the current step.
 
 class Timeline {
   constructor(film, scrub, strip) {
@@ -7,7 +7,7 @@ class Timeline {
     new ResizeObserver(() => this.drawStrip()).observe(strip);
   }
 
-  // Steps share bars where there are more of them than pixels.
+  // A bar is at least two pixels wide, so several steps may share one.
   drawStrip() {
     const { film, strip } = this;
     const ratio = devicePixelRatio || 1;
@@ -44,6 +44,6 @@ class Timeline {
     const { film, scrub } = this;
     if (Number(scrub.value) !== step) scrub.value = step;
     scrub.setAttribute("aria-valuetext", `step ${step} of ${film.numSteps}`);
-    tell(byId("step"), `step ${step} / ${film.numSteps}`);
+    setText(byId("step"), `step ${step} / ${film.numSteps}`);
   }
 }

@@ -1,8 +1,8 @@
-// Small helpers for the document.
+// Helpers for the document.
 
 const byId = (id) => document.getElementById(id);
 
-// An element with properties and children; texts become text nodes, so nothing is ever read as HTML.
+// Makes an element with properties and children. Strings become text nodes, so they are never parsed as HTML.
 function make(name, properties = {}, ...children) {
   const element = document.createElement(name);
   for (const [key, value] of Object.entries(properties)) {
@@ -13,8 +13,8 @@ function make(name, properties = {}, ...children) {
   return element;
 }
 
-// Writes a text only where it differs: playing would otherwise lay out the page at every frame.
-function tell(element, text) {
+// Sets a text only if it differs, because every change lays out the page again.
+function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
@@ -22,10 +22,10 @@ const clamp = (number, least, most) => Math.min(Math.max(number, least), most);
 
 const count = (number, one, many = `${one}s`) => `${number.toLocaleString("en")} ${number === 1 ? one : many}`;
 
-// A cell as it is written everywhere, row first.
+// Formats a cell, row first.
 const place = ([row, col]) => `(${row}, ${col})`;
 
-// Whether a key belongs to the element that has the focus, and is no command to the page.
+// Returns whether a key is input to the focused element and not a command of the page.
 function isTyping(event) {
   const target = event.target;
   if (event.ctrlKey || event.metaKey || event.altKey) return true;
@@ -33,11 +33,11 @@ function isTyping(event) {
   return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
 
-// Space and enter press the button that has the focus.
+// Returns whether a key presses the focused button, as space and enter do.
 const isPressing = (event) =>
   (event.key === " " || event.key === "Enter") && event.target.matches("button, a, summary, input[type=checkbox]");
 
-// Opens and closes the help, which is a dialog, so that escape closes it and the focus comes back.
+// Connects the help. It is a dialog, so that escape closes it and restores the focus.
 function wireHelp() {
   const dialog = byId("help");
   byId("help-open").addEventListener("click", () => dialog.showModal());

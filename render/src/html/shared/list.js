@@ -1,7 +1,7 @@
-// A list of any length, of which only the rows in sight are in the document.
+// A list of any length that keeps only its visible rows in the document.
 
 class LongList {
-  // `fill(button, index)` writes one row; `choose(index)` is called when one is picked.
+  // `fill(row, index)` writes one row; `choose(index)` is called when a row is selected.
   constructor(box, label, fill, choose) {
     Object.assign(this, { box, fill, choose, length: 0, chosen: -1 });
     this.rowHeight = 30;
@@ -11,7 +11,7 @@ class LongList {
     box.tabIndex = 0;
     box.append(this.spacer);
     box.addEventListener("scroll", () => this.draw());
-    // By place and not by row, since a row may be made anew between press and release.
+    // By position and not by row element, because a row may be replaced between press and release.
     box.addEventListener("click", (event) => {
       const index = Math.floor((event.clientY - this.spacer.getBoundingClientRect().top) / this.rowHeight);
       if (index >= 0 && index < this.length) choose(index);
@@ -26,7 +26,7 @@ class LongList {
     this.pick(chosen);
   }
 
-  // Marks a row and brings it into sight.
+  // Selects a row and scrolls to it.
   pick(chosen) {
     this.chosen = chosen;
     const { box, rowHeight } = this;
@@ -60,10 +60,10 @@ class LongList {
 
   key(event) {
     const page = Math.max(1, Math.floor(this.box.clientHeight / this.rowHeight) - 1);
-    const ways = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page };
-    if (!(event.key in ways) || this.length === 0) return;
+    const offsets = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page };
+    if (!(event.key in offsets) || this.length === 0) return;
     event.preventDefault();
     event.stopPropagation();
-    this.choose(clamp(this.chosen + ways[event.key], 0, this.length - 1));
+    this.choose(clamp(this.chosen + offsets[event.key], 0, this.length - 1));
   }
 }

@@ -1,6 +1,6 @@
-// Colours, and the map itself.
+// Colours and the map.
 
-// POGEMA's seven, then the ones furthest from all before.
+// POGEMA's seven colours; each later colour is the one most distant from all before it.
 const PALETTE = [
   "#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72d5c8", "#0ea08c", "#8f7b66",
   "#fca800", "#fc90f0", "#903090", "#007800", "#90b40c", "#fc7878",
@@ -8,7 +8,7 @@ const PALETTE = [
   "#6c54c0", "#e4a8b4", "#90c0fc", "#00cc84", "#84546c",
 ];
 const colorOf = (agent) => PALETTE[agent % PALETTE.length];
-// Whether dark or light letters are read better on each colour.
+// The text colour, dark or light, that is more readable on each colour.
 const INK = PALETTE.map((color) => {
   const [red, green, blue] = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16));
   return 0.3 * red + 0.59 * green + 0.11 * blue > 150 ? "#14171a" : "#ffffff";
@@ -17,10 +17,10 @@ const INK = PALETTE.map((color) => {
 // POGEMA's proportions: of a cell 100 wide, circles have radius 35 and lines are 10 wide.
 const RADIUS = 0.35;
 const LINE = 0.1;
-// Below this, circles and round corners cannot be seen. Units: pixels per cell.
+// Below this scale, circles and round corners are invisible. Units: pixels per cell.
 const COARSE = 6;
 
-// The colours of the style sheet, read again when light turns dark.
+// The colours of the style sheet, read again when the colour scheme changes.
 const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
@@ -36,7 +36,7 @@ function watchTheme(onChange) {
   });
 }
 
-// The map one pixel a cell, for when it is seen from afar.
+// Draws the map with one pixel per cell, for small scales.
 function bitmapOf(isObstacle, height, width) {
   const canvas = make("canvas", { width, height });
   const context = canvas.getContext("2d");
@@ -59,7 +59,7 @@ function paintMap(context, view, isObstacle, bitmap) {
   context.strokeRect(-wall / 2, -wall / 2, width + wall, height + wall);
   if (scale < 2 * COARSE) {
     context.imageSmoothingEnabled = scale < 1;
-    // From afar obstacles are so many that they would drown the agents.
+    // At small scales opaque obstacles would hide the agents among them.
     context.globalAlpha = scale < COARSE ? 0.6 : 1;
     context.drawImage(bitmap(), 0, 0);
     context.globalAlpha = 1;
@@ -93,7 +93,7 @@ function paintGrid(context, view) {
   context.stroke();
 }
 
-// A disc, or from afar a square, which is drawn much faster.
+// Adds a disc or, at small scales, a square, which is much faster to draw.
 function addDisc(context, x, y, radius, isCoarse) {
   if (isCoarse) {
     context.rect(x - radius, y - radius, 2 * radius, 2 * radius);

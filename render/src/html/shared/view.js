@@ -1,9 +1,9 @@
-// Which part of the map a stage shows, and the gestures that change it.
+// The part of the map that a stage shows, and the gestures that change it.
 
 const SMALLEST_CELL = 0.25;
 const LARGEST_CELL = 96;
-// A press that moves less is a click. Units: pixels.
-const SLACK = 5;
+// A press that moves at most this far is a click. Units: pixels.
+const CLICK_DISTANCE = 5;
 
 class View {
   // Cells are `scale` pixels wide, and the corner of the map is at (left, top).
@@ -29,7 +29,7 @@ class View {
     else this.pan(shiftX, shiftY);
   }
 
-  // The whole map, with the wall around it.
+  // Shows the whole map with its wall.
   fit() {
     const across = this.stageWidth / (this.width + 2);
     const down = this.stageHeight / (this.height + 2);
@@ -43,7 +43,7 @@ class View {
   pan(x, y) {
     this.left += x;
     this.top += y;
-    this.settle();
+    this.keepVisible();
   }
 
   zoom(factor, x = this.stageWidth / 2, y = this.stageHeight / 2) {
@@ -51,11 +51,11 @@ class View {
     this.left = x - ((x - this.left) * scale) / this.scale;
     this.top = y - ((y - this.top) * scale) / this.scale;
     this.scale = scale;
-    this.settle();
+    this.keepVisible();
   }
 
-  // Keeps some of the map in sight.
-  settle() {
+  // Keeps a part of the map visible.
+  keepVisible() {
     const margin = 40;
     this.left = clamp(this.left, margin - this.scale * this.width, this.stageWidth - margin);
     this.top = clamp(this.top, margin - this.scale * this.height, this.stageHeight - margin);
@@ -63,7 +63,7 @@ class View {
     this.onChange();
   }
 
-  // Brings a cell into sight, if it is not.
+  // Moves the view to a cell unless the cell is visible.
   show(row, col) {
     const [x, y] = this.center(row, col);
     const margin = Math.min(this.stageWidth, this.stageHeight) / 8;
@@ -84,14 +84,14 @@ class View {
     return row >= 0 && col >= 0 && row < this.height && col < this.width;
   }
 
-  // The rows and columns in sight: [first row, last row, first col, last col].
+  // Returns the visible rows and columns: [first row, last row, first col, last col].
   seen() {
     const [top, left] = this.cellAt(0, 0);
     const [bottom, right] = this.cellAt(this.stageWidth, this.stageHeight);
     return [Math.max(0, top), Math.min(this.height - 1, bottom), Math.max(0, left), Math.min(this.width - 1, right)];
   }
 
-  // Makes a context draw in units of cells, the corner of the map being (0, 0).
+  // Clears a canvas and returns its context, with cells as units and the corner of the map as (0, 0).
   begin(canvas) {
     const context = canvas.getContext("2d");
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -101,8 +101,8 @@ class View {
     return context;
   }
 
-  // Wheel, drag and pinch. `tool` may take a press for itself: press(x, y, event) says whether it does, and then
-  // gets move, release and cancel; click is told of presses that did not move.
+  // Handles wheel, drag and pinch. If `tool.press(x, y, event)` returns true, the tool handles the press and gets its
+  // move, release and cancel; otherwise a press that does not move calls `tool.click`.
   listen(tool) {
     this.tool = tool;
     this.pointers = new Map();
@@ -134,7 +134,7 @@ class View {
       this.isDrag = false;
       this.isTool = event.button === 0 && Boolean(this.tool.press?.(x, y, event));
     } else if (this.isTool) {
-      // A second finger means that the first one was no stroke.
+      // A second finger makes the press a pinch, so cancel the stroke.
       this.isTool = false;
       this.tool.cancel?.();
     }
@@ -152,7 +152,7 @@ class View {
       this.pinch(last, [x, y], others[0]);
     } else if (this.isTool) {
       this.tool.move(x, y, event);
-    } else if (this.isDrag || Math.hypot(x - this.pressed[0], y - this.pressed[1]) > SLACK) {
+    } else if (this.isDrag || Math.hypot(x - this.pressed[0], y - this.pressed[1]) > CLICK_DISTANCE) {
       if (!this.isDrag) this.stage.classList.add("dragging");
       this.isDrag = true;
       this.pan(x - last[0], y - last[1]);
