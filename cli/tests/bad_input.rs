@@ -78,7 +78,7 @@ const REJECTED: [(&str, &str); 53] = [
     ("run goals.yaml", "goals.yaml: targets_xy has length 1, expected 2"),
     (
         "run --size 3 --density 0 --seed 1 --num-agents 5",
-        "`--num-agents` is `5`, expected at most 4, for which the map has room",
+        "`--num-agents` is `5`, expected at most 4; the map has no room for more",
     ),
     ("run missing.yaml", "missing.yaml: No such file or directory (os error 2)"),
     (

@@ -219,7 +219,7 @@ impl InstanceSource {
         let num_agents = self.config.num_agents;
         Error::check_length("targets_xy", starts.len(), goals.len())?;
         if num_agents > starts.len() {
-            let expected = format!("at most the {} agents of agents_xy", starts.len());
+            let expected = format!("at most {}, the number of agents in agents_xy", starts.len());
             return Err(Error::config("num_agents", num_agents, expected));
         }
         let mut map = self.ground()?;
@@ -250,7 +250,7 @@ impl InstanceSource {
         for (what, pool) in [("possible_agents_xy", &pools.starts), ("possible_targets_xy", &pools.goals)] {
             check_on_map(&map, what, pool)?;
             if pool.len() < num_agents {
-                let expected = format!("at most the {} cells of {what}", pool.len());
+                let expected = format!("at most {}, the number of cells in {what}", pool.len());
                 return Err(Error::config("num_agents", num_agents, expected));
             }
         }
@@ -281,7 +281,7 @@ impl InstanceSource {
                 return Ok((map, starts, goals));
             }
         }
-        Err(Error::config("num_agents", num_agents, format!("at most {room}, for which the map has room")))
+        Err(Error::config("num_agents", num_agents, format!("at most {room}; the map has no room for more")))
     }
 
     /// Returns the goal stream of each agent.

@@ -208,7 +208,7 @@ impl Reader {
         }
         if num_starts > 0 && self.has_pools {
             let reason =
-                "the map has letters and one of `@$!`, expected exact starts and goals or possible ones";
+                "the map has letters and one of `@$!`, expected either exact or possible starts and goals";
             return Err(Error::instance(reason));
         }
         let map = Map::new(self.height, self.width, self.obstacles)?;

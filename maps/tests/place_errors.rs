@@ -51,11 +51,11 @@ const MAPS: [(&str, &str); 23] = [
     ("map: aAbb", "instance: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
     (
         "map: aA@",
-        "instance: the map has letters and one of `@$!`, expected exact starts and goals or possible ones",
+        "instance: the map has letters and one of `@$!`, expected either exact or possible starts and goals",
     ),
     (
         "map: a!A",
-        "instance: the map has letters and one of `@$!`, expected exact starts and goals or possible ones",
+        "instance: the map has letters and one of `@$!`, expected either exact or possible starts and goals",
     ),
     ("map: []", "config: `map` is `[]`, expected at least one row of at least one cell"),
     ("map: [[], []]", "config: `map` is `[[],[]]`, expected at least one row of at least one cell"),
@@ -164,7 +164,7 @@ const INSTANCES: [(&str, &str); 17] = [
     ),
     (
         "{agents_xy: [[0, 0]], targets_xy: [[0, 1]], num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 agents of agents_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of agents in agents_xy",
     ),
     (
         "{agents_xy: [[0, 0], [0, 0]], targets_xy: [[0, 1], [1, 1]]}",
@@ -172,25 +172,25 @@ const INSTANCES: [(&str, &str); 17] = [
     ),
     (
         "{size: 2, num_agents: 3, density: 0, seed: 1}",
-        "config: `num_agents` is `3`, expected at most 2, for which the map has room",
+        "config: `num_agents` is `3`, expected at most 2; the map has no room for more",
     ),
     (
         "{size: 2, num_agents: 3, density: 0}",
-        "config: `num_agents` is `3`, expected at most 2, for which the map has room",
+        "config: `num_agents` is `3`, expected at most 2; the map has no room for more",
     ),
-    ("density: 1", "config: `num_agents` is `1`, expected at most 0, for which the map has room"),
-    ("map: '#'", "config: `num_agents` is `1`, expected at most 0, for which the map has room"),
+    ("density: 1", "config: `num_agents` is `1`, expected at most 0; the map has no room for more"),
+    ("map: '#'", "config: `num_agents` is `1`, expected at most 0; the map has no room for more"),
     (
         "{map: '.#.', num_agents: 10000000}",
-        "config: `num_agents` is `10000000`, expected at most 0, for which the map has room",
+        "config: `num_agents` is `10000000`, expected at most 0; the map has no room for more",
     ),
     (
         "{map: '@@$', num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 cells of possible_targets_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of cells in possible_targets_xy",
     ),
     (
         "{possible_agents_xy: [[0, 0]], possible_targets_xy: [[0, 1], [0, 0]], num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 cells of possible_agents_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of cells in possible_agents_xy",
     ),
     (
         "{possible_agents_xy: [[0, 0], [0, 0]], possible_targets_xy: [[0, 1], [1, 1]], num_agents: 2}",

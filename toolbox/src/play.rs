@@ -51,10 +51,10 @@ fn run(
     let mut episode = Episode::new(Engine::new(rules)?).with_density().with_collisions();
     episode.record(is_recorded);
     episode.start(instance)?;
-    let dice = Generator::seeded(config.seed.unwrap_or_default());
+    let rng = Generator::seeded(config.seed.unwrap_or_default());
     let began = Instant::now();
     let BuiltIn { name, settings, .. } = algorithm;
-    let mut policy = NamedPolicy::new(name, settings, &rules, episode.instance()?, dice)?;
+    let mut policy = NamedPolicy::new(name, settings, &rules, episode.instance()?, rng)?;
     let mut runtime = began.elapsed();
     while !episode.is_over() {
         let began = Instant::now();

@@ -31,7 +31,7 @@ words! {
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
-    noted: Mutex<Noted>,
+    journal: Mutex<Journal>,
     /// Versions of further software that plays, by name.
     versions: Vec<(String, String)>,
     /// Held as long as the store lives.
@@ -40,7 +40,7 @@ pub struct Store {
 
 /// The manifest and the state of its last run.
 #[derive(Debug)]
-struct Noted {
+struct Journal {
     manifest: Manifest,
     /// Whether the manifest already has a run for this process.
     has_begun: bool,
@@ -76,8 +76,8 @@ impl Store {
             }
             (_, None) => check_empty(folder)?,
         }
-        let noted = Mutex::new(Noted { manifest: manifest.clone(), has_begun: false });
-        let store = Self { folder: folder.to_owned(), noted, versions: Vec::new(), _lock: lock };
+        let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
+        let store = Self { folder: folder.to_owned(), journal, versions: Vec::new(), _lock: lock };
         // The manifest comes first, because it marks a folder of results and the run may be killed in between.
         store.write_manifest(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
@@ -97,7 +97,7 @@ impl Store {
 
     /// Returns the manifest of the results.
     pub fn manifest(&self) -> Manifest {
-        self.noted().manifest.clone()
+        self.journal().manifest.clone()
     }
 
     /// Returns the index of this process's run. The first call adds the run to the manifest.
@@ -105,17 +105,17 @@ impl Store {
     /// # Errors
     /// If the manifest cannot be written.
     pub fn run(&self) -> Result<usize, Error> {
-        let mut noted = self.noted();
-        if !noted.has_begun {
-            noted.manifest.runs.push(RunRecord::now(&self.versions));
-            self.write_manifest(&noted.manifest)?;
-            noted.has_begun = true;
+        let mut journal = self.journal();
+        if !journal.has_begun {
+            journal.manifest.runs.push(RunRecord::now(&self.versions));
+            self.write_manifest(&journal.manifest)?;
+            journal.has_begun = true;
         }
-        Ok(noted.manifest.runs.len() - 1)
+        Ok(journal.manifest.runs.len() - 1)
     }
 
-    fn noted(&self) -> MutexGuard<'_, Noted> {
-        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn write_manifest(&self, manifest: &Manifest) -> Result<(), Error> {

@@ -87,7 +87,7 @@ fn without_episodes_costs_are_compared_if_all_instances_are_solved() {
     );
     let text = shown.tables[0].text(Format::Markdown);
     assert!(text.contains("| 1.0000 |        1.0000 |    1.0000 |  9.00 |         10.00 |"), "{text}");
-    assert!(text.ends_with("`LaCAM` beside the published `LaCAM`, MAPF"), "{text}");
+    assert!(text.ends_with("`LaCAM` compared with the published `LaCAM`, MAPF"), "{text}");
     let [compared, unsolvable] = &shown.notes[..] else { panic!("{:?}", shown.notes) };
     assert!(compared.starts_with("`01-random` with 4 agents: `SoC` is not compared"), "{compared}");
     let expected = "01-random, num_agents=4, seed=1: proved unsolvable: agents 0 and 1 block each other";

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use crate::results::{Pairs, Results, Row, short};
 
 /// Metrics that rank episodes, and whether less is better. The first one that all rows have is used.
-const JUDGED_BY: [(&str, bool); 4] =
+const RANKED_BY: [(&str, bool); 4] =
     [("avg_throughput", false), ("SoC", true), ("makespan", true), ("ep_length", true)];
 
 /// The share of agents that reached their goals. It ranks before any other metric.
@@ -34,32 +34,33 @@ pub struct Pick {
 /// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
 pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
     let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
-    let Some(&(figure, is_less_better)) = JUDGED_BY.iter().find(|(name, _)| has(name)) else {
+    let Some(&(figure, is_less_better)) = RANKED_BY.iter().find(|(name, _)| has(name)) else {
         return Vec::new();
     };
     let best = best_of(results, figure, is_less_better);
-    let mut of_algorithms: IndexMap<&str, Vec<Judged>> = IndexMap::new();
+    let mut of_algorithms: IndexMap<&str, Vec<Ranked>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
         let episodes = of_algorithms.entry(name).or_default();
         let value = row.metric(figure).unwrap_or_default();
-        let (least, whose) = best.get(&environment(&row.settings)).copied().unwrap_or((value, name));
-        let times = if is_less_better { value / least } else { least / value };
-        let times = if times.is_nan() { 1.0 } else { times };
+        let (best_value, winner) = best.get(&environment(&row.settings)).copied().unwrap_or((value, name));
+        let ratio = if is_less_better { value / best_value } else { best_value / value };
+        let ratio = if ratio.is_nan() { 1.0 } else { ratio };
         let solved = row.metric(SOLVED);
-        let why = why(figure, value, solved, value / least, (whose != name && times > 1.0).then_some(whose));
+        let why =
+            why(figure, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
         let worth = if is_less_better { value } else { -value };
-        let bad = [-solved.unwrap_or(1.0), times, worth];
+        let badness = [-solved.unwrap_or(1.0), ratio, worth];
         let pick = Pick { algorithm: name.into(), episode: episodes.len(), row: at, is_worst: true, why };
-        episodes.push(Judged { pick, bad });
+        episodes.push(Ranked { pick, badness });
     }
     of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
-struct Judged {
+struct Ranked {
     pick: Pick,
     /// Criteria in order of precedence; larger is worse.
-    bad: [f64; 3],
+    badness: [f64; 3],
 }
 
 /// Returns the best value of a metric in each environment, and its algorithm.
@@ -77,10 +78,10 @@ fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> Hash
     best
 }
 
-fn why(figure: &str, value: f64, solved: Option<f64>, times: f64, whose: Option<&str>) -> String {
+fn why(figure: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option<&str>) -> String {
     let mut parts = vec![format!("{figure} {}", short(value))];
     parts.extend(solved.map(|share| format!("{SOLVED} {}", short(share))));
-    parts.extend(whose.map(|whose| format!("{times:.2} × that of {whose}")));
+    parts.extend(winner.map(|winner| format!("{ratio:.2} × that of {winner}")));
     parts.join(", ")
 }
 
@@ -91,16 +92,16 @@ fn environment(settings: &Pairs) -> String {
     parts.join("\n")
 }
 
-fn ends(mut episodes: Vec<Judged>, number: usize) -> Vec<Pick> {
-    let by_worth = |one: &Judged, other: &Judged| {
-        let pairs = one.bad.iter().zip(&other.bad);
+fn ends(mut episodes: Vec<Ranked>, number: usize) -> Vec<Pick> {
+    let by_worth = |one: &Ranked, other: &Ranked| {
+        let pairs = one.badness.iter().zip(&other.badness);
         let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
         differs.unwrap_or_else(|| one.pick.episode.cmp(&other.pick.episode))
     };
     episodes.sort_by(by_worth);
-    let worst = episodes.iter().take(number).map(|judged| judged.pick.clone());
+    let worst = episodes.iter().take(number).map(|ranked| ranked.pick.clone());
     let best =
-        episodes.iter().rev().take(number).map(|judged| Pick { is_worst: false, ..judged.pick.clone() });
+        episodes.iter().rev().take(number).map(|ranked| Pick { is_worst: false, ..ranked.pick.clone() });
     worst.chain(best).collect()
 }
 

@@ -123,7 +123,7 @@ impl PublishedView {
                 lines.push(line);
             }
         }
-        let remark = format!("`{ours}` beside the published `{}`, {}", self.algorithm, self.setting);
+        let remark = format!("`{ours}` compared with the published `{}`, {}", self.algorithm, self.setting);
         Ok(Shown { tables: vec![self.table(&lines, remark)], notes, ..Shown::default() })
     }
 
