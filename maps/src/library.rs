@@ -82,7 +82,7 @@ impl Library {
     /// it.
     ///
     /// # Errors
-    /// As [`Library::matching`].
+    /// Those of [`Library::matching`].
     pub fn named_or_chosen(&self, name: &str, seed: u64) -> Result<(&str, &MapText), Error> {
         self.maps.get_key_value(name).map_or_else(|| self.choose(name, seed), |(name, text)| Ok((name, text)))
     }
@@ -90,7 +90,7 @@ impl Library {
     /// Returns the map that a seed chooses among those that match a pattern.
     ///
     /// # Errors
-    /// As [`Library::matching`].
+    /// Those of [`Library::matching`].
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     pub fn choose(&self, pattern: &str, seed: u64) -> Result<(&str, &MapText), Error> {
