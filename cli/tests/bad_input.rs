@@ -38,7 +38,7 @@ const REJECTED: [(&str, &str); 53] = [
     ("run unreadable.yaml", "unreadable.yaml: config: line 2, column 6: unclosed bracket '['"),
     (
         "run unknown-key.yaml",
-        "unknown-key.yaml: config: unknown field `colision_system`, the nearest known one is `collision_system`",
+        "unknown-key.yaml: config: unknown field `colision_system`; did you mean `collision_system`?",
     ),
     (
         "run wrong-type.yaml",
@@ -72,13 +72,13 @@ const REJECTED: [(&str, &str); 53] = [
     (
         "run --map five-rooms",
         "five-rooms: no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a \
-         known map; the nearest is `four-rooms`",
+         known map; did you mean `four-rooms`?",
     ),
     ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
     ("run goals.yaml", "goals.yaml: targets_xy has length 1, expected 2"),
     (
         "run --size 3 --density 0 --seed 1 --num-agents 5",
-        "`--num-agents` is `5`, expected at most 4, for which the map has room",
+        "`--num-agents` is `5`, expected at most 4; the map has no room for more",
     ),
     ("run missing.yaml", "missing.yaml: No such file or directory (os error 2)"),
     (

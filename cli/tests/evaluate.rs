@@ -186,7 +186,7 @@ fn a_torn_last_line_is_played_again_and_other_damage_is_reported() {
     let rows = read(folder.path(), "Dice.json");
     assert_eq!(rows[2]["metrics"], serde_json::json!({"ISR": 0.5}), "a stored episode is not played again");
     for (text, expected) in [
-        (format!("{line}\n{line}\n"), "Dice.jsonl: line 2: episode `2` again, which stands in line 1"),
+        (format!("{line}\n{line}\n"), "Dice.jsonl: line 2: duplicate episode `2`, first in line 1"),
         (line.replace('2', "9") + "\n", "Dice.jsonl: line 1: episode `9`, expected one below 6"),
         (format!("{line}\nnonsense\n"), "Dice.jsonl: line 2: expected"),
         (line.replace("runtime", "runtme") + "\n", "Dice.jsonl: line 1: unknown field `runtme`"),
@@ -216,7 +216,7 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);
     let before = bytes(folder.path());
     let (_, error, _) = run(folder.path(), &EVALUATE);
-    assert!(error.contains("`--resume` goes on with them, `--force` deletes them"), "{error}");
+    assert!(error.contains("`--resume` continues them, `--force` deletes them"), "{error}");
     for (from, to, expected) in [
         ("density: 0.2", "density: 0.3", "results of other environments"),
         ("nodes: 500", "nodes: 400", "results of `LaCAM` with other parameters"),
@@ -271,32 +271,28 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
         (
             "  size: 16",
             "  sise: 16",
-            "suite.yaml: line 8: unknown key `sise` in environment; the nearest known one is `size`",
+            "suite.yaml: line 8: unknown key `sise` in environment; did you mean `size`?",
         ),
-        ("nodes: 500", "nods: 500", "`LaCAM.nods` is unknown; the nearest known one is `nodes`"),
+        ("nodes: 500", "nods: 500", "unknown parameter `LaCAM.nods`; did you mean `nodes`?"),
         ("nodes: 500", "nodes: many", "line 14: `LaCAM.nodes`, expected a number of nodes"),
         ("{name: random}", "{name: SCRIMP}", "line 13: `Dice.name`: `SCRIMP` is not built in"),
         ("{name: random}", "{nam: random}", "line 13: `Dice`, expected a field `name`"),
         ("balanced_dask", "cloud", "`LaCAM.parallel_backend`, expected one of sequential"),
         ("num_process: 2", "num_process: 0", "`LaCAM.num_process`, expected a number of 1 or more"),
-        ("  Dice:", "  about:", "line 13: `about`, expected a name that a file of results may have"),
-        ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that a file of results may have"),
+        ("  Dice:", "  about:", "line 13: `about`, expected a name that is valid for a file of results"),
+        ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that is valid for a file of results"),
         ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
         ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
-        ("seed: {grid_search: [3, 1, 2]}", "size: 4", "`size` stands twice"),
+        ("seed: {grid_search: [3, 1, 2]}", "size: 4", "duplicate key `size`"),
         ("density: 0.2", "density: {grid_search: [0.1, 2]}", "line 9: config: `density`"),
         (
             "size: 16",
             "map_name: {grid_search: [wall-e, wall-f, four-rooms]}",
-            "2 maps are not known: `wall-e`, `wall-f`",
+            "2 unknown maps: `wall-e`, `wall-f`",
         ),
-        ("size: 16", "map_name: four-room", "the nearest is `four-rooms`"),
+        ("size: 16", "map_name: four-room", "did you mean `four-rooms`?"),
         ("name: Environment", "name: MyEnv", "line 3: config: `name` is `MyEnv`, expected `Environment`"),
-        (
-            "algorithms:",
-            "algorithm:",
-            "unknown key `algorithm` in the file; the nearest known one is `algorithms`",
-        ),
+        ("algorithms:", "algorithm:", "unknown key `algorithm` in the file; did you mean `algorithms`?"),
     ] {
         assert!(SUITE.contains(from), "{from}");
         fs::write(folder.path().join("suite.yaml"), SUITE.replacen(from, to, 1)).unwrap();
@@ -332,10 +328,14 @@ fn algorithms_from_another_file_replace_those_of_the_suite() {
     assert_eq!((notes.as_str(), status), ("", 0), "{text}");
     for (from, to, expected) in [
         ("nodes: 100", "nodes: 200", "results of `Quick` with other parameters"),
-        ("nodes", "nods", "quick.yaml: line 2: `Quick.nods` is unknown; the nearest known one is `nodes`"),
+        ("nodes", "nods", "quick.yaml: line 2: unknown parameter `Quick.nods`; did you mean `nodes`?"),
         ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
         ("true", "often", "quick.yaml: line 2: `Quick.single_attempt`, expected true or false"),
-        ("algorithms:", "algorithm:", "quick.yaml: line 2: unknown key `algorithm` in the file; the nearest"),
+        (
+            "algorithms:",
+            "algorithm:",
+            "quick.yaml: line 2: unknown key `algorithm` in the file; did you mean",
+        ),
         ("algorithms:", "maps: x\nalgorithms:", "quick.yaml: line 1: unknown key `maps` in the file"),
     ] {
         fs::write(path("quick.yaml"), quick.replacen(from, to, 1)).unwrap();

@@ -1,5 +1,5 @@
-//! Configs: read or refused in one line; what was read is written and read again as the same, and can be made into an
-//! instance or is refused.
+//! Fuzzes configs: each is read, or rejected in one line. A config that was read survives a round trip, and becomes an
+//! instance or is rejected.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

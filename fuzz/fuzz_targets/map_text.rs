@@ -1,4 +1,4 @@
-//! Map texts: refused in one line, or read as the map that its rows draw.
+//! Fuzzes map texts: each is rejected in one line, or read as a map whose rows read as the same map.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

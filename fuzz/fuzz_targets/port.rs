@@ -1,4 +1,4 @@
-//! Whatever a port says, it is compared or named as misbehaviour, and never a panic.
+//! Fuzzes the answers of a port: each is compared or reported as misbehaviour, and none causes a panic.
 #![no_main]
 
 use std::sync::LazyLock;
@@ -8,7 +8,7 @@ use pogema_conformance::port::{Ask, Hello, Link, Misbehaviour, Mode, Reply, judg
 use pogema_conformance::{Op, Request, Response, play};
 use serde_json::json;
 
-/// A port that says one line of the input after the other.
+/// A port that answers with the lines of the input, in order.
 struct Lines<'a>(std::slice::Split<'a, u8, fn(&u8) -> bool>);
 
 impl Lines<'_> {
@@ -28,7 +28,7 @@ impl Link for Lines<'_> {
     }
 }
 
-static ASKED: LazyLock<(Request, Response)> = LazyLock::new(|| {
+static EXPECTED: LazyLock<(Request, Response)> = LazyLock::new(|| {
     let config = json!({
         "map": "a.b\nB.A", "obs_radius": 1, "collision_system": "soft", "observation_type": "default",
     });
@@ -39,7 +39,7 @@ static ASKED: LazyLock<(Request, Response)> = LazyLock::new(|| {
 });
 
 fuzz_target!(|text: &[u8]| {
-    let (request, expected) = &*ASKED;
+    let (request, expected) = &*EXPECTED;
     let mut lines = Lines(text.split((|&byte| byte == b'\n') as fn(&u8) -> bool));
     let Ok(hello) = lines.hello() else { return };
     for mode in [Mode::Instance, Mode::Config] {

@@ -1,4 +1,4 @@
-//! Traces: refused in one line, or read and then written and read again as the same.
+//! Fuzzes traces: each is rejected in one line, or survives a round trip.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Maps that come with the program, by name.
+//! Built-in maps, by name.
 
 mod puzzles;
 
@@ -10,23 +10,23 @@ use crate::text::MapText;
 
 pub use puzzles::PUZZLES;
 
-/// A map of five rows and columns on which agents get in each other's way.
+/// A small map with starts and goals, on which agents must make way for each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Puzzle {
     /// Its name.
     pub name: &'static str,
-    /// What has to be done.
+    /// One sentence on what the agents have to do.
     pub says: &'static str,
-    /// The map, `a` where agent 0 starts, and so on.
+    /// The rows of the map with the start of each agent: `a` for agent 0, and so on.
     pub starts: [&'static str; 5],
-    /// The map, `a` where agent 0 wants to go, and so on.
+    /// The rows of the map with the goal of each agent: `a` for agent 0, and so on.
     pub goals: [&'static str; 5],
-    /// The least sum of costs with `on_target: nothing`, as a search through all joint states finds it.
+    /// The optimal sum of costs with `on_target: nothing`, found by a search through all joint states.
     pub sum_of_costs: u64,
 }
 
 impl Puzzle {
-    /// The map with starts and goals.
+    /// Returns the map with starts and goals.
     ///
     /// # Errors
     /// None for the puzzles of the catalogue.
@@ -41,7 +41,7 @@ impl Puzzle {
     }
 }
 
-/// Where the letters stand, in the order of the alphabet.
+/// Returns the cells of the lowercase letters, in alphabetical order.
 fn cells_of_letters(rows: &[&str; 5]) -> Vec<Cell> {
     let letters = (0..).zip(rows).flat_map(|(row, text)| {
         (0..).zip(text.chars()).map(move |(col, letter)| (letter, Cell::new(row, col)))
@@ -51,18 +51,18 @@ fn cells_of_letters(rows: &[&str; 5]) -> Vec<Cell> {
     letters.into_iter().map(|(_, cell)| cell).collect()
 }
 
-/// Each map without agents and its name.
+/// The maps without agents, each with its name.
 const MAPS: [(&str, &str); 1] = [("four-rooms", include_str!("../data/four-rooms.txt"))];
 
-/// The names of all maps.
+/// Returns the names of all built-in maps.
 pub fn map_names() -> impl Iterator<Item = &'static str> {
     MAPS.iter().map(|(name, _)| *name).chain(PUZZLES.iter().map(|puzzle| puzzle.name))
 }
 
-/// The map of a name, with starts and goals if it is a puzzle.
+/// Returns the map with a name, with starts and goals if it is a puzzle.
 ///
 /// # Errors
-/// [`Error::Config`] with the nearest known name if there is none.
+/// [`Error::Config`] with the nearest known name if the name is unknown.
 ///
 /// Rule: grid/named
 pub fn named_map(name: &str) -> Result<MapText, Error> {
@@ -71,12 +71,12 @@ pub fn named_map(name: &str) -> Result<MapText, Error> {
     }
     let Some((_, text)) = MAPS.iter().find(|(known, _)| *known == name) else {
         let hint = nearest(name, map_names()).unwrap_or_default();
-        return Err(Error::config("map_name", name, format!("a known map; the nearest is `{hint}`")));
+        return Err(Error::config("map_name", name, format!("a known map; did you mean `{hint}`?")));
     };
     Map::from_rows(&text.split_whitespace().collect::<Vec<_>>()).map(MapText::from)
 }
 
-/// All maps under their names.
+/// Returns all built-in maps with their names.
 pub(crate) fn named_maps() -> impl Iterator<Item = NamedMap> {
     let named = |name: &'static str| Some(NamedMap { name: name.into(), text: named_map(name).ok()? });
     map_names().filter_map(named)

@@ -1,4 +1,4 @@
-//! Which free cells can be reached from which.
+//! Connected components of free cells.
 
 use pogema_core::{Cell, Map};
 
@@ -18,7 +18,7 @@ pub struct Components {
 impl Components {
     const NONE: u32 = u32::MAX;
 
-    /// Labels a map.
+    /// Labels the components of a map.
     pub fn of(map: &Map) -> Self {
         let mut components =
             Self { width: map.width(), labels: vec![Self::NONE; map.obstacles().len()], sizes: vec![] };
@@ -56,32 +56,32 @@ impl Components {
         self.sizes.push(size);
     }
 
-    /// Number of components.
+    /// Returns the number of components.
     pub fn len(&self) -> usize {
         self.sizes.len()
     }
 
-    /// Whether there is no free cell.
+    /// Returns whether the map has no free cell.
     pub fn is_empty(&self) -> bool {
         self.sizes.is_empty()
     }
 
-    /// The number of cells of each component.
+    /// Returns the number of cells of each component.
     pub fn sizes(&self) -> &[u32] {
         &self.sizes
     }
 
-    /// The component of the cell at a row-major place; none for an obstacle.
+    /// Returns the component of the cell at a row-major index; `None` for an obstacle.
     pub fn label_at(&self, index: usize) -> Option<u32> {
         self.labels.get(index).copied().filter(|&label| label != Self::NONE)
     }
 
-    /// The component of a cell; none for an obstacle.
+    /// Returns the component of a cell; `None` for an obstacle.
     pub fn label(&self, cell: Cell) -> Option<u32> {
         self.label_at(usize::from(cell.row) * self.width + usize::from(cell.col))
     }
 
-    /// The cells of each component, row by row.
+    /// Returns the cells of each component, row by row.
     pub fn cells(&self) -> ComponentCells {
         let mut offsets = Vec::with_capacity(self.sizes.len() + 1);
         let mut total = 0;
@@ -111,7 +111,7 @@ pub struct ComponentCells {
 }
 
 impl ComponentCells {
-    /// The cells of one component.
+    /// Returns the cells of one component.
     pub fn of(&self, label: u32) -> &[Cell] {
         &self.cells[self.offsets[label as usize]..self.offsets[label as usize + 1]]
     }

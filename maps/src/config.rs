@@ -1,4 +1,4 @@
-//! POGEMA's `GridConfig`: one file that says everything about an environment.
+//! POGEMA's `GridConfig`: the complete description of an environment.
 
 mod check;
 mod fields;
@@ -14,28 +14,28 @@ pub use fields::{FIELDS, nearest};
 pub use parse::{value_from_json, value_from_yaml, yaml_document};
 pub(crate) use read::read_targets;
 
-/// A config under POGEMA's names, checked and with everything derived that POGEMA derives.
+/// A checked config under POGEMA's field names, with the values that POGEMA derives.
 ///
-/// Made by [`GridConfig::from_yaml`], [`GridConfig::from_json`] or [`GridConfig::from_value`].
+/// Created by [`GridConfig::from_yaml`], [`GridConfig::from_json`] or [`GridConfig::from_value`].
 ///
 /// Rule: config/fields, config/size, config/map, config/agents
 ///
 /// Source: POGEMA 1.4.0, `grid_config.py`, `GridConfig`
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridConfig {
-    /// What reaching a goal does.
+    /// What happens when an agent reaches its goal.
     pub on_target: OnGoal,
-    /// Seed of every random stream; none means a fresh one from the system at each reset.
+    /// Seed of every random stream. If `None`, each reset takes a fresh seed from the operating system.
     pub seed: Option<u64>,
     /// Number of columns.
     pub width: usize,
     /// Number of rows.
     pub height: usize,
-    /// The longer side.
+    /// The larger of width and height.
     pub size: usize,
-    /// Share of obstacles: the wanted one, or that of the given map.
+    /// Share of obstacles: the requested share, or that of the given map.
     pub density: f64,
-    /// How far agents see.
+    /// How many cells far an agent sees in each direction.
     pub obs_radius: usize,
     /// Explicit starts.
     pub agents_xy: Option<Vec<Cell>>,
@@ -49,7 +49,7 @@ pub struct GridConfig {
     pub possible_targets_xy: Option<Vec<Cell>>,
     /// How conflicts are resolved.
     pub collision_system: Collision,
-    /// Whether steps are kept and can be taken back.
+    /// Whether steps are kept and can be undone.
     pub persistent: bool,
     /// What agents observe.
     pub observation_type: Observation,
@@ -57,19 +57,19 @@ pub struct GridConfig {
     pub map: Option<Map>,
     /// Name of a registered map.
     pub map_name: Option<String>,
-    /// The framework to wrap for; meaningful to the Python package alone.
+    /// The framework to wrap the environment for; used only by the Python package.
     pub integration: Option<Integration>,
-    /// Units: steps.
+    /// Maximum length of an episode. Units: steps.
     pub max_episode_steps: i64,
-    /// Whether the `SampleFactory` wrapper resets by itself.
+    /// Whether the `SampleFactory` wrapper resets automatically.
     pub auto_reset: Option<bool>,
-    /// Whether there are free cells, and not random obstacles, beyond the wall.
+    /// Whether the cells beyond the wall are free rather than random obstacles.
     pub empty_outside: bool,
-    /// Ours, not POGEMA's: what the occupancy grid shows.
+    /// Extension of POGEMA's config: what the occupancy grid shows.
     pub occupancy: Occupancy,
-    /// Ours, not POGEMA's: who is rewarded.
+    /// Extension of POGEMA's config: which agents are rewarded.
     pub reward: Reward,
-    /// Ours, not POGEMA's: how large maps and crowds may be.
+    /// Extension of POGEMA's config: limits on the sides of maps and the number of agents.
     pub limits: Limits,
 }
 
@@ -79,12 +79,12 @@ pub struct GridConfig {
 pub enum Targets {
     /// One goal per agent.
     Single(Vec<Cell>),
-    /// At least two goals per agent, gone through round and round.
+    /// At least two goals per agent, repeated cyclically.
     Sequences(Vec<Vec<Cell>>),
 }
 
 impl Targets {
-    /// Number of agents that have goals.
+    /// Returns the number of agents that have goals.
     pub fn len(&self) -> usize {
         match self {
             Self::Single(goals) => goals.len(),
@@ -92,12 +92,12 @@ impl Targets {
         }
     }
 
-    /// Whether no agent has goals.
+    /// Returns whether no agent has goals.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The first goal of each agent.
+    /// Returns the first goal of each agent.
     pub fn first(&self) -> Vec<Cell> {
         match self {
             Self::Single(goals) => goals.clone(),
@@ -107,7 +107,7 @@ impl Targets {
         }
     }
 
-    /// The goals of all agents.
+    /// Returns all goals of all agents.
     pub(crate) fn all(&self) -> Vec<Cell> {
         match self {
             Self::Single(goals) => goals.clone(),
@@ -133,15 +133,15 @@ words! {
 }
 
 words! {
-    /// The largest maps and crowds.
+    /// Limits on the sides of maps and the number of agents.
     ///
     /// Rule: config/limits
     #[derive(Default)]
     pub enum Limits {
-        /// As POGEMA 1.4.0: sides up to 4096, up to 10,000,000 agents.
+        /// The limits of POGEMA 1.4.0: sides up to 4096, up to 10,000,000 agents.
         #[default]
         AsReleased = "as_released",
-        /// As our types: sides up to [`Map::LONGEST_SIDE`], agents up to 2³²−1.
+        /// The limits of our data types: sides up to [`Map::LONGEST_SIDE`], agents up to 2³²−1.
         Extended = "extended",
     }
 }
@@ -178,7 +178,7 @@ impl Default for GridConfig {
 }
 
 impl GridConfig {
-    /// The part that the engines need: rules and sizes.
+    /// Returns the part that the engines need: rules and sizes.
     pub fn rules(&self) -> Config {
         Config {
             num_agents: self.num_agents,

@@ -1,10 +1,10 @@
-//! How far it is from cell to cell.
+//! Shortest-path distances between cells.
 
 use std::collections::VecDeque;
 
 use pogema_core::{Action, Cell, Map};
 
-/// The steps from each cell to a goal, row by row; [`u32::MAX`] where there is no way.
+/// Returns the distance from each cell to a goal, row by row; [`u32::MAX`] for cells without a path. Units: steps.
 pub fn distances_to(map: &Map, goal: Cell) -> Vec<u32> {
     let mut distances = vec![u32::MAX; map.obstacles().len()];
     if map.is_obstacle(goal) {
@@ -25,7 +25,7 @@ pub fn distances_to(map: &Map, goal: Cell) -> Vec<u32> {
     distances
 }
 
-/// The free cells above, below, left and right of a cell.
+/// Returns the free cells above, below, left and right of a cell.
 pub fn free_neighbours(map: &Map, cell: Cell) -> impl Iterator<Item = Cell> + '_ {
     let moves = Action::ALL.into_iter().filter(|&action| action != Action::Stay);
     let targets = moves.filter_map(move |action| {

@@ -1,4 +1,4 @@
-//! Maps and scenarios from files, and files written whole or not at all.
+//! Reads maps and scenarios from files.
 
 use std::fs::File;
 use std::io::{Cursor, Read};
@@ -11,22 +11,22 @@ use crate::formats::{
 use crate::text::{MapText, parse_map_text};
 use pogema_core::Error;
 
-/// A larger file is not read. Units: bytes.
+/// Maximum size of a file. Units: bytes.
 const MOST_BYTES: u64 = 1 << 28;
 
-/// What MovingAI maps are taken for.
+/// Options for reading MovingAI maps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reading {
-    /// What water is.
+    /// Whether water is free or an obstacle.
     pub water: Water,
-    /// Whether their outermost cells are taken off.
+    /// Whether the outermost cells are removed.
     pub strips_border: bool,
 }
 
-/// All maps of a file, or of the files of a folder in the order of their names.
+/// Reads all maps of a file, or of the files of a folder, sorted by name.
 ///
 /// # Errors
-/// [`Error::Io`] with the file, and what is wrong about it.
+/// [`Error::Io`] with the file and the reason.
 pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
     if !path.is_dir() {
         return read_file(path, reading);
@@ -79,7 +79,7 @@ fn read_file(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
     }
 }
 
-/// A map set, or a config with a map.
+/// Reads a map set, or a config with a map.
 fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
     let in_file = |error: Error| Error::io(path, error);
     let text = read_text(path)?;
@@ -98,11 +98,12 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
     Ok(vec![NamedMap { name: stem(path), text }])
 }
 
-/// The starts and goals of a scenario file, all on the map: MovingAI's, or a YAML file with `agents_xy` and
-/// `targets_xy`.
+/// Reads the starts and goals of a scenario file and checks that they are on the map.
+///
+/// The file is a MovingAI `.scen` file, or a YAML file with `agents_xy` and `targets_xy`.
 ///
 /// # Errors
-/// As [`read_maps`]; if a start or goal is not on the map.
+/// Those of [`read_maps`], and an error if a start or goal is not on the map.
 pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Error> {
     let text = read_text(path)?;
     let scenario = if ending(path) == "scen" {
@@ -115,10 +116,10 @@ pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Er
         .map_err(|error| Error::io(path, error))
 }
 
-/// A file as text, without the mark that some programs put first.
+/// Reads a file as text, without a leading byte order mark.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read or is no text.
+/// [`Error::Io`] if the file cannot be read or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, Error> {
     let text = String::from_utf8(read_bytes(path)?).map_err(|error| {
         let place = error.utf8_error().valid_up_to();
@@ -134,13 +135,13 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     if bytes.len() as u64 > MOST_BYTES {
         return Err(Error::io(
             path,
-            format!("more than {} MiB, which is more than any map needs", MOST_BYTES >> 20),
+            format!("the file is larger than {} MiB, the limit for a map file", MOST_BYTES >> 20),
         ));
     }
     Ok(bytes)
 }
 
-/// What stands behind the last point of a file's name.
+/// Returns the extension of a file, empty if it has none.
 pub fn ending(path: &Path) -> &str {
     path.extension().and_then(|ending| ending.to_str()).unwrap_or_default()
 }

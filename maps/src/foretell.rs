@@ -1,11 +1,13 @@
-//! The goals an agent of a lifelong episode is going to have.
+//! The future goals of the agents in a lifelong episode.
 
 use pogema_core::{Cell, GoalStream, Instance};
 
 use crate::config::{GridConfig, Targets};
 
-/// The goals POGEMA foretells right after a reset: until an agent walking straight from goal to goal would need the
-/// whole episode. None where it would go on for ever, since only the goal just reached can be drawn again.
+/// Returns the goals that POGEMA foretells right after a reset.
+///
+/// The list of an agent ends where walking from goal to goal, at Manhattan distance, would take the whole episode.
+/// Returns `None` if the list would never end because only the goal just reached can be drawn again.
 ///
 /// Rule: goal/restart/foretold
 ///
@@ -14,8 +16,9 @@ pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Ve
     foretold_from(config, instance, instance.starts(), &instance.first_goals())
 }
 
-/// What POGEMA foretells later in the episode: the draws of the reset once more, but from where the agents are now
-/// and with the goals that they have now.
+/// Returns the goals that POGEMA foretells later in the episode.
+///
+/// POGEMA repeats the draws of the reset, but starts from the agents' current cells and current goals.
 ///
 /// Rule: goal/restart/foretold
 pub fn foretold_from(
@@ -34,7 +37,7 @@ pub fn foretold_from(
 }
 
 fn foretold_to_one(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i64) -> Option<Vec<Cell>> {
-    /// So many equal draws in a row are no chance.
+    /// More equal draws in a row than this cannot be chance: no other goal can be drawn.
     const MOST_REPEATS: usize = 10_000;
     let mut at = goal;
     let mut goals = vec![at];

@@ -1,7 +1,7 @@
-//! From a config and a seed to an instance, bit for bit as POGEMA 1.4.0 makes it.
+//! Generates instances from a config and a seed, bit for bit as POGEMA 1.4.0 does.
 //!
 //! [`GridConfig`] is POGEMA's config file. [`InstanceSource`] turns it into one [`pogema_core::Instance`] per
-//! reset, drawing the same random numbers as POGEMA does through NumPy ([`pogema_numpy`]).
+//! reset. It draws the same random numbers as POGEMA, which uses NumPy ([`pogema_numpy`]).
 //!
 //! ```
 //! use pogema_maps::{GridConfig, InstanceSource};

@@ -1,4 +1,4 @@
-//! Maps by name: those that come with the program and those of the user's files.
+//! Maps by name: built-in maps and maps from the user's files.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +11,24 @@ use crate::formats::NamedMap;
 use crate::text::MapText;
 use pogema_numpy::Generator;
 
-/// Maps by name, in the order of their names.
+/// A collection of maps, sorted by name.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
     maps: BTreeMap<String, MapText>,
 }
 
 impl Library {
-    /// No map.
+    /// Creates a library without maps.
     pub fn empty() -> Self {
         Self::default()
     }
 
-    /// The maps that come with the program.
+    /// Creates a library of the built-in maps.
     pub fn built_in() -> Self {
         Self { maps: named_maps().map(|map| (map.name, map.text)).collect() }
     }
 
-    /// Takes in further maps, each in the place of one that had its name; says which names were taken.
+    /// Adds maps and returns the names that were already taken. A new map replaces an existing one of the same name.
     ///
     /// Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry.register_maps`
     pub fn register(&mut self, maps: impl IntoIterator<Item = NamedMap>) -> Vec<String> {
@@ -41,12 +41,12 @@ impl Library {
         replaced
     }
 
-    /// All names, in order.
+    /// Returns all names, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.maps.keys().map(String::as_str)
     }
 
-    /// The map of a name.
+    /// Returns the map with a name.
     ///
     /// # Errors
     /// [`Error::Config`] with the nearest known name.
@@ -54,13 +54,13 @@ impl Library {
         self.maps.get(name).ok_or_else(|| self.unknown(name, "a known map"))
     }
 
-    /// The names that a pattern matches, in order.
+    /// Returns the names that match a pattern, sorted.
     ///
-    /// The pattern is a regular expression, and `^PATTERN$` has to match from the beginning of the name on; so `a|b`
-    /// means names that begin with `a` and names that are `b`.
+    /// The pattern is a regular expression, and `^PATTERN$` must match at the beginning of the name. So `a|b` matches
+    /// names that begin with `a`, and the name `b`.
     ///
     /// # Errors
-    /// [`Error::Config`] for a pattern that is none, and with the nearest known name for one that matches nothing.
+    /// [`Error::Config`] for an invalid pattern; [`Error::Config`] with the nearest known name if nothing matches.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.__init__`
     pub fn matching(&self, pattern: &str) -> Result<Vec<&str>, Error> {
@@ -69,7 +69,7 @@ impl Library {
             let last = reason.lines().last().unwrap_or_default().trim_start_matches("error: ");
             Error::config("map_name", pattern, format!("a regular expression: {last}"))
         })?;
-        // A second part of `a|b` is not held to the beginning by `^`, but by where the match begins.
+        // In `^a|b$`, `^` does not anchor the second alternative, so the start of the match is checked.
         let matches = |name: &&str| expression.find(name).is_some_and(|found| found.start() == 0);
         let names: Vec<&str> = self.names().filter(matches).collect();
         if names.is_empty() {
@@ -78,18 +78,19 @@ impl Library {
         Ok(names)
     }
 
-    /// Returns the map of a name; without such a map, the name is a pattern from which a seed chooses.
+    /// Returns the map with a name. If there is none, the name is a pattern, and the seed chooses a map that matches
+    /// it.
     ///
     /// # Errors
-    /// As [`Library::matching`].
+    /// Those of [`Library::matching`].
     pub fn named_or_chosen(&self, name: &str, seed: u64) -> Result<(&str, &MapText), Error> {
         self.maps.get_key_value(name).map_or_else(|| self.choose(name, seed), |(name, text)| Ok((name, text)))
     }
 
-    /// The map that a seed chooses among those that a pattern matches.
+    /// Returns the map that a seed chooses among those that match a pattern.
     ///
     /// # Errors
-    /// As [`Library::matching`].
+    /// Those of [`Library::matching`].
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     pub fn choose(&self, pattern: &str, seed: u64) -> Result<(&str, &MapText), Error> {
@@ -101,7 +102,7 @@ impl Library {
 
     fn unknown(&self, name: &str, expected: &str) -> Error {
         let hint = nearest(name, self.names());
-        let hint = hint.map(|hint| format!("; the nearest is `{}`", shorten(hint, Error::LONGEST_QUOTE)));
+        let hint = hint.map(|hint| format!("; did you mean `{}`?", shorten(hint, Error::LONGEST_QUOTE)));
         Error::config("map_name", name, format!("{expected}{}", hint.unwrap_or_default()))
     }
 }

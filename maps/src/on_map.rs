@@ -1,4 +1,4 @@
-//! Configs on maps and scenarios from other files.
+//! Combines configs with maps and scenarios from other files.
 
 use pogema_core::Error;
 use serde_json::{Map as Object, Value};
@@ -8,12 +8,12 @@ use crate::formats::Scenario;
 use crate::text::MapText;
 
 impl GridConfig {
-    /// Reads a config on a map from another source, which replaces the fields for the map and its sides.
+    /// Reads a config whose map comes from another source and replaces the fields for the map and its sides.
     ///
-    /// Starts and goals of the map are those of the first agents, unless the field `agents_xy` has others.
+    /// The first agents take the starts and goals of the map, unless the field `agents_xy` is given.
     ///
     /// # Errors
-    /// As for [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts.
+    /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts.
     pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
         let has_scenario = !text.starts.is_empty() && !fields.contains_key("agents_xy");
         let mut others = fields.clone();
@@ -31,11 +31,12 @@ impl GridConfig {
         config.with_scenario(&scenario, fields)
     }
 
-    /// Replaces starts and goals by those of a scenario: those of the first agents, if the fields of the config have
-    /// `num_agents`.
+    /// Replaces starts and goals by those of a scenario.
+    ///
+    /// If the fields of the config include `num_agents`, only that many of the scenario's agents are used.
     ///
     /// # Errors
-    /// [`Error::Config`] for more agents than the scenario has, or goals that the config cannot have.
+    /// [`Error::Config`] for more agents than the scenario has, or goals that do not fit the config.
     pub fn with_scenario(
         mut self,
         scenario: &Scenario,

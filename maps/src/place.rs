@@ -1,14 +1,14 @@
-//! Where agents start and want to go, drawn at random.
+//! Places starts and goals at random.
 
 use pogema_core::{Cell, Map};
 
 use crate::components::Components;
 use pogema_numpy::Generator;
 
-/// Draws starts and first goals: cell after cell of the shuffled free cells is a start, or the goal of the last
-/// start of its component. None if the map has no room for so many agents.
+/// Draws starts and first goals; returns `None` if the map has no room for all agents.
 ///
-/// Time and memory are linear in the map.
+/// Goes through the shuffled free cells. Each becomes a start, or the goal of the last start in its component. Time and
+/// memory are linear in the number of cells.
 ///
 /// Rule: place/order, place/pairs
 ///
@@ -19,7 +19,7 @@ pub fn place_at_random(
     num_agents: usize,
     generator: &mut Generator,
 ) -> Option<(Vec<Cell>, Vec<Cell>)> {
-    const NOBODY: u32 = u32::MAX;
+    const NO_AGENT: u32 = u32::MAX;
     if num_agents > capacity(components) {
         return None;
     }
@@ -27,7 +27,7 @@ pub fn place_at_random(
         (0..map.obstacles().len() as u32).filter(|&at| !map.obstacles()[at as usize]).collect();
     generator.shuffle(&mut order);
     let mut num_left = components.sizes().to_vec();
-    let mut waiting = vec![NOBODY; components.len()];
+    let mut waiting = vec![NO_AGENT; components.len()];
     let mut starts = Vec::with_capacity(num_agents);
     let mut goals = vec![Cell::new(0, 0); num_agents];
     let mut num_goals = 0;
@@ -35,9 +35,9 @@ pub fn place_at_random(
         let Some(label) = components.label_at(at as usize) else { continue };
         let label = label as usize;
         let cell = map.cell_at(at as usize);
-        if waiting[label] != NOBODY {
+        if waiting[label] != NO_AGENT {
             goals[waiting[label] as usize] = cell;
-            waiting[label] = NOBODY;
+            waiting[label] = NO_AGENT;
             num_goals += 1;
         } else if starts.len() < num_agents && num_left[label] >= 2 {
             num_left[label] -= 2;
@@ -51,7 +51,7 @@ pub fn place_at_random(
     Some((starts, goals))
 }
 
-/// How many agents fit: each takes two cells of a component.
+/// Returns the largest number of agents that fit on a map: each needs two cells of one component.
 ///
 /// Rule: place/retries
 pub fn capacity(components: &Components) -> usize {

@@ -1,4 +1,4 @@
-//! From a config to an instance, one reset after the other.
+//! Generates the instances of a config, one for each reset.
 
 use std::sync::Arc;
 
@@ -11,21 +11,21 @@ use crate::place::{capacity, place_at_random};
 use crate::streams::{Choice, DrawnGoals, Reach};
 use pogema_numpy::{Generator, SeedSequence};
 
-/// How often POGEMA tries to place the agents before it gives up.
+/// Number of attempts to place the agents before POGEMA gives up.
 const NUM_ATTEMPTS: usize = 11;
-/// Below this each agent's generator is seeded: the largest `int32`.
+/// Upper bound, excluded, of the seeds of the agents' generators: the largest `int32`.
 const AGENT_SEEDS: i64 = i32::MAX as i64;
 
-/// An instance and what its maker wants said about it.
+/// An instance and the warnings from generating it.
 #[derive(Clone, Debug)]
 pub struct Generated {
     /// The instance.
     pub instance: Instance,
-    /// What POGEMA, too, would warn of, a line each; cells are counted without the border.
+    /// Warnings that POGEMA gives too, one line each. Cells are counted without the border.
     pub warnings: Vec<String>,
 }
 
-/// The parts of an instance, to be kept and made anew.
+/// The parts of an instance, for saving it and restoring it later.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MadeInstance {
@@ -37,10 +37,10 @@ pub struct MadeInstance {
 }
 
 impl MadeInstance {
-    /// The parts of an instance.
+    /// Returns the parts of an instance.
     ///
     /// # Errors
-    /// If its goals come from a source that cannot be kept.
+    /// If its goals come from a source that cannot be saved.
     pub fn of(instance: &Instance) -> Result<Self, Error> {
         Ok(Self {
             map: instance.map().clone(),
@@ -52,7 +52,7 @@ impl MadeInstance {
     }
 }
 
-/// Makes the instances of a config; each call of [`InstanceSource::generate`] is one reset of POGEMA.
+/// Generates the instances of a config. Each call of [`InstanceSource::generate`] is one reset of POGEMA.
 ///
 /// Rule: seed/streams, seed/reset
 ///
@@ -64,7 +64,7 @@ pub struct InstanceSource {
     pools: Option<Pools>,
 }
 
-/// Possible starts and goals in their present order: every reset shuffles them further.
+/// Possible starts and goals in their current order. Every reset shuffles them again.
 #[derive(Clone, Debug)]
 struct Pools {
     starts: Vec<Cell>,
@@ -72,11 +72,12 @@ struct Pools {
 }
 
 impl InstanceSource {
-    /// A source for a config. `registered` is the map that the config's `map_name` names; it takes the place of
-    /// the config's own.
+    /// Creates a source for a config.
+    ///
+    /// `registered` is the map named by the config's `map_name`; it replaces the config's own map.
     ///
     /// # Errors
-    /// If the config names a map that is not given.
+    /// If the config names a map but `registered` is `None`.
     ///
     /// Rule: grid/named
     pub fn new(config: GridConfig, registered: Option<Map>) -> Result<Self, Error> {
@@ -93,33 +94,33 @@ impl InstanceSource {
         Ok(Self { config, registered, pools })
     }
 
-    /// The config.
+    /// Returns the config.
     pub fn config(&self) -> &GridConfig {
         &self.config
     }
 
-    /// Chooses the seed of what is made from now on; pools stay as resets have shuffled them.
+    /// Sets the seed of the following resets. Pools keep the order to which earlier resets have shuffled them.
     ///
     /// Rule: seed/streams
     pub fn reseed(&mut self, seed: Option<u64>) {
         self.config.seed = seed;
     }
 
-    /// The possible starts and goals, in the order to which resets have shuffled them so far.
+    /// Returns the possible starts and goals, in the order to which resets have shuffled them so far.
     ///
     /// Rule: place/pools
     pub fn pools(&self) -> Option<(&[Cell], &[Cell])> {
         self.pools.as_ref().map(|pools| (&pools.starts[..], &pools.goals[..]))
     }
 
-    /// The registered map that takes the place of the config's own.
+    /// Returns the registered map that replaces the config's own.
     ///
     /// Rule: grid/named
     pub fn registered(&self) -> Option<&Map> {
         self.registered.as_ref()
     }
 
-    /// An instance that was made by this source before, as it was.
+    /// Restores an instance that this source generated before.
     ///
     /// # Errors
     /// If its parts do not fit the config or each other.
@@ -133,11 +134,11 @@ impl InstanceSource {
         Instance::new(map, outside, starts, streams)
     }
 
-    /// Makes the instance of the next reset.
+    /// Generates the instance of the next reset.
     ///
     /// # Errors
-    /// If no instance can be made: too many agents for the map, places that do not fit the map or each other, a
-    /// next goal that could never be drawn. The source is then as it was.
+    /// If there are too many agents for the map, if starts or goals do not fit the map or each other, or if a next goal
+    /// could never be drawn. An error leaves the source unchanged.
     ///
     /// Rule: place/obstacles, place/explicit, place/pools, place/retries
     pub fn generate(&mut self) -> Result<Generated, Error> {
@@ -160,19 +161,21 @@ impl InstanceSource {
         Ok(Generated { instance, warnings })
     }
 
-    /// A fresh random stream; with a seed, the same one every time.
+    /// Returns a fresh random stream; with a seed, always the same one.
     ///
     /// Rule: seed/streams
     fn stream(&self) -> Result<Generator, Error> {
         match self.config.seed {
             Some(seed) => Ok(Generator::seeded(seed)),
-            None => SeedSequence::from_os()
-                .map(|sequence| Generator::from_sequence(&sequence))
-                .map_err(|error| Error::instance(format!("the system gives no random seed: {error}"))),
+            None => {
+                SeedSequence::from_os().map(|sequence| Generator::from_sequence(&sequence)).map_err(|error| {
+                    Error::instance(format!("the operating system provides no random seed: {error}"))
+                })
+            }
         }
     }
 
-    /// The map before any start or goal clears a cell of it.
+    /// Returns the map before starts and goals clear any of its cells.
     ///
     /// Rule: place/obstacles
     fn ground(&self) -> Result<Map, Error> {
@@ -193,6 +196,8 @@ impl InstanceSource {
         Map::new(height, width, obstacles)
     }
 
+    /// Returns the cells outside the map.
+    ///
     /// Rule: border/outside, border/noise
     fn outside(&self, map: &Map) -> Result<Outside, Error> {
         if self.config.empty_outside {
@@ -202,6 +207,8 @@ impl InstanceSource {
         self.noise(map.height() + border, map.width() + border).map(Outside::Noise)
     }
 
+    /// Places the agents on explicit starts and goals, and clears obstacles there.
+    ///
     /// Rule: place/explicit
     fn place_explicitly(
         &self,
@@ -212,7 +219,7 @@ impl InstanceSource {
         let num_agents = self.config.num_agents;
         Error::check_length("targets_xy", starts.len(), goals.len())?;
         if num_agents > starts.len() {
-            let expected = format!("at most the {} agents of agents_xy", starts.len());
+            let expected = format!("at most {}, the number of agents in agents_xy", starts.len());
             return Err(Error::config("num_agents", num_agents, expected));
         }
         let mut map = self.ground()?;
@@ -232,6 +239,8 @@ impl InstanceSource {
         Ok((map, starts[..num_agents].to_vec(), goals[..num_agents].to_vec()))
     }
 
+    /// Draws starts and goals from the pools.
+    ///
     /// Rule: place/pools
     ///
     /// Source: POGEMA 1.4.0, `generator.py`, `generate_from_possible_positions`
@@ -241,7 +250,7 @@ impl InstanceSource {
         for (what, pool) in [("possible_agents_xy", &pools.starts), ("possible_targets_xy", &pools.goals)] {
             check_on_map(&map, what, pool)?;
             if pool.len() < num_agents {
-                let expected = format!("at most the {} cells of {what}", pool.len());
+                let expected = format!("at most {}, the number of cells in {what}", pool.len());
                 return Err(Error::config("num_agents", num_agents, expected));
             }
         }
@@ -251,11 +260,13 @@ impl InstanceSource {
         Ok((map, pools.starts[..num_agents].to_vec(), pools.goals[..num_agents].to_vec()))
     }
 
+    /// Places the agents at random, with as many attempts as POGEMA.
+    ///
     /// Rule: place/retries
     fn place_at_random(&self, warnings: &mut Vec<String>) -> Result<Placed, Error> {
         let num_agents = self.config.num_agents;
         let draws_map = self.registered.is_none() && self.config.map.is_none();
-        // Every attempt of a seeded config is the same, and a given map never grows.
+        // With a seed all attempts are equal, and on a given map the room never changes.
         let num_attempts = if draws_map && self.config.seed.is_none() { NUM_ATTEMPTS } else { 1 };
         let mut room = 0;
         for attempt in 0..num_attempts {
@@ -265,14 +276,16 @@ impl InstanceSource {
             let placed = place_at_random(&map, &components, num_agents, &mut self.stream()?);
             if let Some((starts, goals)) = placed {
                 if (1..NUM_ATTEMPTS - 1).contains(&attempt) {
-                    warnings.push(format!("the agents found room only at attempt {}", attempt + 1));
+                    warnings.push(format!("the agents were placed only at attempt {}", attempt + 1));
                 }
                 return Ok((map, starts, goals));
             }
         }
-        Err(Error::config("num_agents", num_agents, format!("at most {room}, for which the map has room")))
+        Err(Error::config("num_agents", num_agents, format!("at most {room}; the map has no room for more")))
     }
 
+    /// Returns the goal stream of each agent.
+    ///
     /// Rule: goal/restart/draw, goal/restart/pool, goal/restart/sequence, seed/goals
     fn streams(&self, map: &Map, goals: &[Cell], pools: Option<&Pools>) -> Result<Vec<GoalStream>, Error> {
         if self.config.on_target != OnGoal::Restart {
@@ -319,6 +332,8 @@ impl InstanceSource {
 
 type Placed = (Map, Vec<Cell>, Vec<Cell>);
 
+/// Returns the goal streams of explicit sequences.
+///
 /// Rule: goal/restart/sequence
 fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error> {
     let Targets::Sequences(sequences) = targets else {
@@ -336,7 +351,7 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
     Ok(first.iter().zip(sequences).map(stream).collect())
 }
 
-/// Passes if every cell of a field is on the map.
+/// Checks that every cell of a field is on the map.
 pub(crate) fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
     let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
     Err(Error::cell_outside(field, cell, (map.height(), map.width())))

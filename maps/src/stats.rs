@@ -1,4 +1,4 @@
-//! What can be said of a map, and of a scenario on it, before anybody has moved.
+//! Figures of maps and of scenarios on them, computed without playing an episode.
 
 use std::collections::BTreeMap;
 
@@ -18,18 +18,18 @@ pub struct MapStats {
     pub num_free: usize,
     /// Share of obstacles among all cells.
     pub density: f64,
-    /// The sizes of all components, the largest first. Units: cells.
+    /// The sizes of all components, largest first. Units: cells.
     pub components: Vec<u32>,
-    /// Free cells with one free neighbour.
+    /// Number of free cells with exactly one free neighbour.
     pub dead_ends: usize,
-    /// Free cells with two.
+    /// Number of free cells with exactly two free neighbours.
     pub corridor: usize,
-    /// Pairs of free cells without a way from one to the other.
+    /// Number of pairs of free cells without a path between them.
     pub unreachable_pairs: u64,
 }
 
 impl MapStats {
-    /// The figures of a map.
+    /// Computes the figures of a map.
     pub fn of(map: &Map) -> Self {
         let num_cells = map.obstacles().len();
         let num_free = map.num_free();
@@ -56,22 +56,22 @@ impl MapStats {
         }
     }
 
-    /// Share of the free cells that are corridor.
+    /// Returns the share of corridor cells among the free cells.
     pub fn corridor_share(&self) -> f64 {
         if self.num_free == 0 { 0.0 } else { self.corridor as f64 / self.num_free as f64 }
     }
 }
 
-/// Why a scenario cannot be solved.
+/// A reason why a scenario cannot be solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Infeasibility {
-    /// There is no way from this agent's start to its goal.
+    /// This agent has no path from its start to its goal.
     NoPath(usize),
-    /// These agents want to stay on one cell.
+    /// These agents share a goal, on which all of them have to stay.
     SameGoal(Vec<usize>, Cell),
     /// These agents share a component, and a search through their joint states finds no solution.
     Locked(Vec<usize>),
-    /// These agents share a corridor that none can leave, and their goals stand in another order than they do.
+    /// These agents share a corridor that none can leave, and their goals are in another order than their starts.
     WrongOrder(Vec<usize>),
 }
 
@@ -80,23 +80,25 @@ pub enum Infeasibility {
 pub struct ScenarioStats {
     /// Number of agents.
     pub num_agents: usize,
-    /// Why it cannot be solved; nothing is proven if there is nothing here.
+    /// The reasons why it cannot be solved. An empty list proves nothing.
     pub infeasibilities: Vec<Infeasibility>,
-    /// Whether every part of it was proven to have a solution.
+    /// Whether every part of the scenario is proven solvable.
     pub is_proven_solvable: bool,
-    /// The sum over all agents that can reach their goals of the way there; no solution costs less. Units: steps.
+    /// Sum of the distances from start to goal over all agents that can reach their goals; a lower bound on the cost of
+    /// a solution. Units: steps.
     pub sum_of_distances: u64,
-    /// The longest of those ways. Units: steps.
+    /// The longest of these distances. Units: steps.
     pub longest_distance: u32,
 }
 
 impl ScenarioStats {
-    /// The limit on joint states of a component that is passed to the joint search.
+    /// Maximum number of joint states of a component that is passed to the joint search.
     pub const MAX_STATES: usize = 200_000;
 
-    /// Returns the figures of starts and goals on a map.
+    /// Computes the figures of starts and goals on a map.
     ///
-    /// `is_solvable` decides small components by a search through their joint states, and returns `None` if it cannot.
+    /// `is_solvable` decides small components by a search through their joint states; it returns `None` if it cannot
+    /// decide.
     pub fn of(
         map: &Map,
         starts: &[Cell],
@@ -206,16 +208,16 @@ fn part_of(
 }
 
 impl ScenarioPart {
-    /// Whether its joint states are within the limit.
+    /// Returns whether the number of joint states is within the limit.
     fn is_small(&self) -> bool {
         let num_free = self.map.num_free();
         let orders = (0..self.starts.len()).map(|agent| num_free.saturating_sub(agent));
-        // Each agent is done or not.
+        // The factor 2: each agent has finished or not.
         let states = orders.fold(1_usize, |states, choices| states.saturating_mul(2 * choices));
         states <= ScenarioStats::MAX_STATES
     }
 
-    /// Whether it is one corridor along which starts and goals stand in different orders.
+    /// Returns whether the part is one corridor along which starts and goals are in different orders.
     fn is_in_wrong_order(&self) -> bool {
         let Some(path) = self.corridor() else { return false };
         let place = |cell: &Cell| path.iter().position(|other| other == cell);
@@ -224,7 +226,7 @@ impl ScenarioPart {
         !agents.is_sorted_by_key(|&agent| place(&self.goals[agent]))
     }
 
-    /// All cells from one end to the other, if there is a single row of them.
+    /// Returns all cells from one end to the other if the part is a single corridor.
     fn corridor(&self) -> Option<Vec<Cell>> {
         let cells = (0..self.map.obstacles().len()).map(|index| self.map.cell_at(index));
         let free: Vec<Cell> = cells.filter(|&cell| !self.map.is_obstacle(cell)).collect();

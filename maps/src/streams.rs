@@ -1,4 +1,4 @@
-//! Where an agent's next goal is drawn from in lifelong mode.
+//! Draws the next goals of the agents in lifelong mode.
 
 use std::sync::Arc;
 
@@ -16,17 +16,17 @@ pub struct DrawnGoals {
     choice: Choice,
 }
 
-/// The cells that a goal is drawn from. All agents of a map share them.
+/// The cells from which a goal is drawn, shared by all agents of a map.
 #[derive(Clone, Debug)]
 pub enum Choice {
-    /// The cells that the agent can reach, all but the one it stands on.
+    /// The cells that the agent can reach, except its own.
     ///
     /// Source: POGEMA 1.4.0, `generator.py`, `generate_new_target`
     Reach(Arc<Reach>),
     /// The possible goals.
     ///
-    /// POGEMA means to leave out the cell the agent stands on, but compares a cell of the map with one that counts
-    /// the border, so it leaves out the cell that lies one radius below and to the right.
+    /// POGEMA intends to exclude the agent's own cell, but compares a cell counted without the border with one counted
+    /// with it. It therefore excludes the cell one radius below and one radius to the right.
     ///
     /// Rule: goal/restart/pool
     ///
@@ -34,7 +34,7 @@ pub enum Choice {
     Pool { cells: Arc<[Cell]>, radius: u16 },
 }
 
-/// The cells that can be reached from each cell of a map.
+/// The cells reachable from each cell of a map.
 #[derive(Debug)]
 pub struct Reach {
     components: Components,
@@ -42,20 +42,20 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// The reach of every cell of a map.
+    /// Collects the reachable cells of every cell of a map.
     pub fn new(components: Components) -> Self {
         let cells = components.cells();
         Self { components, cells }
     }
 
-    /// The cells that can be reached from a cell, itself included; none from an obstacle.
+    /// Returns the cells reachable from a cell, itself included; none for an obstacle.
     fn from(&self, cell: Cell) -> &[Cell] {
         self.components.label(cell).map_or(&[], |label| self.cells.of(label))
     }
 }
 
 impl Choice {
-    /// The cells to draw from for an agent at `at`, and the one among them that does not count.
+    /// Returns the cells to draw from for an agent at `at`, and the cell that is excluded.
     fn cells(&self, at: Cell) -> (&[Cell], Cell) {
         match self {
             Self::Reach(reach) => (reach.from(at), at),
@@ -65,30 +65,31 @@ impl Choice {
         }
     }
 
-    /// Whether a goal can be drawn at all for an agent at `at`.
+    /// Returns whether any goal can be drawn for an agent at `at`.
     pub fn can_draw(&self, at: Cell) -> bool {
-        let (cells, left_out) = self.cells(at);
-        cells.iter().any(|&cell| cell != left_out)
+        let (cells, excluded) = self.cells(at);
+        cells.iter().any(|&cell| cell != excluded)
     }
 }
 
 impl DrawnGoals {
-    /// A source with its own random numbers.
+    /// Creates a source with its own random numbers.
     pub fn new(generator: Generator, choice: Choice) -> Self {
         Self { generator, choice }
     }
 }
 
 impl GoalSource for DrawnGoals {
-    /// Draws until a cell counts. Where none does, POGEMA would draw for ever; the agent keeps its goal here.
+    /// Draws until the cell is not excluded. If all cells are excluded, POGEMA would draw forever; here the agent keeps
+    /// its goal.
     fn next_goal(&mut self, at: Cell) -> Cell {
-        let (cells, left_out) = self.choice.cells(at);
-        if cells.iter().all(|&cell| cell == left_out) {
+        let (cells, excluded) = self.choice.cells(at);
+        if cells.iter().all(|&cell| cell == excluded) {
             return at;
         }
         loop {
             let Ok(index) = self.generator.choice_index(cells.len()) else { return at };
-            if cells[index] != left_out {
+            if cells[index] != excluded {
                 return cells[index];
             }
         }

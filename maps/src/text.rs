@@ -1,4 +1,4 @@
-//! Maps as text, with all the characters POGEMA gives a meaning.
+//! Maps as text, with all characters that have a meaning in POGEMA.
 
 use std::collections::BTreeMap;
 
@@ -6,20 +6,20 @@ use pogema_core::{Cell, Error, Map};
 
 use crate::source::check_on_map;
 
-/// What a map text says.
+/// The content of a map text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapText {
     /// The obstacles.
     pub map: Map,
-    /// Where `a` to `z` stand, in the order of the alphabet.
+    /// The cells of `a` to `z`, in alphabetical order.
     pub starts: Vec<Cell>,
-    /// Where `A` to `Z` stand, in the order of the alphabet: the first one is the first start's goal.
+    /// The cells of `A` to `Z`, in alphabetical order: the first one is the goal of the first start.
     pub goals: Vec<Cell>,
-    /// Cells that starts and goals may be drawn from, if the text has one of `@`, `$` and `!`.
+    /// The cells from which starts and goals are drawn, if the text has one of `@`, `$` and `!`.
     pub pools: Option<(Vec<Cell>, Vec<Cell>)>,
 }
 
-/// Letters for so many agents.
+/// Number of agents for which a map text has letters.
 const MOST_LETTERS: usize = 26;
 
 impl From<Map> for MapText {
@@ -29,11 +29,11 @@ impl From<Map> for MapText {
 }
 
 impl MapText {
-    /// The rows of the text that says the same.
+    /// Returns the rows of the map text.
     ///
     /// # Errors
-    /// [`Error::Instance`] if there are no letters for it: more than 26 agents, two of them on one cell, or agents
-    /// beside pools; [`Error::Config`] for a cell off the map.
+    /// [`Error::Instance`] for content that a map text cannot express: more than 26 agents, two letters on one cell, or
+    /// a letter on an obstacle or a cell marked by a pool; [`Error::Config`] for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
@@ -55,16 +55,19 @@ impl MapText {
             }
         }
         if self.starts.len() > MOST_LETTERS {
-            let reason =
-                format!("a map text has letters for {MOST_LETTERS} agents, not for {}", self.starts.len());
+            let reason = format!(
+                "a map text has letters for {MOST_LETTERS} agents, but the map has {}",
+                self.starts.len()
+            );
             return Err(Error::instance(reason));
         }
         for (first, cells) in [(b'a', &self.starts), (b'A', &self.goals)] {
             for (letter, &cell) in (first..).zip(cells) {
                 let place = &mut letters[self.map.index(cell)];
                 if *place != '.' {
-                    let reason =
-                        format!("a map text has one character for cell {cell}, which is `{place}` already");
+                    let reason = format!(
+                        "a map text has one character per cell, and cell {cell} is `{place}` already"
+                    );
                     return Err(Error::instance(reason));
                 }
                 *place = letter as char;
@@ -73,16 +76,16 @@ impl MapText {
         Ok(letters.chunks(width).map(|row| row.iter().collect()).collect())
     }
 
-    /// The text.
+    /// Returns the map text.
     ///
     /// # Errors
-    /// As [`MapText::rows`].
+    /// Those of [`MapText::rows`].
     pub fn to_text(&self) -> Result<String, Error> {
         self.rows().map(|rows| rows.join("\n"))
     }
 }
 
-/// A side of a map as a file's header gives it.
+/// Reads a side of a map from a file's header.
 pub(crate) fn check_side(line: usize, text: &str) -> Result<usize, Error> {
     let side = text.parse::<usize>().ok().filter(|side| (1..=Map::LONGEST_SIDE).contains(side));
     side.ok_or_else(|| {
@@ -92,8 +95,10 @@ pub(crate) fn check_side(line: usize, text: &str) -> Result<usize, Error> {
     })
 }
 
-/// Reads a map text: `.` free, `#` obstacle, `a` a start, `A` a goal, `@` a possible start, `$` a possible
-/// goal, `!` neither. White space separates rows.
+/// Reads a map text.
+///
+/// `.` is free, `#` an obstacle, `a` a start, `A` a goal, `@` a possible start, `$` a possible goal, and `!` free but
+/// neither. White space separates rows.
 ///
 /// # Errors
 /// [`Error::Map`] with line and column for an unknown character or a row of another length, and an error for
@@ -106,7 +111,7 @@ pub fn parse_map_text(text: &str) -> Result<MapText, Error> {
     let mut reader = Reader::default();
     for (line, words) in text.lines().enumerate() {
         for word in words.split_whitespace() {
-            // Both are slices of one line, so the distance between them is where the word begins.
+            // Both are slices of one line, so the distance of their pointers is the offset of the word.
             let begin = word.as_ptr() as usize - words.as_ptr() as usize;
             reader.read_row(word).map_err(|(col, fault)| {
                 let (line, column) = (line + 1, words[..begin].chars().count() + col + 1);
@@ -132,14 +137,14 @@ struct Reader {
     has_pools: bool,
 }
 
-/// What is wrong with a row.
+/// A reason why a row cannot be read.
 enum Fault {
     Letter(char),
     Other(String),
 }
 
 impl Reader {
-    /// An error has the column, counted from 0.
+    /// Reads a row; an error holds the column, counted from 0.
     fn read_row(&mut self, row: &str) -> Result<(), (usize, Fault)> {
         let coordinate = |number: usize, col: usize| {
             let reason = |_| format!("the map has more than {} rows or columns", u16::MAX);
@@ -197,13 +202,13 @@ impl Reader {
         let (num_starts, num_goals) = (self.starts.len(), self.goals.len());
         if num_starts != num_goals {
             let reason = format!(
-                "the map has {num_starts} starts (a-z) and {num_goals} goals (A-Z), expected as many"
+                "the map has {num_starts} starts (a-z) and {num_goals} goals (A-Z), expected equal numbers"
             );
             return Err(Error::instance(reason));
         }
         if num_starts > 0 && self.has_pools {
             let reason =
-                "the map has letters and one of `@$!`, expected exact starts and goals or possible ones";
+                "the map has letters and one of `@$!`, expected either exact or possible starts and goals";
             return Err(Error::instance(reason));
         }
         let map = Map::new(self.height, self.width, self.obstacles)?;

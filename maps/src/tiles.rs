@@ -1,17 +1,17 @@
-//! Large maps cut into tiles.
+//! Cuts large maps into tiles.
 
 use pogema_core::{Error, Map};
 
 use crate::formats::NamedMap;
 use crate::text::MapText;
 
-/// Side of the tiles of the published set. Units: cells.
+/// Side of the tiles in the published set. Units: cells.
 pub const PUBLISHED_TILE: usize = 64;
 
 /// Cuts a map into square tiles, row by row, named `<name>_00` and so on.
 ///
 /// # Errors
-/// [`Error::Config`] if the side does not divide those of the map, so that no cell is lost.
+/// [`Error::Config`] if the side does not divide both sides of the map, because cells would be lost.
 ///
 /// Source: POGEMA benchmark, `04-movingai`, which is `06-pathfinding` in tiles of 64 × 64
 pub fn tiles(name: &str, map: &Map, side: usize) -> Result<Vec<NamedMap>, Error> {

@@ -1,4 +1,4 @@
-//! Configs that cannot be read, each with the one line it is refused with: syntax, types and ranges.
+//! Configs that cannot be read, each with its one-line error: syntax, types and ranges.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,7 +8,7 @@ use pogema_core::Error;
 use pogema_maps::{FIELDS, GridConfig, value_from_json};
 use serde_json::{Value, json};
 
-/// Texts that hold no fields and values.
+/// YAML texts that are not a valid object of fields.
 const SYNTAX: [(&str, &str); 28] = [
     ("size: [", "config: line 1, column 7: unclosed bracket '['"),
     ("{size: 8", "config: line 1, column 1: unclosed bracket '{'"),
@@ -26,39 +26,36 @@ const SYNTAX: [(&str, &str); 28] = [
     ("yes", "config: found true or false, expected fields and values such as `size: 8`"),
     ("- size: 8\n- seed: 1", "config: found a list, expected fields and values such as `size: 8`"),
     ("[]", "config: found a list, expected fields and values such as `size: 8`"),
-    ("size: 8\n---\nsize: 9", "config: line 3, column 1: a second document, expected one"),
+    ("size: 8\n---\nsize: 9", "config: line 3, column 1: found a second document, expected one"),
     ("%YAML 3.0\n---\nsize: 8", "config: line 1, column 1: unsupported YAML major version"),
-    ("size: 8\nseed: 1\nsize: 9", "config: line 3, column 1: `size` stands twice"),
+    ("size: 8\nseed: 1\nsize: 9", "config: line 3, column 1: duplicate key `size`"),
     ("? [size]\n: 8", "config: line 1, column 3: expected string scalar"),
     ("null: 8", "config: line 1, column 1: null is not allowed here"),
     ("size: *side", "config: line 1, column 7: unknown alias"),
-    ("map: &rows [*rows]", "config: line 1, column 13: an alias of what it is a part of"),
+    ("map: &rows [*rows]", "config: line 1, column 13: an alias refers to a value that contains it"),
     ("<<: 8", "config: line 1, column 5: YAML merge value must be mapping or sequence of mappings"),
-    // Without an error these would be no map and a plain number: what a tag means is unknown, so nothing is.
+    // Without an error these would be read as an absent map and a plain number. No tag is supported.
     ("map: !..", "config: line 1, column 9: unsupported tag `!..`"),
     ("seed: !vault 8", "config: line 1, column 14: unsupported tag `!vault`"),
-    (
-        "colision_system: soft",
-        "config: unknown field `colision_system`, the nearest known one is `collision_system`",
-    ),
-    ("radius: 3", "config: unknown field `radius`, the nearest known one is `obs_radius`"),
-    ("{size: 8, Seed: 3}", "config: unknown field `Seed`, the nearest known one is `seed`"),
-    ("\"a\\nb\\e[2J\": 3", "config: unknown field `a\\nb\\u{1b}[2J`, the nearest known one is `map`"),
-    ("1: 2", "config: unknown field `1`, the nearest known one is `limits`"),
+    ("colision_system: soft", "config: unknown field `colision_system`; did you mean `collision_system`?"),
+    ("radius: 3", "config: unknown field `radius`; did you mean `obs_radius`?"),
+    ("{size: 8, Seed: 3}", "config: unknown field `Seed`; did you mean `seed`?"),
+    ("\"a\\nb\\e[2J\": 3", "config: unknown field `a\\nb\\u{1b}[2J`; did you mean `map`?"),
+    ("1: 2", "config: unknown field `1`; did you mean `limits`?"),
 ];
 
-/// The same of JSON.
+/// JSON texts that are not a valid object of fields.
 const JSON: [(&str, &str); 7] = [
     ("", "config: line 1, column 0: EOF while parsing a value"),
     ("{\"size\": 8", "config: line 1, column 10: EOF while parsing an object"),
     ("{\n\"size\": 08}", "config: line 2, column 10: invalid number"),
     ("{\"density\": NaN}", "config: line 1, column 13: expected value"),
     ("{\"density\": 1e999}", "config: line 1, column 17: number out of range"),
-    ("{\"size\": 8, \"size\": 9}", "config: line 1, column 18: `size` stands twice"),
+    ("{\"size\": 8, \"size\": 9}", "config: line 1, column 18: duplicate key `size`"),
     ("null", "config: found nothing, expected fields and values such as `size: 8`"),
 ];
 
-/// Numbers that JSON has no form for, or that are too long for one.
+/// Numbers that JSON cannot express, or that do not fit the field's type.
 const NUMBERS: [(&str, &str); 10] = [
     ("density: .nan", "config: line 1, column 10: `density` is `NaN`, expected a finite number"),
     ("size: 8\ndensity: .inf", "config: line 2, column 10: `density` is `inf`, expected a finite number"),
@@ -84,7 +81,7 @@ const NUMBERS: [(&str, &str); 10] = [
     ),
 ];
 
-/// Every field, what its values are, and which of the [`WRONG`] ones it takes: null stands for absent in some.
+/// Every field, its expected values, and the values of [`WRONG`] that it accepts; for some fields null means absent.
 const TYPES: [(&str, &str, &str); 27] = [
     ("MOVES", "[[0,0],[-1,0],[1,0],[0,-1],[0,1]]", ""),
     ("FREE", "0", ""),
@@ -115,10 +112,10 @@ const TYPES: [(&str, &str, &str); 27] = [
     ("limits", "one of `as_released`, `extended`", ""),
 ];
 
-/// A value of each type; none is right for a field unless [`TYPES`] says so.
+/// A value of each type. A field rejects all of them except those listed in [`TYPES`].
 const WRONG: [&str; 7] = ["null", "true", "0.5", "\"Soft\"", "\"2\"", "[]", "{\"a\":1}"];
 
-/// Fields with a range: the least and the largest value.
+/// Fields with a range: the smallest and the largest value.
 const RANGES: [(&str, i64, i64); 6] = [
     ("seed", 0, i64::MAX - 1),
     ("size", 2, 4096),
@@ -133,39 +130,39 @@ fn yaml_error(text: &str) -> Option<Error> {
 }
 
 #[test]
-fn unreadable_texts_are_refused_with_their_place() {
+fn unreadable_texts_are_rejected_with_line_and_column() {
     refused::check(&SYNTAX, &yaml_error);
     refused::check(&NUMBERS, &yaml_error);
     refused::check(&JSON, &|text| GridConfig::from_json(text).err());
 }
 
 #[test]
-fn empty_texts_are_the_default() {
+fn empty_texts_give_the_default_config() {
     for text in ["", " \n", "# nothing", "---", "~", "null", "{}", "---\n...\n"] {
         assert_eq!(GridConfig::from_yaml(text).unwrap(), GridConfig::default(), "{text:?}");
     }
 }
 
 #[test]
-fn every_field_refuses_every_other_type() {
+fn every_field_rejects_every_other_type() {
     assert_eq!(TYPES.map(|(field, ..)| field), FIELDS);
     for (field, expected, allowed) in TYPES {
         for wrong in WRONG.iter().filter(|wrong| !allowed.split(' ').any(|right| right == **wrong)) {
             let value = value_from_json(wrong).unwrap();
             let error = GridConfig::from_value(&json!({ field: value })).unwrap_err().to_string();
-            let told = match (field, *wrong) {
+            let expected = match (field, *wrong) {
                 ("map", "\"2\"") => {
                     "map: line 1, column 1: unknown character `2`, expected one of `.#@$!`, a-z or A-Z".into()
                 }
                 _ => format!("config: `{field}` is `{wrong}`, expected {expected}"),
             };
-            assert_eq!(error, told);
+            assert_eq!(error, expected);
         }
     }
 }
 
 #[test]
-fn every_range_ends_where_it_says() {
+fn ranges_are_inclusive() {
     let accepts = |field: &str, number: Value| {
         let other = if field == "width" { "height" } else { "width" };
         let sides = field == "width" || field == "height";
@@ -196,7 +193,7 @@ fn every_range_ends_where_it_says() {
 }
 
 #[test]
-fn extended_limits_end_where_they_say() {
+fn extended_limits_are_inclusive() {
     for (field, most) in [("size", 65_279_u64), ("num_agents", 4_294_967_295)] {
         let read = |number: u64| GridConfig::from_value(&json!({ "limits": "extended", field: number }));
         read(most).unwrap();
@@ -206,7 +203,7 @@ fn extended_limits_end_where_they_say() {
 }
 
 #[test]
-fn texts_that_grow_are_refused() {
+fn texts_that_expand_too_far_are_rejected() {
     let nine = |name: char, of: char| format!("{name}: &{name} [{}]\n", vec![format!("*{of}"); 9].join(", "));
     let bomb = format!(
         "a: &a [0, 0, 0, 0, 0, 0, 0, 0, 0]\n{}",
@@ -229,7 +226,7 @@ fn texts_that_grow_are_refused() {
 }
 
 #[test]
-fn a_large_map_is_no_bomb() {
+fn a_large_map_is_accepted() {
     let row = format!("[{}]", vec!["0"; 600].join(", "));
     let config = GridConfig::from_yaml(&format!("map: [{}]", vec![row; 600].join(", "))).unwrap();
     assert_eq!((config.width, config.height), (600, 600));

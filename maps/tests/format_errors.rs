@@ -1,4 +1,4 @@
-//! What is wrong with a file is told in one line, with the place.
+//! Errors in map files are reported in one line, with their place.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,15 +14,15 @@ use pogema_maps::{MapText, tiles};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-fn told<T: std::fmt::Debug>(result: Result<T, Error>) -> String {
+fn error_line<T: std::fmt::Debug>(result: Result<T, Error>) -> String {
     let line = result.unwrap_err().to_string();
     assert!(!line.contains('\n') && line.len() < 400, "{line}");
     line
 }
 
 #[track_caller]
-fn assert_told<T: std::fmt::Debug>(result: Result<T, Error>, parts: &[&str]) {
-    let line = told(result);
+fn assert_error<T: std::fmt::Debug>(result: Result<T, Error>, parts: &[&str]) {
+    let line = error_line(result);
     for part in parts {
         assert!(line.contains(part), "`{part}` is not in: {line}");
     }
@@ -31,56 +31,56 @@ fn assert_told<T: std::fmt::Debug>(result: Result<T, Error>, parts: &[&str]) {
 const HEADER: &str = "type octile\nheight 2\nwidth 3\nmap\n";
 
 #[test]
-fn a_movingai_map_that_is_none() {
+fn invalid_movingai_maps() {
     let read = |text: &str| read_movingai(text, Water::Free);
-    assert_told(read(""), &["line 1"]);
-    assert_told(read("type octile\nheight 2\nwidth 3\n...\n"), &["line 4", "`map`"]);
-    assert_told(read("type octile\nheight two\nwidth 3\nmap\n"), &["line 2", "`two`"]);
-    assert_told(read("type octile\nheight 0\nwidth 3\nmap\n"), &["line 2", "`0`"]);
-    assert_told(read("type octile\nheight 2\nheight 2\nmap\n"), &["line 3"]);
-    assert_told(read(&format!("{HEADER}...\n")), &["line 6", "after 1 rows"]);
-    assert_told(read(&format!("{HEADER}...\n..\n")), &["line 6, column 3", "2 cells"]);
-    assert_told(read(&format!("{HEADER}....\n...\n")), &["line 5, column 4", "longer"]);
-    assert_told(read(&format!("{HEADER}...\n.x.\n")), &["line 6, column 2", "`x`"]);
-    assert_told(read(&format!("{HEADER}..\t\n...\n")), &["line 5, column 3"]);
-    assert_told(read(&format!("{HEADER}...\n...\n...\n")), &["line 7", "goes on"]);
-    assert_told(read("type octile\nheight 99999999999999999999\nwidth 1\nmap\n"), &["line 2"]);
+    assert_error(read(""), &["line 1"]);
+    assert_error(read("type octile\nheight 2\nwidth 3\n...\n"), &["line 4", "`map`"]);
+    assert_error(read("type octile\nheight two\nwidth 3\nmap\n"), &["line 2", "`two`"]);
+    assert_error(read("type octile\nheight 0\nwidth 3\nmap\n"), &["line 2", "`0`"]);
+    assert_error(read("type octile\nheight 2\nheight 2\nmap\n"), &["line 3"]);
+    assert_error(read(&format!("{HEADER}...\n")), &["line 6", "after 1 rows"]);
+    assert_error(read(&format!("{HEADER}...\n..\n")), &["line 6, column 3", "2 cells"]);
+    assert_error(read(&format!("{HEADER}....\n...\n")), &["line 5, column 4", "longer"]);
+    assert_error(read(&format!("{HEADER}...\n.x.\n")), &["line 6, column 2", "`x`"]);
+    assert_error(read(&format!("{HEADER}..\t\n...\n")), &["line 5, column 3"]);
+    assert_error(read(&format!("{HEADER}...\n...\n...\n")), &["line 7", "another row"]);
+    assert_error(read("type octile\nheight 99999999999999999999\nwidth 1\nmap\n"), &["line 2"]);
     let endless = format!("type octile\nheight 1\nwidth 3\nmap\n{}", ".".repeat(100_000_000));
-    assert_told(read(&endless), &["line 5, column 4"]);
+    assert_error(read(&endless), &["line 5, column 4"]);
 }
 
 #[test]
-fn a_scen_file_that_is_none() {
-    assert_told(read_scen(""), &["line 1", "version 1"]);
-    assert_told(read_scen("version 2\n"), &["`version 2`"]);
+fn invalid_scen_files() {
+    assert_error(read_scen(""), &["line 1", "version 1"]);
+    assert_error(read_scen("version 2\n"), &["`version 2`"]);
     let line = |text: &str| read_scen(&format!("version 1\n{text}\n"));
-    assert_told(line("1\tm\t3\t3\t0\t0\t1"), &["line 2", "7 columns"]);
-    assert_told(line("1\tm\t3\t3\t3\t0\t1\t1\t2"), &["line 2, column 9", "start x is `3`", "0 to 2"]);
-    assert_told(line("1\tm\t3\t3\t0\t0\t1\t1\tfar"), &["optimal length is `far`"]);
-    assert_told(line("1\tm\t3\t3\t0\t0\t1\t1\tNaN"), &["`NaN`"]);
+    assert_error(line("1\tm\t3\t3\t0\t0\t1"), &["line 2", "7 columns"]);
+    assert_error(line("1\tm\t3\t3\t3\t0\t1\t1\t2"), &["line 2, column 9", "start x is `3`", "0 to 2"]);
+    assert_error(line("1\tm\t3\t3\t0\t0\t1\t1\tfar"), &["optimal length is `far`"]);
+    assert_error(line("1\tm\t3\t3\t0\t0\t1\t1\tNaN"), &["`NaN`"]);
     let map = Map::from_rows(&["....", "...."]).unwrap();
     let tasks = read_scen("version 1\n1 m 3 3 0 0 1 1 2\n").unwrap();
-    assert_told(Scenario::from_tasks(&tasks, &map), &["`m`", "3 rows", "4"]);
+    assert_error(Scenario::from_tasks(&tasks, &map), &["`m`", "3 rows", "4"]);
     let (start, goal) = (Cell::new(0, 0), Cell::new(0, 1));
     let task = Task { bucket: 0, map: "a\tb".into(), height: 2, width: 2, start, goal, length: 1.0 };
-    assert_told(write_scen(&[task]), &["cannot be the name"]);
+    assert_error(write_scen(&[task]), &["cannot be the name"]);
 }
 
 #[test]
-fn a_set_that_is_none() {
+fn invalid_map_sets() {
     assert_eq!(read_set("").unwrap(), []);
-    assert_told(read_set("- a\n"), &["line 1"]);
-    assert_told(read_set("one: |-\n  ..\n  .?\n"), &["map: line 3, column 4", "`one`", "`?`"]);
-    assert_told(read_set("one: |-\n  ..\n  ...\n"), &["line 3", "`one`"]);
-    assert_told(read_set("one: ..\ntwo: [1]\n"), &["line 2"]);
-    assert_told(read_set("one: ..\none: ..\n"), &["one", "twice"]);
-    assert_told(read_set("one: |-\n\t..\n"), &["line 1, column 6", "tab"]);
-    assert_told(read_set("one: a.\n"), &["line 1", "`one`", "as many"]);
-    assert_told(read_set("one: \"\u{feff}..\"\n"), &["`one`"]);
+    assert_error(read_set("- a\n"), &["line 1"]);
+    assert_error(read_set("one: |-\n  ..\n  .?\n"), &["map: line 3, column 4", "`one`", "`?`"]);
+    assert_error(read_set("one: |-\n  ..\n  ...\n"), &["line 3", "`one`"]);
+    assert_error(read_set("one: ..\ntwo: [1]\n"), &["line 2"]);
+    assert_error(read_set("one: ..\none: ..\n"), &["one", "duplicate"]);
+    assert_error(read_set("one: |-\n\t..\n"), &["line 1, column 6", "tab"]);
+    assert_error(read_set("one: a.\n"), &["line 1", "`one`", "equal numbers"]);
+    assert_error(read_set("one: \"\u{feff}..\"\n"), &["`one`"]);
     let bomb = "a: &a [x,x,x,x,x,x,x,x,x]\nb: &b [*a,*a,*a,*a,*a,*a,*a,*a,*a]\nc: &c [*b,*b,*b,*b,*b,*b,*b,*b,*b]\n\
                 d: &d [*c,*c,*c,*c,*c,*c,*c,*c,*c]\ne: &e [*d,*d,*d,*d,*d,*d,*d,*d,*d]\n\
                 f: &f [*e,*e,*e,*e,*e,*e,*e,*e,*e]\ng: &g [*f,*f,*f,*f,*f,*f,*f,*f,*f]\n";
-    told(read_set(bomb));
+    error_line(read_set(bomb));
 }
 
 fn archive(entries: &[(&str, &[u8])]) -> Cursor<Vec<u8>> {
@@ -93,25 +93,25 @@ fn archive(entries: &[(&str, &[u8])]) -> Cursor<Vec<u8>> {
 }
 
 #[test]
-fn an_archive_that_is_none() {
+fn invalid_archives() {
     let read = |entries: &[(&str, &[u8])]| read_archive(archive(entries), Water::Free);
     let good: &[u8] = b"type octile\nheight 1\nwidth 2\nmap\n..\n";
-    assert_eq!(read(&[("maps/one.map", good), ("readme.txt", b"no map")]).unwrap().len(), 1);
-    assert_told(read_archive(Cursor::new(b"no archive".to_vec()), Water::Free), &["archive"]);
+    assert_eq!(read(&[("maps/one.map", good), ("readme.txt", b"not a map")]).unwrap().len(), 1);
+    assert_error(read_archive(Cursor::new(b"not an archive".to_vec()), Water::Free), &["archive"]);
     let whole = archive(&[("one.map", good)]).into_inner();
-    told(read_archive(Cursor::new(whole[..whole.len() / 2].to_vec()), Water::Free));
-    assert_told(read(&[("../one.map", good)]), &["../one.map", "outside"]);
-    assert_told(read(&[("/etc/one.map", good)]), &["one.map"]);
-    assert_told(read(&[("a/one.map", good), ("b/one.map", good)]), &["b/one.map", "second map"]);
-    assert_told(read(&[("one.map", b"type\n")]), &["one.map", "line 1"]);
-    assert_told(read(&[("one.map", b"\xff\xfe")]), &["one.map", "utf-8"]);
+    error_line(read_archive(Cursor::new(whole[..whole.len() / 2].to_vec()), Water::Free));
+    assert_error(read(&[("../one.map", good)]), &["../one.map", "outside"]);
+    assert_error(read(&[("/etc/one.map", good)]), &["one.map"]);
+    assert_error(read(&[("a/one.map", good), ("b/one.map", good)]), &["b/one.map", "second map"]);
+    assert_error(read(&[("one.map", b"type\n")]), &["one.map", "line 1"]);
+    assert_error(read(&[("one.map", b"\xff\xfe")]), &["one.map", "utf-8"]);
     let map = Map::from_rows(&["."]).unwrap();
-    assert_told(write_archive([("a/b", &map)]), &["no name of a file"]);
-    assert_told(write_archive([("a", &map), ("a", &map)]), &["a"]);
+    assert_error(write_archive([("a/b", &map)]), &["not a file name"]);
+    assert_error(write_archive([("a", &map), ("a", &map)]), &["a"]);
 }
 
 #[test]
-fn an_archive_that_unpacks_without_end() {
+fn archives_that_unpack_too_far() {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     let zeros = vec![b'.'; 1 << 24];
     writer.start_file("one.map", SimpleFileOptions::default().large_file(true)).unwrap();
@@ -120,32 +120,35 @@ fn an_archive_that_unpacks_without_end() {
     }
     let bomb = writer.finish().unwrap();
     assert!(bomb.get_ref().len() < 1 << 22);
-    assert_told(read_archive(bomb, Water::Free), &["one.map", "256 MiB"]);
+    assert_error(read_archive(bomb, Water::Free), &["one.map", "256 MiB"]);
 }
 
 #[test]
-fn settings_that_no_map_has() {
+fn generator_settings_out_of_range() {
     let random = RandomMap { width: 5, height: 5, obstacle_density: 0.5, seed: 1 };
-    assert_told(RandomMap { width: 0, ..random }.generate(), &["width", "`0`"]);
-    assert_told(RandomMap { height: 1 << 40, ..random }.generate(), &["height"]);
-    assert_told(RandomMap { obstacle_density: 1.1, ..random }.generate(), &["obstacle_density"]);
-    assert_told(RandomMap { obstacle_density: f64::NAN, ..random }.generate(), &["obstacle_density"]);
+    assert_error(RandomMap { width: 0, ..random }.generate(), &["width", "`0`"]);
+    assert_error(RandomMap { height: 1 << 40, ..random }.generate(), &["height"]);
+    assert_error(RandomMap { obstacle_density: 1.1, ..random }.generate(), &["obstacle_density"]);
+    assert_error(RandomMap { obstacle_density: f64::NAN, ..random }.generate(), &["obstacle_density"]);
     let ranges = RandomRanges::default();
-    assert_told(RandomRanges { width_max: 3, ..ranges }.sample(0), &["width_min", "`17`", "3"]);
-    assert_told(RandomRanges { width_max: i64::MAX, ..ranges }.sample(0), &["width_min"]);
-    assert_told(RandomRanges { obstacle_density_max: 0.0, ..ranges }.sample(0), &["obstacle_density_min"]);
+    assert_error(RandomRanges { width_max: 3, ..ranges }.sample(0), &["width_min", "`17`", "3"]);
+    assert_error(RandomRanges { width_max: i64::MAX, ..ranges }.sample(0), &["width_min"]);
+    assert_error(RandomRanges { obstacle_density_max: 0.0, ..ranges }.sample(0), &["obstacle_density_min"]);
     let maze =
         Maze { width: 9, height: 9, obstacle_density: 1.0, wall_components: 4, go_straight: 0.8, seed: 1 };
-    assert_told(Maze { height: -1, ..maze }.generate(), &["height", "`-1`"]);
-    assert_told(Maze { go_straight: 1.5, ..maze }.generate(), &["go_straight", "`1.5`"]);
-    assert_told(Maze { obstacle_density: f64::INFINITY, ..maze }.generate(), &["obstacle_density"]);
-    assert_told(Maze { obstacle_density: 1e30, ..maze }.generate(), &["obstacle_density"]);
-    assert_told(MazeRanges { go_straight_max: 0.1, ..MazeRanges::default() }.sample(0), &["go_straight_min"]);
+    assert_error(Maze { height: -1, ..maze }.generate(), &["height", "`-1`"]);
+    assert_error(Maze { go_straight: 1.5, ..maze }.generate(), &["go_straight", "`1.5`"]);
+    assert_error(Maze { obstacle_density: f64::INFINITY, ..maze }.generate(), &["obstacle_density"]);
+    assert_error(Maze { obstacle_density: 1e30, ..maze }.generate(), &["obstacle_density"]);
+    assert_error(
+        MazeRanges { go_straight_max: 0.1, ..MazeRanges::default() }.sample(0),
+        &["go_straight_min"],
+    );
     let warehouse = Warehouse::default();
-    assert_told(Warehouse { vertical_gap: 1, ..warehouse }.generate(Bays::Toolbox), &["vertical_gap"]);
-    assert_told(Warehouse { wall_width: usize::MAX, ..warehouse }.generate(Bays::None), &["wall_width"]);
-    assert_told(Warehouse { walls_rows: 60_000, ..warehouse }.generate(Bays::None), &["height"]);
-    assert_told(Preset::by_name("validation-maze"), &["`validation-mazes`"]);
+    assert_error(Warehouse { vertical_gap: 1, ..warehouse }.generate(Bays::Toolbox), &["vertical_gap"]);
+    assert_error(Warehouse { wall_width: usize::MAX, ..warehouse }.generate(Bays::None), &["wall_width"]);
+    assert_error(Warehouse { walls_rows: 60_000, ..warehouse }.generate(Bays::None), &["height"]);
+    assert_error(Preset::by_name("validation-maze"), &["`validation-mazes`"]);
 }
 
 #[test]
@@ -153,24 +156,24 @@ fn maps_that_a_format_cannot_hold() {
     let map = Map::new(6, 10, vec![false; 60]).unwrap();
     let cells: Vec<Cell> = (0..27).map(|at| map.cell_at(at)).collect();
     let crowd = MapText { starts: cells.clone(), goals: cells, ..MapText::from(map.clone()) };
-    assert_told(crowd.to_text(), &["26 agents", "27"]);
+    assert_error(crowd.to_text(), &["26 agents", "27"]);
     let (start, goal) = (vec![Cell::new(0, 0)], vec![Cell::new(0, 0)]);
     let both = MapText { starts: start, goals: goal, ..MapText::from(map.clone()) };
-    assert_told(both.to_text(), &["`a` already"]);
-    assert_told(tiles("city", &map, 4), &["`4`", "6 rows and 10 columns"]);
-    assert_told(tiles("city", &map, 0), &["`0`"]);
-    assert_told(without_ring(&Map::from_rows(&["..", ".."]).unwrap()), &["2 x 2"]);
+    assert_error(both.to_text(), &["`a` already"]);
+    assert_error(tiles("city", &map, 4), &["`4`", "6 rows and 10 columns"]);
+    assert_error(tiles("city", &map, 0), &["`0`"]);
+    assert_error(without_ring(&Map::from_rows(&["..", ".."]).unwrap()), &["2 x 2"]);
 }
 
 #[test]
-fn scenarios_that_do_not_fit() {
-    assert_told(Scenario::from_yaml("agents_xy: [[0, 0]]"), &["targets_xy"]);
-    assert_told(Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1]]"), &["targets_xy"]);
-    assert_told(
+fn inconsistent_scenarios() {
+    assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]"), &["targets_xy"]);
+    assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1]]"), &["targets_xy"]);
+    assert_error(
         Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1, 1], [2, 2]]"),
         &["1 agents", "2 goals"],
     );
-    assert_told(Scenario::from_yaml("[1]"), &["agents_xy"]);
+    assert_error(Scenario::from_yaml("[1]"), &["agents_xy"]);
     let one = Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1, 1]]\nother: 3").unwrap();
-    assert_told(one.truncated(2), &["num_agents", "`2`", "1"]);
+    assert_error(one.truncated(2), &["num_agents", "`2`", "1"]);
 }

@@ -1,4 +1,4 @@
-//! Every format can be read as it was written, and nothing is lost on the way through another.
+//! Every format survives a round trip.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -66,12 +66,12 @@ fn any_task() -> impl Strategy<Value = Task> {
 
 proptest! {
     #[test]
-    fn a_map_text_is_read_as_it_was_written(text in any_text()) {
+    fn map_text_round_trip(text in any_text()) {
         prop_assert_eq!(parse_map_text(&text.to_text().unwrap()).unwrap(), text);
     }
 
     #[test]
-    fn a_set_is_read_as_it_was_written(maps in vec((any_name(), any_text()), 0..5)) {
+    fn map_set_round_trip(maps in vec((any_name(), any_text()), 0..5)) {
         let mut maps: Vec<NamedMap> = maps.into_iter().map(|(name, text)| NamedMap { name, text }).collect();
         maps.dedup_by(|one, other| one.name == other.name);
         let names: BTreeSet<&String> = maps.iter().map(|map| &map.name).collect();
@@ -80,7 +80,7 @@ proptest! {
     }
 
     #[test]
-    fn a_movingai_map_is_read_as_it_was_written(map in any_map()) {
+    fn movingai_map_round_trip(map in any_map()) {
         let text = write_movingai(&map);
         prop_assert_eq!(read_movingai(&text, Water::Free).unwrap(), map.clone());
         let on_windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
@@ -88,12 +88,12 @@ proptest! {
     }
 
     #[test]
-    fn tasks_are_read_as_they_were_written(tasks in vec(any_task(), 0..6)) {
+    fn tasks_round_trip(tasks in vec(any_task(), 0..6)) {
         prop_assert_eq!(read_scen(&write_scen(&tasks).unwrap()).unwrap(), tasks);
     }
 
     #[test]
-    fn an_archive_holds_what_was_packed(maps in vec(any_map(), 1..5)) {
+    fn archive_round_trip(maps in vec(any_map(), 1..5)) {
         let named: Vec<(String, Map)> =
             maps.into_iter().enumerate().map(|(at, map)| (format!("map {at}"), map)).collect();
         let packed = write_archive(named.iter().map(|(name, map)| (name.as_str(), map))).unwrap();
@@ -104,7 +104,7 @@ proptest! {
     }
 
     #[test]
-    fn a_scenario_goes_through_a_config(text in any_text(), is_long in any::<bool>()) {
+    fn scenario_round_trip_through_config_fields(text in any_text(), is_long in any::<bool>()) {
         prop_assume!(!text.starts.is_empty());
         let goals = if is_long {
             Targets::Sequences(text.goals.iter().map(|&goal| vec![goal, text.goals[0]]).collect())
@@ -142,7 +142,7 @@ proptest! {
 }
 
 #[test]
-fn all_terrain_of_movingai_is_known() {
+fn all_movingai_terrain_is_read() {
     let text = "type octile\nheight 2\nwidth 4\nmap\n.GSW\n@OTW\n";
     assert_eq!(read_movingai(text, Water::Free).unwrap().rows(), ["....", "###."]);
     assert_eq!(read_movingai(text, Water::Obstacle).unwrap().rows(), ["...#", "####"]);
@@ -151,7 +151,7 @@ fn all_terrain_of_movingai_is_known() {
 }
 
 #[test]
-fn x_is_the_column() {
+fn x_is_the_column_in_scen_files() {
     let text = "version 1\n3\tcity.map\t20\t10\t15\t2\t0\t9\t15.5\n";
     let tasks = read_scen(text).unwrap();
     assert_eq!((tasks[0].height, tasks[0].width), (10, 20));
@@ -161,7 +161,7 @@ fn x_is_the_column() {
 }
 
 #[test]
-fn the_library_knows_what_comes_with_the_program_and_what_it_is_given() {
+fn library_holds_built_in_and_registered_maps() {
     let mut library = Library::built_in();
     assert!(library.map("four-rooms").is_ok());
     assert_eq!(library.matching("puzzle-.*").unwrap().len(), pogema_maps::PUZZLES.len());
@@ -178,7 +178,7 @@ fn the_library_knows_what_comes_with_the_program_and_what_it_is_given() {
 }
 
 #[test]
-fn a_config_of_a_map_text_is_read_back() {
+fn letters_of_a_map_text_become_agents_xy() {
     let text = parse_map_text("a.#\n..A").unwrap();
     let config = GridConfig::from_yaml("map: |-\n  a.#\n  ..A\n").unwrap();
     assert_eq!(config.agents_xy, Some(text.starts));

@@ -1,4 +1,4 @@
-//! The generated map sets and tiles are the published ones, byte by byte.
+//! The generated map sets and tiles equal the published ones, byte for byte.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,17 +7,22 @@ use pogema_maps::generators::Preset;
 use pogema_maps::{PUBLISHED_TILE, tiles};
 use sha2::{Digest, Sha256};
 
-/// A published file, as its hash and its number of maps.
+/// Compares maps with a published file, given by its number of maps and its hash.
 fn check(maps: &[NamedMap], num_maps: usize, hash: &str) {
     assert_eq!(maps.len(), num_maps);
     let text = write_set(maps).unwrap();
     let digits: Vec<String> = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
-    assert_eq!(digits.concat(), hash, "{} and so on are not the published set", maps[0].name);
+    assert_eq!(
+        digits.concat(),
+        hash,
+        "the set that begins with {} differs from the published one",
+        maps[0].name
+    );
     assert_eq!(read_set(&text).unwrap(), maps);
 }
 
 #[test]
-fn random_maps_are_the_published_ones() {
+fn random_maps_equal_the_published_ones() {
     check(
         &Preset::ValidationRandom.maps().unwrap(),
         128,
@@ -26,7 +31,7 @@ fn random_maps_are_the_published_ones() {
 }
 
 #[test]
-fn mazes_are_the_published_ones() {
+fn mazes_equal_the_published_ones() {
     check(
         &Preset::ValidationMazes.maps().unwrap(),
         128,
@@ -35,7 +40,7 @@ fn mazes_are_the_published_ones() {
 }
 
 #[test]
-fn the_warehouse_is_the_published_one() {
+fn the_warehouse_equals_the_published_one() {
     check(
         &Preset::Warehouse.maps().unwrap(),
         1,
@@ -44,7 +49,7 @@ fn the_warehouse_is_the_published_one() {
 }
 
 #[test]
-fn tiles_of_the_city_maps_are_the_published_ones() {
+fn tiles_of_city_maps_equal_the_published_ones() {
     let packed: &[u8] = include_bytes!("data/city-maps.yaml.zst");
     let text = String::from_utf8(zstd::decode_all(packed).unwrap()).unwrap();
     let cities = read_set(&text).unwrap();

@@ -1,4 +1,4 @@
-//! Instances that are kept in the middle of an episode give the same goals as if nothing had been.
+//! Instances saved and restored during an episode give the same goals as uninterrupted ones.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -17,18 +17,18 @@ fn source(config: &str) -> InstanceSource {
     InstanceSource::new(GridConfig::from_yaml(config).unwrap(), None).unwrap()
 }
 
-/// The parts of an instance, written down and read again.
-fn kept(instance: &Instance) -> MadeInstance {
+/// Serializes and deserializes the parts of an instance.
+fn saved(instance: &Instance) -> MadeInstance {
     let text = serde_json::to_string(&MadeInstance::of(instance).unwrap()).unwrap();
     serde_json::from_str(&text).unwrap()
 }
 
 #[test]
-fn a_kept_instance_is_made_again() {
+fn saved_instances_are_restored() {
     for config in CONFIGS {
         let mut source = source(config);
         let instance = source.generate().unwrap().instance;
-        let again = source.remake(kept(&instance)).unwrap();
+        let again = source.remake(saved(&instance)).unwrap();
         assert_eq!((again.map(), again.outside()), (instance.map(), instance.outside()));
         assert_eq!(again.starts(), instance.starts());
         for (one, other) in again.goals().iter().zip(instance.goals()) {
@@ -38,7 +38,7 @@ fn a_kept_instance_is_made_again() {
 }
 
 #[test]
-fn a_stream_goes_on_from_where_it_was() {
+fn restored_streams_continue() {
     for config in CONFIGS {
         let instance = source(config).generate().unwrap().instance;
         for stream in instance.goals() {
@@ -59,7 +59,7 @@ fn a_stream_goes_on_from_where_it_was() {
 }
 
 #[test]
-fn a_state_of_another_kind_is_refused() {
+fn states_of_another_kind_are_rejected() {
     let drawn = source(CONFIGS[0]).generate().unwrap().instance;
     let round = source(CONFIGS[3]).generate().unwrap().instance;
     let single = source(CONFIGS[4]).generate().unwrap().instance;

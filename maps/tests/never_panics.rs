@@ -1,5 +1,5 @@
-//! Whatever stands in a config or a map, reading it ends with one or with a line that says what is wrong; whatever
-//! is read can be written and read again; and an instance of it is made or refused.
+//! No config or map text causes a panic. Each text is read, or rejected in one line; a config that was read survives a
+//! round trip, and its instances are generated or rejected in one line.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -71,7 +71,7 @@ const MAPS: [&str; 3] = ["..#\n.#.\n...\n", "  @@$ \n  !.# \n", "aB.\nAb#"];
 
 const MAP_TOKENS: [&str; 12] = ["", ".", "#", "@", "!", "a", "Z", " ", "\n", "\u{1c}", "é", "..."];
 
-/// The most cells of a map that a test draws.
+/// Maximum number of cells of a map for which instances are generated.
 const MOST_CELLS: usize = 2_500;
 
 fn check_config(read: Result<GridConfig, pogema_core::Error>) -> Result<(), TestCaseError> {
@@ -85,7 +85,7 @@ fn check_config(read: Result<GridConfig, pogema_core::Error>) -> Result<(), Test
     Ok(())
 }
 
-/// Resets twice, since pools change in between, and draws some goals.
+/// Resets twice, because a reset changes the pools, and draws some goals.
 fn check_instances(config: GridConfig) {
     if config.width * config.height > MOST_CELLS {
         return;
@@ -104,7 +104,7 @@ fn check_instances(config: GridConfig) {
     }
 }
 
-/// A value that a field takes, or nearly.
+/// Draws a value that a field accepts or almost accepts.
 fn likely_value(field: &'static str) -> BoxedStrategy<Value> {
     let cell = (0..4_u8, 0..4_u8).prop_map(|(row, col)| json!([row, col]));
     let cells = vec(cell, 0..5);
@@ -134,7 +134,7 @@ fn likely_value(field: &'static str) -> BoxedStrategy<Value> {
     }
 }
 
-/// A config with some fields, one in eight of them odd.
+/// Draws a config with some fields, one in eight of them with an odd value.
 fn almost_valid() -> impl Strategy<Value = Value> {
     let field = select(&FIELDS[..]).prop_flat_map(|field| {
         let value = prop_oneof![7 => likely_value(field), 1 => odd_value()];
@@ -147,19 +147,19 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(3000) })]
 
     #[test]
-    fn any_text_is_a_config_or_refused(text in any::<String>()) {
+    fn any_text_is_read_or_rejected_as_config(text in any::<String>()) {
         check_config(GridConfig::from_yaml(&text))?;
         check_config(GridConfig::from_json(&text))?;
     }
 
     #[test]
-    fn a_mutated_config_is_read_or_refused(text in mutated(&CONFIGS, &TOKENS)) {
+    fn mutated_configs_are_read_or_rejected(text in mutated(&CONFIGS, &TOKENS)) {
         check_config(GridConfig::from_yaml(&text))?;
         check_config(GridConfig::from_json(&text))?;
     }
 
     #[test]
-    fn an_almost_valid_config_is_read_or_refused(value in almost_valid()) {
+    fn almost_valid_configs_are_read_or_rejected(value in almost_valid()) {
         check_config(GridConfig::from_value(&value))?;
     }
 
@@ -171,12 +171,12 @@ proptest! {
     }
 
     #[test]
-    fn odd_values_are_refused(fields in btree_map(select(&FIELDS[..]).prop_map(str::to_owned), odd_value(), 0..4)) {
+    fn odd_values_never_panic(fields in btree_map(select(&FIELDS[..]).prop_map(str::to_owned), odd_value(), 0..4)) {
         check_config(GridConfig::from_value(&json!(fields)))?;
     }
 
     #[test]
-    fn any_text_is_a_map_or_refused(text in prop_oneof![any::<String>(), mutated(&MAPS, &MAP_TOKENS)]) {
+    fn any_text_is_read_or_rejected_as_map(text in prop_oneof![any::<String>(), mutated(&MAPS, &MAP_TOKENS)]) {
         match parse_map_text(&text) {
             Ok(parsed) => {
                 let plain = parsed.map.rows().join("\n");
@@ -188,7 +188,7 @@ proptest! {
 }
 
 #[test]
-fn a_map_of_many_short_rows_is_refused_quickly() {
+fn maps_of_many_short_rows_are_rejected_quickly() {
     let text = ". ".repeat(200_000);
     let error = parse_map_text(&text).unwrap_err().to_string();
     assert_eq!(error, "map: line 1, column 131073: the map has more than 65535 rows or columns");
@@ -211,7 +211,7 @@ fn almost_valid_configs_are_often_valid() {
 }
 
 #[test]
-fn a_map_longer_than_the_fields_allow_is_read_again() {
+fn maps_longer_than_the_fields_allow_survive_a_round_trip() {
     let config = GridConfig::from_value(&json!({ "map": ".".repeat(5_000) })).unwrap();
     assert_eq!(GridConfig::from_value(&config.to_value()).unwrap(), config);
 }

@@ -1,5 +1,5 @@
-//! Configs whose fields do not go together, each with the one line it is refused with: sizes, maps, positions,
-//! and what only shows when an instance is made.
+//! Configs with inconsistent fields, each with its one-line error: sizes, maps, positions, and errors that occur only
+//! when an instance is generated.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,7 +8,7 @@ mod refused;
 use pogema_core::Error;
 use pogema_maps::{GridConfig, InstanceSource};
 
-/// Fields that need each other, or exclude each other.
+/// Fields that require or exclude each other.
 const TOGETHER: [(&str, &str); 7] = [
     ("width: 5", "config: `width` is `5`, expected a height to go with it"),
     ("{height: 5, size: 5}", "config: `height` is `5`, expected a width to go with it"),
@@ -47,15 +47,15 @@ const MAPS: [(&str, &str); 23] = [
         "map: \"..\\e[2J\"",
         "map: line 1, column 3: unknown character `\\u{1b}`, expected one of `.#@$!`, a-z or A-Z",
     ),
-    ("map: a", "instance: the map has 1 starts (a-z) and 0 goals (A-Z), expected as many"),
-    ("map: aAbb", "instance: the map has 2 starts (a-z) and 1 goals (A-Z), expected as many"),
+    ("map: a", "instance: the map has 1 starts (a-z) and 0 goals (A-Z), expected equal numbers"),
+    ("map: aAbb", "instance: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
     (
         "map: aA@",
-        "instance: the map has letters and one of `@$!`, expected exact starts and goals or possible ones",
+        "instance: the map has letters and one of `@$!`, expected either exact or possible starts and goals",
     ),
     (
         "map: a!A",
-        "instance: the map has letters and one of `@$!`, expected exact starts and goals or possible ones",
+        "instance: the map has letters and one of `@$!`, expected either exact or possible starts and goals",
     ),
     ("map: []", "config: `map` is `[]`, expected at least one row of at least one cell"),
     ("map: [[], []]", "config: `map` is `[[],[]]`, expected at least one row of at least one cell"),
@@ -68,7 +68,7 @@ const MAPS: [(&str, &str); 23] = [
     ("map: ['..', '..']", "config: `map` is `\"..\"`, expected a row as a list of 0 and 1"),
 ];
 
-/// What every `[row, col]` has to be.
+/// Values that are not a pair `[row, col]`.
 const PAIRS: [&str; 11] = [
     "0",
     "null",
@@ -154,7 +154,7 @@ const POSITIONS: [(&str, &str); 17] = [
     ),
 ];
 
-/// Accepted when read, refused when the instance is made.
+/// Configs that are read, but rejected when an instance is generated.
 const INSTANCES: [(&str, &str); 17] = [
     ("{agents_xy: [[0, 0]], targets_xy: [[0, 1], [1, 1]]}", "targets_xy has length 2, expected 1"),
     ("{agents_xy: [[0, 0], [0, 1]], targets_xy: [[1, 1]]}", "targets_xy has length 1, expected 2"),
@@ -164,7 +164,7 @@ const INSTANCES: [(&str, &str); 17] = [
     ),
     (
         "{agents_xy: [[0, 0]], targets_xy: [[0, 1]], num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 agents of agents_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of agents in agents_xy",
     ),
     (
         "{agents_xy: [[0, 0], [0, 0]], targets_xy: [[0, 1], [1, 1]]}",
@@ -172,25 +172,25 @@ const INSTANCES: [(&str, &str); 17] = [
     ),
     (
         "{size: 2, num_agents: 3, density: 0, seed: 1}",
-        "config: `num_agents` is `3`, expected at most 2, for which the map has room",
+        "config: `num_agents` is `3`, expected at most 2; the map has no room for more",
     ),
     (
         "{size: 2, num_agents: 3, density: 0}",
-        "config: `num_agents` is `3`, expected at most 2, for which the map has room",
+        "config: `num_agents` is `3`, expected at most 2; the map has no room for more",
     ),
-    ("density: 1", "config: `num_agents` is `1`, expected at most 0, for which the map has room"),
-    ("map: '#'", "config: `num_agents` is `1`, expected at most 0, for which the map has room"),
+    ("density: 1", "config: `num_agents` is `1`, expected at most 0; the map has no room for more"),
+    ("map: '#'", "config: `num_agents` is `1`, expected at most 0; the map has no room for more"),
     (
         "{map: '.#.', num_agents: 10000000}",
-        "config: `num_agents` is `10000000`, expected at most 0, for which the map has room",
+        "config: `num_agents` is `10000000`, expected at most 0; the map has no room for more",
     ),
     (
         "{map: '@@$', num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 cells of possible_targets_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of cells in possible_targets_xy",
     ),
     (
         "{possible_agents_xy: [[0, 0]], possible_targets_xy: [[0, 1], [0, 0]], num_agents: 2}",
-        "config: `num_agents` is `2`, expected at most the 1 cells of possible_agents_xy",
+        "config: `num_agents` is `2`, expected at most 1, the number of cells in possible_agents_xy",
     ),
     (
         "{possible_agents_xy: [[0, 0], [0, 0]], possible_targets_xy: [[0, 1], [1, 1]], num_agents: 2}",
@@ -216,17 +216,17 @@ fn yaml_error(text: &str) -> Option<Error> {
 }
 
 #[test]
-fn fields_that_do_not_go_together_are_refused() {
+fn inconsistent_fields_are_rejected() {
     refused::check(&TOGETHER, &yaml_error);
 }
 
 #[test]
-fn maps_are_refused_with_line_and_column() {
+fn maps_are_rejected_with_line_and_column() {
     refused::check(&MAPS, &yaml_error);
 }
 
 #[test]
-fn positions_are_refused_with_the_one_that_is_wrong() {
+fn positions_are_rejected_with_the_first_wrong_one() {
     refused::check(&POSITIONS, &yaml_error);
     for field in ["agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy"] {
         for pair in PAIRS {
@@ -239,7 +239,7 @@ fn positions_are_refused_with_the_one_that_is_wrong() {
 }
 
 #[test]
-fn instances_that_cannot_be_made_are_refused() {
+fn impossible_instances_are_rejected() {
     refused::check(&INSTANCES, &|text| {
         let config = GridConfig::from_yaml(text).unwrap();
         InstanceSource::new(config, None).and_then(|mut source| source.generate()).err()
@@ -247,17 +247,17 @@ fn instances_that_cannot_be_made_are_refused() {
 }
 
 #[test]
-fn a_refusal_leaves_the_pools_as_they_were() {
-    let mut num_refused = 0;
+fn a_failed_reset_leaves_the_pools_unchanged() {
+    let mut num_rejected = 0;
     for seed in 0..20 {
         let pools = "possible_agents_xy: [[0, 0], [0, 0], [0, 1]], possible_targets_xy: [[1, 0], [1, 1]]";
         let config = GridConfig::from_yaml(&format!("{{{pools}, num_agents: 2, seed: {seed}}}")).unwrap();
         let mut source = InstanceSource::new(config, None).unwrap();
-        // Shuffled once more, most of these pools would give two different starts.
+        // If the failed reset had shuffled the pools, most of them would give two different starts.
         if let Err(first) = source.generate() {
-            num_refused += 1;
+            num_rejected += 1;
             assert_eq!(source.generate().unwrap_err(), first, "seed {seed}");
         }
     }
-    assert!((4..17).contains(&num_refused), "{num_refused}");
+    assert!((4..17).contains(&num_rejected), "{num_rejected}");
 }

@@ -1,4 +1,4 @@
-//! No puzzle can be solved without making way.
+//! No puzzle can be solved unless agents make way for each other.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,14 +7,14 @@ use std::collections::BTreeSet;
 use pogema_maps::{PUZZLES, distances_to};
 
 #[test]
-fn no_agent_can_go_as_if_it_were_alone() {
-    // Where all have to step at once, no way gets longer.
+fn optimal_cost_exceeds_the_sum_of_distances() {
+    // In these puzzles all agents move in the same step, and no path gets longer.
     let turns = ["puzzle-full-ring", "puzzle-square-turn"];
     for puzzle in PUZZLES.iter().filter(|puzzle| !turns.contains(&puzzle.name)) {
         let text = puzzle.text().unwrap();
-        let ways = text.starts.iter().zip(&text.goals);
-        let alone = |(&start, &goal)| u64::from(distances_to(&text.map, goal)[text.map.index(start)]);
-        assert!(ways.map(alone).sum::<u64>() < puzzle.sum_of_costs, "{}", puzzle.name);
+        let agents = text.starts.iter().zip(&text.goals);
+        let distance = |(&start, &goal)| u64::from(distances_to(&text.map, goal)[text.map.index(start)]);
+        assert!(agents.map(distance).sum::<u64>() < puzzle.sum_of_costs, "{}", puzzle.name);
     }
 }
 

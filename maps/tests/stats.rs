@@ -1,4 +1,4 @@
-//! Figures of maps and scenarios, and what is proven of them.
+//! Figures of maps and scenarios, and proofs that scenarios cannot be solved.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -16,7 +16,7 @@ fn judge(rows: &[&str], agents: &[[(u16, u16); 2]], on_goal: OnGoal) -> Scenario
 }
 
 #[test]
-fn a_map_by_its_figures() {
+fn figures_of_a_map() {
     let figures = MapStats::of(&map(&["...#.", ".#.#.", "...##", "#####", "..###"]));
     assert_eq!((figures.height, figures.width, figures.num_free), (5, 5, 12));
     assert_eq!(figures.density, 13.0 / 25.0);
@@ -30,7 +30,7 @@ fn a_map_by_its_figures() {
 }
 
 #[test]
-fn no_way_to_the_goal() {
+fn unreachable_goals_are_infeasible() {
     let stats = judge(&["..#.."], &[[(0, 0), (0, 4)], [(0, 3), (0, 4)]], OnGoal::Finish);
     assert_eq!(stats.infeasibilities, [Infeasibility::NoPath(0)]);
     assert!(!stats.is_proven_solvable);
@@ -43,7 +43,7 @@ fn no_way_to_the_goal() {
 }
 
 #[test]
-fn one_cell_is_the_goal_of_two() {
+fn shared_goals_are_infeasible_if_agents_stay() {
     let agents = [[(0, 0), (0, 1)], [(0, 2), (0, 1)]];
     let together = judge(&["...", "..."], &agents, OnGoal::Nothing);
     assert!(together.infeasibilities.contains(&Infeasibility::SameGoal(vec![0, 1], Cell::new(0, 1))));
@@ -51,7 +51,7 @@ fn one_cell_is_the_goal_of_two() {
 }
 
 #[test]
-fn a_corridor_keeps_the_order_of_its_agents() {
+fn agents_in_a_corridor_keep_their_order() {
     let row = ".".repeat(1000);
     let rows = [row.as_str()];
     let reversed = [[(0, 10), (0, 990)], [(0, 500), (0, 20)]];
@@ -61,7 +61,7 @@ fn a_corridor_keeps_the_order_of_its_agents() {
     );
     let kept = [[(0, 10), (0, 20)], [(0, 500), (0, 990)]];
     assert_eq!(judge(&rows, &kept, OnGoal::Nothing).infeasibilities, []);
-    // A ring has no ends, so no order.
+    // A ring has no ends, so its agents have no fixed order.
     let around = [[(0, 0), (0, 2)], [(0, 2), (0, 0)]];
     assert!(judge(&["...", ".#.", "..."], &around, OnGoal::Nothing).is_proven_solvable);
 }

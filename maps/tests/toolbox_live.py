@@ -1,4 +1,5 @@
-"""Asks pogema-toolbox 0.1.1: a list of requests as JSON on standard input, a list of maps or names as the answer."""
+"""Answers requests with pogema-toolbox 0.1.1: reads a JSON list of requests from standard input and writes a JSON
+object with the toolbox's version and a list of maps or names."""
 
 import json
 import sys
@@ -12,7 +13,7 @@ from pogema_toolbox.registry import ToolboxRegistry
 
 
 def choose(maps, pattern, seed):
-    """The name of the map that a seed chooses, or nothing where no map matches."""
+    """Returns the name of the map that a seed chooses, or None if no map matches."""
     from pogema import pogema_v0
 
     ToolboxRegistry._maps = dict(maps)

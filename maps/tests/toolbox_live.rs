@@ -1,4 +1,4 @@
-//! The generators and the choice of a map, held against a live pogema-toolbox 0.1.1.
+//! Compares the generators and the choice of a map with a live pogema-toolbox 0.1.1.
 //!
 //! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-maps --test toolbox_live`
 
@@ -15,7 +15,7 @@ use pogema_numpy::Generator;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-const EACH: usize = 300;
+const NUM_REQUESTS: usize = 300;
 
 #[derive(Deserialize)]
 struct Reply {
@@ -42,7 +42,7 @@ fn ask_toolbox(requests: &[Value]) -> Vec<Value> {
     reply.answers
 }
 
-/// Settings drawn at random.
+/// Draws settings at random.
 struct Draw(Generator);
 
 impl Draw {
@@ -55,12 +55,12 @@ impl Draw {
     }
 }
 
-fn check(kind: &str, asked: Vec<(Value, String)>) {
-    let requests: Vec<Value> = asked.iter().map(|(request, _)| request.clone()).collect();
+fn check(kind: &str, cases: Vec<(Value, String)>) {
+    let requests: Vec<Value> = cases.iter().map(|(request, _)| request.clone()).collect();
     let answers = ask_toolbox(&requests);
     let num_kinds = answers.iter().collect::<std::collections::HashSet<_>>().len();
-    assert!(num_kinds > asked.len() / 10, "{kind}: only {num_kinds} different answers");
-    for ((request, ours), theirs) in asked.iter().zip(answers) {
+    assert!(num_kinds > cases.len() / 10, "{kind}: only {num_kinds} different answers");
+    for ((request, ours), theirs) in cases.iter().zip(answers) {
         assert_eq!(theirs, json!(ours), "{kind}: {request}");
     }
 }
@@ -70,9 +70,9 @@ fn rows(map: pogema_core::Map) -> String {
 }
 
 #[test]
-fn random_maps_are_the_toolbox_s() {
+fn random_maps_match_the_toolbox() {
     let mut draw = Draw(Generator::seeded(1));
-    let asked = (0..EACH).map(|number| {
+    let cases = (0..NUM_REQUESTS).map(|number| {
         let seed = number as u64 * 977;
         if number % 2 == 0 {
             let (width, height) = (draw.whole(1, 40), draw.whole(1, 40));
@@ -97,13 +97,13 @@ fn random_maps_are_the_toolbox_s() {
         let map = ranges.sample(seed).unwrap().generate().unwrap();
         (json!({"kind": "random ranges", "settings": settings, "seed": seed}), rows(map))
     });
-    check("random", asked.collect());
+    check("random", cases.collect());
 }
 
 #[test]
-fn mazes_are_the_toolbox_s() {
+fn mazes_match_the_toolbox() {
     let mut draw = Draw(Generator::seeded(2));
-    let asked = (0..EACH).map(|number| {
+    let cases = (0..NUM_REQUESTS).map(|number| {
         let seed = number as u64 * 1013;
         if number % 2 == 0 {
             let maze = Maze {
@@ -111,7 +111,7 @@ fn mazes_are_the_toolbox_s() {
                 height: draw.whole(1, 40),
                 obstacle_density: draw.share(0.0, 1.5),
                 wall_components: draw.whole(0, 12),
-                // At one half, and at its ends, the weights are of other kinds.
+                // 0 and one half are special cases of the weights.
                 go_straight: [0.0, 0.5, draw.share(0.0, 1.0)][number / 2 % 3],
                 seed,
             };
@@ -139,14 +139,14 @@ fn mazes_are_the_toolbox_s() {
         let map = ranges.sample(seed).unwrap().generate().unwrap();
         (json!({"kind": "maze ranges", "settings": settings, "seed": seed}), rows(map))
     });
-    check("mazes", asked.collect());
+    check("mazes", cases.collect());
 }
 
 #[test]
-fn warehouses_are_the_toolbox_s() {
+fn warehouses_match_the_toolbox() {
     let mut draw = Draw(Generator::seeded(3));
     let mut size = |lowest: i64, highest: i64| draw.whole(lowest, highest) as usize;
-    let asked = (0..EACH).map(|number| {
+    let cases = (0..NUM_REQUESTS).map(|number| {
         let with_bays = number % 2 == 1;
         let warehouse = Warehouse {
             wall_width: size(1, 8),
@@ -170,11 +170,11 @@ fn warehouses_are_the_toolbox_s() {
         let text = warehouse.generate(bays).unwrap().to_text().unwrap();
         (json!({"kind": kind, "settings": settings}), text)
     });
-    check("warehouses", asked.collect());
+    check("warehouses", cases.collect());
 }
 
 #[test]
-fn a_seed_chooses_the_map_that_the_toolbox_chooses() {
+fn the_choice_of_a_seed_matches_the_toolbox() {
     let names = ["a", "ab", "b", "maze-1", "maze-10", "maze-2", "Maze-3", "random-1", "x.y", "xzy", "a|b"];
     let mut library = Library::empty();
     let map = |name: &str| NamedMap {
@@ -185,17 +185,17 @@ fn a_seed_chooses_the_map_that_the_toolbox_chooses() {
     let maps: serde_json::Map<String, Value> =
         names.into_iter().map(|name| (name.into(), "....\n....".into())).collect();
     let patterns = ["a", "a|b", ".*", "maze-.*", "maze-[0-9]", "x.y", r"x\.y", "(?i:maze)-.*", "none", "a.?"];
-    let mut asked = Vec::new();
+    let mut cases = Vec::new();
     for pattern in patterns {
         for seed in 0..20 {
             let ours = library.choose(pattern, seed).ok().map(|(name, _)| name.to_owned());
             let settings = json!({"maps": maps, "pattern": pattern, "seed": seed});
-            asked.push((json!({"kind": "choice", "settings": settings}), ours));
+            cases.push((json!({"kind": "choice", "settings": settings}), ours));
         }
     }
-    let requests: Vec<Value> = asked.iter().map(|(request, _)| request.clone()).collect();
-    for ((request, ours), theirs) in asked.iter().zip(ask_toolbox(&requests)) {
+    let requests: Vec<Value> = cases.iter().map(|(request, _)| request.clone()).collect();
+    for ((request, ours), theirs) in cases.iter().zip(ask_toolbox(&requests)) {
         assert_eq!(theirs, json!(ours), "{request}");
     }
-    assert!(asked.iter().any(|(_, ours)| ours.is_none()));
+    assert!(cases.iter().any(|(_, ours)| ours.is_none()));
 }

@@ -1,4 +1,4 @@
-//! Steps 256 lifelong environments and counts episodes; one that ends is followed by the next one.
+//! Steps 256 lifelong environments and counts episodes. When an episode ends, the next one starts automatically.
 
 use pogema::{Action, Error, GridConfig, Observations, StepResults};
 

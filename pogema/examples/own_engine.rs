@@ -1,11 +1,12 @@
-//! Checks an engine of your own with the kit: it plays drawn episodes beside the reference, and every array is compared.
+//! Checks your own engine with the conformance kit, which plays random episodes on it and on the reference and compares
+//! every array.
 
 use pogema::reference::Reference;
 use pogema::{Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut};
 use pogema_conformance::{NamedEngine, Report};
 
-/// Your engine. This one borrows everything from the reference, but for the bug that `is_wrong` switches on: the first
-/// agent never moves up.
+/// Your engine. This one delegates to the reference. If `is_wrong` is set, it has a bug: the first agent never moves
+/// up.
 struct Mine {
     inner: Reference,
     is_wrong: bool,
@@ -50,7 +51,7 @@ impl Environment for Mine {
     }
 }
 
-/// Plays 200 drawn episodes; counterexamples are kept in a folder.
+/// Plays 200 random episodes and keeps counterexamples in a folder.
 fn check(engine: NamedEngine) -> Result<Report, Error> {
     let mut report = Report::default();
     let folder = std::env::temp_dir().join(format!("pogema-found-{}", std::process::id()));

@@ -1,8 +1,8 @@
-//! A policy of your own: each agent moves greedily towards its goal, as far as it sees no obstacle.
+//! Plays an episode with your own policy: each agent moves greedily towards its goal unless it sees an obstacle there.
 
 use pogema::{Action, Environment, Episode, Error, GridConfig};
 
-/// Chooses the first action that leads closer to the goal and onto a free cell.
+/// Chooses, for each agent, the first action that leads closer to the goal and onto a free cell.
 fn act<E: Environment>(episode: &Episode<E>, seen: &mut [f32]) -> Result<Vec<Action>, Error> {
     let (config, state) = (episode.config(), episode.state());
     // Shape: [agents, 3, side, side]; the agent is in the centre of its window.

@@ -1,10 +1,10 @@
-//! From a config to an episode.
+//! Starts episodes from configs.
 
 use pogema_core::{Environment, Episode, Error};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
 
-/// Starts the episode of a config on the fast engine. It measures all figures.
+/// Starts the episode of a config on the fast engine and records all metrics.
 ///
 /// # Errors
 /// If the config is out of range, or its map has no room for the agents.
@@ -12,7 +12,7 @@ pub fn start(config: &GridConfig) -> Result<Episode<Engine>, Error> {
     start_on(Engine::new(config.rules())?, config)
 }
 
-/// Starts the episode of a config on any engine. It measures all figures.
+/// Starts the episode of a config on any engine and records all metrics.
 ///
 /// # Errors
 /// If the config is out of range, or its map has no room for the agents.

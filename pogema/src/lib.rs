@@ -15,7 +15,7 @@
 //! # Ok::<(), pogema::Error>(())
 //! ```
 //!
-//! [`batch`] turns it into a [`Batch`] of environments that one call steps and observes:
+//! [`batch`] turns it into a [`Batch`] of environments, which one call steps and observes:
 //!
 //! ```
 //! use pogema::{Action, GridConfig, Observations, StepResults};
@@ -36,8 +36,8 @@
 //! | --- | --- |
 //! | `planners` | [`planners`]: LaCAM*, CBS, RHCR, PIBT and POGEMA's own policies |
 //! | `render` | [`render`]: SVG, PNG, GIF, video and replay pages |
-//! | `reference` | [`reference`](mod@reference): the rules as plain as possible, to compare other engines with |
-//! | `toolbox` | [`toolbox`]: evaluations of many methods on many episodes |
+//! | `reference` | [`reference`](mod@reference): the rules in their plainest form, for comparison with other engines |
+//! | `toolbox` | [`toolbox`]: evaluations of many algorithms on many episodes |
 
 #![forbid(unsafe_code)]
 

@@ -3,38 +3,39 @@
 use pogema_core::Error;
 use pogema_numpy::SeedSequence;
 
-/// Seeds are below this, as POGEMA requires.
+/// Upper bound of the seeds, excluded, as POGEMA requires.
 const SEEDS: u64 = i64::MAX as u64;
 
 /// The source of the seeds of an environment's episodes.
 ///
-/// They depend on the seed given, the number of the environment and the number of the episode alone. With NumPy, where
-/// `first(key)` is `int(SeedSequence(seed, spawn_key=key).generate_state(1, uint64)[0]) % (2**63 - 1)`:
+/// The seed of an episode depends only on the given seed, the number of the environment and the number of the episode.
+/// In NumPy, `first(key)` is `int(SeedSequence(seed, spawn_key=key).generate_state(1, uint64)[0]) % (2**63 - 1)`:
 ///
-/// | seed given | episode 0 | episode e |
+/// | given seed | episode 0 | episode e |
 /// | --- | --- | --- |
-/// | one for all | `first((env, 0))` | `first((env, e))` |
-/// | one of its own | the seed itself | `first((e,))` |
+/// | shared | `first((env, 0))` | `first((env, e))` |
+/// | own | the seed itself | `first((e,))` |
 #[derive(Clone, Copy, Debug)]
 pub enum Seed {
-    /// One for all environments.
+    /// One seed for all environments.
     Shared(u64),
-    /// One of its own.
+    /// The environment's own seed.
     Own(u64),
 }
 
 impl Seed {
-    /// A seed for all environments from the operating system.
+    /// Returns a seed for all environments from the operating system.
     ///
     /// # Errors
-    /// If the operating system gives none.
+    /// If the operating system provides none.
     pub fn from_os() -> Result<Self, Error> {
-        let sequence = SeedSequence::from_os()
-            .map_err(|error| Error::instance(format!("the system gives no random seed: {error}")))?;
+        let sequence = SeedSequence::from_os().map_err(|error| {
+            Error::instance(format!("the operating system provides no random seed: {error}"))
+        })?;
         Ok(Self::Shared(first(&sequence)))
     }
 
-    /// POGEMA's seed of an episode.
+    /// Returns POGEMA's seed of an episode.
     pub fn of_episode(self, env: usize, episode: u64) -> u64 {
         match self {
             Self::Shared(seed) => first(&SeedSequence::spawned(seed, &[env as u64, episode])),

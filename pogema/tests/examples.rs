@@ -1,4 +1,4 @@
-//! The examples run, and their own assertions hold.
+//! Runs the examples with their assertions.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -38,7 +38,7 @@ fn plan_and_replay_runs() {
     plan_and_replay::main().unwrap();
 }
 
-/// The batch of the front door draws the instances that the environments of `VecEnv` play for the same seed.
+/// `pogema::batch` draws the same instances as `VecEnv` in Python with the same seed.
 #[test]
 fn a_batch_plays_the_episodes_of_its_seeds() {
     let config = pogema::GridConfig::from_yaml("{size: 8, num_agents: 4}").unwrap();
@@ -52,12 +52,12 @@ fn a_batch_plays_the_episodes_of_its_seeds() {
 }
 
 #[test]
-fn what_is_no_batch_is_refused_by_name() {
+fn invalid_batches_are_rejected_with_the_field() {
     let refusal = |text: &str, num_envs| {
         let config = pogema::GridConfig::from_yaml(text).unwrap();
         pogema::batch(&config, num_envs, 0).err().unwrap().to_string()
     };
     assert_eq!(refusal("{}", 0), "`num_envs` is `0`, expected at least 1");
-    let expected = "config: `persistent` is `true`, expected false, since a batch keeps no steps";
+    let expected = "config: `persistent` is `true`, expected false, because a batch keeps no steps";
     assert_eq!(refusal("{persistent: true}", 2), expected);
 }

@@ -227,7 +227,7 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
         return lambda content: content["environment"].update(fields)
 
     assert "ValueError" in said(environment(map_name="nowhere")) and "nowhere" in said(environment(map_name="nowhere"))
-    assert "unknown key `sise` in environment; the nearest known one is `size`" in said(environment(sise=8))
+    assert "unknown key `sise` in environment; did you mean `size`?" in said(environment(sise=8))
     assert "SCRIMP" in said(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
     assert said(lambda content: None, "anew").startswith("4\n")
     assert "OSError" in said(lambda content: None) and "`--resume`" in said(lambda content: None)

@@ -43,7 +43,7 @@ def test_page_has_replays_of_policies_in_python(played):
     # The failed episodes are missing in the results, and the page says so.
     labels = re.findall(r'aria-label="replay episode (\d+) of ([^"]+)"', page)
     assert [name for _, name in labels] == ["A star"] * 6 + ["LaCAM"] * 6, labels
-    assert "came out otherwise" not in page
+    assert "the replay differs" not in page
     assert "Crowd has 0 of 8" in page
     assert "Python 3." in page
 
@@ -69,7 +69,7 @@ def test_views_respect_their_options(played, tmp_path, caplog):
 def test_wrong_options_are_reported(played, tmp_path):
     folder, _ = played
     for wrong, told in [
-        ({"names": ["Mean"]}, "no view `Mean`; the nearest one is `Means`"),
+        ({"names": ["Mean"]}, "no view `Mean`; did you mean `Means`?"),
         ({"table_format": "word"}, "`table_format` is `word`, expected one of `terminal`"),
         ({"plot_format": "gif"}, "`plot_format` is `gif`, expected one of `svg`"),
         ({"six": "mine"}, "`six` is `mine`, expected one of `published`"),

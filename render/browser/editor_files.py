@@ -116,7 +116,7 @@ def test_errors_are_reported_with_line_and_column(world):
         ("bad.txt", "...\n.?.", 'bad.txt: line 2, column 2: unknown character "?", expected one of .#@$!, a-z or A-Z'),
         ("bad.txt", "...\n..", "bad.txt: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
         ("bad.txt", "a..\n.A.\n..b", "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
-        ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected exact starts and goals or possible ones"),
+        ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected either exact or possible starts and goals"),
         ("bad.txt", " \n\n", "bad.txt: line 1, column 1: the map has no cell, expected some of .#@$!, a-z and A-Z"),
         ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, expected the field map"),
         ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),

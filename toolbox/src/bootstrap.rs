@@ -1,46 +1,48 @@
-//! How sure a mean is.
+//! Means and their confidence intervals.
 
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
-/// So many times the values are drawn anew.
+/// Number of bootstrap samples.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_tabular.py`, `Aggregator.bootstrap`
 pub const RESAMPLES: usize = 1000;
 
-/// What every sequence of draws begins with; any number would do.
+/// Seed of every sequence of draws; the number is arbitrary.
 const SEED: u128 = 0x706f_6765_6d61;
 
-/// How far a mean may be off.
+/// How the interval around a mean is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spread {
     /// Between percentiles of the means of [`RESAMPLES`] samples drawn from the values with replacement.
     Bootstrap {
-        /// So many percent of the means are within.
+        /// Percentage of the means that lie within the interval.
         level: f64,
     },
-    /// The sample's standard deviation, so many times.
+    /// A multiple of the sample's standard deviation on each side.
     Deviation {
-        /// How many times.
+        /// The multiple.
         factor: f64,
     },
-    /// Not asked for.
+    /// No interval is computed.
     Unknown,
 }
 
-/// A mean and how sure it is.
+/// A mean and its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The mean.
     pub mean: f64,
-    /// The lower and the upper end, if there is more than one value.
+    /// The lower and the upper end; `None` for a single value.
     pub interval: Option<(f64, f64)>,
     /// Number of values.
     pub count: usize,
 }
 
 impl Estimate {
-    /// The mean of values, and its interval by draws that depend on the values and a number alone; nothing of none.
+    /// Computes the mean of values and its interval; returns `None` for no values.
+    ///
+    /// The draws of the bootstrap depend only on the values and on `number`.
     pub fn of(values: &[f64], spread: Spread, number: u64) -> Option<Self> {
         if values.is_empty() {
             return None;
@@ -58,18 +60,18 @@ impl Estimate {
         Some(Self { mean, interval, count: values.len() })
     }
 
-    /// Half the length of the interval.
+    /// Returns half the length of the interval.
     pub fn half(&self) -> Option<f64> {
         self.interval.map(|(low, high)| (high - low) / 2.0)
     }
 }
 
-/// The mean of values, of which there is one at least.
+/// Returns the mean of at least one value.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The mean of values, if there are any.
+/// Returns the mean of values; `None` for no values.
 pub(crate) fn mean_of(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| mean(values))
 }
@@ -95,12 +97,12 @@ fn bootstrap(values: &[f64], level: f64, number: u64) -> (f64, f64) {
     (percentile(&means, lower), percentile(&means, 100.0 - lower))
 }
 
-/// A number below a bound.
+/// Draws a number below a bound.
 fn below(random: &mut Pcg64, bound: usize) -> usize {
     ((u128::from(random.next_u64()) * bound as u128) >> 64) as usize
 }
 
-/// The value below which so many percent of sorted values lie, in a straight line between two of them.
+/// Returns a percentile of sorted values, linearly interpolated.
 ///
 /// Source: NumPy 1.26, `numpy.percentile`, method `linear`
 pub fn percentile(sorted: &[f64], percent: f64) -> f64 {
@@ -108,7 +110,7 @@ pub fn percentile(sorted: &[f64], percent: f64) -> f64 {
     let (low, share) = (place.floor() as usize, place.fract());
     let high = (low + 1).min(sorted.len() - 1);
     let step = sorted[high] - sorted[low];
-    // As NumPy does: from the nearer end.
+    // Interpolates from the nearer end, as NumPy does.
     if share < 0.5 { sorted[low] + step * share } else { sorted[high] - step * (1.0 - share) }
 }
 
@@ -116,10 +118,10 @@ pub fn percentile(sorted: &[f64], percent: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SURE: Spread = Spread::Bootstrap { level: 95.0 };
+    const CI_95: Spread = Spread::Bootstrap { level: 95.0 };
 
     #[test]
-    fn percentiles_are_numpy_s() {
+    fn percentiles_match_numpy() {
         // numpy.percentile([1, 2, 4, 8], [0, 2.5, 50, 97.5, 100])
         let values = [1.0, 2.0, 4.0, 8.0];
         let found = [0.0, 2.5, 50.0, 97.5, 100.0].map(|percent| percentile(&values, percent));
@@ -127,20 +129,20 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_is_near_that_of_a_normal_mean_and_the_same_each_time() {
+    fn intervals_are_reproducible_and_close_to_the_normal_ones() {
         let values: Vec<f64> = (0..400).map(f64::from).collect();
-        let estimate = Estimate::of(&values, SURE, 7).unwrap();
-        assert_eq!(Estimate::of(&values, SURE, 7), Some(estimate));
-        assert_ne!(Estimate::of(&values, SURE, 8), Some(estimate));
+        let estimate = Estimate::of(&values, CI_95, 7).unwrap();
+        assert_eq!(Estimate::of(&values, CI_95, 7), Some(estimate));
+        assert_ne!(Estimate::of(&values, CI_95, 8), Some(estimate));
         let expected = 1.96 * deviation(&values, 199.5) / 20.0;
         assert!((estimate.half().unwrap() / expected - 1.0).abs() < 0.1, "{estimate:?} {expected}");
     }
 
     #[test]
-    fn one_value_or_equal_values_leave_no_doubt() {
-        assert_eq!(Estimate::of(&[], SURE, 0), None);
-        assert_eq!(Estimate::of(&[3.0], SURE, 0).unwrap().half(), None);
-        assert_eq!(Estimate::of(&[3.0; 5], SURE, 0).unwrap().half(), Some(0.0));
+    fn single_or_equal_values_have_no_or_zero_intervals() {
+        assert_eq!(Estimate::of(&[], CI_95, 0), None);
+        assert_eq!(Estimate::of(&[3.0], CI_95, 0).unwrap().half(), None);
+        assert_eq!(Estimate::of(&[3.0; 5], CI_95, 0).unwrap().half(), Some(0.0));
         let spread = Spread::Deviation { factor: 1.96 };
         let half = Estimate::of(&[1.0, 3.0], spread, 0).unwrap().half().unwrap();
         assert!((half - 1.96 * 2f64.sqrt()).abs() < 1e-12, "{half}");

@@ -1,4 +1,4 @@
-//! The algorithms that are built in: planners, and POGEMA's own policies.
+//! The built-in algorithms: planners, and POGEMA's own policies.
 
 use std::time::Duration;
 
@@ -12,23 +12,23 @@ use crate::tree::Node;
 /// The parameters of every built-in algorithm.
 const PARAMETERS: [&str; 6] = ["seed", "seconds", "nodes", "threads", "future_goals", "single_attempt"];
 
-/// What pogema-toolbox's algorithms may say, and nothing built in makes use of.
-const IDLE: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
+/// Parameters of pogema-toolbox's algorithms that built-in algorithms accept and ignore.
+const IGNORED: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
 
 /// A built-in algorithm with its settings.
 #[derive(Clone, Debug)]
 pub struct BuiltIn {
-    /// Its name among policies.
+    /// Its name among the policies.
     pub name: String,
-    /// What its policies are made with.
+    /// The settings of its policies.
     pub settings: PolicySettings,
 }
 
 impl BuiltIn {
-    /// The built-in algorithm that is meant, whatever the case of its name; none if there is no such.
+    /// Returns the built-in algorithm with the name of `algorithm`, ignoring case; `None` if there is none.
     ///
     /// # Errors
-    /// One line about a parameter that it does not have, or that is not as it has to be.
+    /// One line about an unknown parameter or an invalid value.
     pub fn of(algorithm: &Algorithm) -> Option<Result<Self, Error>> {
         let name = match algorithm.name.to_lowercase().replace('_', "-").as_str() {
             "a*" => "astar".to_owned(),
@@ -68,11 +68,11 @@ impl BuiltIn {
             }
             "future_goals" => settings.future_goals = flag()?,
             "single_attempt" => settings.single_attempt = flag()?,
-            idle if IDLE.contains(&idle) => {}
+            ignored if IGNORED.contains(&ignored) => {}
             _ => {
                 let hint = nearest(key, PARAMETERS).unwrap_or_default();
                 let reason =
-                    format!("line {}: `{path}` is unknown; the nearest known one is `{hint}`", node.line);
+                    format!("line {}: unknown parameter `{path}`; did you mean `{hint}`?", node.line);
                 return Err(Error::Syntax { reason });
             }
         }

@@ -1,4 +1,4 @@
-//! The environments of a suite, one for each episode.
+//! The environments of a suite, one per episode.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::frame::plain_text;
 use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
 use crate::variants::{Variant, Variants};
 
-/// The environments of a suite, each made when it is asked for.
+/// The environments of a suite, each created on request.
 #[derive(Clone, Debug)]
 pub struct EpisodeConfigs {
     variants: Variants,
@@ -24,26 +24,26 @@ pub struct EpisodeConfigs {
 /// One environment.
 #[derive(Clone, Debug)]
 pub struct EpisodeConfig {
-    /// What was varied, by its last name, in the order of the file.
+    /// The varied fields by the last key of their path, in the order of the file.
     pub changes: Pairs,
-    /// The map that `map_name` stands for.
+    /// The name of the chosen map, if `map_name` is given.
     pub map_name: Option<String>,
-    /// What makes the episode.
+    /// The config of the episode.
     pub config: GridConfig,
 }
 
 impl EpisodeConfigs {
-    /// The environments of a suite, whose maps are in a library.
+    /// Creates the environments of a suite, with the maps of a library, and checks them.
     ///
     /// # Errors
-    /// One line with all maps that are missing; else about the first environment that cannot be, of those that
-    /// differ from the first one in one field.
+    /// One line with all missing maps. If no map is missing, one line about the first invalid environment among those
+    /// that differ from the first one in at most one field.
     pub fn new(suite: &Suite, library: Library) -> Result<Self, Error> {
         let environments = Self::unchecked(suite, library);
         environments.check(suite).map(|()| environments)
     }
 
-    /// The environments of a suite that somebody else makes, who knows what they may be.
+    /// Creates the environments of a suite without checks, for callers that build the environments themselves.
     pub fn unchecked(suite: &Suite, library: Library) -> Self {
         let folder = suite.path.parent().map(std::path::Path::to_owned).unwrap_or_default();
         Self { variants: suite.environments.clone(), library, folder }
@@ -52,19 +52,19 @@ impl EpisodeConfigs {
     fn check(&self, suite: &Suite) -> Result<(), Error> {
         self.check_maps().map_err(|error| suite.in_file(error))?;
         self.variants.probes().try_for_each(|(index, line)| {
-            let tell = |error: Error| {
+            let with_line = |error: Error| {
                 let of_field = error.field().and_then(|field| self.variants.line_of(field));
                 let reason = format!("line {}: {error}", of_field.unwrap_or(line));
                 suite.in_file(Error::request(reason))
             };
-            self.at(index).map(|_| ()).map_err(tell)
+            self.at(index).map(|_| ()).map_err(with_line)
         })
     }
 
-    /// All fields of an environment of a number below their count, as its file has them.
+    /// Returns all fields of the environment at an index, as in the file.
     ///
     /// # Errors
-    /// If it is out of range.
+    /// If the index is out of range.
     pub fn fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         self.variant(index).map(|variant| variant.fields)
     }
@@ -74,11 +74,10 @@ impl EpisodeConfigs {
         self.variants.at(index).ok_or_else(out_of_range)
     }
 
-    /// All fields of an environment of a number below their count, with the name of the map that its seed chooses
-    /// where its file has a pattern.
+    /// Returns all fields of the environment at an index; a pattern in `map_name` is replaced by the chosen map's name.
     ///
     /// # Errors
-    /// If it is out of range.
+    /// If the index is out of range.
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
@@ -89,27 +88,27 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
-    /// Number of environments.
+    /// Returns the number of environments.
     pub fn len(&self) -> usize {
         self.variants.len()
     }
 
-    /// Whether a field is varied over nothing.
+    /// Returns whether a field is varied over an empty list.
     pub fn is_empty(&self) -> bool {
         self.variants.is_empty()
     }
 
-    /// The environment of a number below their count.
+    /// Returns the environment at an index.
     ///
     /// # Errors
-    /// If it is out of range, or cannot be.
+    /// If the index is out of range, or the environment is invalid.
     pub fn at(&self, index: usize) -> Result<EpisodeConfig, Error> {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
         if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
             let name = fields.get("name").map_or_else(String::new, plain_text);
-            return Err(Error::config("name", name, "`Environment`; others are registered in Python"));
+            return Err(Error::config("name", name, "`Environment`; other environments run only in Python"));
         }
         for own in OWN_FIELDS {
             fields.remove(own);
@@ -117,7 +116,7 @@ impl EpisodeConfigs {
         let seed = fields.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| {
             let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
-            Error::config("seed", given, "a number, or results could not be repeated")
+            Error::config("seed", given, "a number, so that results are reproducible")
         })?;
         let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
         let config = match &map {
@@ -135,39 +134,39 @@ impl EpisodeConfigs {
         Ok(EpisodeConfig { changes, map_name, config })
     }
 
-    /// What was varied for the environment of a number below their count.
+    /// Returns the varied fields of the environment at an index.
     ///
     /// # Errors
-    /// If it is out of range.
+    /// If the index is out of range.
     pub fn changes(&self, index: usize) -> Result<Pairs, Error> {
         self.variant(index).map(|variant| variant.changes)
     }
 
-    /// Numbers of environments with those first that make the most work; of two that make as much, the earlier one.
+    /// Sorts indices of environments by cost, highest first; equal costs keep their order.
     pub fn by_cost(&self, mut indices: Vec<usize>) -> Vec<usize> {
         indices.sort_by_cached_key(|&index| std::cmp::Reverse(self.cost(index)));
         indices
     }
 
-    /// Work that an environment makes. Units: agent steps, at most.
+    /// Returns an upper bound on the work for an environment. Units: agent steps.
     fn cost(&self, index: usize) -> u64 {
         let number = |name: &str, otherwise: u64| {
             self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
         };
-        // POGEMA's defaults stand for what is not given.
+        // Missing fields have POGEMA's defaults.
         number("num_agents", 1) * number("max_episode_steps", 64)
     }
 
-    /// The name and text of the map that a name, or a pattern and a seed, mean.
+    /// Returns the name and text of the map with a name, or of the map that a seed chooses for a pattern.
     ///
     /// # Errors
-    /// If there is none.
+    /// If there is no such map.
     pub fn map(&self, pattern: &str, seed: u64) -> Result<(String, String), Error> {
         let (name, text) = self.library.named_or_chosen(pattern, seed)?;
         Ok((name.to_owned(), text.to_text()?))
     }
 
-    /// Takes the name of a map out of the fields, and returns the map that the seed chooses among those of the name.
+    /// Removes `map_name` from the fields, and returns the map with that name or the one that the seed chooses.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     fn chosen_map(
@@ -186,11 +185,11 @@ impl EpisodeConfigs {
 
     fn scenario(&self, scenario: &Value, map: Option<&Map>) -> Result<Scenario, Error> {
         let file = scenario.as_str().ok_or_else(|| Error::config("scenario", scenario, "a file"))?;
-        let map = map.ok_or_else(|| Error::config("scenario", file, "a map that it is on"))?;
+        let map = map.ok_or_else(|| Error::config("scenario", file, "an environment with a map"))?;
         read_scenario(&self.folder.join(file), map)
     }
 
-    /// Passes if there is a map for each name.
+    /// Checks that there is a map for each name.
     fn check_maps(&self) -> Result<(), Error> {
         if self.variants.values_of("use_maps").contains(&&Value::Bool(false)) {
             return Ok(());
@@ -204,9 +203,9 @@ impl EpisodeConfigs {
             [] => Ok(()),
             [name] => self.library.matching(name).map(|_| ()),
             _ => {
-                let told: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
+                let names: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
                 let number = missing.len();
-                Err(Error::request(format!("{number} maps are not known: {}", told.join(", "))))
+                Err(Error::request(format!("{number} unknown maps: {}", names.join(", "))))
             }
         }
     }

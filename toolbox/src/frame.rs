@@ -1,4 +1,4 @@
-//! Rows sorted into groups, and what their metrics amount to.
+//! Groups of rows, and the values of their metrics.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -7,16 +7,16 @@ use serde_json::Value;
 
 use crate::results::{ALGORITHM, Row};
 
-/// Rows that are alike in some columns.
+/// Rows with equal values in some columns.
 #[derive(Clone, Debug)]
 pub struct Group<'a> {
-    /// What stands in these columns, null where a row has none.
+    /// The values in these columns, null if missing.
     pub keys: Vec<Value>,
-    /// The rows, in their order.
+    /// The rows in their original order.
     pub rows: Vec<&'a Row>,
 }
 
-/// Sorts rows into groups by some columns; the groups are sorted by what stands there, numbers by size.
+/// Groups rows by some columns; the groups are sorted by the values there (see [`compare`]).
 pub fn group_by<'a>(rows: impl IntoIterator<Item = &'a Row>, columns: &[String]) -> Vec<Group<'a>> {
     let mut places: HashMap<String, usize> = HashMap::new();
     let mut groups: Vec<Group<'a>> = Vec::new();
@@ -35,7 +35,7 @@ pub fn group_by<'a>(rows: impl IntoIterator<Item = &'a Row>, columns: &[String])
     groups
 }
 
-/// The order of values in tables: numbers by size, then texts, then the rest, then what is missing.
+/// Compares values for the order of tables: numbers by size, then texts, then other values, then missing ones.
 pub fn compare(one: &Value, other: &Value) -> Ordering {
     let rank = |value: &Value| match value {
         Value::Bool(_) | Value::Number(_) => 0,
@@ -51,22 +51,22 @@ pub fn compare(one: &Value, other: &Value) -> Ordering {
     }
 }
 
-/// A value as it is shown: a text without quotes, nothing for what is missing.
+/// Formats a value for display: texts without quotes, an empty text for null.
 pub fn shown(value: &Value) -> String {
     if value.is_null() { String::new() } else { plain_text(value) }
 }
 
-/// A value in JSON, but a text without quotes.
+/// Formats a value as JSON, but texts without quotes.
 pub(crate) fn plain_text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// The figures of a metric, without those of rows that have none.
+/// Returns the values of a metric, skipping rows without it.
 pub fn values(rows: &[&Row], metric: &str) -> Vec<f64> {
     rows.iter().filter_map(|row| row.metric(metric)).collect()
 }
 
-/// One line for each algorithm and metric about how many rows have no number there.
+/// Returns a note for each algorithm and metric with the number of rows that lack the metric.
 pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     for Group { keys, rows } in group_by(rows, &[ALGORITHM.to_owned()]) {
@@ -93,18 +93,18 @@ mod tests {
     }
 
     #[test]
-    fn groups_are_sorted_and_what_is_missing_is_last() {
+    fn groups_are_sorted_with_missing_values_last() {
         let rows = ["{\"n\": 16}", "{}", "{\"n\": 8}", "{\"n\": 16}", "{\"n\": \"all\"}"];
         let rows: Vec<Row> = rows.iter().map(|settings| row(settings, "{}")).collect();
         let groups = group_by(&rows, &["n".to_owned()]);
-        let told: Vec<(String, usize)> =
+        let found: Vec<(String, usize)> =
             groups.iter().map(|group| (shown(&group.keys[0]), group.rows.len())).collect();
         let expected = [("8", 1), ("16", 2), ("all", 1), ("", 1)];
-        assert_eq!(told, expected.map(|(key, count)| (key.to_owned(), count)));
+        assert_eq!(found, expected.map(|(key, count)| (key.to_owned(), count)));
     }
 
     #[test]
-    fn rows_without_a_metric_are_told() {
+    fn rows_without_a_metric_are_noted() {
         let rows = [row("{}", "{\"SoC\": 4}"), row("{}", "{\"SoC\": null}"), row("{}", "{\"SoC\": [1]}")];
         let all: Vec<&Row> = rows.iter().collect();
         assert_eq!(values(&all, "SoC"), [4.0]);

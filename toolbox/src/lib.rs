@@ -1,6 +1,6 @@
-//! Evaluations: many episodes of many algorithms, and the tables and plots of what came of them.
+//! Evaluations: plays many episodes of many algorithms, and shows the results in tables and plots.
 //!
-//! A [`Suite`] is read from one YAML file: environments, of which fields may be varied, algorithms, and views.
+//! A [`Suite`] is read from one YAML file. It holds environments, whose fields may be varied, algorithms, and views.
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! The maps that a suite may name.
+//! The maps available to a suite.
 
 use std::path::PathBuf;
 
@@ -11,8 +11,10 @@ use serde_json::Value;
 use crate::suite::Suite;
 
 impl Suite {
-    /// The maps that are built in, those of the suite's files and of a `maps.yaml` beside it, those of further files,
-    /// and those of the paper's generators that it names; and a warning for each map that took another's place.
+    /// Collects the maps available to the suite, with a warning for each map that replaces another one.
+    ///
+    /// These are the built-in maps, the maps of a `maps.yaml` next to the suite, of the suite's files and of further
+    /// files, and the maps of the paper's generators that the suite names.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -23,8 +25,8 @@ impl Suite {
         for path in beside.iter().chain(&self.maps).chain(further) {
             let replaced = library.register(read_maps(path, Reading::default())?);
             let path = path.display();
-            let tell = |name| format!("{path}: a second map named `{name}` takes the place of the first");
-            warnings.extend(replaced.into_iter().map(tell));
+            let warning = |name| format!("{path}: a second map named `{name}` replaces the first");
+            warnings.extend(replaced.into_iter().map(warning));
         }
         for preset in Preset::all() {
             if self.names_of(preset).any(|name| library.matching(name).is_err()) {
@@ -36,7 +38,7 @@ impl Suite {
         Ok((library, warnings))
     }
 
-    /// The names of maps that may be those of a generator.
+    /// Returns the names of maps that a generator may provide.
     fn names_of(&self, preset: Preset) -> impl Iterator<Item = &str> {
         let names = self.environments.values_of("map_name").into_iter().filter_map(Value::as_str);
         names.filter(move |name| name.contains(preset.word()))

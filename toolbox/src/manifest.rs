@@ -1,4 +1,4 @@
-//! How results were made: by what suite, what algorithms, and what runs on what machines.
+//! The manifest of results: suite, algorithms, and the runs with their machines.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,35 +10,35 @@ use sha2::{Digest, Sha256};
 
 use crate::suite::{Algorithm, Suite};
 
-/// The file that tells how results were made.
+/// Name of the manifest's file.
 pub(crate) const FILE: &str = "about.json";
 
-/// How results were made.
+/// A record of how results were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// The suite's file, beside which stand files that it names.
+    /// Path of the suite's file; paths in the suite are relative to its folder.
     pub suite: PathBuf,
-    /// By what the environments are known.
+    /// Fingerprint of the environments.
     pub environment: String,
-    /// By what each algorithm is known.
+    /// Fingerprint of each algorithm, by its name among the results.
     pub algorithms: BTreeMap<String, String>,
-    /// Whoever played some of the episodes, each of which has the number of its run.
+    /// The runs that played episodes. Each episode has the index of its run.
     pub runs: Vec<RunRecord>,
 }
 
 /// One process that played episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
-    /// When it began to play, in the form of RFC 3339.
+    /// Time at which it began to play, in RFC 3339 format.
     pub began: String,
-    /// The processor and how many threads it has.
+    /// The processor and its number of threads.
     pub machine: String,
-    /// Releases by the name of what they are of.
+    /// Versions of the software, by name.
     pub versions: BTreeMap<String, String>,
 }
 
 impl Manifest {
-    /// What a suite's results are known by, before anything was played.
+    /// Returns the manifest of a suite before any run.
     pub fn of(suite: &Suite) -> Self {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.fingerprint()));
         Self {
@@ -49,10 +49,10 @@ impl Manifest {
         }
     }
 
-    /// What is known of the results in a folder, if there are any.
+    /// Reads the manifest of the results in a folder; returns `None` if there is none.
     ///
     /// # Errors
-    /// If the file cannot be read, or is another one.
+    /// If the file cannot be read, or is not a manifest.
     pub fn read(folder: &Path) -> Result<Option<Self>, Error> {
         let path = folder.join(FILE);
         if !path.exists() {
@@ -62,16 +62,16 @@ impl Manifest {
         serde_json::from_str(&text).map(Some).map_err(|error| Error::io(&path, error))
     }
 
-    /// Takes over what an earlier run did; algorithms that are no longer in the suite stay known.
+    /// Takes over the runs and algorithms of an earlier manifest; algorithms that left the suite are kept.
     ///
     /// # Errors
-    /// In what the earlier results are others, without a change.
-    pub(crate) fn go_on(&mut self, known: Self) -> Result<(), String> {
+    /// The difference, if the earlier results are of other environments or parameters; nothing is changed then.
+    pub(crate) fn continue_from(&mut self, known: Self) -> Result<(), String> {
         if known.environment != self.environment {
             return Err("has results of other environments than the suite's".into());
         }
         let is_other =
-            |(key, told): &(&String, &String)| self.algorithms.get(*key).is_some_and(|now| now != *told);
+            |(key, known): &(&String, &String)| self.algorithms.get(*key).is_some_and(|now| now != *known);
         if let Some((key, _)) = known.algorithms.iter().find(is_other) {
             return Err(format!("has results of `{key}` with other parameters than the suite's"));
         }
@@ -82,7 +82,7 @@ impl Manifest {
 }
 
 impl RunRecord {
-    /// This process, with the releases of what else it plays with.
+    /// Returns the record of this process, with the versions of the other software it plays with.
     pub(crate) fn now(versions: &[(String, String)]) -> Self {
         let own = [("pogema-rs", env!("CARGO_PKG_VERSION")), ("POGEMA", "1.4.0")];
         let own = own.map(|(name, version)| (name.to_owned(), version.to_owned()));
@@ -94,7 +94,7 @@ impl RunRecord {
     }
 }
 
-/// The processor of this machine and how many threads it has.
+/// Returns the processor of this machine and its number of threads.
 pub fn machine() -> &'static str {
     static MACHINE: LazyLock<String> = LazyLock::new(|| {
         let number = std::thread::available_parallelism().map_or(1, usize::from);
@@ -106,7 +106,7 @@ pub fn machine() -> &'static str {
     &MACHINE
 }
 
-/// A short name for a text.
+/// Returns a short hash of a text.
 fn digest(text: &str) -> String {
     let bytes: [u8; 32] = Sha256::digest(text.as_bytes()).into();
     let [first, ..] = bytes.as_chunks::<8>().0 else { return String::new() };

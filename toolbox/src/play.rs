@@ -1,4 +1,4 @@
-//! One episode on the fast engine, measured, and recorded on request.
+//! Plays one episode on the fast engine, measures it, and records it on request.
 
 use std::time::{Duration, Instant};
 
@@ -14,20 +14,20 @@ use crate::results::Proof;
 /// The result of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Played {
-    /// Its figures.
+    /// Its metrics.
     pub metrics: Metrics,
-    /// Time that the policy took, all steps together.
+    /// Total time of the policy over all steps.
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
-    /// What a one-shot planner proved about the episode.
+    /// What a one-shot planner proved about the episode, if anything.
     pub proof: Proof,
 }
 
 /// Plays an episode to its end.
 ///
 /// # Errors
-/// If there is no such episode, or the algorithm cannot play it.
+/// If no instance can be generated, or the algorithm cannot play it.
 pub fn play(config: &GridConfig, algorithm: &BuiltIn) -> Result<Played, Error> {
     run(config, algorithm, false).map(|(played, _)| played)
 }
@@ -35,7 +35,7 @@ pub fn play(config: &GridConfig, algorithm: &BuiltIn) -> Result<Played, Error> {
 /// Plays an episode to its end and records it.
 ///
 /// # Errors
-/// As for [`play`].
+/// Those of [`play`].
 pub fn record(config: &GridConfig, algorithm: &BuiltIn) -> Result<(Played, Trace), Error> {
     let (played, episode) = run(config, algorithm, true)?;
     Ok((played, episode.trace()?))
@@ -51,10 +51,10 @@ fn run(
     let mut episode = Episode::new(Engine::new(rules)?).with_density().with_collisions();
     episode.record(is_recorded);
     episode.start(instance)?;
-    let dice = Generator::seeded(config.seed.unwrap_or_default());
+    let rng = Generator::seeded(config.seed.unwrap_or_default());
     let began = Instant::now();
     let BuiltIn { name, settings, .. } = algorithm;
-    let mut policy = NamedPolicy::new(name, settings, &rules, episode.instance()?, dice)?;
+    let mut policy = NamedPolicy::new(name, settings, &rules, episode.instance()?, rng)?;
     let mut runtime = began.elapsed();
     while !episode.is_over() {
         let began = Instant::now();
@@ -66,7 +66,7 @@ fn run(
     Ok((Played { metrics: episode.metrics(), runtime, proof }, episode))
 }
 
-/// What a planner proved, whether it found a plan or not.
+/// Returns what a planner proved, with or without a plan.
 fn proof(outcome: &Outcome) -> Proof {
     let unsolvable = match outcome {
         Outcome::Impossible { reason } => Some(reason.clone()),

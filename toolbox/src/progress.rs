@@ -1,4 +1,4 @@
-//! The episodes that an algorithm has done, and what is written of them.
+//! The finished episodes of an algorithm, and the files that keep them.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -14,23 +14,23 @@ use crate::results::{Episode, Proof, Row};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
 use crate::{EpisodeConfigs, Pairs};
 
-/// An episode that is done.
+/// A finished episode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Done {
-    /// Its number.
+    /// Its index.
     pub index: usize,
-    /// Its figures, and whatever else the one who played it measured.
+    /// Its metrics, and further measurements of the player.
     pub metrics: Pairs,
-    /// What the policy took of it. Units: seconds.
+    /// Time of the policy. Units: seconds.
     pub runtime: f64,
-    /// The machine, if it is not that of the run.
+    /// The machine, if it differs from that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub machine: Option<String>,
-    /// The number of the run that played it, which is set when it is kept.
+    /// Index of the run that played it, set by [`Progress::keep`].
     #[serde(default)]
     pub run: usize,
-    /// What its planner proved.
+    /// What the planner proved.
     #[serde(default, skip_serializing_if = "Proof::is_empty")]
     pub proof: Proof,
 }
@@ -38,20 +38,20 @@ pub struct Done {
 /// An episode that could not be played.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failed {
-    /// Its number.
+    /// Its index.
     pub index: usize,
-    /// What was varied.
+    /// The varied fields.
     pub env_grid_search: Pairs,
-    /// All that makes it.
+    /// The complete config.
     pub config: Value,
-    /// What happened, in one line.
+    /// The error, in one line.
     pub error: String,
-    /// Where it happened, if that is known.
+    /// The traceback of the error, if known.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub traceback: String,
 }
 
-/// The file to which the episodes of an algorithm are written while it plays.
+/// Writes the episodes of an algorithm to a file while it plays.
 #[derive(Debug)]
 pub struct Progress {
     store: Arc<Store>,
@@ -64,13 +64,15 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Takes up what is done of so many episodes of an algorithm; none if all are.
+    /// Reads which of an algorithm's `num_episodes` episodes are done; returns `None` if all are.
+    ///
+    /// An incomplete last line, left by an interrupted run, is removed from the file.
     ///
     /// # Errors
-    /// If a file holds anything else than this wrote. What a run that broke off wrote last is taken off the file.
+    /// If a file holds anything that this type did not write.
     pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
         if store.path(&format!("{key}{RESULTS}")).exists() {
-            // A run may have broken off after it had written all.
+            // The last run may have been interrupted after it wrote all results.
             remove(&store.path(&format!("{key}{LINES}")))?;
             return Ok(None);
         }
@@ -88,17 +90,17 @@ impl Progress {
         Ok(Some(Self { store: Arc::clone(store), key: key.to_owned(), run, path, file, done, failed: None }))
     }
 
-    /// The episodes that are not done.
+    /// Returns the indices of the episodes that are not done.
     pub fn to_do(&self) -> Vec<usize> {
         (0..self.done.len()).filter(|&index| !self.done[index]).collect()
     }
 
-    /// Number of episodes that are done.
+    /// Returns the number of episodes that are done.
     pub fn num_done(&self) -> usize {
         self.done.iter().filter(|&&done| done).count()
     }
 
-    /// Keeps an episode.
+    /// Writes a finished episode.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -109,7 +111,7 @@ impl Progress {
         Ok(())
     }
 
-    /// Notes an episode that could not be played; the next run tries again.
+    /// Writes an episode that could not be played; the next run plays it again.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -122,10 +124,10 @@ impl Progress {
         append(file, &path, failed)
     }
 
-    /// Writes the results, if all episodes are done; says whether they are.
+    /// Writes the results if all episodes are done; returns whether they are.
     ///
     /// # Errors
-    /// If they cannot be written; what is done stays kept then.
+    /// If the results cannot be written. The finished episodes are kept then.
     pub fn finish(self, environments: &EpisodeConfigs) -> Result<bool, Error> {
         if self.done.contains(&false) {
             return Ok(false);
@@ -135,9 +137,9 @@ impl Progress {
         for line in sorted(lines) {
             let settings = environments.changes(line.index)?;
             let algorithm = self.key.clone();
-            rows.push(self.told(&Row { metrics: line.metrics, settings, algorithm, ..Row::default() })?);
+            rows.push(self.to_json(&Row { metrics: line.metrics, settings, algorithm, ..Row::default() })?);
             let config = Value::Object(environments.named_fields(line.index)?);
-            episodes.push(self.told(&Episode {
+            episodes.push(self.to_json(&Episode {
                 episode: line.index,
                 seed: config.get("seed").cloned().unwrap_or_default(),
                 config,
@@ -153,12 +155,12 @@ impl Progress {
         Ok(true)
     }
 
-    fn told(&self, value: &impl Serialize) -> Result<String, Error> {
+    fn to_json(&self, value: &impl Serialize) -> Result<String, Error> {
         serde_json::to_string(value).map_err(|error| Error::io(&self.path, error))
     }
 }
 
-/// A list in JSON with a line for each of its elements.
+/// Returns a JSON list with one element per line.
 fn list(elements: &[String]) -> String {
     format!("[\n{}\n]\n", elements.join(",\n"))
 }
@@ -168,14 +170,15 @@ fn append(file: &mut File, path: &Path, value: &impl Serialize) -> Result<(), Er
     let mut line = serde_json::to_vec(value).map_err(|error| Error::io(path, error))?;
     line.push(b'\n');
     let whole = file.metadata().map_err(failed)?.len();
-    // One call, so that whoever ends this process ends it before or after; what a full disk took is taken back.
+    // One call, so that a kill of this process falls before or after it. If the disk is full, the file is truncated to
+    // its previous length.
     file.write_all(&line).map_err(|error| {
         let _ = file.set_len(whole);
         failed(error)
     })
 }
 
-/// The episodes of a file, and how many of its bytes are whole lines.
+/// Reads the episodes of a file, and returns the number of bytes in complete lines as well.
 fn read(path: &Path, num_episodes: usize) -> Result<(Vec<Done>, u64), Error> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
@@ -191,7 +194,7 @@ fn read(path: &Path, num_episodes: usize) -> Result<(Vec<Done>, u64), Error> {
             return Err(wrong(format!("episode `{}`, expected one below {num_episodes}", done.index)));
         }
         if let Some(first) = seen.insert(done.index, number) {
-            return Err(wrong(format!("episode `{}` again, which stands in line {first}", done.index)));
+            return Err(wrong(format!("duplicate episode `{}`, first in line {first}", done.index)));
         }
         lines.push(done);
     }

@@ -1,4 +1,4 @@
-//! Episodes of results, played again.
+//! Replays episodes of results.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,33 +15,33 @@ use crate::store::{ALGORITHMS, SUITE};
 use crate::suite::{Algorithm, Suite};
 
 impl Suite {
-    /// The suite whose results are in a folder.
+    /// Reads the suite of the results in a folder.
     ///
     /// # Errors
-    /// If there are none, or the suite beside them is wrong.
+    /// If the folder holds no results, or the suite saved with them is invalid.
     pub fn of_results(folder: &Path) -> Result<Self, Error> {
         let manifest = Manifest::read(folder)?;
         let manifest = manifest.ok_or_else(|| Error::io(folder, "holds no results of `pogema evaluate`"))?;
         let text = pogema_maps::files::read_text(&folder.join(SUITE))?;
-        // What it names lies beside the file that it was read from.
+        // Paths in the suite are relative to the folder of the original file.
         let suite = Self::parse(&manifest.suite, &text)?;
         let algorithms = folder.join(ALGORITHMS);
         if algorithms.exists() { suite.with_algorithms(&algorithms) } else { Ok(suite) }
     }
 
-    /// Its environments, with the maps of further files.
+    /// Creates its environments with the maps of further files, and returns warnings about replaced maps as well.
     ///
     /// # Errors
-    /// As for [`EpisodeConfigs::new`], or if a file cannot be read.
+    /// Those of [`EpisodeConfigs::new`], or if a file cannot be read.
     pub fn environments(&self, further: &[PathBuf]) -> Result<(EpisodeConfigs, Vec<String>), Error> {
         let (library, warnings) = self.library(further)?;
         Ok((EpisodeConfigs::new(self, library)?, warnings))
     }
 
-    /// Plays an episode of one of its algorithms, and keeps all of it.
+    /// Plays an episode of one of its algorithms and records it.
     ///
     /// # Errors
-    /// If there is no such algorithm or episode, or the algorithm is played in Python.
+    /// If there is no such algorithm or episode, or the algorithm runs only in Python.
     pub fn play_again(
         &self,
         environments: &EpisodeConfigs,
@@ -56,10 +56,10 @@ impl Suite {
         Ok((measured(&played), trace))
     }
 
-    /// Plays the first episode of its first algorithm, which is built in: its figures, and the time that it took.
+    /// Plays the first episode of its first algorithm, and returns the metrics and the runtime.
     ///
     /// # Errors
-    /// If it cannot be played.
+    /// If the episode cannot be played, or the algorithm is not built in.
     pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<(Pairs, Duration), Error> {
         let algorithm = self.algorithms.first();
         let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
@@ -71,15 +71,15 @@ impl Suite {
 fn built_in(algorithm: &Algorithm) -> Result<BuiltIn, Error> {
     BuiltIn::of(algorithm).unwrap_or_else(|| {
         let key = &algorithm.key;
-        Err(Error::request(format!("`{key}` is no algorithm that is built in; `pogema_rs.toolbox` plays it")))
+        Err(Error::request(format!("`{key}` is not a built-in algorithm; play it with `pogema_rs.toolbox`")))
     })
 }
 
-/// In what figures an episode that was played again differs from its row, each told in a few words.
+/// Returns the metrics in which a replayed episode differs from its row, each with both values.
 pub fn differences(row: &Row, metrics: &Pairs) -> Vec<String> {
-    let told = |(name, then): (&String, &serde_json::Value)| {
+    let difference = |(name, then): (&String, &serde_json::Value)| {
         let (then, now) = (figure(then)?, figure(metrics.get(name)?)?);
-        (then.to_bits() != now.to_bits()).then(|| format!("{name} {now}, in the results {then}"))
+        (then.to_bits() != now.to_bits()).then(|| format!("{name} is {now}, but {then} in the results"))
     };
-    row.metrics.iter().filter_map(told).collect()
+    row.metrics.iter().filter_map(difference).collect()
 }

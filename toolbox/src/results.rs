@@ -1,4 +1,4 @@
-//! What came of an evaluation: the rows of all algorithms, read from its folder.
+//! The results of an evaluation: the rows of all algorithms, read from its folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub const ALGORITHM: &str = "algorithm";
 /// The share of instances that were solved: 1 or 0 in one row.
 pub(crate) const SOLVED: &str = "CSR";
 
-/// The metric that a file of episodes adds.
+/// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
 
 /// The field of a config that names its map.
@@ -29,7 +29,7 @@ const MAP_NAME: &str = "map_name";
 /// If a name occurs twice, the last value counts, as in Python's reader.
 pub type Pairs = IndexMap<String, Value>;
 
-/// What is larger is no figure.
+/// The largest absolute value that counts as a number.
 const LARGEST: f64 = 1e100;
 
 /// What a planner proved about an episode.
@@ -39,7 +39,7 @@ pub struct Proof {
     /// A lower bound on the sum of costs of any plan. Units: steps, summed over all agents.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lower_bound: Option<u64>,
-    /// Why there is no plan.
+    /// The reason why there is no plan, if that was proved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unsolvable: Option<String>,
 }
@@ -50,23 +50,23 @@ impl Proof {
     }
 }
 
-/// How an episode was played, which may differ where what came of it does not.
+/// How an episode was played. This may differ between runs even if the results are equal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Episode {
-    /// Its number.
+    /// Its index.
     pub episode: usize,
     /// Its environment's seed.
     pub seed: Value,
     /// All fields of its environment.
     pub config: Value,
-    /// What the policy took of it. Units: seconds.
+    /// Time of the policy. Units: seconds.
     pub seconds: Option<f64>,
-    /// The number of the run that played it.
+    /// Index of the run that played it.
     pub run: usize,
-    /// The machine, if it is not that of the run.
+    /// The machine, if it differs from that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub machine: Option<String>,
-    /// What its planner proved.
+    /// What the planner proved.
     #[serde(flatten)]
     pub proof: Proof,
 }
@@ -76,17 +76,17 @@ pub struct Episode {
 /// Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Figures by name; what is neither number nor truth value is left to others.
+    /// Metrics by name. Values other than numbers and booleans are kept but not used.
     pub metrics: Pairs,
-    /// What was varied, by name.
+    /// The varied fields by name.
     #[serde(rename = "env_grid_search")]
     pub settings: Pairs,
-    /// Who played.
+    /// The name of the algorithm.
     pub algorithm: String,
-    /// The name of the folder in which it was found.
+    /// The name of its folder.
     #[serde(skip)]
     pub set: String,
-    /// Numbers, truth values and the map's name in the environment's config, varied or not, if the folder has them.
+    /// Numbers, booleans and the map's name in the environment's config, varied or not, if the folder has them.
     #[serde(skip)]
     pub config: Pairs,
     /// What the planner proved, if the folder has it.
@@ -95,12 +95,12 @@ pub struct Row {
 }
 
 impl Row {
-    /// A metric, if it is a number, and not one so large that only a mistake makes it.
+    /// Returns a metric if it is a number of plausible size.
     pub fn metric(&self, name: &str) -> Option<f64> {
         figure(self.metrics.get(name)?)
     }
 
-    /// Whether the instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
+    /// Returns whether the instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
     pub(crate) fn is_solved(&self) -> bool {
         self.metric(SOLVED).is_none_or(|share| share > 0.0)
     }
@@ -110,7 +110,7 @@ impl Row {
         self.settings.get(name).or_else(|| self.config.get(name))
     }
 
-    /// What stands in a column that is no metric.
+    /// Returns the value in a column that is not a metric.
     pub fn key(&self, column: &str) -> Option<Value> {
         if column == ALGORITHM {
             Some(self.algorithm.clone().into())
@@ -120,13 +120,13 @@ impl Row {
     }
 }
 
-/// A number that can be reckoned with and drawn.
+/// Returns a value as a number that can be averaged and drawn.
 pub(crate) fn figure(value: &Value) -> Option<f64> {
     let number = value.as_bool().map(|is_so| f64::from(u8::from(is_so))).or(value.as_f64());
     number.filter(|number| number.abs() <= LARGEST)
 }
 
-/// A figure with at most four decimals and no trailing zeros.
+/// Formats a number with at most four decimals and no trailing zeros.
 pub fn short(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -135,21 +135,21 @@ pub fn short(value: f64) -> String {
 /// The rows of one or more folders.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// Folder by folder, algorithm by algorithm, in the order of the files.
+    /// The rows, sorted by folder and algorithm, in the order of the files.
     pub rows: Vec<Row>,
-    /// What was found but left out, a line each.
+    /// Notes on files and rows that were left out, one line each.
     pub notes: Vec<String>,
 }
 
 impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
-    /// Each `<algorithm>.json` holds rows; `<algorithm>.episodes.json` how they were played, in their order, of which
-    /// the seconds are read as their metric `runtime` where they have none; `<algorithm>.jsonl` belongs to an algorithm
-    /// that is not finished.
+    /// Each `<algorithm>.json` holds rows. `<algorithm>.episodes.json` holds how they were played, in the same order;
+    /// its seconds become the metric `runtime` of rows that lack it. `<algorithm>.jsonl` belongs to an unfinished
+    /// algorithm.
     ///
     /// # Errors
-    /// One line with the file and the place in it for anything else, or if there are no rows at all.
+    /// One line with the file and the place in it if a file is invalid, or one line if there are no rows at all.
     pub fn read(folders: &[PathBuf]) -> Result<Self, Error> {
         let mut results = Self::default();
         for folder in folders {
@@ -185,13 +185,13 @@ impl Results {
         Ok(())
     }
 
-    /// The algorithms, sorted by name.
+    /// Returns the names of the algorithms, sorted.
     pub fn algorithms(&self) -> Vec<String> {
         let names: BTreeSet<&String> = self.rows.iter().map(|row| &row.algorithm).collect();
         names.into_iter().cloned().collect()
     }
 
-    /// The rows of each folder, by its name.
+    /// Returns the rows of each folder, by its name.
     pub(crate) fn by_folder(&self) -> BTreeMap<&str, Vec<&Row>> {
         let mut folders: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
         for row in &self.rows {
@@ -200,7 +200,7 @@ impl Results {
         folders
     }
 
-    /// Columns that are no metrics: what was varied, in order of first appearance, then the algorithm.
+    /// Returns the columns that are not metrics: the varied fields, in order of first appearance, then the algorithm.
     pub fn key_columns(&self) -> Vec<String> {
         let settings = self.rows.iter().flat_map(|row| row.settings.keys());
         let mut columns = first_appearances(settings.filter(|&name| name != ALGORITHM));
@@ -208,7 +208,7 @@ impl Results {
         columns
     }
 
-    /// Metrics that are numbers in some row, or nowhere anything, in order of first appearance.
+    /// Returns the metrics that are a number, a boolean or null in some row, in order of first appearance.
     pub fn metric_columns(&self) -> Vec<String> {
         let is_figure = |value: &Value| value.is_number() || value.is_boolean() || value.is_null();
         let metrics = self.rows.iter().flat_map(|row| row.metrics.iter());
@@ -216,7 +216,7 @@ impl Results {
     }
 }
 
-/// Whether a JSON file holds something else than rows.
+/// Returns whether a JSON file holds something other than rows.
 fn is_apart(name: &str) -> bool {
     name == manifest::FILE || name.ends_with(EPISODES)
 }
@@ -226,12 +226,12 @@ fn first_appearances<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String>
 }
 
 fn name_of(path: &Path) -> String {
-    // `.` and `..` have no name of their own.
+    // `.` and `..` have no file name.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The files of a folder, sorted by name.
+/// Returns the files of a folder, sorted by name.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut paths = entries(folder)?;
     paths.retain(|path| path.is_file());
@@ -252,14 +252,14 @@ fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
         Some(index) => {
             let (number, found) = (index + 1, &rows[index].algorithm);
             let reason = format!(
-                "row {number} is of algorithm `{found}`, expected `{algorithm}` as the file is named"
+                "row {number} has the algorithm `{found}`, expected `{algorithm}` as in the file name"
             );
             Err(Error::io(path, reason))
         }
     }
 }
 
-/// Adds to rows how they were played, if there is a file about that; rows with a runtime keep theirs.
+/// Adds runtime, config and proof to rows if there is a file of episodes; rows with a runtime keep it.
 fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
@@ -279,7 +279,7 @@ fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The fields of a config that take little memory; a map's text may be as large as all results.
+/// Returns the fields of a config that take little memory. A map's text may be as large as all results together.
 fn small_fields(config: Value) -> Pairs {
     let Value::Object(fields) = config else { return Pairs::default() };
     let is_small = |(name, value): &(String, Value)| {
@@ -288,7 +288,7 @@ fn small_fields(config: Value) -> Pairs {
     fields.into_iter().filter(is_small).collect()
 }
 
-/// The text with null in place of the numbers that Python writes though JSON does not have them.
+/// Replaces `NaN` and infinities by null; Python writes them although JSON does not allow them.
 fn without_nan(text: &str) -> String {
     let (mut clean, mut rest, mut in_string) = (String::with_capacity(text.len()), text, false);
     while let Some(next) = rest.chars().next() {
@@ -325,13 +325,13 @@ mod tests {
     }
 
     #[test]
-    fn times_are_the_runtime_and_unfinished_algorithms_are_told() {
+    fn seconds_become_the_runtime_and_unfinished_algorithms_are_noted() {
         let rows = format!("[{ROW}, {ROW}]");
         let how = |seconds: &str| {
             format!(r#"{{"episode": 0, "seed": 1, "config": {{}}, "seconds": {seconds}, "run": 0}}"#)
         };
         let episodes = format!("[{}, {}]", how("0.5"), how("NaN"));
-        let files = [("A.json", rows.as_str()), ("A.episodes.json", &episodes), ("B.jsonl", "what")];
+        let files = [("A.json", rows.as_str()), ("A.episodes.json", &episodes), ("B.jsonl", "unfinished")];
         let results = read(&files).unwrap();
         assert_eq!(results.rows[0].metric("runtime"), Some(0.5));
         assert_eq!(results.rows[1].metric("runtime"), None);
@@ -342,20 +342,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_result_is_told_with_its_place() {
-        let told = |files: &[(&str, &str)]| read(files).unwrap_err();
+    fn invalid_results_are_rejected_with_their_place() {
+        let error_of = |files: &[(&str, &str)]| read(files).unwrap_err();
         let whole = format!("[{ROW}]");
-        assert!(told(&[("A.json", &whole[..60])]).contains("A.json: expected a list of results"));
-        assert!(told(&[("A.json", &whole[..60])]).contains("line 1 column 60"));
-        assert!(told(&[("A.json", "{\"some\": 1}")]).contains("invalid type: map"));
-        assert!(told(&[("A.json", "[{\"some\": 1}]")]).contains("missing field `metrics` at line 1"));
-        assert!(told(&[("B.json", &whole)]).contains("row 1 is of algorithm `A`, expected `B`"));
-        let episodes = told(&[("A.json", &whole), ("A.episodes.json", "[]")]);
+        assert!(error_of(&[("A.json", &whole[..60])]).contains("A.json: expected a list of results"));
+        assert!(error_of(&[("A.json", &whole[..60])]).contains("line 1 column 60"));
+        assert!(error_of(&[("A.json", "{\"some\": 1}")]).contains("invalid type: map"));
+        assert!(error_of(&[("A.json", "[{\"some\": 1}]")]).contains("missing field `metrics` at line 1"));
+        assert!(error_of(&[("B.json", &whole)]).contains("row 1 has the algorithm `A`, expected `B`"));
+        let episodes = error_of(&[("A.json", &whole), ("A.episodes.json", "[]")]);
         assert!(episodes.contains("`0` episodes, expected 1"), "{episodes}");
-        let episodes = told(&[("A.json", &whole), ("A.episodes.json", "[1]")]);
+        let episodes = error_of(&[("A.json", &whole), ("A.episodes.json", "[1]")]);
         assert!(episodes.contains("expected a list of episodes: invalid type"), "{episodes}");
-        assert!(told(&[]).contains("no results in"));
-        assert!(told(&[("A.json", "[]")]).contains("no results in"));
+        assert!(error_of(&[]).contains("no results in"));
+        assert!(error_of(&[("A.json", "[]")]).contains("no results in"));
     }
 
     #[test]
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn python_s_numbers_are_null_outside_of_strings() {
+    fn nan_and_infinity_become_null_outside_of_strings() {
         assert_eq!(without_nan(r#"[NaN, "NaN \" NaN", -Infinity]"#), r#"[null, "NaN \" NaN", null]"#);
     }
 }

@@ -1,4 +1,4 @@
-//! All episodes of the built-in algorithms of a suite, played on threads.
+//! Plays all episodes of a suite's built-in algorithms on threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,7 +15,7 @@ use crate::results::Pairs;
 use crate::store::Store;
 use crate::suite::{Algorithm, Suite};
 
-/// What happens while a suite is run.
+/// An event during the run of a suite.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
     /// An algorithm begins.
@@ -24,43 +24,43 @@ pub enum Event<'a> {
         algorithm: &'a str,
         /// Number of episodes.
         total: usize,
-        /// Number of those that an earlier run did.
+        /// Number of episodes that earlier runs finished.
         done: usize,
     },
     /// An episode is done.
     Played,
     /// An episode could not be played.
     Failed(&'a Failed),
-    /// An algorithm has done all it could.
+    /// An algorithm ends, with or without all its episodes done.
     End,
 }
 
-/// How a suite is run.
+/// Options for the run of a suite.
 #[derive(Clone, Copy)]
 pub struct Running<'a> {
-    /// Threads; of an algorithm at most as many as it asks for.
+    /// Number of threads; an algorithm may set a lower limit.
     pub threads: usize,
-    /// Set it to end after the episodes that are being played.
+    /// Set it to stop the run after the current episodes.
     pub stop: &'a AtomicBool,
-    /// Told of all that happens.
+    /// Called for each event.
     pub watch: &'a (dyn Fn(Event<'_>) + Sync),
 }
 
-/// What a run came to.
+/// The outcome of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Episodes that this run played.
     pub num_played: usize,
     /// Episodes that could not be played.
     pub num_failed: usize,
-    /// Whether all results are there.
+    /// Whether all results are complete.
     pub is_whole: bool,
 }
 
-/// Plays what a store does not have yet of the algorithms that are built in.
+/// Plays the episodes of all algorithms that a store does not hold yet.
 ///
 /// # Errors
-/// For an algorithm that is not built in, before anything is played; if results cannot be written.
+/// If an algorithm is not built in, before any episode is played; if results cannot be written.
 pub fn run(
     suite: &Suite,
     environments: &EpisodeConfigs,
@@ -82,10 +82,10 @@ pub fn run(
     Ok(summary)
 }
 
-/// The algorithms of a suite, if all are built in.
+/// Returns the algorithms of a suite if all are built in.
 ///
 /// # Errors
-/// One line about the first one that is not, or that has a parameter it cannot have.
+/// One line about the first algorithm that is not built in or has an invalid parameter.
 pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
     let all = suite.algorithms.iter().map(|algorithm| {
         let built_in = BuiltIn::of(algorithm).unwrap_or_else(|| Err(unknown(algorithm)));
@@ -99,13 +99,13 @@ fn unknown(algorithm: &Algorithm) -> Error {
     let (line, key, name) = (algorithm.line, &algorithm.key, &algorithm.name);
     let known = all.join(", ");
     let reason = format!(
-        "line {line}: `{key}.name`: `{name}` is not built in, as {known} are; \
-         policies in Python are run by `pogema_rs.toolbox`"
+        "line {line}: `{key}.name`: `{name}` is not built in, expected one of {known}; \
+         to run policies written in Python, use `pogema_rs.toolbox`"
     );
     Error::Syntax { reason }
 }
 
-/// Plays what a store does not have yet of one algorithm.
+/// Plays the episodes of one algorithm that a store does not hold yet.
 ///
 /// # Errors
 /// If results cannot be written.
@@ -145,7 +145,7 @@ pub fn run_one(
         Ok(())
     };
     let threads = algorithm.num_processes.map_or(running.threads, |most| most.min(running.threads));
-    // Taken one by one, so that the longest begin first and nobody waits long at the end.
+    // Threads take tasks one by one. The longest episodes begin first, so that no thread idles long at the end.
     pool(threads)?.install(|| tasks.into_iter().par_bridge().try_for_each(one))?;
     (running.watch)(Event::End);
     let progress = progress.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -173,14 +173,14 @@ fn done(index: usize, played: Played) -> Done {
     Done { index, metrics, runtime, proof: played.proof, ..Done::default() }
 }
 
-/// The figures of an episode as results have them: what POGEMA counts is whole, and a mean is not.
+/// Returns the metrics of an episode as in results: POGEMA's counts as whole numbers, means as floats.
 pub(crate) fn measured(played: &Played) -> Pairs {
     let has_one_goal_each = played.metrics.soc.is_some();
-    let told = |(name, value): (&str, f64)| {
+    let entry = |(name, value): (&str, f64)| {
         let is_count = COUNTS.contains(&name) || name == "ep_length" && has_one_goal_each;
         (name.to_owned(), if is_count { (value as u64).into() } else { value.into() })
     };
-    played.metrics.named().into_iter().map(told).collect()
+    played.metrics.named().into_iter().map(entry).collect()
 }
 
 const COUNTS: [&str; 4] = ["SoC", "makespan", "a_collisions", "o_collisions"];

@@ -1,4 +1,4 @@
-//! The six metrics by which the POGEMA benchmark compares algorithms, each between 0 and 1.
+//! The six metrics of the POGEMA benchmark for comparing algorithms, each between 0 and 1.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -10,27 +10,27 @@ use crate::frame::{compare, shown};
 use crate::results::{Results, Row};
 
 words! {
-    /// How the metrics are computed.
+    /// Definition of the metrics.
     #[derive(Default)]
     pub enum Definition {
-        /// As the published numbers, all of which follow from the published files.
+        /// The definition behind the published numbers, all of which follow from the published files.
         ///
-        /// - What nobody solved counts for nobody. The best is the best of the algorithms that take part.
+        /// - Instances that no algorithm solved are left out. "Best" is the best of the compared algorithms.
         /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
-        /// - Pathfinding counts a way that was not found as one of the length of the episode.
-        /// - Coordination counts the steps of an episode as its makespan less 1. That is what the published files have
-        ///   as `ep_length` wherever they count collisions. POGEMA 1.4.0, and so what we play, has one more in
-        ///   `ep_length`, while makespan is the same everywhere; so files of either kind can be compared.
+        /// - Pathfinding counts a path that was not found as a path of the length of the episode.
+        /// - Coordination counts makespan − 1 steps per episode. In the published files, this equals `ep_length`
+        ///   wherever they count collisions. In POGEMA 1.4.0, and therefore in our results, `ep_length` is larger by
+        ///   one. Makespan is the same in both, so files of both kinds can be compared.
         ///
         /// Source: `build_web_plot.py` of the public repository pogema-benchmark, commit 7b86d776
         #[default]
         Published = "published",
-        /// As the paper's text defines them.
+        /// The definition in the paper's text.
         ///
-        /// - What was not solved is 0, whoever else solved it.
-        /// - Scalability uses seconds, and has no upper bound; all pairs count, which the text leaves open.
-        /// - Pathfinding is 0 where no way was found.
-        /// - Coordination counts as many steps as `ep_length` says.
+        /// - An unsolved instance counts as 0, whether or not another algorithm solved it.
+        /// - Scalability uses seconds and has no upper bound. All pairs count; the text leaves this open.
+        /// - Pathfinding is 0 if no path was found.
+        /// - Coordination counts `ep_length` steps per episode.
         ///
         /// Source: POGEMA (ICLR 2025), section 4.2, equations 1 to 9
         Paper = "paper",
@@ -38,25 +38,25 @@ words! {
 }
 
 words! {
-    /// One of the six, in the order in which they are shown.
+    /// One of the six metrics, in display order.
     pub enum Metric {
-        /// Best sum of costs over own, on random maps and mazes.
+        /// Best sum of costs divided by own, on random maps and mazes.
         Performance = "Performance",
-        /// The same on tiles of cities.
+        /// The same ratio on tiles of cities.
         OutOfDistribution = "Out-of-Distribution",
-        /// The same on puzzles.
+        /// The same ratio on puzzles.
         Cooperation = "Cooperation",
-        /// How much time per agent few agents take, over what more take, in the warehouse.
+        /// Time per agent with few agents, divided by that with more agents, in the warehouse.
         Scalability = "Scalability",
-        /// How seldom agents are in each other's way, on random maps and mazes.
+        /// One minus the rate of collisions per agent and step, on random maps and mazes.
         Coordination = "Coordination",
-        /// Shortest way over own, with one agent on whole cities.
+        /// Length of the shortest path divided by own, with one agent on whole cities.
         Pathfinding = "Pathfinding",
     }
 }
 
 impl Metric {
-    /// Parts of the names of the folders that it needs.
+    /// Returns the parts of names that identify the required folders.
     fn sets(self) -> &'static [&'static str] {
         match self {
             Self::Performance | Self::Coordination => &["random", "mazes"],
@@ -71,22 +71,23 @@ impl Metric {
 /// The metrics of one algorithm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Six {
-    /// Its name.
+    /// The name of the algorithm.
     pub algorithm: String,
-    /// In the order of [`Metric`]; none where its folder is missing or rows lack what is needed.
+    /// The metrics in the order of [`Metric`]; `None` if the folder is missing or rows lack a required metric.
     pub values: [Option<f64>; 6],
-    /// Scalability before it is bounded by 1.
+    /// Scalability without the upper bound of 1.
     pub unbounded_scalability: Option<f64>,
 }
 
-/// Length of the benchmark's lifelong episodes, which the published numbers divide by whatever the length was.
+/// Length of the benchmark's lifelong episodes. The published numbers divide by it whatever the actual length.
 const LIFELONG_STEPS: f64 = 256.0;
 
-/// Computes the metrics of all algorithms from the folders of one evaluation, known by their names.
+/// Computes the metrics of all algorithms from the folders of one evaluation.
 ///
-/// An instance counts if all algorithms of its folder have it. A row's collisions are taken as none if no row of its
-/// algorithm has any. Lifelong episodes are known by their `avg_throughput`, which stands for the sum of costs there.
-/// The second result says what is missing, a line each.
+/// Folders are identified by their names. An instance counts if all algorithms of its folder have played it. If no row
+/// of an algorithm has `a_collisions`, the algorithm counts as free of collisions. Lifelong episodes are recognized by
+/// `avg_throughput`, which replaces the sum of costs there. The second result holds notes on missing data, one line
+/// each.
 pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>) {
     let mut notes = Vec::new();
     let joined: Vec<Joined<'_>> =
@@ -108,7 +109,7 @@ pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>)
             if value.is_none() && !joined.instances.is_empty() {
                 let algorithm = &six.algorithm;
                 notes.push(format!(
-                    "`{algorithm}` has no {metric}: its rows are missing or lack a metric for it"
+                    "`{algorithm}` has no {metric}: rows are missing or lack a required metric"
                 ));
             }
         }
@@ -116,7 +117,7 @@ pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>)
     (all, notes)
 }
 
-/// The instances of some folders that every algorithm there has played.
+/// The instances of some folders that all algorithms there have played.
 struct Joined<'a> {
     instances: Vec<HashMap<&'a str, &'a Row>>,
     is_lifelong: bool,
@@ -142,8 +143,9 @@ impl<'a> Joined<'a> {
         instances.retain(|_, rows| rows.len() == algorithms.len());
         if instances.len() < all {
             let left = instances.len();
-            notes
-                .push(format!("{metric}: {left} of {all} instances count, which every algorithm has played"));
+            notes.push(format!(
+                "{metric}: {left} of {all} instances count, those that all algorithms have played"
+            ));
         }
         let is_lifelong = rows.iter().any(|row| row.metric("avg_throughput").is_some());
         Self { instances: instances.into_values().collect(), is_lifelong }
@@ -160,23 +162,25 @@ impl<'a> Joined<'a> {
         }
     }
 
-    /// The mean of a figure of each instance; instances without one are left out, and none may lack what it is of.
+    /// Returns the mean of a value over all instances; `None` if the value is unknown for any instance.
+    ///
+    /// Instances that do not count are left out.
     fn mean(&self, figure: impl Fn(&HashMap<&str, &Row>) -> Option<Counted>) -> Option<f64> {
         let found: Option<Vec<Counted>> = self.instances.iter().map(figure).collect();
         mean_of(&found?.into_iter().flatten().collect::<Vec<f64>>())
     }
 
-    /// Best sum of costs over own, or own throughput over the best.
+    /// Computes best sum of costs divided by own, or own throughput divided by the best.
     fn ratio(&self, algorithm: &str, definition: Definition) -> Option<f64> {
-        let nobody = (definition == Definition::Paper).then_some(0.0);
+        let unsolved = (definition == Definition::Paper).then_some(0.0);
         self.mean(|rows| {
             let own = rows.get(algorithm)?;
             if self.is_lifelong {
                 let all: Option<Vec<f64>> = rows.values().map(|row| row.metric("avg_throughput")).collect();
                 let best = all?.into_iter().fold(0.0, f64::max);
-                return Some(if best > 0.0 { Some(own.metric("avg_throughput")? / best) } else { nobody });
+                return Some(if best > 0.0 { Some(own.metric("avg_throughput")? / best) } else { unsolved });
             }
-            let Some(best) = least(rows, "SoC")? else { return Some(nobody) };
+            let Some(best) = least(rows, "SoC")? else { return Some(unsolved) };
             Some(Some(solved(own, "SoC")?.map_or(0.0, |cost| best / cost)))
         })
     }
@@ -208,7 +212,7 @@ impl<'a> Joined<'a> {
             let num_agents = row.settings.get("num_agents")?.as_f64()?;
             let steps = match definition {
                 Definition::Published if self.is_lifelong => LIFELONG_STEPS,
-                // An episode of one step has no collision that is not of this step.
+                // An episode of one step would otherwise divide by zero.
                 Definition::Published => (row.metric("makespan")? - 1.0).max(1.0),
                 Definition::Paper if self.is_lifelong => row.metric("ep_length").unwrap_or(LIFELONG_STEPS),
                 Definition::Paper => row.metric("ep_length")?.max(1.0),
@@ -235,26 +239,26 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// A figure, or none for what does not count.
+/// A value, or `None` if the instance does not count.
 type Counted = Option<f64>;
 
-/// A metric of a row, none if it was not solved; nothing at all if that is not known.
+/// Returns a metric of a row, `Some(None)` if the row is not solved, and `None` if that is unknown.
 fn solved(row: &Row, metric: &str) -> Option<Counted> {
     Some(if row.metric("CSR")? > 0.0 { Some(row.metric(metric)?) } else { None })
 }
 
-/// The least of a metric over the rows that solved the instance; nothing at all if that is not known of every row.
+/// Returns the minimum of a metric over the rows that solved the instance; `None` if it is unknown for any row.
 fn least(rows: &HashMap<&str, &Row>, metric: &str) -> Option<Counted> {
     let all: Option<Vec<Counted>> = rows.values().map(|row| solved(row, metric)).collect();
     Some(all?.into_iter().flatten().reduce(f64::min))
 }
 
-/// What tells an instance from others: its folder and all that was varied, whatever the order.
+/// Returns a text that identifies an instance: its folder and all varied fields, sorted by name.
 pub(crate) fn instance(row: &Row) -> String {
     let mut settings: Vec<(&String, &Value)> = row.settings.iter().collect();
     settings.sort_by(|one, other| one.0.cmp(other.0).then_with(|| compare(one.1, other.1)));
-    let told = settings.into_iter().map(|(name, value)| format!("{name}={}", shown(value)));
-    std::iter::once(row.set.clone()).chain(told).collect::<Vec<_>>().join(", ")
+    let settings = settings.into_iter().map(|(name, value)| format!("{name}={}", shown(value)));
+    std::iter::once(row.set.clone()).chain(settings).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -274,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_solved_counts_for_nobody_or_as_nothing() {
+    fn instances_without_a_solution_are_left_out_or_count_as_zero() {
         let metrics = [r#"{"CSR": 1, "SoC": 4}"#, r#"{"CSR": 1, "SoC": 8}"#, r#"{"CSR": 0, "SoC": 9}"#];
         let rows = || {
             let of_seed = |seed, one: usize, other: usize| {
@@ -294,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn coordination_is_that_of_either_count_of_steps() {
+    fn coordination_is_the_same_for_both_counts_of_steps() {
         let coordination = |ep_length: u64, definition| {
             let metrics = format!(
                 r#"{{"ep_length": {ep_length}, "makespan": 11, "a_collisions": 3, "o_collisions": 2}}"#
@@ -302,14 +306,14 @@ mod tests {
             of(vec![row("01-random", "A", 0, &metrics), row("02-mazes", "A", 0, &metrics)], definition).0[0]
                 .values[4]
         };
-        // As published, and as POGEMA 1.4.0 counts.
+        // `ep_length` as in the published files, then as in POGEMA 1.4.0.
         assert_eq!(coordination(10, Definition::Published), Some(0.75));
         assert_eq!(coordination(11, Definition::Published), Some(0.75));
         assert_eq!(coordination(10, Definition::Paper), Some(0.75));
     }
 
     #[test]
-    fn instances_that_somebody_lacks_are_told() {
+    fn instances_missing_for_an_algorithm_are_noted() {
         let metrics = r#"{"avg_throughput": 0.5}"#;
         let rows = vec![
             row("04-movingai", "A", 0, metrics),
@@ -318,7 +322,7 @@ mod tests {
         ];
         let (all, notes) = of(rows, Definition::Published);
         assert_eq!(all.iter().map(|six| six.values[1]).collect::<Vec<_>>(), [Some(0.5), Some(1.0)]);
-        let told = "Out-of-Distribution: 1 of 2 instances count, which every algorithm has played";
-        assert!(notes.contains(&told.to_owned()), "{notes:?}");
+        let note = "Out-of-Distribution: 1 of 2 instances count, those that all algorithms have played";
+        assert!(notes.contains(&note.to_owned()), "{notes:?}");
     }
 }

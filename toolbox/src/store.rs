@@ -1,8 +1,8 @@
-//! A folder with the results of an evaluation, kept episode by episode.
+//! A folder with the results of an evaluation, written episode by episode.
 //!
-//! For each algorithm there is, while it plays, a file of lines, one for each episode that is done, in the order in
-//! which they were; and when all are done, the results in pogema-toolbox's layout, in the order of the suite, and
-//! beside them how each episode was played and how long it took, which differs from run to run and results must not.
+//! While an algorithm plays, its file has one line per finished episode, in the order in which they finished. When all
+//! episodes are done, the store writes the results in pogema-toolbox's layout, in the order of the suite. A second file
+//! holds how each episode was played and how long it took. These data differ between runs, and results must not.
 
 use std::borrow::Cow;
 use std::fs::{self, File};
@@ -16,40 +16,40 @@ use crate::manifest::{self, Manifest, RunRecord};
 use crate::suite::Suite;
 
 words! {
-    /// How a run treats the results that the folder holds already.
+    /// How a run treats existing results in the folder.
     pub enum Begin {
-        /// Fails if there are any.
+        /// Fails if there are results.
         New = "new",
         /// Continues an earlier run of the same suite.
         Resume = "resume",
-        /// Deletes them.
+        /// Deletes the results.
         Anew = "anew",
     }
 }
 
-/// The folder, which one process at a time may write to.
+/// A folder of results, to which only one process at a time may write.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
-    noted: Mutex<Noted>,
-    /// Releases of what plays besides this program, by name.
+    journal: Mutex<Journal>,
+    /// Versions of further software that plays, by name.
     versions: Vec<(String, String)>,
-    /// Held until the end.
+    /// Held as long as the store lives.
     _lock: File,
 }
 
-/// What is noted of how the results are made.
+/// The manifest and the state of its last run.
 #[derive(Debug)]
-struct Noted {
+struct Journal {
     manifest: Manifest,
-    /// Whether what this process plays is a run of its own already.
+    /// Whether the manifest already has a run for this process.
     has_begun: bool,
 }
 
-/// The suite that was played.
+/// File with the suite that was played.
 pub(crate) const SUITE: &str = "suite.yaml";
 
-/// The algorithms that replaced those of the suite; without this file, the suite's own played.
+/// File with the algorithms that replaced those of the suite. Without this file, the suite's own were played.
 pub(crate) const ALGORITHMS: &str = "algorithms.yaml";
 const LOCK: &str = ".lock";
 
@@ -57,8 +57,8 @@ impl Store {
     /// Opens a folder for a suite.
     ///
     /// # Errors
-    /// If another process writes to it; if it holds anything that `begin` does not allow, all of which is then as it
-    /// was.
+    /// If another process writes to the folder; if the folder holds anything that `begin` does not allow, which is left
+    /// unchanged.
     pub fn open(folder: &Path, suite: &Suite, begin: Begin) -> Result<Self, Error> {
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let lock = lock(folder)?;
@@ -66,18 +66,20 @@ impl Store {
         let mut manifest = Manifest::of(suite);
         let known = Manifest::read(folder)?;
         match (begin, known) {
-            (Begin::Resume, Some(known)) => manifest.go_on(known).map_err(|what| refused(folder, &what))?,
+            (Begin::Resume, Some(known)) => {
+                manifest.continue_from(known).map_err(|what| refused(folder, &what))?
+            }
             (Begin::Anew, Some(known)) => delete(folder, &known)?,
             (Begin::New, Some(_)) => {
-                let reason = "has results already: `--resume` goes on with them, `--force` deletes them";
+                let reason = "has results already: `--resume` continues them, `--force` deletes them";
                 return Err(Error::io(folder, reason));
             }
             (_, None) => check_empty(folder)?,
         }
-        let noted = Mutex::new(Noted { manifest: manifest.clone(), has_begun: false });
-        let store = Self { folder: folder.to_owned(), noted, versions: Vec::new(), _lock: lock };
-        // First what makes it a folder of results: a run may be killed between the two.
-        store.tell(&manifest)?;
+        let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
+        let store = Self { folder: folder.to_owned(), journal, versions: Vec::new(), _lock: lock };
+        // The manifest comes first, because it marks a folder of results and the run may be killed in between.
+        store.write_manifest(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
         match &suite.replacement {
             Some(file) => store.write(ALGORITHMS, file.text.as_bytes())?,
@@ -86,54 +88,54 @@ impl Store {
         Ok(store)
     }
 
-    /// The same for a process that plays with more than this program, whose releases are told by name.
+    /// Sets the versions of further software that plays, by name.
     #[must_use]
     pub fn with(mut self, versions: Vec<(String, String)>) -> Self {
         self.versions = versions;
         self
     }
 
-    /// How the results were made.
+    /// Returns the manifest of the results.
     pub fn manifest(&self) -> Manifest {
-        self.noted().manifest.clone()
+        self.journal().manifest.clone()
     }
 
-    /// The number of the run that this process is, which is noted when it is asked for first.
+    /// Returns the index of this process's run. The first call adds the run to the manifest.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the manifest cannot be written.
     pub fn run(&self) -> Result<usize, Error> {
-        let mut noted = self.noted();
-        if !noted.has_begun {
-            noted.manifest.runs.push(RunRecord::now(&self.versions));
-            self.tell(&noted.manifest)?;
-            noted.has_begun = true;
+        let mut journal = self.journal();
+        if !journal.has_begun {
+            journal.manifest.runs.push(RunRecord::now(&self.versions));
+            self.write_manifest(&journal.manifest)?;
+            journal.has_begun = true;
         }
-        Ok(noted.manifest.runs.len() - 1)
+        Ok(journal.manifest.runs.len() - 1)
     }
 
-    fn noted(&self) -> MutexGuard<'_, Noted> {
-        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self, manifest: &Manifest) -> Result<(), Error> {
+    fn write_manifest(&self, manifest: &Manifest) -> Result<(), Error> {
         let text = serde_json::to_string_pretty(manifest).map_err(|error| Error::io(&self.folder, error))?;
         self.write(manifest::FILE, format!("{text}\n").as_bytes())
     }
 
-    /// The file of a name in the folder.
+    /// Returns the path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Writes a whole file, or leaves the one that is there.
+    /// Writes a whole file, or on failure leaves the existing one unchanged.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         write_whole(&self.path(name), bytes)
     }
 }
 
 fn refused(folder: &Path, what: &str) -> Error {
-    Error::io(folder, format!("{what}; choose another folder, or `--force` deletes the results"))
+    Error::io(folder, format!("{what}; choose another folder, or delete the results with `--force`"))
 }
 
 /// Deletes the results that an evaluation wrote, and nothing else.
@@ -146,7 +148,7 @@ fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
     remove(&folder.join(REPORT))
 }
 
-/// Removes what runs were writing when they were killed; nobody else writes here now.
+/// Removes the unfinished files of killed runs. The lock guarantees that no other process is writing them.
 fn remove_unfinished(folder: &Path) -> Result<(), Error> {
     let mut unfinished = entries(folder)?.into_iter().filter(|path| name_of(path).starts_with(UNFINISHED));
     unfinished.try_for_each(|path| remove(&path))
@@ -162,7 +164,7 @@ fn check_empty(folder: &Path) -> Result<(), Error> {
     }
 }
 
-/// The files and folders in a folder.
+/// Returns the files and folders in a folder.
 pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
     entries.map_err(|error| Error::io(folder, error))
@@ -172,10 +174,10 @@ fn name_of(path: &Path) -> Cow<'_, str> {
     path.file_name().unwrap_or_default().to_string_lossy()
 }
 
-/// The page of the results.
+/// File with the report of the results.
 pub const REPORT: &str = "report.html";
 
-/// Endings of the files of an algorithm: its results, how each was played, the episodes done so far, and those that failed.
+/// Endings of an algorithm's files: results, how each episode was played, episodes done so far, and failed episodes.
 pub(crate) const RESULTS: &str = ".json";
 pub(crate) const EPISODES: &str = ".episodes.json";
 pub(crate) const LINES: &str = ".jsonl";
@@ -188,7 +190,7 @@ fn lock(folder: &Path) -> Result<File, Error> {
     Ok(file)
 }
 
-/// Deletes a file that may not be there.
+/// Deletes a file if it exists.
 pub(crate) fn remove(path: &Path) -> Result<(), Error> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, error)),

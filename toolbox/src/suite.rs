@@ -1,4 +1,4 @@
-//! What an evaluation is to do: environments, algorithms and views, read from one YAML file.
+//! Suites: the environments, algorithms and views of an evaluation, read from one YAML file.
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +14,10 @@ const KEYS: [&str; 5] = ["environment", ALGORITHMS, "results_views", "maps", "da
 /// The key of the algorithms.
 const ALGORITHMS: &str = "algorithms";
 
-/// The name of POGEMA's environment; others are registered in Python, with fields of their own.
+/// The name of POGEMA's environment. Other environments are registered in Python and have their own fields.
 pub(crate) const ENVIRONMENT: &str = "Environment";
 
-/// The fields of an environment that are not POGEMA's.
+/// The fields of an environment that are not in POGEMA's config.
 ///
 /// Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
 pub(crate) const OWN_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
@@ -42,23 +42,23 @@ words! {
     }
 }
 
-/// The keys of every algorithm; all others are parameters of its own.
+/// The keys common to all algorithms; all others are the algorithm's own parameters.
 const ALGORITHM_KEYS: [&str; 3] = ["name", "num_process", "parallel_backend"];
 
-/// An evaluation as its file says it.
+/// The description of an evaluation, as in its file.
 #[derive(Clone, Debug)]
 pub struct Suite {
-    /// Where it was read.
+    /// Path of its file.
     pub path: PathBuf,
-    /// What was read.
+    /// Text of its file.
     pub text: String,
     /// The file whose algorithms replace its own.
     pub replacement: Option<Replacement>,
-    /// One environment for each episode.
+    /// One environment per episode.
     pub environments: Variants,
-    /// Who plays, each all episodes.
+    /// The algorithms, each of which plays all episodes.
     pub algorithms: Vec<Algorithm>,
-    /// What to show of the results, by name.
+    /// The views of the results, by name.
     pub views: Vec<(String, Node)>,
     /// Files and folders with maps.
     pub maps: Vec<PathBuf>,
@@ -69,42 +69,42 @@ pub struct Suite {
 /// A file whose algorithms replace those of a suite.
 #[derive(Clone, Debug)]
 pub struct Replacement {
-    /// Where it was read.
+    /// Its path.
     pub path: PathBuf,
-    /// What was read.
+    /// Its text.
     pub text: String,
 }
 
-/// Who plays, under the name that results have.
+/// An algorithm of a suite.
 #[derive(Clone, Debug)]
 pub struct Algorithm {
     /// The name of its results.
     pub key: String,
-    /// The line of the file on which it begins.
+    /// The line of the file where it begins.
     pub line: u64,
     /// The name under which it is registered.
     pub name: String,
-    /// Most processes or threads that play its episodes, if it says so.
+    /// Maximum number of processes or threads for its episodes, if given.
     pub num_processes: Option<usize>,
     /// How its episodes are distributed.
     pub backend: Backend,
-    /// The fields that are its own, in the order of the file.
+    /// Its own parameters, in the order of the file.
     pub parameters: Vec<(String, Node)>,
 }
 
 impl Suite {
-    /// Reads a file.
+    /// Reads a suite from a file.
     ///
     /// # Errors
-    /// One line with the file, the line and the key of what is wrong, and of what was expected there.
+    /// One line with the file, the line, the invalid key and what is expected there.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::parse(path, &pogema_maps::files::read_text(path)?)
     }
 
-    /// Reads the text of a file.
+    /// Reads a suite from the text of a file.
     ///
     /// # Errors
-    /// As for [`Suite::read`].
+    /// Those of [`Suite::read`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, Error> {
         Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
@@ -112,7 +112,7 @@ impl Suite {
     /// Replaces its algorithms by those of a file that has no other key.
     ///
     /// # Errors
-    /// As for [`Suite::read`].
+    /// Those of [`Suite::read`].
     pub fn with_algorithms(mut self, path: &Path) -> Result<Self, Error> {
         let text = pogema_maps::files::read_text(path)?;
         let read = |root: Node| {
@@ -124,22 +124,22 @@ impl Suite {
         Ok(self)
     }
 
-    /// The algorithm of a name among the results.
+    /// Returns the algorithm whose results have a name.
     pub fn algorithm(&self, key: &str) -> Option<&Algorithm> {
         self.algorithms.iter().find(|algorithm| algorithm.key == key)
     }
 
-    /// Whether its environments are others than POGEMA's.
+    /// Returns whether it has environments other than POGEMA's.
     pub fn is_foreign(&self) -> bool {
         self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
     }
 
-    /// Tells an error with the file.
+    /// Adds the path of the suite to an error.
     pub fn in_file(&self, error: Error) -> Error {
         in_file(&self.path, error)
     }
 
-    /// Tells an error of an algorithm with the file that it was read from.
+    /// Adds the path of the file with the algorithms to an error.
     pub fn in_algorithms_file(&self, error: Error) -> Error {
         in_file(self.replacement.as_ref().map_or(&self.path, |file| &file.path), error)
     }
@@ -175,7 +175,7 @@ fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
     entries.map(|(key, node)| Algorithm::read(key, node)).collect()
 }
 
-/// The files that are named, beside the suite's own.
+/// Returns the paths of the named files, relative to the suite's folder.
 fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
     let Some(node) = root.field("maps") else { return Ok(Vec::new()) };
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -186,10 +186,10 @@ fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
         let is_plain = |letter: char| !letter.is_control() && !matches!(letter, '/' | '\\');
-        // Beside the results stand files about them.
+        // These names belong to other files in the folder of results.
         let is_taken = key == "about" || key.strip_suffix(".episodes").is_some();
         if key.is_empty() || key.starts_with('.') || is_taken || !key.chars().all(is_plain) {
-            return Err(wrong(node, key, "a name that a file of results may have"));
+            return Err(wrong(node, key, "a name that is valid for a file of results"));
         }
         let own = |field: &str| format!("{key}.{field}");
         let all = fields(node, key)?;
@@ -216,14 +216,14 @@ impl Algorithm {
         })
     }
 
-    /// Text that differs between algorithms that play differently.
+    /// Returns a text that differs between algorithms with different names or parameters.
     pub fn fingerprint(&self) -> String {
         let parameters = self.parameters.iter().map(|(key, node)| serde_json::json!([key, node.value()]));
         serde_json::json!([self.name, parameters.collect::<Vec<_>>()]).to_string()
     }
 }
 
-/// An error told with the file it is in.
+/// Adds the path of a file to an error.
 pub(crate) fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::Syntax { reason } | Error::Request { reason } => Error::io(path, reason),
@@ -243,12 +243,12 @@ fn required<'a>(root: &'a Node, key: &str) -> Result<&'a Node, Error> {
     root.field(key).ok_or_else(|| wrong(root, "the file", &format!("a field `{key}`")))
 }
 
-/// An error about a value that should be something else.
+/// Returns an error about a value, with its line and the expected value.
 pub(crate) fn wrong(node: &Node, key: &str, expected: &str) -> Error {
     Error::Syntax { reason: format!("line {}: `{key}`, expected {expected}", node.line) }
 }
 
-/// Passes if all keys are known.
+/// Checks that all keys are known.
 pub(crate) fn check_keys(node: &Node, what: &str, known: &[&str], more: &[&str]) -> Result<(), Error> {
     let fields = node.fields().ok_or_else(|| wrong(node, what, "keys and values"))?;
     let all = || known.iter().chain(more).copied();
@@ -256,10 +256,8 @@ pub(crate) fn check_keys(node: &Node, what: &str, known: &[&str], more: &[&str])
         None => Ok(()),
         Some((key, value)) => {
             let hint = nearest(key, all()).unwrap_or_default();
-            let reason = format!(
-                "line {}: unknown key `{key}` in {what}; the nearest known one is `{hint}`",
-                value.line
-            );
+            let reason =
+                format!("line {}: unknown key `{key}` in {what}; did you mean `{hint}`?", value.line);
             Err(Error::Syntax { reason })
         }
     }

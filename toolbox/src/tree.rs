@@ -1,4 +1,4 @@
-//! A YAML file as it is written: keys in their order, each value with its line.
+//! The tree of a YAML file, with keys in their order and the line of each value.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 use serde_saphyr::Spanned;
 
-/// A value of a file, and where it stands.
+/// A value of a file, and its line.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// The line, counted from 1.
@@ -19,24 +19,24 @@ pub struct Node {
 /// A value of a file.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// What is neither list nor fields.
+    /// A scalar.
     Plain(Value),
-    /// Values one after the other.
+    /// A list of values.
     List(Vec<Node>),
     /// Values by key, in the order of the file.
     Fields(Vec<(String, Node)>),
 }
 
 impl Node {
-    /// Reads a file's text.
+    /// Parses the text of a file.
     ///
     /// # Errors
-    /// [`Error::Syntax`] with the place of what is no YAML.
+    /// [`Error::Syntax`] with line and column for invalid YAML.
     pub fn parse(text: &str) -> Result<Self, Error> {
         pogema_maps::yaml_document(text)
     }
 
-    /// The fields, if it has some.
+    /// Returns the fields, if it has fields.
     pub fn fields(&self) -> Option<&[(String, Node)]> {
         match &self.content {
             Content::Fields(fields) => Some(fields),
@@ -44,12 +44,12 @@ impl Node {
         }
     }
 
-    /// The field of a key.
+    /// Returns the field with a key.
     pub fn field(&self, key: &str) -> Option<&Node> {
         self.fields()?.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
 
-    /// The values of a list.
+    /// Returns the values, if it is a list.
     pub fn list(&self) -> Option<&[Node]> {
         match &self.content {
             Content::List(nodes) => Some(nodes),
@@ -57,7 +57,7 @@ impl Node {
         }
     }
 
-    /// A text.
+    /// Returns the text, if it is one.
     pub fn text(&self) -> Option<&str> {
         match &self.content {
             Content::Plain(Value::String(text)) => Some(text),
@@ -65,7 +65,7 @@ impl Node {
         }
     }
 
-    /// The same without lines.
+    /// Returns the value as JSON, without lines.
     pub fn value(&self) -> Value {
         match &self.content {
             Content::Plain(value) => value.clone(),
@@ -114,7 +114,7 @@ impl<'de> Visitor<'de> for Reader {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Content, E> {
-        // JSON has no NaN; the word is left for whoever reads the field to refuse.
+        // JSON has no NaN. It becomes a text, which the reader of the field rejects.
         let number = serde_json::Number::from_f64(value).map(Value::Number);
         Ok(Content::Plain(number.unwrap_or_else(|| value.to_string().into())))
     }

@@ -1,4 +1,4 @@
-//! One environment for each combination of what is varied.
+//! Combinations of varied fields, one environment each.
 
 use pogema_core::Error;
 use serde_json::{Map as Object, Value};
@@ -6,18 +6,18 @@ use serde_json::{Map as Object, Value};
 use crate::results::Pairs;
 use crate::tree::{Content, Node};
 
-/// The key whose list says what a field is varied over.
+/// The key of the list of values over which a field is varied.
 const GRID: &str = "grid_search";
 
-/// A field that takes one value after the other.
+/// A varied field and its values.
 #[derive(Clone, Debug)]
 struct Parameter {
     path: Vec<String>,
-    /// Each with the line of the file on which it stands.
+    /// Each value with its line in the file.
     values: Vec<(Value, u64)>,
 }
 
-/// The combinations of all varied fields, of which the last one changes fastest; each is made when it is asked for.
+/// The combinations of all varied fields, each created on request. The last field changes fastest.
 ///
 /// Source: pogema-toolbox 0.1.1, `config_variant_generator.py`, `generate_variants`
 #[derive(Clone, Debug)]
@@ -25,25 +25,25 @@ pub struct Variants {
     fields: Value,
     parameters: Vec<Parameter>,
     line: u64,
-    /// Of each outermost field that is not varied.
+    /// The line of each outermost field that is not varied.
     lines: Vec<(String, u64)>,
 }
 
 /// One combination.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
-    /// What was varied, by the last key of its path, in the order of the file.
+    /// The varied fields by the last key of their path, in the order of the file.
     pub changes: Pairs,
     /// All fields.
     pub fields: Object<String, Value>,
 }
 
 impl Variants {
-    /// Finds what is varied in some fields, however deep, but not in lists.
+    /// Finds the varied fields at any depth, except within lists.
     ///
     /// # Errors
-    /// One line for fields that are none, for values to be varied over that are no list, or for two varied fields of
-    /// the same last key, which results could not tell apart.
+    /// One line if `grid_search` is not below a field, if its value is not a list, or if two varied fields have the
+    /// same last key, because results could not distinguish them.
     pub fn of(node: &Node) -> Result<Self, Error> {
         let mut parameters: Vec<Parameter> = Vec::new();
         let fields = plain(node, &mut Vec::new(), &mut parameters)?;
@@ -51,7 +51,7 @@ impl Variants {
             let twin = parameters[..index].iter().find(|other| other.path.last() == parameter.path.last());
             if let Some(twin) = twin {
                 let (one, other) = (twin.path.join("."), parameter.path.join("."));
-                let reason = format!("`{one}` and `{other}` are both varied under the same last name");
+                let reason = format!("`{one}` and `{other}` are both varied, expected different last keys");
                 return Err(Error::request(reason));
             }
         }
@@ -61,18 +61,19 @@ impl Variants {
         Ok(Self { fields, parameters, line: node.line, lines })
     }
 
-    /// Number of combinations; one if nothing is varied.
+    /// Returns the number of combinations; 1 if nothing is varied.
     pub fn len(&self) -> usize {
         self.parameters.iter().map(|parameter| parameter.values.len()).product()
     }
 
-    /// Whether a field is varied over nothing.
+    /// Returns whether a field is varied over an empty list.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Numbers of combinations that together have each value of each varied field, all others being the first, with
-    /// the line of that value.
+    /// Returns indices of combinations that cover each value of each varied field, with the line of that value.
+    ///
+    /// All other varied fields have their first value.
     pub fn probes(&self) -> impl Iterator<Item = (usize, u64)> {
         let mut stride = self.len();
         let values = self.parameters.iter().flat_map(move |Parameter { values, .. }| {
@@ -84,12 +85,12 @@ impl Variants {
         is_plain.then_some((0, self.line)).into_iter().chain(values).filter(move |_| !is_empty)
     }
 
-    /// The line of an outermost field that is not varied.
+    /// Returns the line of an outermost field that is not varied.
     pub fn line_of(&self, field: &str) -> Option<u64> {
         self.lines.iter().find(|(key, _)| key == field).map(|(_, line)| *line)
     }
 
-    /// All values of an outermost field, varied or not.
+    /// Returns all values of an outermost field, varied or not.
     pub fn values_of(&self, field: &str) -> Vec<&Value> {
         match self.parameter(field) {
             Some(parameter) => parameter.values.iter().map(|(value, _)| value).collect(),
@@ -97,7 +98,7 @@ impl Variants {
         }
     }
 
-    /// The value of an outermost field in a combination.
+    /// Returns the value of an outermost field in a combination.
     pub fn value_at(&self, index: usize, field: &str) -> Option<&Value> {
         let Some(parameter) = self.parameter(field) else { return self.fields.get(field) };
         let faster = self.parameters.iter().skip_while(|other| !std::ptr::eq(*other, parameter)).skip(1);
@@ -110,7 +111,7 @@ impl Variants {
         self.parameters.iter().find(|parameter| parameter.path == [field])
     }
 
-    /// Text that differs between different combinations.
+    /// Returns a text that differs between different sets of combinations.
     pub fn fingerprint(&self) -> String {
         let parameters: Vec<_> = self
             .parameters
@@ -123,7 +124,7 @@ impl Variants {
         serde_json::json!([self.fields, parameters]).to_string()
     }
 
-    /// The combination of a number below their count.
+    /// Returns the combination at an index; `None` if the index is out of range.
     pub fn at(&self, index: usize) -> Option<Variant> {
         if index >= self.len() {
             return None;
@@ -144,7 +145,7 @@ impl Variants {
     }
 }
 
-/// The value of a node, with null in the place of what is varied.
+/// Returns the value of a node with null for varied fields, which are added to `found`.
 fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Result<Value, Error> {
     let Content::Fields(fields) = &node.content else { return Ok(node.value()) };
     if let Some(values) = node.field(GRID) {
@@ -183,7 +184,7 @@ mod tests {
     fn the_last_field_changes_fastest() {
         let text = "size: 8\nseed:\n  grid_search: [1, 2]\ndeep:\n  agents:\n    grid_search: [a, b, c]\n";
         let variants = variants(text).unwrap();
-        let told = |index: usize| {
+        let label = |index: usize| {
             let variant = variants.at(index).unwrap();
             assert_eq!(variant.fields["size"], 8);
             assert_eq!(variant.fields["seed"], variant.changes[0]);
@@ -192,12 +193,12 @@ mod tests {
             format!("{}{}", variant.changes[0], variant.changes[1].as_str().unwrap())
         };
         assert_eq!(variants.len(), 6);
-        assert_eq!((0..6).map(told).collect::<Vec<_>>(), ["1a", "1b", "1c", "2a", "2b", "2c"]);
+        assert_eq!((0..6).map(label).collect::<Vec<_>>(), ["1a", "1b", "1c", "2a", "2b", "2c"]);
         assert!(variants.at(6).is_none());
     }
 
     #[test]
-    fn nothing_varied_is_one_and_over_nothing_is_none() {
+    fn no_varied_field_gives_one_combination_and_an_empty_list_none() {
         assert_eq!(variants("size: 8").unwrap().len(), 1);
         assert!(variants("size: 8").unwrap().at(0).unwrap().changes.is_empty());
         assert!(variants("seed: {grid_search: []}").unwrap().is_empty());
@@ -206,15 +207,15 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_varied_is_told_with_its_line() {
-        let told = |text: &str| variants(text).unwrap_err().to_string();
+    fn invalid_grid_searches_are_rejected_with_line_numbers() {
+        let error_of = |text: &str| variants(text).unwrap_err().to_string();
         assert!(
-            told("size: 8\nseed:\n  grid_search: 5\n").contains("line 3: `seed`"),
+            error_of("size: 8\nseed:\n  grid_search: 5\n").contains("line 3: `seed`"),
             "{}",
-            told("seed:\n  grid_search: 5\n")
+            error_of("seed:\n  grid_search: 5\n")
         );
         let twins = "a:\n  seed: {grid_search: [1]}\nb:\n  seed: {grid_search: [2]}\n";
-        assert!(told(twins).contains("`a.seed` and `b.seed`"));
-        assert!(told("grid_search: [1]").contains("belongs below a field"));
+        assert!(error_of(twins).contains("`a.seed` and `b.seed`"));
+        assert!(error_of("grid_search: [1]").contains("belongs below a field"));
     }
 }

@@ -1,4 +1,4 @@
-//! `type: published`: small made-up results beside made-up published ones, and files that are wrong.
+//! `type: published`: small artificial results compared with artificial published ones, and invalid files.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -19,7 +19,7 @@ LMAPF,01-random,RHCR,2,3,,,0.5,none
 
 const VIEW: &str = "{type: published, file: means.csv, setting: MAPF, algorithm: LaCAM, metrics: [CSR, SoC]}";
 
-/// A row of `LaCAM` with what was varied, in JSON; nothing costs what was not solved.
+/// Returns a row of `LaCAM` with varied fields in JSON; without a cost, the row is unsolved.
 fn row(set: &str, settings: &str, cost: Option<u64>) -> Row {
     let (csr, soc) = (u8::from(cost.is_some()), cost.unwrap_or(99));
     let text = format!(
@@ -46,7 +46,7 @@ fn results() -> Results {
     Results { rows, notes: Vec::new() }
 }
 
-/// A folder with `means.csv`, and `episodes` with published rows of a dataset.
+/// Creates a folder with `means.csv`, and `episodes` with published rows of a dataset.
 fn folder(means: &str, dataset: &str, rows: &[(&str, u64)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("means.csv"), means).unwrap();
@@ -74,7 +74,7 @@ fn csv(shown: &Shown) -> Vec<String> {
 }
 
 #[test]
-fn without_episodes_costs_are_compared_where_all_is_solved() {
+fn without_episodes_costs_are_compared_if_all_instances_are_solved() {
     let folder = folder(MEANS, "01-random", &[]);
     let shown = show(folder.path(), VIEW, &results()).unwrap();
     assert_eq!(
@@ -87,11 +87,11 @@ fn without_episodes_costs_are_compared_where_all_is_solved() {
     );
     let text = shown.tables[0].text(Format::Markdown);
     assert!(text.contains("| 1.0000 |        1.0000 |    1.0000 |  9.00 |         10.00 |"), "{text}");
-    assert!(text.ends_with("`LaCAM` beside the published `LaCAM`, MAPF"), "{text}");
+    assert!(text.ends_with("`LaCAM` compared with the published `LaCAM`, MAPF"), "{text}");
     let [compared, unsolvable] = &shown.notes[..] else { panic!("{:?}", shown.notes) };
     assert!(compared.starts_with("`01-random` with 4 agents: `SoC` is not compared"), "{compared}");
-    let told = "01-random, num_agents=4, seed=1: proved unsolvable: agents 0 and 1 block each other";
-    assert_eq!(unsolvable, told);
+    let expected = "01-random, num_agents=4, seed=1: proved unsolvable: agents 0 and 1 block each other";
+    assert_eq!(unsolvable, expected);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn with_episodes_costs_are_compared_on_the_instances_that_both_solve() {
     let fields = VIEW.replace("means.csv", "means.csv, episodes: episodes");
     let shown = show(folder.path(), &fields, &results()).unwrap();
     assert_eq!(csv(&shown)[1], format!("2,3,1,1,1,9,15,0.6,{}", 8.0 / 15.0));
-    // The bound counts what the published algorithm solved; there is none for what is unsolvable.
+    // The bound counts instances that the published algorithm solved; unsolvable instances have no bound.
     assert_eq!(csv(&shown)[2], "4,2,0.5,0.5,1,18,20,0.9,0.8");
     assert_eq!(shown.notes.len(), 1, "{:?}", shown.notes);
     let fields = fields.replace("CSR, SoC", "runtime");
@@ -124,7 +124,7 @@ fn folders_are_datasets_and_the_longest_time_is_shown() {
     let head = "Folder,Number of Agents,Episodes,Runtime (seconds),Runtime (seconds) published,Runtime (seconds) ratio,longest";
     assert_eq!(csv(&shown)[..2], [head.to_owned(), "01-random,2,3,9,3,3,9".to_owned()]);
     assert_eq!(csv(&shown)[3], format!("03-warehouse,2,1,4,3,{},4", 4.0 / 3.0));
-    // A named dataset stands for that of every folder.
+    // A named dataset replaces that of every folder.
     let fields = fields.replace("runtime", "SoC").replace("setting", "dataset: 03-warehouse, setting");
     let shown = show(folder.path(), &fields, &results).unwrap();
     assert!(csv(&shown)[1].starts_with("01-random,2,3,9,8,1.125"), "{:?}", csv(&shown));
@@ -137,13 +137,13 @@ fn lifelong_results_are_compared_by_throughput() {
         "{type: published, file: means.csv, setting: LMAPF, algorithm: RHCR, metrics: avg_throughput}";
     let shown = show(folder.path(), fields, &results()).unwrap();
     assert_eq!(csv(&shown)[1..], ["2,3,0.75,0.5,1.5", "4,2,0.75,,"]);
-    let note = "`01-random` with 4 agents: there are no published means";
+    let note = "`01-random` with 4 agents: no published means";
     assert_eq!(shown.notes[0], note);
 }
 
-/// Published rows name no map if there is only one, and results name none that was not varied.
+/// Published rows do not name the map if there is only one, and results do not name a map that is not varied.
 #[test]
-fn instances_are_known_by_what_is_varied_in_the_published_rows() {
+fn fields_varied_in_the_published_rows_identify_instances() {
     let published = [(r#"{"num_agents": 2, "seed": 5}"#, 8)];
     let folder = folder(MEANS, "03-warehouse", &published);
     let fields = VIEW.replace("means.csv", "means.csv, episodes: episodes");
@@ -173,19 +173,15 @@ fn instances_are_known_by_what_is_varied_in_the_published_rows() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_the_nearest_that_is_right() {
+fn wrong_names_are_rejected_with_the_nearest_known_one() {
     let folder = folder(MEANS, "01-random", &[(r#"{"num_agents": 2}"#, 8)]);
-    for (from, to, told) in [
+    for (from, to, expected) in [
         ("means.csv", "mean.csv", "mean.csv: No such file"),
-        ("MAPF", "MAPE", "expected one of MAPF, LMAPF (such as `MAPF`), found `\"MAPE\"`"),
+        ("MAPF", "MAPE", "expected one of MAPF, LMAPF (did you mean `MAPF`?), found `\"MAPE\"`"),
         ("setting: MAPF, ", "", "`A`, expected a field `setting`"),
-        ("file", "fil", "unknown key `fil` in view `A`; the nearest known one is `file`"),
-        ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; the nearest one is `LaCAM`"),
-        (
-            "LaCAM",
-            "LaCAM, dataset: 01-randm",
-            "no dataset `01-randm` of MAPF; the nearest one is `01-random`",
-        ),
+        ("file", "fil", "unknown key `fil` in view `A`; did you mean `file`?"),
+        ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; did you mean `LaCAM`?"),
+        ("LaCAM", "LaCAM, dataset: 01-randm", "no dataset `01-randm` of MAPF; did you mean `01-random`?"),
         ("LaCAM", "LaCAM, ours: LaCam", "view `A`: expected `ours`, one of LaCAM, found `LaCam`"),
         ("[CSR, SoC]", "[CSR, SOC]", "`metrics` is `SOC`, expected a column of the results"),
         ("LaCAM", "DCC, episodes: episodes", "no `DCC.json` in"),
@@ -193,12 +189,12 @@ fn what_is_wrong_is_told_with_the_nearest_that_is_right() {
     ] {
         assert!(VIEW.contains(from), "{from}");
         let error = show(folder.path(), &VIEW.replacen(from, to, 1), &results()).unwrap_err();
-        assert!(error.contains(told), "{to}: {error}");
+        assert!(error.contains(expected), "{to}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
     }
-    for (from, to, told) in [
-        ("dataset,", "data,", "means.csv: no column `dataset`; the nearest one is `data`"),
-        ("SoC", "soc", "means.csv: no column `SoC`; the nearest one is `soc`"),
+    for (from, to, expected) in [
+        ("dataset,", "data,", "means.csv: no column `dataset`; did you mean `data`?"),
+        ("SoC", "soc", "means.csv: no column `SoC`; did you mean `soc`?"),
         (",10,", ",ten,", "means.csv: line 2: `SoC` is `ten`, expected a number or nothing"),
         (",10,", ",NaN,", "means.csv: line 2: `SoC` is `NaN`, expected a number or nothing"),
         (",10,,none", ",10", "means.csv: CSV error: record 1 (line: 2"),
@@ -206,6 +202,6 @@ fn what_is_wrong_is_told_with_the_nearest_that_is_right() {
         assert!(MEANS.contains(from), "{from}");
         fs::write(folder.path().join("means.csv"), MEANS.replacen(from, to, 1)).unwrap();
         let error = show(folder.path(), VIEW, &results()).unwrap_err();
-        assert!(error.contains(told), "{to}: {error}");
+        assert!(error.contains(expected), "{to}: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! Views of small made-up results: boxes, cactuses, comparisons, checks of seeds and the six metrics.
+//! Views of small artificial results: box plots, cactus plots, comparisons, checks of seeds and the six metrics.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -6,7 +6,7 @@ use pogema_toolbox::six::Definition;
 use pogema_toolbox::views::{Format, ImageFormat, Shown, View};
 use pogema_toolbox::{Node, Results, Row};
 
-/// A row of a folder: who solved which seed at what cost, in half as many seconds; nothing costs what was not solved.
+/// Returns a row of an algorithm and a seed. Its runtime in seconds is half its cost; without a cost, it is unsolved.
 fn row(set: &str, algorithm: &str, seed: u64, cost: Option<u64>) -> Row {
     let (csr, soc) = (u8::from(cost.is_some()), cost.unwrap_or(999));
     let text = format!(
@@ -54,7 +54,7 @@ fn a_comparison_counts_each_instance_once() {
         [
             "One and Other: SoC,Instances",
             "One is better,6",
-            "both are alike,6",
+            "both are equal,6",
             "Other is better,0",
             "only One solved it,6",
             "only Other solved it,6",
@@ -63,15 +63,15 @@ fn a_comparison_counts_each_instance_once() {
     );
     assert!(svg(&shown).contains(">SoC, One<"));
     let shown = show("{type: compare, y: CSR, first: Other, second: One}").unwrap();
-    assert_eq!(csv(&shown)[1..4], ["Other is better,6", "both are alike,18", "One is better,6"]);
-    assert!(show("{type: compare, first: One, second: Oter}").unwrap_err().contains("nearest"));
+    assert_eq!(csv(&shown)[1..4], ["Other is better,6", "both are equal,18", "One is better,6"]);
+    assert!(show("{type: compare, first: One, second: Oter}").unwrap_err().contains("did you mean `Other`?"));
     assert!(show("{type: compare, first: One}").unwrap_err().contains("each one of One, Other"));
 }
 
 #[test]
-fn what_is_missing_or_double_is_told() {
+fn missing_and_duplicated_results_are_shown() {
     let shown = show("{type: seeds}").unwrap();
-    assert_eq!(shown.notes, ["view `View1`: every algorithm has each of 30 instances once"]);
+    assert_eq!(shown.notes, ["view `View1`: every algorithm has each of the 30 instances once"]);
     let mut broken = results();
     broken.rows.remove(0);
     let double = broken.rows[2].clone();
@@ -82,31 +82,33 @@ fn what_is_missing_or_double_is_told() {
         ["Folder,Number of Agents,seed,One,Other", "01-random,2,0,missing,ok", "01-random,4,1,ok,x2",]
     );
     assert!(
-        shown.tables[0].text(Format::Markdown).ends_with("2 results are missing or double, of 30 instances")
+        shown.tables[0]
+            .text(Format::Markdown)
+            .ends_with("2 results of 30 instances are missing or duplicated")
     );
 }
 
 #[test]
-fn boxes_and_cactuses_are_drawn_of_what_there_is() {
+fn box_and_cactus_plots_are_drawn_from_available_rows() {
     let text = svg(&show("{type: box, y: SoC}").unwrap());
     assert!(text.contains(">One<") && text.contains(">SoC<"), "{text}");
     let text = svg(&show("{type: cactus}").unwrap());
     assert!(text.contains(">Solved Instances<") && text.contains(">Runtime (seconds)<"), "{text}");
-    assert!(show("{type: cactus, x: run_time}").unwrap_err().contains("the nearest column is `runtime`"));
+    assert!(show("{type: cactus, x: run_time}").unwrap_err().contains("did you mean `runtime`?"));
     let none = results().rows.into_iter().filter(|row| row.metric("CSR") == Some(0.0)).collect();
     let none = Results { rows: none, notes: Vec::new() };
     assert!(show_of(&none, "{type: cactus}").unwrap_err().contains("no row is solved"));
 }
 
 #[test]
-fn the_six_metrics_are_a_table_and_a_star() {
+fn six_metrics_are_shown_as_table_and_radar_plot() {
     let shown = show("{type: radar, round_digits: 4}").unwrap();
     let rows = csv(&shown);
     assert!(
         rows[0].starts_with("Algorithm,Performance,Out-of-Distribution,Cooperation,Scalability"),
         "{rows:?}"
     );
-    // Of four instances that somebody solved, One solved three as well as anybody.
+    // Of the four instances with a solution, One solved three at the best cost.
     assert!(rows[1].starts_with("One,0.75,0.75,0.75,"), "{rows:?}");
     assert!(svg(&shown).contains(">Cooperation<"));
     let view = View::read("View1", &Node::parse("{type: radar}").unwrap()).unwrap();

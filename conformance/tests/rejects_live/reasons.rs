@@ -69,7 +69,7 @@ const REASONS: [(&str, Holds); 21] = [
     ("throughput over zero steps", |no| no.is_about(&["max_episode_steps"], |value| *value == 0)),
     ("an invalid value of one of our own fields", |no| no.is_about(&OURS, |_| true)),
     ("a named map that is too small", |no| {
-        no.says("for which the map has room") && no.config["map_name"].is_string()
+        no.says("the map has no room for more") && no.config["map_name"].is_string()
     }),
 ];
 

@@ -2,8 +2,8 @@
 
 use super::Puzzle;
 
-/// A table of puzzles: the name without `puzzle-`, the least sum of costs, what has to be done, and the rows of the map
-/// with the starts and with the goals.
+/// Builds a table of puzzles. Each entry holds the name without `puzzle-`, the optimal sum of costs, a description, and
+/// the rows of the map with the starts and with the goals.
 macro_rules! puzzles {
     ($($name:literal, $sum_of_costs:literal, $says:literal: [$($starts:literal)+] => [$($goals:literal)+];)+) => {
         [$(Puzzle {
@@ -16,7 +16,7 @@ macro_rules! puzzles {
     };
 }
 
-/// Each is solvable, and none without agents that make way for each other.
+/// All puzzles. Each is solvable, but only if agents make way for each other.
 pub const PUZZLES: [Puzzle; 26] = puzzles! {
     "passing-bay", 11, "One of two agents in a corridor steps into the bay and lets the other pass.":
         ["#####" "##.##" "a...b" "#####" "#####"] => ["#####" "##.##" "b...a" "#####" "#####"];
@@ -30,15 +30,15 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["a####" "b#.##" "c...." "##.##" "#####"] => ["c####" "b#.##" "a...." "##.##" "#####"];
     "crossroads", 28, "Four agents cross one square, each to the opposite arm.":
         ["##a##" "##.##" "b...d" "##.##" "##c##"] => ["##c##" "##.##" "d...b" "##.##" "##a##"];
-    "full-ring", 8, "Eight agents fill a ring: it turns only if all of them step at once.":
+    "full-ring", 8, "Eight agents fill a ring: it turns only if all of them move in the same step.":
         ["#####" "#abc#" "#h#d#" "#gfe#" "#####"] => ["#####" "#hab#" "#g#c#" "#fed#" "#####"];
     "square-turn", 4, "Four agents in a square turn it without a free cell.":
         ["#####" "#ab##" "#dc##" "#####" "#####"] => ["#####" "#da##" "#cb##" "#####" "#####"];
     "side-street", 17, "A side street two cells deep holds two agents while the third passes.":
         ["##.##" "##.##" "ab..c" "#####" "#####"] => ["##.##" "##.##" "cb..a" "#####" "#####"];
-    "hostage", 7, "An agent that is home already leaves its goal for another and comes back.":
+    "hostage", 7, "An agent that is already on its goal leaves it for another agent and comes back.":
         ["#####" "##.##" "a.b.." "#####" "#####"] => ["#####" "##.##" "..b.a" "#####" "#####"];
-    "deep-hostage", 7, "An agent that is home in a dead end lets the other in behind it.":
+    "deep-hostage", 7, "An agent whose goal is in a dead end lets the other agent in behind it.":
         ["#####" "##.##" "a.b.." "##.##" "#####"] => ["#####" "##.##" "..b.a" "##.##" "#####"];
     "revolving-door", 36, "Two agents enter a room through one door while two come out.":
         ["ab..." "....." "##.##" "....." "cd..."] => ["cd..." "....." "##.##" "....." "ab..."];
@@ -48,25 +48,25 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["a#b#c" ".#.#." "....." "#####" "#####"] => ["c#a#b" ".#.#." "....." "#####" "#####"];
     "comb-reversed", 30, "Three agents in the teeth of a comb; the outer two change places past the middle.":
         ["a#b#c" "....." "#####" "#####" "#####"] => ["c#b#a" "....." "#####" "#####" "#####"];
-    "shunting", 14, "Two agents in a siding are put into the other order.":
+    "shunting", 14, "Two agents in a siding change their order.":
         ["....." "##.##" "##a##" "##b##" "#####"] => ["....." "##.##" "##b##" "##a##" "#####"];
-    "three-shunted", 21, "Three agents in a siding are put into another order.":
+    "three-shunted", 21, "Three agents in a siding change their order.":
         ["....." "##a##" "##b##" "##c##" "#####"] => ["....." "##c##" "##a##" "##b##" "#####"];
-    "figure-eight", 17, "Two rings with one cell in common, and an agent on each that wants to the other.":
+    "figure-eight", 17, "Two rings share one cell; an agent on each has its goal on the other.":
         ["a..##" ".#.##" "....." "##.#." "##..b"] => ["b..##" ".#.##" "....." "##.#." "##..a"];
-    "tight-eight", 55, "Two rings with one cell in common, three agents on each.":
+    "tight-eight", 55, "Two rings share one cell, with three agents on each.":
         ["ab.##" "c#.##" "....." "##.#d" "##.ef"] => ["fe.##" "d#.##" "....." "##.#c" "##.ba"];
-    "lobby", 24, "Three agents behind each other leave a lobby that one enters.":
+    "lobby", 24, "Three agents in single file leave a lobby while a fourth enters it.":
         ["#####" ".abc." "##.##" "##d##" "#####"] => ["#####" "d.abc" "##.##" "##.##" "#####"];
-    "bottleneck", 26, "Two agents that want the same way, and one that comes through it.":
+    "bottleneck", 26, "Two agents need the same passage, and a third comes through it.":
         ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];
-    "double-shunt", 28, "Two sidings, two agents in each, one of each pair changes sidings.":
+    "double-shunt", 28, "Two sidings hold two agents each; one agent of each pair changes sidings.":
         ["a#..c" "b#.#d" "....." "#####" "#####"] => ["b#..d" "a#.#c" "....." "#####" "#####"];
-    "guarded-gate", 7, "Two agents at home in a gate open it for a third.":
+    "guarded-gate", 7, "Two agents whose goals are in a gate open it for a third.":
         ["##.##" "a.b.." "##c##" "##.##" "#####"] => ["##.##" "..b.a" "##c##" "##.##" "#####"];
     "parade", 36, "Three agents in a row turn around in one square.":
         ["#####" ".###." "abc.." ".###." "#####"] => ["#####" ".###." "cba.." ".###." "#####"];
-    "long-way-round", 16, "The short way is taken, so one of two goes around.":
+    "long-way-round", 16, "The short way is occupied, so one of two agents takes the long way.":
         ["a...b" ".###." ".###." ".###." "....."] => ["b...a" ".###." ".###." ".###." "....."];
     "last-cell", 17, "Five agents and one free cell: three of them change places.":
         ["#####" "#####" "#abc#" "#d.e#" "#####"] => ["#####" "#####" "#cab#" "#d.e#" "#####"];

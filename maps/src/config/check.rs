@@ -1,10 +1,12 @@
-//! What has to hold between the fields of a config.
+//! Checks across the fields of a config.
 
 use pogema_core::{Cell, Error, OnGoal};
 
 use super::{GridConfig, Integration, Targets};
 
 impl GridConfig {
+    /// Checks positions, and fields that depend on each other.
+    ///
     /// Rule: config/positions, config/fields
     pub(crate) fn check_places(&self) -> Result<(), Error> {
         self.check_inside("agents_xy", self.agents_xy.as_deref().unwrap_or_default())?;
@@ -13,16 +15,16 @@ impl GridConfig {
             let expected = "goal sequences such as [[[0, 0], [1, 1]]] with on_target `restart`";
             return Err(Error::config("targets_xy", "one goal per agent", expected));
         }
-        // POGEMA measures nothing in its persistent mode.
+        // In persistent mode POGEMA computes no metrics, so 0 is allowed there.
         if self.on_target == OnGoal::Restart && self.max_episode_steps == 0 && !self.persistent {
-            let expected = "not 0 with on_target `restart`, whose throughput divides by it";
+            let expected = "a number other than 0 with on_target `restart`, whose throughput divides by it";
             return Err(Error::config("max_episode_steps", 0, expected));
         }
         if self.auto_reset == Some(true) && self.integration != Some(Integration::SampleFactory) {
             return Err(Error::config("auto_reset", true, "the integration `SampleFactory`"));
         }
         if self.integration == Some(Integration::Rllib) {
-            return Err(Error::config("integration", "rllib", "`PettingZoo`, which POGEMA has in its place"));
+            return Err(Error::config("integration", "rllib", "`PettingZoo`, which replaces it in POGEMA"));
         }
         Ok(())
     }

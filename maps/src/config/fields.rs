@@ -1,11 +1,11 @@
-//! One field of a config at a time: its type, its range, and the error if it has neither.
+//! Reads single fields of a config and checks their type and range.
 
 use std::ops::RangeInclusive;
 
 use pogema_core::{Cell, Error, Words, shorten};
 use serde_json::{Map as Object, Value};
 
-/// Every key a config may have, POGEMA's first, ours last.
+/// All keys of a config: those of POGEMA first, then our extensions.
 pub const FIELDS: [&str; 27] = [
     "MOVES",
     "FREE",
@@ -36,37 +36,37 @@ pub const FIELDS: [&str; 27] = [
     "limits",
 ];
 
-/// The known word that is most like the one given.
+/// Returns the known word most similar to a given one.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let likeness = |other: &str| strsim::jaro_winkler(&word.to_lowercase(), &other.to_lowercase());
     known.into_iter().max_by(|one, other| likeness(one).total_cmp(&likeness(other)))
 }
 
-/// A key of the input for a message.
+/// Quotes a key of the input for a message, shortened if it is long.
 pub(super) fn quoted(key: &str) -> String {
     format!("`{}`", shorten(key, Error::LONGEST_QUOTE))
 }
 
-/// The fields of a config as they stand in the file.
+/// The fields of a config, unchecked, as in the file.
 pub(super) struct Fields<'a>(&'a Object<String, Value>);
 
 impl<'a> Fields<'a> {
-    /// Takes the fields of a file in, if all of them are known.
+    /// Wraps the fields of a file if all of them are known.
     pub fn new(object: &'a Object<String, Value>) -> Result<Self, Error> {
         if let Some(key) = object.keys().find(|key| !FIELDS.contains(&key.as_str())) {
             let hint = nearest(key, FIELDS).unwrap_or_default();
-            let reason = format!("unknown field {}, the nearest known one is `{hint}`", quoted(key));
+            let reason = format!("unknown field {}; did you mean `{hint}`?", quoted(key));
             return Err(Error::Syntax { reason });
         }
         Ok(Self(object))
     }
 
-    /// The value of a field, unless it is absent or null.
+    /// Returns the value of a field; `None` if it is absent or null.
     pub fn optional(&self, field: &str) -> Option<&'a Value> {
         self.0.get(field).filter(|value| !value.is_null())
     }
 
-    /// The value of a field that may be absent but not null.
+    /// Returns the value of a field that may be absent but not null.
     pub fn required(&self, field: &str, expected: &str) -> Result<Option<&'a Value>, Error> {
         match self.0.get(field) {
             Some(Value::Null) => Err(Error::config(field, "null", expected)),
@@ -74,18 +74,18 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// A whole number in a range, where null stands for absent.
+    /// Reads a whole number in a range; null means absent.
     pub fn optional_integer(&self, field: &str, range: RangeInclusive<i64>) -> Result<Option<i64>, Error> {
         self.optional(field).map(|value| integer(field, value, &range)).transpose()
     }
 
-    /// A whole number in a range.
+    /// Reads a whole number in a range.
     pub fn integer(&self, field: &str, range: RangeInclusive<i64>, default: i64) -> Result<i64, Error> {
         let value = self.required(field, &whole_number_in(&range))?;
         value.map_or(Ok(default), |value| integer(field, value, &range))
     }
 
-    /// A number in a range.
+    /// Reads a number in a range.
     pub fn number(&self, field: &str, range: RangeInclusive<f64>, default: f64) -> Result<f64, Error> {
         let expected = format!("a number from {} to {}", range.start(), range.end());
         let Some(value) = self.required(field, &expected)? else { return Ok(default) };
@@ -93,33 +93,33 @@ impl<'a> Fields<'a> {
         number.ok_or_else(|| Error::config(field, value, expected))
     }
 
-    /// True or false, where null stands for absent.
+    /// Reads true or false; null means absent.
     pub fn optional_flag(&self, field: &str) -> Result<Option<bool>, Error> {
         self.optional(field).map(|value| flag(field, value)).transpose()
     }
 
-    /// True or false.
+    /// Reads true or false.
     pub fn flag(&self, field: &str, default: bool) -> Result<bool, Error> {
         self.required(field, "true or false")?.map_or(Ok(default), |value| flag(field, value))
     }
 
-    /// A word, where null stands for absent.
+    /// Reads a keyword; null means absent.
     pub fn optional_word<T: Words>(&self, field: &str) -> Result<Option<T>, Error> {
         self.optional(field).map(|value| word(field, value)).transpose()
     }
 
-    /// A word, or the default.
+    /// Reads a keyword; if it is absent, returns the default.
     pub fn word<T: Words + Default>(&self, field: &str) -> Result<T, Error> {
         self.required(field, &T::expected())?.map_or_else(|| Ok(T::default()), |value| word(field, value))
     }
 
-    /// A text, where null stands for absent.
+    /// Reads a text; null means absent.
     pub fn text(&self, field: &str) -> Result<Option<&'a str>, Error> {
         let Some(value) = self.optional(field) else { return Ok(None) };
         value.as_str().map(Some).ok_or_else(|| Error::config(field, value, "a text"))
     }
 
-    /// A list of cells, where null stands for absent.
+    /// Reads a list of cells; null means absent.
     pub fn cells(&self, field: &str) -> Result<Option<Vec<Cell>>, Error> {
         self.optional(field).map(|value| cells(field, value)).transpose()
     }
@@ -146,7 +146,7 @@ fn word<T: Words>(field: &str, value: &Value) -> Result<T, Error> {
     known.ok_or_else(|| Error::config(field, value, T::expected()))
 }
 
-/// A list of `[row, col]` pairs.
+/// Reads a list of `[row, col]` pairs.
 pub(crate) fn cells(field: &str, value: &Value) -> Result<Vec<Cell>, Error> {
     let list = value.as_array().ok_or_else(|| Error::config(field, value, "a list of [row, col] pairs"))?;
     list.iter().map(|pair| cell(field, pair)).collect()

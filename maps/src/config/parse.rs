@@ -1,4 +1,4 @@
-//! From text to an object of fields: YAML and JSON, where nothing is guessed and nothing is lost in silence.
+//! Parses YAML and JSON into an object of fields, without guessing values or silently dropping any.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use super::fields::quoted;
 /// Parses YAML; an empty text is null.
 ///
 /// # Errors
-/// [`Error::Syntax`] with the place.
+/// [`Error::Syntax`] with line and column.
 pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
     if text.trim().is_empty() {
         return Ok(Value::Null);
@@ -22,10 +22,10 @@ pub fn value_from_yaml(text: &str) -> Result<Value, Error> {
     yaml_document::<Document>(text).map(|document| document.0)
 }
 
-/// Reads one YAML document that holds something.
+/// Reads one YAML document that is not empty.
 ///
 /// # Errors
-/// [`Error::Syntax`] with the place; also for a text that aliases make far longer than it is.
+/// [`Error::Syntax`] with line and column; also if aliases expand the text far beyond its length.
 pub fn yaml_document<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
     serde_saphyr::from_str_with_options(text, options(text)).map_err(|error| yaml_error(&error))
 }
@@ -33,7 +33,7 @@ pub fn yaml_document<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Er
 /// Parses JSON.
 ///
 /// # Errors
-/// [`Error::Syntax`] with the place.
+/// [`Error::Syntax`] with line and column.
 pub fn value_from_json(text: &str) -> Result<Value, Error> {
     let document: Document = serde_json::from_str(text).map_err(|error| {
         let (line, column) = (error.line(), error.column());
@@ -45,16 +45,16 @@ pub fn value_from_json(text: &str) -> Result<Value, Error> {
 }
 
 fn options(text: &str) -> Options {
-    // A text has at most a node and two events per character, so beyond that only aliases can have made it grow.
+    // A text has at most one node and two events per character. Only aliases can produce more.
     let (spare_nodes, spare_events) = (250_000, 1_000_000);
     serde_saphyr::options! {
         budget: serde_saphyr::budget! {
             max_nodes: text.len() + spare_nodes,
             max_events: 2 * text.len() + spare_events,
         },
-        // `Node` refuses them, with the name of the field.
+        // `Node` rejects them and names the field.
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
-        // A map such as `!..` is a tag with nothing behind it: without this, no map at all.
+        // The map text `!..` parses as a tag without a value. Without this option it would be read as an absent map.
         reject_unsupported_tags: true,
         with_snippet: false,
     }
@@ -68,10 +68,12 @@ fn yaml_error(error: &YamlError) -> Error {
 fn yaml_reason(error: &YamlError) -> String {
     match error.without_snippet() {
         YamlError::AliasError { error, .. } => yaml_reason(error),
-        YamlError::DuplicateMappingKey { key: Some(key), .. } => twice(key),
-        YamlError::MultipleDocuments { .. } => "a second document, expected one".into(),
+        YamlError::DuplicateMappingKey { key: Some(key), .. } => duplicate(key),
+        YamlError::MultipleDocuments { .. } => "found a second document, expected one".into(),
         YamlError::UnknownAnchor { .. } => "unknown alias".into(),
-        YamlError::RecursiveReferencesRequireWeakTypes { .. } => "an alias of what it is a part of".into(),
+        YamlError::RecursiveReferencesRequireWeakTypes { .. } => {
+            "an alias refers to a value that contains it".into()
+        }
         YamlError::Budget { breach: BudgetBreach::Depth { .. }, .. } => "too many levels of nesting".into(),
         YamlError::Budget { .. } | YamlError::AliasReplayLimitExceeded { .. } => {
             "too large, or too many aliases".into()
@@ -80,12 +82,12 @@ fn yaml_reason(error: &YamlError) -> String {
     }
 }
 
-fn twice(key: &str) -> String {
-    format!("{} stands twice", quoted(key))
+fn duplicate(key: &str) -> String {
+    format!("duplicate key {}", quoted(key))
 }
 
 fn syntax(line: u64, column: u64, reason: &str) -> Error {
-    // Parsers count from 1 and say 0 where they do not know.
+    // Parsers count lines from 1; 0 means that the line is unknown.
     let place = if line == 0 { String::new() } else { format!("line {line}, column {column}: ") };
     Error::Syntax { reason: place + reason }
 }
@@ -98,8 +100,8 @@ impl<'de> Deserialize<'de> for Document {
     }
 }
 
-/// A value that refuses what [`Value`] would swallow: it makes NaN and infinities null and keeps the last of two
-/// equal keys.
+/// A value that rejects NaN, infinities and duplicate keys. [`Value`] would accept them: it turns NaN and infinities
+/// into null and keeps the last of two equal keys.
 #[derive(Clone, Copy)]
 struct Node<'a> {
     /// The innermost key above the value, for messages.
@@ -160,7 +162,7 @@ impl<'de> Visitor<'de> for Node<'_> {
         let mut object = Object::new();
         while let Some(key) = entries.next_key::<String>()? {
             if object.contains_key(&key) {
-                return Err(A::Error::custom(twice(&key)));
+                return Err(A::Error::custom(duplicate(&key)));
             }
             let value = entries.next_value_seed(Node { field: &key })?;
             object.insert(key, value);

@@ -1,4 +1,4 @@
-//! From YAML or JSON to a config.
+//! Reads configs from YAML and JSON.
 
 use pogema_core::{Cell, Error, Map};
 use serde_json::{Map as Object, Value, json};
@@ -16,7 +16,7 @@ impl GridConfig {
     /// Reads a config from YAML.
     ///
     /// # Errors
-    /// One line that names the field, its value and what was expected.
+    /// One line that names the field, its value and the expected values.
     ///
     /// Rule: config/fields
     pub fn from_yaml(text: &str) -> Result<Self, Error> {
@@ -29,7 +29,7 @@ impl GridConfig {
     /// Reads a config from JSON.
     ///
     /// # Errors
-    /// One line that names the field, its value and what was expected.
+    /// One line that names the field, its value and the expected values.
     ///
     /// Rule: config/fields
     pub fn from_json(text: &str) -> Result<Self, Error> {
@@ -39,14 +39,14 @@ impl GridConfig {
     /// Reads a config from an already parsed object.
     ///
     /// # Errors
-    /// One line that names the field, its value and what was expected.
+    /// One line that names the field, its value and the expected values.
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {
         Self::read(value.as_object().ok_or_else(|| no_object(value))?, None)
     }
 
-    /// Reads fields, of which a given map replaces `map`.
+    /// Reads a config from its fields; a given map replaces the field `map`.
     pub(crate) fn read(object: &Object<String, Value>, map: Option<MapText>) -> Result<Self, Error> {
         let fields = Fields::new(object)?;
         check_constants(&fields)?;
@@ -60,6 +60,8 @@ impl GridConfig {
         Ok(config)
     }
 
+    /// Reads seed, sides, density, radius and number of agents.
+    ///
     /// Rule: config/size
     fn read_sizes(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
         let (longest, agents) = match self.limits {
@@ -73,7 +75,7 @@ impl GridConfig {
         (self.width, self.height) = match (width, height) {
             (Some(width), Some(height)) => (width as usize, height as usize),
             (None, None) => (size, size),
-            // A map brings its own.
+            // A map sets both sides itself.
             _ if fields.optional("map").is_some() => (size, size),
             (Some(width), None) => return Err(Error::config("width", width, "a height to go with it")),
             (None, Some(height)) => return Err(Error::config("height", height, "a width to go with it")),
@@ -88,6 +90,8 @@ impl GridConfig {
         Ok(())
     }
 
+    /// Reads goals and pools.
+    ///
     /// Rule: config/positions
     fn read_places(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
         self.targets_xy = fields.optional("targets_xy").map(read_targets).transpose()?;
@@ -110,6 +114,8 @@ impl GridConfig {
         Ok(())
     }
 
+    /// Reads the map, and derives sides and density from it.
+    ///
     /// Rule: config/map
     fn read_map(&mut self, fields: &Fields<'_>, given: Option<MapText>) -> Result<(), Error> {
         let map = match (given, fields.optional("map")) {
@@ -127,13 +133,15 @@ impl GridConfig {
         Ok(())
     }
 
+    /// Takes starts, goals and pools from a map text.
+    ///
     /// Rule: grid/letters, grid/pools
     fn take_map_text(&mut self, text: MapText) -> Result<Map, Error> {
         let both_given = self.agents_xy.is_some() && self.targets_xy.is_some();
         if !text.starts.is_empty() {
-            let twice = "starts and goals either in the map or in agents_xy and targets_xy";
             if both_given {
-                return Err(Error::config("map", "letters", twice));
+                let expected = "starts and goals either in the map or in agents_xy and targets_xy";
+                return Err(Error::config("map", "letters", expected));
             }
             self.num_agents = text.starts.len();
             self.agents_xy = Some(text.starts);
@@ -161,7 +169,7 @@ fn no_object(value: &Value) -> Error {
     Error::Syntax { reason: format!("found {found}, expected fields and values such as `size: 8`") }
 }
 
-/// POGEMA lets a config redefine these; we accept only what every rule is written for.
+/// Checks the constants. POGEMA lets a config redefine them; we accept only the values that the rules assume.
 ///
 /// Rule: config/constants
 fn check_constants(fields: &Fields<'_>) -> Result<(), Error> {
@@ -193,6 +201,8 @@ pub(crate) fn read_targets(value: &Value) -> Result<Targets, Error> {
     Ok(Targets::Sequences(list.iter().map(sequence).collect::<Result<_, _>>()?))
 }
 
+/// Reads a map given as rows of 0 and 1.
+///
 /// Rule: config/map
 fn map_from_rows(rows: &[Value]) -> Result<Map, Error> {
     if rows.iter().all(|row| row.as_array().is_some_and(Vec::is_empty)) {

@@ -1,12 +1,13 @@
-//! From a config back to the object that POGEMA would read.
+//! Writes a config as an object that POGEMA can read.
 
 use serde_json::{Value, json};
 
 use super::GridConfig;
 
 impl GridConfig {
-    /// The config as an object under POGEMA's names, everything derived written out but for the sides of a given
-    /// map, which may be longer than the fields for them allow.
+    /// Returns the config as an object under POGEMA's field names, derived values included.
+    ///
+    /// The sides of a given map are left out, because they may exceed the limits of their fields.
     pub fn to_value(&self) -> Value {
         let side = |length: usize| self.map.is_none().then_some(length);
         json!({

@@ -1,4 +1,4 @@
-//! Zip archives of MovingAI maps, as they are downloaded.
+//! Zip archives of MovingAI maps, in the form in which MovingAI distributes them.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read, Seek, Write};
@@ -11,16 +11,18 @@ use super::movingai::{Water, read_movingai, write_movingai};
 use super::set::NamedMap;
 use crate::text::MapText;
 
-/// More entries than this are refused, whatever they hold.
+/// Maximum number of entries, maps or not.
 const MOST_ENTRIES: usize = 100_000;
-/// More than this is not unpacked, of all entries together. Units: bytes.
+/// Maximum size of all unpacked maps together. Units: bytes.
 const MOST_UNPACKED: u64 = 1 << 28;
 
-/// Reads every `.map` file of a zip archive, by the file's name without folder and ending, in order of their names.
+/// Reads every `.map` file of a zip archive, sorted by name.
+///
+/// The name of a map is the name of its file without folder and extension.
 ///
 /// # Errors
-/// [`Error::Io`] with the entry's name for what is no archive, cannot be unpacked, unpacks to more than 256 MiB, lies
-/// outside the archive's own folder, has the name of another, or is no map.
+/// [`Error::Io`] if the file is not a zip archive; and [`Error::Io`] with the entry's name if an entry cannot be
+/// unpacked, makes the maps exceed 256 MiB, lies outside the archive's folder, repeats a name, or is not a valid map.
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
 pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<NamedMap>, Error> {
@@ -44,7 +46,9 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         let mut bytes = Vec::new();
         entry.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| failed(error.into()))?;
         room = room.checked_sub(bytes.len() as u64).ok_or_else(|| {
-            failed(format!("with this entry the maps unpack to more than {} MiB", MOST_UNPACKED >> 20).into())
+            failed(
+                format!("the maps up to this entry unpack to more than {} MiB", MOST_UNPACKED >> 20).into(),
+            )
         })?;
         let text = String::from_utf8(bytes).map_err(|error| failed(error.utf8_error().into()))?;
         let map = read_movingai(&text, water).map_err(|error| failed(error.into()))?;
@@ -59,15 +63,15 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
 /// Packs maps into a zip archive of `.map` files.
 ///
 /// # Errors
-/// [`Error::Io`] if a name is no file name, or stands twice.
+/// [`Error::Io`] if a name is not a file name, or occurs twice.
 pub fn write_archive<'a>(maps: impl IntoIterator<Item = (&'a str, &'a Map)>) -> Result<Vec<u8>, Error> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
-    // Nothing of when and where it was made, so that the same maps give the same bytes.
+    // No time or place of creation, so that equal maps give equal bytes.
     let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
     for (name, map) in maps {
         let failed = |cause: BoxedError| Error::io(name, cause);
         if name.is_empty() || name.contains(['/', '\\', '\0']) || name == "." || name == ".." {
-            return Err(failed("is no name of a file".into()));
+            return Err(failed("is not a file name".into()));
         }
         writer.start_file(format!("{name}.map"), options).map_err(|error| failed(error.into()))?;
         writer.write_all(write_movingai(map).as_bytes()).map_err(|error| failed(error.into()))?;

@@ -1,13 +1,13 @@
-//! Maps and scenarios in the formats that people keep them in.
+//! File formats of maps and scenarios.
 //!
-//! | Format | What it holds | Here |
+//! | Format | Content | Functions and types |
 //! | --- | --- | --- |
 //! | map text | one map, with letters or pools | [`crate::parse_map_text`], [`crate::MapText::to_text`] |
-//! | map set | map texts by name, as the toolbox keeps them | [`read_set`], [`write_set`] |
+//! | map set | map texts by name, in the toolbox's format | [`read_set`], [`write_set`] |
 //! | MovingAI `.map` | one map | [`read_movingai`], [`write_movingai`] |
 //! | MovingAI `.scen` | starts and goals | [`read_scen`], [`write_scen`], [`Task`] |
-//! | zip | many `.map` files, as they are downloaded | [`read_archive`], [`write_archive`] |
-//! | scenario | starts and goals or sequences of them, as configs have them | [`Scenario`] |
+//! | zip | many `.map` files, as MovingAI distributes them | [`read_archive`], [`write_archive`] |
+//! | scenario | starts and goals or goal sequences, as in configs | [`Scenario`] |
 
 mod archive;
 mod movingai;

@@ -8,22 +8,22 @@ words! {
     /// Whether agents may enter water, which MovingAI writes as `W`.
     #[derive(Default)]
     pub enum Water {
-        /// They may, as in the toolbox and the published map sets.
+        /// Water is free, as in the toolbox and the published map sets.
         #[default]
         Free = "free",
-        /// They may not, as MovingAI defines it for walking agents.
+        /// Water is an obstacle, as MovingAI defines it for walking agents.
         Obstacle = "obstacle",
     }
 }
 
 /// Reads a `.map` file.
 ///
-/// Free are ground (`.`, `G`), swamp (`S`) and, if wanted, water (`W`); obstacles are trees (`T`) and what is out of
-/// bounds (`@`, `O`).
+/// Ground (`.`, `G`) and swamp (`S`) are free; trees (`T`) and out-of-bounds cells (`@`, `O`) are obstacles. `water`
+/// decides about water (`W`).
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for a header that is none, rows that are not as many or as long as it says,
-/// and any other letter.
+/// [`Error::Map`] with line and column for an invalid header, a number or length of rows that contradicts it, and any
+/// other letter.
 ///
 /// Source: MovingAI, "Benchmark problem sets for grid-based pathfinding", file formats; pogema-toolbox 0.1.1,
 /// `moving_ai_ingestion.py`, `map_to_grid`
@@ -35,14 +35,14 @@ pub fn read_movingai(text: &str, water: Water) -> Result<Map, Error> {
     let mut last_line = HEADER_LINES;
     for row in 0..height {
         let Some((line, letters)) = lines.next() else {
-            let reason = format!("the map ends after {row} rows, its header says {height}");
+            let reason = format!("the map ends after {row} rows, expected {height} as in its header");
             return Err(Error::Map { line: last_line + 1, column: 1, reason });
         };
         last_line = line;
         read_row(line, letters.trim_end(), width, water, &mut obstacles)?;
     }
     if let Some((line, _)) = lines.find(|(_, text)| !text.trim().is_empty()) {
-        let reason = format!("the map goes on, its header says {height} rows");
+        let reason = format!("found another row, expected {height} rows as in the header");
         return Err(Error::Map { line, column: 1, reason });
     }
     Map::new(height, width, obstacles)
@@ -105,13 +105,13 @@ fn read_row(
         length += 1;
     }
     if length < width {
-        let reason = format!("the row has {length} cells, its header says {width}");
+        let reason = format!("the row has {length} cells, expected {width} as in the header");
         return Err(Error::Map { line, column: length + 1, reason });
     }
     Ok(())
 }
 
-/// Writes a `.map` file, `.` for what is free and `@` for obstacles.
+/// Writes a `.map` file, with `.` for free cells and `@` for obstacles.
 pub fn write_movingai(map: &Map) -> String {
     let mut text = format!("type octile\nheight {}\nwidth {}\nmap\n", map.height(), map.width());
     for row in map.rows() {
@@ -121,17 +121,17 @@ pub fn write_movingai(map: &Map) -> String {
     text
 }
 
-/// The map without its outermost rows and columns, as the toolbox takes them off.
+/// Returns the map without its outermost rows and columns, as the toolbox removes them.
 ///
 /// # Errors
-/// [`Error::Instance`] for a map of fewer than three rows or columns, of which nothing would be left.
+/// [`Error::Instance`] for a map of fewer than three rows or columns, which would leave no cell.
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
 pub fn without_ring(map: &Map) -> Result<Map, Error> {
     let (height, width) = (map.height(), map.width());
     if height < 3 || width < 3 {
         let reason =
-            format!("a map of {height} x {width} has no inside that its outermost cells could be taken off");
+            format!("the map has {height} x {width} cells, expected at least 3 x 3 to remove the outermost");
         return Err(Error::instance(reason));
     }
     let rows = map.obstacles().chunks(width).skip(1).take(height - 2);

@@ -1,4 +1,4 @@
-//! Scenarios of the MovingAI benchmarks: a start and a goal on each line.
+//! Scenarios of the MovingAI benchmarks: one start and one goal per line.
 
 use std::fmt::Write;
 
@@ -9,26 +9,26 @@ use crate::text::check_side;
 /// One line of a `.scen` file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
-    /// MovingAI sorts by length: paths of 4 · bucket up to 4 · bucket + 4.
+    /// MovingAI's class of path lengths: from 4 · bucket to 4 · bucket + 4.
     pub bucket: u64,
-    /// The file of the map.
+    /// Name of the map file.
     pub map: String,
-    /// Rows of the map.
+    /// Number of rows of the map.
     pub height: usize,
-    /// Columns of the map.
+    /// Number of columns of the map.
     pub width: usize,
-    /// Where the agent starts.
+    /// The agent's start.
     pub start: Cell,
-    /// Where it wants to go.
+    /// The agent's goal.
     pub goal: Cell,
     /// Length of a shortest path, diagonal steps included. Units: cells.
     pub length: f64,
 }
 
-/// Reads a `.scen` file. There, `x` is the column and `y` the row, and `x` comes first.
+/// Reads a `.scen` file. In this format, `x` is the column, `y` is the row, and `x` comes first.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for a line that is no task, and a start or goal off the map.
+/// [`Error::Map`] with line and column for an invalid line, and for a start or goal off the map.
 pub fn read_scen(text: &str) -> Result<Vec<Task>, Error> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = (1..).zip(text.lines());
@@ -46,7 +46,7 @@ const COLUMNS: [&str; 9] =
     ["bucket", "map", "map width", "map height", "start x", "start y", "goal x", "goal y", "optimal length"];
 
 fn read_task(line: usize, text: &str) -> Result<Task, Error> {
-    // Names of maps may hold blanks, so tabs are what counts where there are any.
+    // Map names may contain spaces, so a line with tabs is split at tabs only.
     let fields: Vec<&str> = if text.contains('\t') {
         text.trim_end().split('\t').collect()
     } else {
@@ -88,7 +88,7 @@ fn read_task(line: usize, text: &str) -> Result<Task, Error> {
 /// Writes a `.scen` file.
 ///
 /// # Errors
-/// [`Error::Instance`] for a name of a map that holds a tab or a line break.
+/// [`Error::Instance`] for a map name that is empty, has surrounding white space, or holds a tab or a line break.
 pub fn write_scen(tasks: &[Task]) -> Result<String, Error> {
     let mut text = String::from("version 1\n");
     for task in tasks {

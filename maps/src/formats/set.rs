@@ -10,7 +10,7 @@ use serde_saphyr::Spanned;
 use crate::config::yaml_document;
 use crate::text::{MapText, parse_map_text};
 
-/// A map under its name.
+/// A map and its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedMap {
     /// The name.
@@ -22,8 +22,8 @@ pub struct NamedMap {
 /// Reads a map set, in the order of the file.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for a name that stands twice or a map that [`parse_map_text`] refuses, and
-/// an error with the place for what is no YAML.
+/// [`Error::Map`] with line and column for a duplicate name or a map that [`parse_map_text`] rejects, and an error with
+/// line and column for invalid YAML.
 ///
 /// Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry._initialize_maps`
 pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
@@ -38,7 +38,7 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
     let read = |(name, block): (String, Spanned<String>)| {
         let place = Place { source: text, block: &block, name: &name };
         if !names.insert(name.clone()) {
-            return Err(place.error(1, 1, "the name stands twice"));
+            return Err(place.error(1, 1, "duplicate name"));
         }
         let map = parse_map_text(&block.value).map_err(|error| match error {
             Error::Map { line, column, reason } => place.error(line, column, &reason),
@@ -53,21 +53,21 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
     entries.0.into_iter().map(read).collect()
 }
 
-/// Writes a map set as the published ones are written.
+/// Writes a map set in the format of the published ones.
 ///
 /// # Errors
 /// [`Error::Instance`] for a map whose starts have no letters.
 pub fn write_set(maps: &[NamedMap]) -> Result<String, Error> {
     let mut lines = Vec::new();
     for NamedMap { name, text } in maps {
-        // What JSON writes between quotes, YAML reads.
+        // A quoted JSON string is also a YAML string.
         lines.push(format!("{}: |-\n", serde_json::Value::from(name.as_str())));
         lines.extend(text.rows()?.iter().map(|row| format!("  {row}\n")));
     }
     Ok(lines.concat())
 }
 
-/// Where a map stands in the file.
+/// The place of a map in the file.
 struct Place<'a> {
     source: &'a str,
     block: &'a Spanned<String>,
@@ -75,7 +75,7 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// What is wrong with a row of the map, counted from 1, told by its place in the file.
+    /// Returns an error about a row of the map, counted from 1, with its line and column in the file.
     fn error(&self, row: usize, column: usize, reason: &str) -> Error {
         let (line, column) = self.find(row, column);
         let quoted = shorten(self.name, Error::LONGEST_QUOTE);
@@ -85,20 +85,20 @@ impl Place<'_> {
     fn find(&self, row: usize, column: usize) -> (usize, usize) {
         let (first, begin) = (self.block.defined.line() as usize, self.block.defined.column() as usize);
         let text = self.block.value.as_str();
-        // The parser tells where the first line stands that is not empty.
+        // The parser reports the first line that is not empty.
         let num_blank = text.lines().take_while(|line| line.is_empty()).count();
         let line = (first + row).saturating_sub(1 + num_blank);
-        let wanted = text.lines().nth(row - 1).unwrap_or_default();
+        let row_text = text.lines().nth(row - 1).unwrap_or_default();
         let found = self.source.lines().nth(line.saturating_sub(1)).and_then(|there| {
-            let offset = there.find(wanted).filter(|_| !wanted.is_empty())?;
+            let offset = there.find(row_text).filter(|_| !row_text.is_empty())?;
             Some(there[..offset].chars().count())
         });
-        // Rows of a text in quotes need not be lines of the file.
+        // The rows of a quoted text may not be lines of the file.
         found.map_or((first, begin), |offset| (line, offset + column))
     }
 }
 
-/// The entries of a set in their order, those of equal names as well.
+/// The entries of a set in the order of the file, duplicate names included.
 struct Entries(Vec<(String, Spanned<String>)>);
 
 impl<'de> Deserialize<'de> for Entries {

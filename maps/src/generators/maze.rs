@@ -1,14 +1,14 @@
-//! Mazes of straight walls.
+//! Generator of mazes with straight walls.
 
 use pogema_core::{Error, Map};
 
 use super::{check_sides, draw_between, draw_share};
 use pogema_numpy::Generator;
 
-/// More wall pieces than this are refused: the largest maze is full long before.
+/// Maximum number of wall pieces, which bounds the run time.
 const MOST_PIECES: f64 = 1e9;
 
-/// What the settings of a maze are drawn from.
+/// The ranges from which the settings of a maze are drawn.
 ///
 /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings`
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,10 +44,10 @@ impl Default for MazeRanges {
 }
 
 impl MazeRanges {
-    /// The settings of a seed.
+    /// Draws the settings of a maze from a seed.
     ///
     /// # Errors
-    /// [`Error::Config`] for a range that ends before it begins.
+    /// [`Error::Config`] for an empty range.
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<Maze, Error> {
@@ -79,13 +79,13 @@ pub struct Maze {
 }
 
 impl Maze {
-    /// The map.
+    /// Generates the map.
     ///
-    /// Walls stand on even rows and columns of a grid with a ring around it; the ring is then taken off, so a maze
-    /// has an odd number of rows and columns, one more than an even `width` or `height`.
+    /// Walls lie on even rows and columns of a grid with a ring around it, and the ring is then removed. A maze
+    /// therefore has an odd number of rows and columns, one more than an even `width` or `height`.
     ///
     /// # Errors
-    /// [`Error::Config`] for a side, density, number or share that no maze has.
+    /// [`Error::Config`] for a side, density, number or share out of range.
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeGenerator.generate_maze`
     pub fn generate(&self) -> Result<Map, Error> {
@@ -112,17 +112,17 @@ impl Maze {
             let expected = format!("at most {MOST_PIECES:e} pieces of wall on all cells together");
             return Err(Error::config("obstacle_density", self.obstacle_density, expected));
         }
-        // Below zero, which is no wall, the cast gives zero.
+        // The cast turns negative numbers into zero, which means no wall.
         Ok(floor_divide(pieces, self.wall_components as f64) as u64)
     }
 }
 
-/// The side of the grid with its ring.
+/// Returns the side of the grid, ring included.
 fn grid_side(side: i64) -> usize {
     (side as usize / 2) * 2 + 3
 }
 
-/// What `//` gives for floats in Python: the floor of the exact quotient, not of the rounded one.
+/// Divides as Python's `//` does for floats: rounds down the exact quotient, not the rounded one.
 fn floor_divide(dividend: f64, divisor: f64) -> f64 {
     let rest = dividend % divisor;
     let quotient = (dividend - rest) / divisor;
@@ -130,7 +130,7 @@ fn floor_divide(dividend: f64, divisor: f64) -> f64 {
     (if is_between { quotient - 1.0 } else { quotient }).round()
 }
 
-/// Two cells on along one axis, or nowhere: (rows, cols).
+/// A move of two cells along one axis, or of none: (rows, cols).
 type Direction = (i64, i64);
 
 struct Grid {
@@ -151,7 +151,7 @@ impl Grid {
         &mut self.walls[(row * self.width + col) as usize]
     }
 
-    /// A wall of up to so many pieces, from a random place on.
+    /// Builds a wall of up to `wall_components` pieces from a random cell.
     fn build_wall(&mut self, maze: &Maze, generator: &mut Generator) -> Result<(), Error> {
         // INVARIANT: a grid has at least three rows and columns, so neither range is empty.
         let mut col = generator.integers(0, self.width / 2).unwrap_or_default() * 2;
@@ -162,7 +162,7 @@ impl Grid {
             let Some((rows, cols)) = self.next_direction(row, col, last, maze.go_straight, generator)? else {
                 continue;
             };
-            // Remembered even if the wall cannot go there.
+            // The direction is remembered even if the wall cannot continue there.
             last = (rows, cols);
             if !*self.wall(row + rows, col + cols) {
                 *self.wall(row + rows, col + cols) = true;
@@ -208,7 +208,7 @@ impl Grid {
         Ok(Some(directions[chosen]))
     }
 
-    /// The map without the ring.
+    /// Returns the map without the ring.
     fn inner_map(&self) -> Result<Map, Error> {
         let rows = self.walls.chunks(self.width as usize).skip(1).take(self.height as usize - 2);
         let inner: Vec<bool> = rows.flat_map(|row| row[1..row.len() - 1].iter().copied()).collect();
@@ -221,7 +221,7 @@ mod tests {
     use super::floor_divide;
 
     #[test]
-    fn division_is_floored_as_python_floors_it() {
+    fn floor_division_matches_python() {
         assert_eq!(floor_divide(7.0, 2.0), 3.0);
         assert_eq!(floor_divide(-7.0, 2.0), -4.0);
         assert_eq!(floor_divide(6.0, 3.0), 2.0);

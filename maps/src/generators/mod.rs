@@ -1,11 +1,11 @@
-//! The map generators of pogema-toolbox 0.1.1: the same map for every seed and setting.
+//! The map generators of pogema-toolbox 0.1.1, with the same map for every seed and setting.
 //!
-//! | Here | What the toolbox has there |
+//! | Here | In the toolbox |
 //! | --- | --- |
 //! | [`RandomRanges`], [`RandomMap`] | `MapRangeSettings`, `generate_map` |
 //! | [`MazeRanges`], [`Maze`] | `MazeRangeSettings`, `MazeGenerator.generate_maze` |
 //! | [`Warehouse`] | `WarehouseConfig`, `generate_warehouse`, `generate_wfi_warehouse` |
-//! | [`Preset`] | `main` of each: the sets of the paper, by the names they were published under |
+//! | [`Preset`] | `main` of each: the paper's map sets under their published names |
 
 mod maze;
 mod preset;
@@ -23,7 +23,7 @@ use pogema_core::{Error, Map};
 
 use pogema_numpy::Generator;
 
-/// Passes if `width` and `height` are those of a map.
+/// Checks that `width` and `height` are within the limits of a map.
 fn check_sides(width: i64, height: i64) -> Result<(), Error> {
     let longest = Map::LONGEST_SIDE as i64;
     for (field, side) in [("width", width), ("height", height)] {
@@ -34,14 +34,14 @@ fn check_sides(width: i64, height: i64) -> Result<(), Error> {
     Ok(())
 }
 
-/// A whole number from `lowest` to `highest`, both ends included.
+/// Draws a whole number from `lowest` to `highest`, both included.
 fn draw_between(generator: &mut Generator, field: &str, (lowest, highest): (i64, i64)) -> Result<i64, Error> {
     let end = highest.checked_add(1).filter(|_| lowest <= highest);
     let drawn = end.and_then(|end| generator.integers(lowest, end).ok());
     drawn.ok_or_else(|| empty_range(field, lowest, highest))
 }
 
-/// A number from `lowest` to `highest`.
+/// Draws a number from `lowest` to `highest`.
 fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f64)) -> Result<f64, Error> {
     generator.uniform(lowest, highest).map_err(|_| empty_range(field, lowest, highest))
 }

@@ -1,4 +1,4 @@
-//! The map sets of the paper, by the names they were published under.
+//! The paper's map sets under their published names.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::formats::NamedMap;
 use crate::text::MapText;
 
 words! {
-    /// A map set of the paper. The names of its maps begin with its word.
+    /// A map set of the paper. The names of its maps begin with its own name, except for the warehouse.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `maze_generator.py` and `warehouse_generator.py`, `main`;
     /// the published sets, whose mazes have sides from 17 to 21 in place of the generator's 5 to 9
@@ -28,24 +28,24 @@ words! {
     }
 }
 
-/// Training goes on where validation ends.
+/// The seeds for training follow those for validation.
 const SEEDS_OF_VALIDATION: Range<u64> = 0..128;
 const SEEDS_OF_RANDOM_TRAINING: Range<u64> = 128..128 + 512;
 const SEEDS_OF_MAZE_TRAINING: Range<u64> = 128..128 + 2048;
 
 impl Preset {
-    /// The preset of a name.
+    /// Returns the preset with a name.
     ///
     /// # Errors
-    /// [`Error::Config`] with the nearest name.
+    /// [`Error::Config`] with the nearest known name.
     pub fn by_name(name: &str) -> Result<Self, Error> {
         Self::of_word(name).ok_or_else(|| {
             let hint = nearest(name, Self::NAMES.iter().copied()).unwrap_or_default();
-            Error::config("preset", name, format!("a known one; the nearest is `{hint}`"))
+            Error::config("preset", name, format!("a known preset; did you mean `{hint}`?"))
         })
     }
 
-    /// The settings that the mazes of the paper are drawn from.
+    /// The ranges from which the settings of the paper's mazes are drawn.
     pub const MAZES: MazeRanges = MazeRanges {
         width_min: 17,
         width_max: 21,
@@ -59,10 +59,10 @@ impl Preset {
         go_straight_max: 0.85,
     };
 
-    /// The maps, in the order they were published in.
+    /// Generates the maps in their published order.
     ///
     /// # Errors
-    /// None: all settings are those of maps.
+    /// None: all settings are in range.
     pub fn maps(self) -> Result<Vec<NamedMap>, Error> {
         let random = |seed| RandomRanges::default().sample(seed)?.generate().map(MapText::from);
         let maze = |seed| Self::MAZES.sample(seed)?.generate().map(MapText::from);
@@ -79,7 +79,7 @@ impl Preset {
     }
 }
 
-/// The name of a seed's map: the seed has as many digits as the largest of all.
+/// Returns the name of a seed's map, with the seed padded to the length of the largest seed.
 ///
 /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_and_save_maps`
 pub fn seed_name(prefix: &str, seed: u64, seeds: &Range<u64>) -> String {
@@ -87,7 +87,7 @@ pub fn seed_name(prefix: &str, seed: u64, seeds: &Range<u64>) -> String {
     format!("{prefix}-seed-{seed:0num_digits$}")
 }
 
-/// The maps of some seeds.
+/// Generates the maps of a range of seeds.
 ///
 /// # Errors
 /// Those of `generate`.

@@ -1,11 +1,11 @@
-//! Maps with obstacles strewn over them.
+//! Generator of maps with random obstacles.
 
 use pogema_core::{Error, Map};
 
 use super::{check_sides, draw_between, draw_share};
 use pogema_numpy::Generator;
 
-/// What the settings of a random map are drawn from.
+/// The ranges from which the settings of a random map are drawn.
 ///
 /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings`
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,10 +33,10 @@ impl Default for RandomRanges {
 }
 
 impl RandomRanges {
-    /// The settings of a seed.
+    /// Draws the settings of a random map from a seed.
     ///
     /// # Errors
-    /// [`Error::Config`] for a range that ends before it begins.
+    /// [`Error::Config`] for an empty range.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<RandomMap, Error> {
@@ -65,10 +65,10 @@ pub struct RandomMap {
 }
 
 impl RandomMap {
-    /// The map.
+    /// Generates the map.
     ///
     /// # Errors
-    /// [`Error::Config`] for a side or density that no map has.
+    /// [`Error::Config`] for a side or density out of range.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
     pub fn generate(&self) -> Result<Map, Error> {

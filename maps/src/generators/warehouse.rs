@@ -1,4 +1,4 @@
-//! Warehouses: shelves in rows, aisles between them, and bays at both ends.
+//! Generator of warehouses: rows of shelves, aisles between them, and bays at both ends.
 
 use pogema_core::{Cell, Error, Map, words};
 
@@ -11,37 +11,37 @@ use crate::text::MapText;
 /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `WarehouseConfig`
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Warehouse {
-    /// Columns of a shelf.
+    /// Number of columns of a shelf.
     pub wall_width: usize,
-    /// Rows of a shelf.
+    /// Number of rows of a shelf.
     pub wall_height: usize,
-    /// Shelves side by side.
+    /// Number of shelves side by side.
     pub walls_in_row: usize,
-    /// Shelves one below the other.
+    /// Number of shelves one below the other.
     pub walls_rows: usize,
-    /// Columns to the left and to the right of all shelves.
+    /// Number of free columns to the left of all shelves, and to the right.
     pub bottom_gap: usize,
-    /// Columns between shelves.
+    /// Number of free columns between shelves.
     pub horizontal_gap: usize,
-    /// Rows between shelves, above and below them.
+    /// Number of free rows between shelves, above all shelves, and below.
     pub vertical_gap: usize,
 }
 
 words! {
-    /// Where agents may start and have their goals.
+    /// The cells where agents may start and have their goals.
     #[derive(Default)]
     pub enum Bays {
-        /// Unspecified.
+        /// No possible starts and goals are marked.
         #[default]
         None = "none",
-        /// As the toolbox lays them.
+        /// As in the toolbox.
         ///
         /// Starts are in the gaps at both ends, in two rows of three; goals are along the shelves.
         Toolbox = "toolbox",
         /// As in the published warehouse.
         ///
-        /// The first and last row have none. Starts are in columns 1, 2, 4 and 5 and the mirrored four, beside each
-        /// shelf and the rows next to it.
+        /// The first and last row have no starts. Starts are in columns 1, 2, 4 and 5 and the mirrored four,
+        /// in the rows of each shelf and the rows next to it.
         Published = "published",
     }
 }
@@ -61,7 +61,7 @@ impl Default for Warehouse {
 }
 
 impl Warehouse {
-    /// The settings of the published map `wfi_warehouse`, which goes with [`Bays::Published`].
+    /// The settings of the published map `wfi_warehouse`, for use with [`Bays::Published`].
     pub const PUBLISHED: Self = Self {
         wall_width: 10,
         wall_height: 1,
@@ -72,10 +72,10 @@ impl Warehouse {
         vertical_gap: 3,
     };
 
-    /// The map, and where agents may start and have their goals.
+    /// Generates the map, and the cells where agents may start and have their goals.
     ///
     /// # Errors
-    /// [`Error::Config`] for settings without a map, or, with bays, without room between the shelves.
+    /// [`Error::Config`] for settings out of range; with bays, also for a `vertical_gap` below 2.
     ///
     /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse` and `generate_wfi_warehouse`
     pub fn generate(&self, bays: Bays) -> Result<MapText, Error> {
@@ -93,12 +93,12 @@ impl Warehouse {
         let cells = (0..map.obstacles().len()).map(|index| map.cell_at(index));
         let free = cells.filter(|&cell| !map.is_obstacle(cell));
         let (goals, others): (Vec<Cell>, Vec<Cell>) = free.partition(|&cell| self.is_goal(&map, cell));
-        // A cell marked as both is written as a goal.
+        // A cell that qualifies as both becomes a goal.
         let starts = others.into_iter().filter(|&cell| is_start(cell)).collect();
         Ok(MapText { pools: Some((starts, goals)), ..MapText::from(map) })
     }
 
-    /// The shelves, without so many rows at the top and at the bottom.
+    /// Returns the map without the first and last `num_cut` rows.
     fn shelves(&self, num_cut: usize) -> Result<Map, Error> {
         let (height, width) = self.sides()?;
         let height = height.saturating_sub(2 * num_cut);
@@ -116,7 +116,7 @@ impl Warehouse {
         Map::new(height, width, obstacles)
     }
 
-    /// Height and width of the whole.
+    /// Returns height and width of the uncut map.
     fn sides(&self) -> Result<(usize, usize), Error> {
         let settings = [
             ("wall_width", self.wall_width),
@@ -132,7 +132,7 @@ impl Warehouse {
         }
         let height = self.vertical_gap * (self.walls_rows + 1) + self.wall_height * self.walls_rows;
         let walls = 2 * self.bottom_gap + self.wall_width * self.walls_in_row;
-        // No wall has one gap less than none.
+        // Without walls there is no gap, rather than one gap less than none.
         let width = (walls + self.horizontal_gap * self.walls_in_row).saturating_sub(self.horizontal_gap);
         super::check_sides(width as i64, height as i64)?;
         Ok((height, width))
@@ -141,7 +141,7 @@ impl Warehouse {
     fn is_toolbox_start(&self, map: &Map, cell: Cell) -> bool {
         let (row, col) = (usize::from(cell.row), usize::from(cell.col));
         let is_inner = row > 0 && row + 1 < map.height();
-        // Every third row is left out, however far the shelves are apart.
+        // The toolbox leaves out every third row, whatever the gap between the shelves.
         let is_left = col + 1 < self.bottom_gap;
         let is_right = col + self.bottom_gap > map.width();
         is_inner && row % 3 != 0 && (is_left || is_right)
@@ -162,7 +162,7 @@ impl Warehouse {
             row.map(|row| Cell::new(row, cell.col))
                 .is_some_and(|other| map.contains(other) && map.is_obstacle(other))
         };
-        // Where shelves are two rows apart, agents come from one side alone.
+        // If shelves are two rows apart, goals are on one side only.
         let has_below = self.vertical_gap != 2 && is_shelf(cell.row.checked_add(1));
         is_shelf(cell.row.checked_sub(1)) || has_below
     }

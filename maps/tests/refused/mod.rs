@@ -1,8 +1,8 @@
-//! Tables of bad inputs and the one line that each is refused with.
+//! Compares tables of invalid inputs with their one-line errors.
 
 use pogema_core::Error;
 
-/// Passes if each input of the table gives the error beside it.
+/// Asserts that each input of the table gives the error next to it.
 pub fn check(table: &[(&str, &str)], error_of: &dyn Fn(&str) -> Option<Error>) {
     let mut wrong = Vec::new();
     for (text, expected) in table {

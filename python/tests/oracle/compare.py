@@ -105,7 +105,7 @@ class Comparison:
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
             # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, once that has become smaller.
             return "pool outside the map", True
-        if call[0] in ("reset", "grid") and "map_name" in case.fields and "has room" in _text(our) and "value" in their:
+        if call[0] in ("reset", "grid") and "map_name" in case.fields and "no room" in _text(our) and "value" in their:
             # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.
             return "registered map without room", True
         return self._known_in_episode(case, call, their, our)

@@ -1,5 +1,4 @@
-//! One page with all that came of an evaluation: tables, plots, replays of the worst and best episodes, and how it was
-//! made.
+//! The report of an evaluation on one page: tables, plots, replays of the worst and best episodes, and provenance.
 
 mod picks;
 
@@ -22,22 +21,22 @@ use crate::suite::{Algorithm, Suite};
 use crate::tree::Node;
 use crate::views::{ImageFormat, Shown, Table, View};
 
-/// So many of the worst and of the best episodes are shown of each algorithm.
+/// Number of worst episodes, and of best episodes, shown for each algorithm.
 pub const SHOWN: usize = 3;
 
-/// An episode that is shown, and what is known of it.
+/// An episode shown in the report, with its replay.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    /// Which it is.
+    /// The episode.
     pub pick: Pick,
-    /// What [`pogema_render::html::pack`] made of it, or why it cannot be replayed, in one line.
+    /// The replay from [`pogema_render::html::pack`], or one line on why there is none.
     pub film: Result<String, String>,
-    /// In what figures it came out differently when it was played again.
+    /// The metrics in which the replay differs from the results.
     pub differences: Vec<String>,
 }
 
 impl Replay {
-    /// Plays an episode again, if its algorithm is built in.
+    /// Replays an episode if its algorithm is built in.
     pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &EpisodeConfigs) -> Self {
         let again = suite.play_again(environments, &pick.algorithm, pick.episode);
         match again.and_then(|(metrics, trace)| Ok((metrics, pack(&trace)?))) {
@@ -46,22 +45,22 @@ impl Replay {
         }
     }
 
-    /// An episode that somebody played again.
+    /// Creates a replay from an episode that the caller played again.
     pub fn played(pick: Pick, results: &Results, metrics: &Pairs, film: String) -> Self {
         let differences = differences(&results.rows[pick.row], metrics);
         Self { pick, film: Ok(film), differences }
     }
 
-    /// An episode that cannot be replayed, and why.
+    /// Creates an entry for an episode that cannot be replayed, with the reason.
     pub fn failed(pick: Pick, why: String) -> Self {
         Self { pick, film: Err(why), differences: Vec::new() }
     }
 }
 
-/// The page, for the views of the suite, or for a table of all figures if it has none.
+/// Returns the page with the views of the suite, or with a table of all metrics if the suite has no views.
 ///
 /// # Errors
-/// If a view is wrong, or a plot cannot be drawn.
+/// If a view is invalid, or a plot cannot be drawn.
 pub fn page(
     suite: &Suite,
     manifest: &Manifest,
@@ -94,10 +93,10 @@ pub fn page(
     album.text()
 }
 
-/// The suite's file, and the file that replaced its algorithms.
+/// Returns the text of the suite's file, and of the file that replaced its algorithms.
 fn played(suite: &Suite) -> String {
     let Some(file) = &suite.replacement else { return suite.text.clone() };
-    format!("{}\n# In place of these algorithms: {}\n{}", suite.text, file.path.display(), file.text)
+    format!("{}\n# Replaces the algorithms above: {}\n{}", suite.text, file.path.display(), file.text)
 }
 
 fn facts(suite: &Suite, results: &Results) -> Vec<(&'static str, String)> {
@@ -124,7 +123,7 @@ fn sections(suite: &Suite, results: &Results) -> Result<Vec<Value>, Error> {
     let views = if suite.views.is_empty() { &usual[..] } else { &suite.views };
     let show = |(name, node): &(String, Node)| {
         let view = View::read(name, node).map_err(|error| suite.in_file(error))?.beside(&suite.path);
-        // What cannot be shown is no reason to show nothing.
+        // A view that fails must not hide the others, so its error becomes a note.
         let shown = view
             .show(name, results, None)
             .unwrap_or_else(|error| Shown { notes: vec![error.to_string()], ..Shown::default() });
@@ -159,7 +158,7 @@ fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Value {
     let remark = match &replay.film {
         Err(reason) => reason.clone(),
         Ok(_) if replay.differences.is_empty() => String::new(),
-        Ok(_) => format!("played again it came out otherwise: {}", replay.differences.join("; ")),
+        Ok(_) => format!("the replay differs from the results: {}", replay.differences.join("; ")),
     };
     json!({
         "number": episode,

@@ -6,71 +6,71 @@ use indexmap::IndexMap;
 
 use crate::results::{Pairs, Results, Row, short};
 
-/// Figures by which episodes are judged, of which the first counts that all rows have, and whether less is better.
-const JUDGED_BY: [(&str, bool); 4] =
+/// Metrics that rank episodes, and whether less is better. The first one that all rows have is used.
+const RANKED_BY: [(&str, bool); 4] =
     [("avg_throughput", false), ("SoC", true), ("makespan", true), ("ep_length", true)];
 
-/// The share of agents that came to their goals: whoever has less is worse, whatever it cost.
+/// The share of agents that reached their goals. It ranks before any other metric.
 const SOLVED: &str = "ISR";
 
-/// An episode to be shown.
+/// An episode chosen for display.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pick {
-    /// Whose it is.
+    /// Its algorithm.
     pub algorithm: String,
-    /// Its number, which is its row's place among those of the algorithm.
+    /// Its index among the rows of the algorithm.
     pub episode: usize,
-    /// The place of its row among all.
+    /// Index of its row among all rows.
     pub row: usize,
-    /// Whether it is one of the worst, and not one of the best.
+    /// Whether it is one of the worst rather than one of the best.
     pub is_worst: bool,
-    /// By what, in a few words.
+    /// The metrics that rank it, as a short text.
     pub why: String,
 }
 
-/// So many of the worst episodes of each algorithm, the worst first, then as many of its best; none if rows have no
-/// figure to judge them by.
+/// Returns the `number` worst episodes of each algorithm, worst first, then as many of its best episodes.
 ///
-/// An episode is the worse the fewer agents came to their goals; then, the larger its figure is in comparison with
-/// that of the best algorithm in the same environment; then, the worse the figure itself is.
+/// Episodes are ranked by three criteria: the share of agents that reached their goals; the ratio of the metric to that
+/// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
 pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
     let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
-    let Some(&(figure, is_less_better)) = JUDGED_BY.iter().find(|(name, _)| has(name)) else {
+    let Some(&(figure, is_less_better)) = RANKED_BY.iter().find(|(name, _)| has(name)) else {
         return Vec::new();
     };
     let best = best_of(results, figure, is_less_better);
-    let mut of_algorithms: IndexMap<&str, Vec<Judged>> = IndexMap::new();
+    let mut of_algorithms: IndexMap<&str, Vec<Ranked>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
         let episodes = of_algorithms.entry(name).or_default();
         let value = row.metric(figure).unwrap_or_default();
-        let (least, whose) = best.get(&told(&row.settings)).copied().unwrap_or((value, name));
-        let times = if is_less_better { value / least } else { least / value };
-        let times = if times.is_nan() { 1.0 } else { times };
+        let (best_value, winner) = best.get(&environment(&row.settings)).copied().unwrap_or((value, name));
+        let ratio = if is_less_better { value / best_value } else { best_value / value };
+        let ratio = if ratio.is_nan() { 1.0 } else { ratio };
         let solved = row.metric(SOLVED);
-        let why = why(figure, value, solved, value / least, (whose != name && times > 1.0).then_some(whose));
+        let why =
+            why(figure, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
         let worth = if is_less_better { value } else { -value };
-        let bad = [-solved.unwrap_or(1.0), times, worth];
+        let badness = [-solved.unwrap_or(1.0), ratio, worth];
         let pick = Pick { algorithm: name.into(), episode: episodes.len(), row: at, is_worst: true, why };
-        episodes.push(Judged { pick, bad });
+        episodes.push(Ranked { pick, badness });
     }
     of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
-struct Judged {
+struct Ranked {
     pick: Pick,
-    /// The larger the worse, the first first.
-    bad: [f64; 3],
+    /// Criteria in order of precedence; larger is worse.
+    badness: [f64; 3],
 }
 
-/// The best figure in each environment, and whose it is.
+/// Returns the best value of a metric in each environment, and its algorithm.
 fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> HashMap<String, (f64, &'a str)> {
     let mut best: HashMap<String, (f64, &str)> = HashMap::new();
-    // Who left agents on their way has fewer costs than who brought all of them home.
+    // An episode in which agents miss their goals may cost less than one in which all of them arrive.
     let is_solved = |row: &&Row| row.metric(SOLVED).is_none_or(|share| share >= 1.0);
     for row in results.rows.iter().filter(is_solved) {
         let value = row.metric(figure).unwrap_or_default();
-        let place = best.entry(told(&row.settings)).or_insert((value, &row.algorithm));
+        let place = best.entry(environment(&row.settings)).or_insert((value, &row.algorithm));
         if if is_less_better { value < place.0 } else { value > place.0 } {
             *place = (value, &row.algorithm);
         }
@@ -78,29 +78,30 @@ fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> Hash
     best
 }
 
-fn why(figure: &str, value: f64, solved: Option<f64>, times: f64, whose: Option<&str>) -> String {
+fn why(figure: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option<&str>) -> String {
     let mut parts = vec![format!("{figure} {}", short(value))];
     parts.extend(solved.map(|share| format!("{SOLVED} {}", short(share))));
-    parts.extend(whose.map(|whose| format!("{times:.2} × that of {whose}")));
+    parts.extend(winner.map(|winner| format!("{ratio:.2} × that of {winner}")));
     parts.join(", ")
 }
 
-fn told(settings: &Pairs) -> String {
+/// Returns a text that identifies an environment, whatever the order of its settings.
+fn environment(settings: &Pairs) -> String {
     let mut parts: Vec<String> = settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
     parts.sort();
     parts.join("\n")
 }
 
-fn ends(mut episodes: Vec<Judged>, number: usize) -> Vec<Pick> {
-    let by_worth = |one: &Judged, other: &Judged| {
-        let pairs = one.bad.iter().zip(&other.bad);
+fn ends(mut episodes: Vec<Ranked>, number: usize) -> Vec<Pick> {
+    let by_worth = |one: &Ranked, other: &Ranked| {
+        let pairs = one.badness.iter().zip(&other.badness);
         let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
         differs.unwrap_or_else(|| one.pick.episode.cmp(&other.pick.episode))
     };
     episodes.sort_by(by_worth);
-    let worst = episodes.iter().take(number).map(|judged| judged.pick.clone());
+    let worst = episodes.iter().take(number).map(|ranked| ranked.pick.clone());
     let best =
-        episodes.iter().rev().take(number).map(|judged| Pick { is_worst: false, ..judged.pick.clone() });
+        episodes.iter().rev().take(number).map(|ranked| Pick { is_worst: false, ..ranked.pick.clone() });
     worst.chain(best).collect()
 }
 
@@ -119,23 +120,23 @@ mod tests {
     }
 
     #[test]
-    fn unsolved_episodes_are_worst_then_those_that_another_solved_better() {
+    fn unsolved_episodes_are_worst_then_those_solved_better_by_another() {
         let rows = [("A", 0, 20.0, 1.0), ("A", 1, 12.0, 1.0), ("A", 2, 5.0, 0.5), ("A", 3, 50.0, 1.0)];
         let of_b = [("B", 0, 10.0, 1.0), ("B", 1, 12.0, 1.0), ("B", 2, 40.0, 1.0), ("B", 3, 50.0, 1.0)];
         let picks = picks(&results(&[rows, of_b].concat()), 2);
-        let told: Vec<_> =
+        let found: Vec<_> =
             picks.iter().map(|pick| (pick.algorithm.as_str(), pick.episode, pick.is_worst)).collect();
         let of_a = [("A", 2, true), ("A", 0, true), ("A", 1, false), ("A", 3, false)];
-        // Nobody did better than B, so that its own costs decide.
+        // No algorithm did better than B, so its own costs decide.
         let of_b = [("B", 3, true), ("B", 2, true), ("B", 0, false), ("B", 1, false)];
-        assert_eq!(told, [of_a, of_b].concat());
+        assert_eq!(found, [of_a, of_b].concat());
         assert_eq!(picks[1].why, "SoC 20, ISR 1, 2.00 × that of B");
         assert_eq!(picks[0].why, "SoC 5, ISR 0.5");
         assert_eq!((picks[4].row, picks[5].row), (7, 6));
     }
 
     #[test]
-    fn rows_that_cannot_be_judged_are_not_picked() {
+    fn rows_without_a_ranking_metric_are_not_picked() {
         let mut results = results(&[("A", 0, 20.0, 1.0)]);
         results.rows[0].metrics = Pairs::from([("fun".into(), 1.0.into())]);
         assert_eq!(picks(&results, 3), []);

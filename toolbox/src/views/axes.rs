@@ -1,23 +1,23 @@
-//! Axes with ticks where the data is, which the plotting library cannot place freely.
+//! Axes with ticks at the data. The plotting library cannot place ticks freely.
 
 use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 use super::compose::plain_layout;
 
-/// The colour of the lines behind a plot.
+/// Colour of the grid lines behind a plot.
 const GRID: &str = "#DDDDDD";
 
-/// The share of an axis that is left free at each end.
+/// Share of an axis that is left free at each end.
 const MARGIN: f64 = 0.05;
 
-/// The least power of two on a logarithmic axis, which is the library's own.
+/// Exponent of the smallest power of two on a logarithmic axis, as in the library.
 const LEAST: f64 = -33.0;
 
 /// Length of a tick. Units: points.
 const TICK: f64 = 3.0;
 
-/// Mean width of a letter in widths of the font's size.
+/// Mean width of a letter, relative to the font size.
 const LETTER: f64 = 0.62;
 
 /// One axis.
@@ -25,14 +25,14 @@ const LETTER: f64 = 0.62;
 pub(super) struct Axis {
     pub title: String,
     pub is_log: bool,
-    /// From where to where it reaches.
+    /// The lower and the upper end.
     pub range: (f64, f64),
-    /// Where it is marked, and what is written there.
+    /// Positions and labels of the ticks.
     pub ticks: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// An axis for numbers, marked at the given ones or at round ones; from 0 to 1 if there are none.
+    /// Creates an axis for numbers, with the given ticks or round ones; from 0 to 1 if there are no values.
     pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
         let may_be_shown = |tick: &&f64| !is_log || **tick > 0.0;
         let ticks: Option<Vec<f64>> = ticks.map(|ticks| ticks.iter().filter(may_be_shown).copied().collect());
@@ -56,7 +56,7 @@ impl Axis {
         Self { title: title.to_owned(), is_log, range, ticks }
     }
 
-    /// An axis for names, of which the first has a place and each next one the next whole number.
+    /// Creates an axis for names at consecutive positions, starting with `first`.
     pub fn of_names(title: &str, names: &[String], first: f64) -> Self {
         let ticks =
             names.iter().enumerate().map(|(place, name)| (first + place as f64, name.clone())).collect();
@@ -65,7 +65,7 @@ impl Axis {
     }
 }
 
-/// A number as it is written at a tick.
+/// Formats a number for a tick.
 fn number(value: f64) -> String {
     let is_small = value != 0.0 && value.abs() < 1e-3;
     if is_small || value.abs() >= 1e7 {
@@ -75,7 +75,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Round numbers within a range, about five of them.
+/// Returns about five round numbers within a range, with their labels.
 fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     let rough = (high - low) / 5.0;
     let power = 10f64.powf(rough.log10().floor());
@@ -85,8 +85,10 @@ fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
 }
 
-/// Powers of two within a range above zero; where they were too many or below one, powers of ten, and if those are
-/// too few, their doubles and fives as well.
+/// Returns powers of two within a range above zero, with their labels.
+///
+/// If there were too many or some below one half, returns powers of ten; if those are too few, also their multiples by
+/// 2 and 5.
 fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     let of = |base: i32, factors: &[f64]| -> Vec<(f64, String)> {
         let power = |value: f64| value.ln() / f64::from(base).ln();
@@ -102,12 +104,12 @@ fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     if decades.len() > 2 { decades } else { of(10, &[1.0, 2.0, 5.0]) }
 }
 
-/// The approximate width of a text.
+/// Returns the approximate width of a text.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {
     text.chars().count() as f64 * f64::from(size) * LETTER
 }
 
-/// The frame of one plot: how large it is, and what is written around it.
+/// The frame of one plot: its size, title and axes.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub width: f64,
@@ -119,7 +121,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The layout for the plotting library, with nothing but the lines of the axes.
+    /// Returns the layout for the plotting library, with only the lines of the axes.
     pub fn layout(&self) -> Layout {
         let size = f64::from(self.font_size);
         let widest = |axis: &Axis| {
@@ -136,7 +138,7 @@ impl Frame {
         layout
     }
 
-    /// Draws lines behind the plot, and ticks and texts around it.
+    /// Draws grid lines behind the plot, and ticks and texts around it.
     pub fn draw(&self, scene: &mut Scene) {
         let place = ComputedLayout::from_layout(&self.layout());
         let (left, right) = (place.margin_left, place.width - place.margin_right);
@@ -181,12 +183,12 @@ impl Frame {
     }
 }
 
-/// A text in the middle of a place.
+/// Returns a text centred at a position.
 pub(super) fn text(text: &str, place: (f64, f64), size: u32) -> Primitive {
     anchored(text, place, size, TextAnchor::Middle, None)
 }
 
-/// A text that begins, has its middle or ends at a place, turned by some degrees.
+/// Returns a text that starts, is centred or ends at a position, rotated by some degrees.
 pub(super) fn anchored(
     text: &str,
     (x, y): (f64, f64),
@@ -197,7 +199,7 @@ pub(super) fn anchored(
     Primitive::Text { x, y, content: text.to_owned(), size, anchor, rotate, bold: false, color: None }
 }
 
-/// The ticks that are on the axis.
+/// Returns the ticks within the range of the axis.
 fn within(axis: &Axis) -> impl Iterator<Item = (f64, &String)> {
     let (low, high) = axis.range;
     axis.ticks.iter().map(|(tick, text)| (*tick, text)).filter(move |&(tick, _)| low <= tick && tick <= high)
@@ -212,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_within() {
+    fn ticks_are_round_and_within_the_range() {
         let texts = |axis: Axis| axis.ticks.into_iter().map(|(_, text)| text).collect::<Vec<_>>();
         assert_eq!(texts(Axis::of_numbers("", &[0.0, 1.0], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);
         assert_eq!(texts(Axis::of_numbers("", &[3.0, 1210.0], false, None)), ["0", "500", "1000"]);

@@ -1,4 +1,4 @@
-//! How a metric is spread in each group of rows.
+//! Box plots: the distribution of a metric in each group of rows.
 
 use kuva::plot::boxplot::BoxPlot;
 use kuva::plot::scatter::ScatterPlot;
@@ -18,10 +18,10 @@ use crate::frame::{lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
-/// `type: box`: for each value of the column `x`, the algorithm if it is not said, a box of the metric `y`.
+/// `type: box`: a box of the metric `y` for each value of the column `x` [default: `algorithm`].
 ///
-/// A box is the middle half of the values with their median; its whiskers reach to the last value within 1.5 of its
-/// lengths; values beyond are dots.
+/// A box spans the middle half of the values and shows their median. Its whiskers reach to the last value within 1.5
+/// box lengths. Values beyond are dots.
 #[derive(Clone, Debug)]
 pub struct BoxView {
     common: Common,
@@ -41,10 +41,10 @@ impl BoxView {
         })
     }
 
-    /// Draws it.
+    /// Draws the plot.
     ///
     /// # Errors
-    /// If the results have no such columns, or no row has numbers in them.
+    /// If the results lack a column, or no row has a number in `y`.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "x", &self.x, results)?;
         known_column(name, "y", &self.y, results)?;
@@ -54,7 +54,7 @@ impl BoxView {
                 results.rows.iter().filter(|row| at(row, &self.x).as_ref() == Some(key)).collect();
             (self.common.shown(&self.x, key), values(&rows, &self.y))
         };
-        // The first is on top.
+        // Groups are drawn from bottom to top, so the order is reversed.
         let groups: Vec<(String, Vec<f64>)> =
             keys.iter().rev().map(group).filter(|(_, values)| !values.is_empty()).collect();
         if groups.is_empty() {
@@ -89,7 +89,7 @@ impl BoxView {
     }
 }
 
-/// What lies further than 1.5 boxes from its box.
+/// Returns the values further than 1.5 box lengths from the box.
 fn outliers(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

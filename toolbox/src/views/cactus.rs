@@ -1,4 +1,4 @@
-//! How many instances each algorithm solves within a time.
+//! Cactus plots: the number of instances that each algorithm solves within a time.
 
 use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::render::plots::Plot;
@@ -16,9 +16,9 @@ use crate::frame::lacking;
 use crate::results::{RUNTIME, Results, SOLVED};
 use crate::tree::Node;
 
-/// `type: cactus`: a line for each algorithm, which rises by one at the `runtime` of each instance that it solved.
+/// `type: cactus`: a line for each algorithm that rises by one at the `runtime` of each solved instance.
 ///
-/// The axis of times is logarithmic unless `use_log_scale_x` says otherwise; `x` may name another metric.
+/// `x` may name another metric [default: `runtime`]. Its axis is logarithmic unless `use_log_scale_x` is false.
 #[derive(Clone, Debug)]
 pub struct CactusView {
     common: Common,
@@ -37,10 +37,10 @@ impl CactusView {
         })
     }
 
-    /// Draws it.
+    /// Draws the plot.
     ///
     /// # Errors
-    /// If the results have no such metrics, or nothing was solved.
+    /// If the results lack a metric, or no instance was solved.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "x", &self.x, results)?;
         known_column(name, "solved", SOLVED, results)?;
@@ -54,11 +54,11 @@ impl CactusView {
         let all = results.algorithms().into_iter();
         let lines: Vec<_> = all.map(|algorithm| (algorithm.clone(), times(&algorithm))).collect();
         if lines.iter().all(|(_, times)| times.is_empty()) {
-            return Err(Error::request(format!("view `{name}`: no row is solved and has a `{}`", self.x)));
+            return Err(Error::request(format!("view `{name}`: no row is solved and has `{}`", self.x)));
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
         let idle = lines.iter().filter(|(_, times)| times.is_empty());
-        notes.extend(idle.map(|(name, _)| format!("`{name}` solved nothing")));
+        notes.extend(idle.map(|(name, _)| format!("`{name}` solved no instance")));
         Ok(Shown { pictures: vec![self.draw(&lines)], notes, ..Shown::default() })
     }
 

@@ -1,4 +1,4 @@
-//! Two algorithms side by side, instance by instance.
+//! Comparison of two algorithms, instance by instance.
 
 use kuva::plot::line::LinePlot;
 use kuva::plot::scatter::ScatterPlot;
@@ -18,13 +18,13 @@ use crate::results::{Results, Row};
 use crate::six::instance;
 use crate::tree::Node;
 
-/// Metrics of which more is better.
+/// Metrics for which higher is better.
 const MORE_IS_BETTER: [&str; 3] = ["CSR", "ISR", "avg_throughput"];
 
-/// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and who was better.
+/// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and a table of wins.
 ///
-/// `y` is the metric, `SoC` if it is not said. Less of it is better, except of those of which more is, or as `better`
-/// says: `lower` or `higher`. Results without `CSR`, as lifelong ones are, count as solved.
+/// `y` is the metric [default: `SoC`]. `better` is `lower` or `higher` [default: `higher` for `CSR`, `ISR` and
+/// `avg_throughput`, else `lower`]. Results without `CSR`, for example lifelong ones, count as solved.
 #[derive(Clone, Debug)]
 pub struct CompareView {
     common: Common,
@@ -35,15 +35,15 @@ pub struct CompareView {
     is_more_better: bool,
 }
 
-/// How the instances ended that both played.
+/// The outcomes of the instances that both algorithms played.
 #[derive(Clone, Debug, Default)]
 struct Score {
-    /// The figures of both, where both solved the instance.
+    /// The values of both, for instances that both solved.
     both: Vec<(f64, f64)>,
     only_first: usize,
     only_second: usize,
     neither: usize,
-    /// Instances that one of them has not played, or of which it has no figure.
+    /// Number of instances that one of them has not played or lacks a value for.
     alone: usize,
 }
 
@@ -65,10 +65,10 @@ impl CompareView {
         })
     }
 
-    /// Counts and draws.
+    /// Counts the wins and draws the plot.
     ///
     /// # Errors
-    /// If the results have no such metric or algorithms.
+    /// If the results lack the metric or the algorithms.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "y", &self.metric, results)?;
         let pair = self.pair(name, results)?;
@@ -76,10 +76,11 @@ impl CompareView {
         let rows = results.rows.iter().filter(|row| pair.contains(&row.algorithm));
         let mut notes = lacking(rows, std::slice::from_ref(&self.metric));
         if score.alone > 0 {
-            notes.push(format!("{} instances are left out, which only one of the two has", score.alone));
+            notes
+                .push(format!("{} instances are left out because only one of the two has them", score.alone));
         }
         let pictures = if score.both.is_empty() {
-            notes.push(format!("view `{name}`: there is no instance that both solved, and so no picture"));
+            notes.push(format!("view `{name}`: no instance was solved by both, so there is no plot"));
             Vec::new()
         } else {
             vec![self.draw(&pair, &score.both)]
@@ -87,7 +88,7 @@ impl CompareView {
         Ok(Shown { tables: vec![self.table(&pair, &score)], pictures, notes })
     }
 
-    /// The two algorithms; those of the results if there are just two.
+    /// Returns the two algorithms; if none are named and the results have exactly two, those.
     fn pair(&self, name: &str, results: &Results) -> Result<[String; 2], Error> {
         let all = results.algorithms();
         let (first, second) = match (&self.first, &self.second, all.as_slice()) {
@@ -124,7 +125,7 @@ impl CompareView {
         score
     }
 
-    /// Whether a row's figure counts: that of the share of solved ones always does.
+    /// Returns whether a row's value counts: the row is solved, or higher is better by default.
     fn counts(&self, row: &Row) -> bool {
         MORE_IS_BETTER.contains(&self.metric.as_str()) || row.is_solved()
     }
@@ -142,7 +143,7 @@ impl CompareView {
             head: vec![format!("{first} and {second}: {metric}"), "Instances".to_owned()],
             rows: vec![
                 row(format!("{first} is better"), wins),
-                row("both are alike".to_owned(), ties),
+                row("both are equal".to_owned(), ties),
                 row(format!("{second} is better"), losses),
                 row(format!("only {first} solved it"), score.only_first),
                 row(format!("only {second} solved it"), score.only_second),

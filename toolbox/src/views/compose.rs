@@ -1,4 +1,4 @@
-//! Plots as parts of a larger scene.
+//! Combines plots into a larger scene.
 
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
@@ -7,13 +7,13 @@ use kuva::render::render::{Primitive, Scene, render_multiple};
 /// Draws plots without their axes.
 pub(super) fn bare(plots: Vec<Plot>, layout: Layout) -> Scene {
     let mut scene = render_multiple(plots, layout);
-    // The axes come first, and then what is cut off at them.
+    // The axes come first, then the content clipped to them.
     let first = scene.elements.iter().position(|element| matches!(element, Primitive::ClipStart { .. }));
     scene.elements.drain(..first.unwrap_or(0));
     scene
 }
 
-/// A layout of nothing but the plot, from end to end.
+/// Returns a layout without axes or margins, filled by the plot.
 pub(super) fn plain_layout((width, height): (f64, f64), x: (f64, f64), y: (f64, f64)) -> Layout {
     let mut layout = Layout::new(x, y)
         .with_width(width)
@@ -29,7 +29,7 @@ pub(super) fn plain_layout((width, height): (f64, f64), x: (f64, f64), y: (f64, 
     layout
 }
 
-/// Puts one scene into another.
+/// Inserts one scene into another at a position.
 pub(super) fn insert(scene: &mut Scene, part: Scene, (x, y): (f64, f64)) {
     scene.font_family = scene.font_family.take().or(part.font_family);
     scene.defs.extend(part.defs);

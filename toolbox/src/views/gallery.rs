@@ -1,4 +1,4 @@
-//! All views of results: their tables as text, their plots as files.
+//! Shows all views of results: tables as text, plots as files.
 
 use std::path::{Path, PathBuf};
 
@@ -11,43 +11,43 @@ use crate::results::Results;
 use crate::six::Definition;
 use crate::store::SUITE;
 
-/// Views by name, and what holds for all of them.
+/// Views by name, and options for all of them.
 #[derive(Clone, Debug, Default)]
 pub struct Gallery {
     /// The views.
     pub views: Vec<(String, View)>,
-    /// The format of tables, whatever the views say.
+    /// The format of tables; overrides that of the views.
     pub format: Option<Format>,
-    /// The format of plots, whatever the views say.
+    /// The format of plots; overrides that of the views.
     pub kind: Option<ImageFormat>,
-    /// The definition of the six metrics, whatever the views say.
+    /// The definition of the six metrics; overrides that of the views.
     pub definition: Option<Definition>,
-    /// The folder for plots; none are written without one.
+    /// The folder for plots; if `None`, no plots are written.
     pub folder: Option<PathBuf>,
 }
 
 /// The tables of a view as text, and the files of its plots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShownView {
-    /// Its tables with its name above them.
+    /// Its tables, each below the view's name.
     pub tables: Vec<String>,
     /// The files of its plots.
     pub files: Vec<PathBuf>,
-    /// What was left out or looks wrong, a line each.
+    /// Notes on omitted or suspicious data, one line each.
     pub notes: Vec<String>,
 }
 
 impl Gallery {
-    /// The views of a file, by default of the one that is with the results; if names are given, only those.
+    /// Reads the views of a file [default: the file in the folder of results]; if names are given, only those.
     ///
     /// # Errors
-    /// If there is no such file or name, or the file is wrong.
+    /// If there is no such file or name, or the file is invalid.
     pub fn of(folders: &[PathBuf], config: Option<&Path>, names: &[String]) -> Result<Self, Error> {
         let path = config.map_or_else(|| own_config(folders), |path| Ok(path.to_owned()))?;
         let views = read_views(&path)?;
         let known = || views.iter().map(|(name, _)| name.as_str());
         if let Some(name) = names.iter().find(|&name| !known().any(|known| known == name)) {
-            let hint = nearest(name, known()).map(|hint| format!("; the nearest one is `{hint}`"));
+            let hint = nearest(name, known()).map(|hint| format!("; did you mean `{hint}`?"));
             return Err(Error::io(&path, format!("no view `{name}`{}", hint.unwrap_or_default())));
         }
         let is_chosen = |name: &String| names.is_empty() || names.contains(name);
@@ -58,7 +58,7 @@ impl Gallery {
     /// Shows one of the views and writes its plots.
     ///
     /// # Errors
-    /// If it cannot be shown, or a file cannot be written.
+    /// If the view cannot be shown, or a file cannot be written.
     pub fn show(&self, name: &str, view: &View, results: &Results) -> Result<ShownView, Error> {
         let shown = view.show(name, results, self.definition)?;
         let format = self.format.or(view.format()).unwrap_or(Format::Terminal);
@@ -84,7 +84,7 @@ fn heading(name: &str, format: Format) -> String {
     }
 }
 
-/// The YAML file of the first folder that has one.
+/// Returns the YAML file of the first folder that has one.
 fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
     let named = |folder: &PathBuf| {
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.clone());
@@ -106,7 +106,7 @@ fn write(folder: &Path, name: &str, kind: ImageFormat, bytes: &[u8]) -> Result<P
     Ok(path)
 }
 
-/// A view's name with nothing in it that a file's name may not have.
+/// Returns a view's name with `_` for characters that are unsafe in a file name.
 fn file_name(name: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || "-_. ".contains(letter);
     let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();

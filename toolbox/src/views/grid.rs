@@ -1,4 +1,4 @@
-//! A table in one of its formats.
+//! Tables and their text formats.
 
 use comfy_table::{CellAlignment, Table as Drawn, presets};
 use pogema_core::words;
@@ -6,51 +6,51 @@ use pogema_core::words;
 use crate::bootstrap::Estimate;
 
 words! {
-    /// How a table is written.
+    /// The text format of a table.
     pub enum Format {
-        /// With lines around its cells.
+        /// Cells with borders, for a terminal.
         Terminal = "terminal",
-        /// As GitHub reads it.
+        /// GitHub's Markdown.
         Markdown = "markdown",
-        /// With the rules of the package booktabs.
+        /// LaTeX with the rules of the package booktabs.
         Latex = "latex",
-        /// Commas, and a column each for mean, lower end, upper end and number of values.
+        /// Comma-separated values; a mean has a column each for mean, lower end, upper end and number of values.
         Csv = "csv",
     }
 }
 
-/// What stands in a cell.
+/// The content of a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// A text, to the left.
+    /// A text, aligned left.
     Text(String),
-    /// A whole number, to the right.
+    /// A whole number, aligned right.
     Count(usize),
-    /// A figure that leaves no doubt, or nothing where there is none, to the right.
+    /// A number without an interval, aligned right; `None` if missing.
     Number(Option<f64>),
-    /// The same for shares and ratios, with four decimals at least.
+    /// A share or ratio, with at least four decimals, aligned right; `None` if missing.
     Ratio(Option<f64>),
-    /// A mean and its doubt, or nothing where no row had a number.
+    /// A mean and its interval; `None` if no row has a number.
     Mean(Option<Estimate>),
 }
 
-/// A table, whatever its format.
+/// A table, independent of its format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What its columns are called.
+    /// The titles of its columns.
     pub head: Vec<String>,
-    /// Its cells, as many in each row as there are columns.
+    /// Its cells; each row has one per column.
     pub rows: Vec<Vec<Cell>>,
     /// Number of decimals.
     pub digits: usize,
-    /// Whether an interval of no length is left out.
+    /// Whether an interval of length zero is left out.
     pub skips_zero: bool,
-    /// What has to be known to read it, in one line.
+    /// An explanation of the table, in one line.
     pub remark: Option<String>,
 }
 
 impl Table {
-    /// The whole text, without a line break at its end.
+    /// Returns the text of the table, without a line break at its end.
     pub fn text(&self, format: Format) -> String {
         match format {
             Format::Terminal => self.drawn(presets::UTF8_FULL_CONDENSED, str::to_owned),
@@ -75,12 +75,12 @@ impl Table {
         format!("{table}{}", self.remark.as_ref().map(|remark| format!("{gap}{remark}")).unwrap_or_default())
     }
 
-    /// The texts of all cells.
+    /// Returns the texts of all cells.
     pub fn texts(&self) -> Vec<Vec<String>> {
         self.rows.iter().map(|row| row.iter().map(|cell| self.shown(cell)).collect()).collect()
     }
 
-    /// Whether a column holds figures.
+    /// Returns whether a column holds numbers.
     pub fn is_figure(&self, column: usize) -> bool {
         self.rows.iter().any(|row| !matches!(row.get(column), Some(Cell::Text(_)) | None))
     }
@@ -96,7 +96,7 @@ impl Table {
         }
     }
 
-    /// The mean, and half its interval if there is one to show.
+    /// Returns the text of the mean, and that of half its interval if it is shown.
     fn parts(&self, estimate: &Estimate) -> Vec<String> {
         let half = estimate.half().filter(|&half| !(self.skips_zero && half == 0.0));
         let numbers = [Some(estimate.mean), half];
@@ -129,7 +129,7 @@ impl Table {
         let rows = self.rows.iter().map(|row| row.iter().flat_map(csv_cells).collect::<Vec<_>>());
         let mut writer = csv::Writer::from_writer(Vec::new());
         for record in std::iter::once(head.collect()).chain(rows) {
-            // A vector takes all that is written, and all rows are of one length.
+            // Writing to a vector cannot fail, and all rows have the same length.
             let _ = writer.write_record(&record);
         }
         let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
@@ -153,7 +153,7 @@ fn csv_cells(cell: &Cell) -> Vec<String> {
     }
 }
 
-/// A text in which nothing is a command of LaTeX.
+/// Escapes the special characters of LaTeX in a text.
 fn latex_text(text: &str) -> String {
     let mut escaped = String::new();
     for letter in text.chars() {
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_says_the_same_in_every_format() {
+    fn every_format_has_the_same_content() {
         let lines = |format| table().text(format).lines().map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(lines(Format::Markdown)[2], "| a\\|b     | 2.12 ± 0.50 |");
         assert_eq!(lines(Format::Terminal)[4], "│ c        ┆        7.00 │");
@@ -201,8 +201,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_rounded_as_python_does() {
-        // f"{179.825:.2f}" and f"{755.975:.2f}", of which the first lies below and the second above what is written.
+    fn numbers_are_rounded_as_in_python() {
+        // f"{179.825:.2f}" and f"{755.975:.2f}": as doubles, the first is below and the second above its decimal text.
         let shown = |mean| table().shown(&Cell::Mean(Some(Estimate { mean, interval: None, count: 1 })));
         assert_eq!([shown(179.825), shown(755.975), shown(0.125)], ["179.82", "755.98", "0.12"]);
     }

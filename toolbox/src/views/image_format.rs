@@ -3,15 +3,15 @@
 use pogema_core::words;
 
 words! {
-    /// The format of a picture, whose word is the extension of its files.
+    /// The format of a picture; its keyword is the file extension.
     #[derive(Default)]
     pub enum ImageFormat {
-        /// Lines and letters, for the web.
+        /// Vector graphics for the web.
         Svg = "svg",
-        /// Lines and letters with their font, for papers.
+        /// Vector graphics with embedded font, for papers.
         #[default]
         Pdf = "pdf",
-        /// Dots.
+        /// Pixels.
         Png = "png",
     }
 }

@@ -1,4 +1,4 @@
-//! Which line is whose.
+//! Legends of plots.
 
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
@@ -6,16 +6,16 @@ use kuva::render::render::{Primitive, Scene, TextAnchor};
 use super::axes::{anchored, text, text_width};
 use super::compose::{bare, insert, plain_layout};
 
-/// Height of a line in heights of the font.
+/// Line height, relative to the font size.
 const LINE: f64 = 1.5;
 
-/// How much of a line is its sign, and space beside it. Units: points.
+/// Width of a line's sign and the space next to it. Units: points.
 const SIGN: f64 = 26.0;
 
 /// One line of a legend.
 pub(super) struct Entry {
     pub label: String,
-    /// What is drawn beside it, in a square from 0 to 1.
+    /// What is drawn next to the label, in a square from 0 to 1.
     pub sign: Vec<Plot>,
 }
 
@@ -41,7 +41,7 @@ impl Legend {
         self.columns.clamp(1, self.entries.len().max(1))
     }
 
-    /// How wide and how high it is.
+    /// Returns its width and height.
     pub fn size(&self) -> (f64, f64) {
         let lines = self.entries.len().div_ceil(self.num_columns()) + usize::from(self.title.is_some());
         let title = self.title.as_ref().map_or(0.0, |title| text_width(title, self.font_size) + 6.0);
@@ -49,7 +49,7 @@ impl Legend {
         (width, lines as f64 * self.line_height() + 4.0)
     }
 
-    /// Draws it with its upper left corner at a place.
+    /// Draws it with its upper left corner at a position.
     pub fn draw(self, scene: &mut Scene, (left, top): (f64, f64), has_box: bool) {
         let (width, height) = self.size();
         if has_box {

@@ -1,4 +1,4 @@
-//! Published means, read from a file with commas.
+//! Published means, read from a CSV file.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -7,37 +7,39 @@ use pogema_core::Error;
 use pogema_maps::files::read_text;
 use pogema_maps::nearest;
 
-/// The columns that say what a row is about.
+/// The columns that identify a row.
 const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", "num_agents"];
 
-/// A file of means, with a row for each setting, dataset, algorithm and number of agents.
+/// The content of a file of means, with a row for each setting, dataset, algorithm and number of agents.
 pub(super) struct Means {
     path: PathBuf,
-    /// The text of each column by its name.
+    /// The text of each column by its name, row by row.
     rows: Vec<HashMap<String, String>>,
 }
 
 impl Means {
-    /// Reads a file that has a column for each metric, with numbers or nothing in it.
+    /// Reads a file that has a column for each metric, with numbers or empty cells.
     ///
     /// # Errors
-    /// One line with the file, the line and the column of what is wrong.
+    /// One line with the file, the line and the column of the error.
     pub fn read(path: &Path, metrics: &[String]) -> Result<Self, Error> {
         let text = read_text(path)?;
         let failed = |error: csv::Error| Error::io(path, error);
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let head = reader.headers().map_err(failed)?.clone();
-        let wanted = || metrics.iter().map(String::as_str);
-        if let Some(name) = KEYS.into_iter().chain(wanted()).find(|name| !head.iter().any(|one| one == *name))
+        let metrics = || metrics.iter().map(String::as_str);
+        if let Some(name) =
+            KEYS.into_iter().chain(metrics()).find(|name| !head.iter().any(|one| one == *name))
         {
             let hint = nearest(name, &head).unwrap_or_default();
-            return Err(Error::io(path, format!("no column `{name}`; the nearest one is `{hint}`")));
+            return Err(Error::io(path, format!("no column `{name}`; did you mean `{hint}`?")));
         }
         let mut rows = Vec::new();
         for record in reader.records() {
             let record = record.map_err(failed)?;
             let row: HashMap<String, String> = record.deserialize(Some(&head)).map_err(failed)?;
-            if let Some(name) = wanted().find(|&name| !row[name].is_empty() && number(&row[name]).is_none()) {
+            if let Some(name) = metrics().find(|&name| !row[name].is_empty() && number(&row[name]).is_none())
+            {
                 let (line, found) = (record.position().map_or(0, csv::Position::line), &row[name]);
                 let reason = format!("line {line}: `{name}` is `{found}`, expected a number or nothing");
                 return Err(Error::io(path, reason));
@@ -55,20 +57,20 @@ impl Means {
         metric: &str,
     ) -> Option<f64> {
         let keys = [setting, dataset, algorithm, &num_agents.to_string()];
-        let is_meant = |row: &&HashMap<_, _>| KEYS.iter().zip(keys).all(|(column, key)| row[*column] == key);
-        number(self.rows.iter().find(is_meant)?.get(metric)?)
+        let matches = |row: &&HashMap<_, _>| KEYS.iter().zip(keys).all(|(column, key)| row[*column] == key);
+        number(self.rows.iter().find(matches)?.get(metric)?)
     }
 
-    /// Passes if there are rows of a setting, a dataset and an algorithm.
+    /// Checks that there are rows of a setting, a dataset and an algorithm.
     ///
     /// # Errors
-    /// Names the first of the three that is unknown, and the nearest known value.
+    /// One line with the first of the three that is unknown, and the nearest known value.
     pub fn check(&self, view: &str, keys: [&str; 3]) -> Result<(), Error> {
         let mut rows: Vec<_> = self.rows.iter().collect();
         for (place, (column, key)) in KEYS.into_iter().zip(keys).enumerate() {
             let known: Vec<&str> = rows.iter().map(|row| row[column].as_str()).collect();
             if !known.contains(&key) {
-                let hint = nearest(key, known).map(|hint| format!("; the nearest one is `{hint}`"));
+                let hint = nearest(key, known).map(|hint| format!("; did you mean `{hint}`?"));
                 let (hint, path) = (hint.unwrap_or_default(), self.path.display());
                 let of = if place == 0 { String::new() } else { format!(" of {}", keys[..place].join(", ")) };
                 let reason = format!("view `{view}`: `{path}` has no {column} `{key}`{of}{hint}");

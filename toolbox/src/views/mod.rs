@@ -1,6 +1,6 @@
-//! Tables and plots of results, as a file of views asks for them.
+//! Tables and plots of results, as described by a file of views.
 //!
-//! A [`Gallery`] shows all views of a file; [`View::show`] makes of [`Results`] what one view asks for.
+//! A [`Gallery`] shows all views of a file; [`View::show`] shows [`Results`] in one view.
 
 mod axes;
 mod boxes;
@@ -49,14 +49,14 @@ use crate::store::SUITE;
 use crate::suite::{in_file, wrong};
 use crate::tree::Node;
 
-/// The field of a file that has the views by name.
+/// The field of a file that holds the views by name.
 const VIEWS: &str = "results_views";
 
 /// The types of views.
 const TYPES: [&str; 9] =
     ["tabular", "plot", "multi-plot", "radar", "box", "cactus", "compare", "seeds", "published"];
 
-/// One way to look at results.
+/// One view of results.
 #[derive(Clone, Debug)]
 pub enum View {
     /// `type: tabular`
@@ -77,21 +77,21 @@ pub enum View {
     Published(Box<PublishedView>),
 }
 
-/// What a view shows.
+/// The output of a view.
 #[derive(Debug, Default)]
 pub struct Shown {
     /// Its tables.
     pub tables: Vec<Table>,
     /// Its plots.
     pub pictures: Vec<Picture>,
-    /// What was left out or looks wrong, a line each.
+    /// Notes on omitted or suspicious data, one line each.
     pub notes: Vec<String>,
 }
 
-/// Reads the views of a file, whatever else is in it.
+/// Reads the views of a file and ignores its other fields.
 ///
 /// # Errors
-/// One line with the file, the line and the key of what is wrong.
+/// One line with the file, the line and the key of the error.
 pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
     let in_file = |error: Error| in_file(path, error);
@@ -100,7 +100,7 @@ pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
         return Err(Error::io(path, format!("expected a field `{VIEWS}`")));
     };
     let fields = node.fields().ok_or_else(|| in_file(wrong(node, VIEWS, "names and their fields")))?;
-    // What the suite of results names lies beside the file that it was copied from.
+    // In the suite saved with results, paths are relative to the folder of the original file.
     let copied = if path.file_name().is_some_and(|name| name == SUITE) { path.parent() } else { None };
     let original = copied.and_then(|folder| Manifest::read(folder).ok().flatten()).map(|known| known.suite);
     let origin = original.as_deref().unwrap_or(path);
@@ -109,10 +109,10 @@ pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
 }
 
 impl View {
-    /// Reads a view's fields.
+    /// Reads a view from its fields.
     ///
     /// # Errors
-    /// One line with the line and the key of what is wrong.
+    /// One line with the line and the key of the error.
     pub fn read(name: &str, node: &Node) -> Result<Self, Error> {
         let kind = node.field("type").ok_or_else(|| wrong(node, name, "a field `type`"))?;
         match kind.text().unwrap_or_default() {
@@ -129,13 +129,13 @@ impl View {
             other => {
                 let hint = nearest(other, TYPES).unwrap_or_default();
                 let types = TYPES.join(", ");
-                let expected = format!("one of {types} (such as `{hint}`), found `{other}`");
+                let expected = format!("one of {types} (did you mean `{hint}`?), found `{other}`");
                 Err(wrong(kind, &format!("{name}.type"), &expected))
             }
         }
     }
 
-    /// Takes the paths of files that it names as relative to the folder of the file that holds it.
+    /// Resolves its paths relative to the folder of the file that holds it.
     #[must_use]
     pub fn beside(mut self, file: &Path) -> Self {
         if let Self::Published(view) = &mut self {
@@ -144,7 +144,7 @@ impl View {
         self
     }
 
-    /// The format of its tables, if it asks for one.
+    /// Returns the format of its tables, if it has tables with a format.
     pub fn format(&self) -> Option<Format> {
         match self {
             Self::Table(view) => Some(view.format),
@@ -152,12 +152,12 @@ impl View {
         }
     }
 
-    /// Makes what it shows; its name is for messages.
+    /// Makes the tables and plots; the name is for messages.
     ///
-    /// A definition of the six metrics that is given has precedence over that of a radar view.
+    /// If `definition` is given, it overrides that of a radar view.
     ///
     /// # Errors
-    /// If the results do not have what it needs.
+    /// If the results lack data that the view needs.
     pub fn show(
         &self,
         name: &str,
@@ -177,7 +177,7 @@ impl View {
     }
 }
 
-/// Passes if the results have a column.
+/// Checks that the results have a column.
 fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Result<(), Error> {
     let columns: Vec<String> = results.key_columns().into_iter().chain(results.metric_columns()).collect();
     if columns.iter().any(|known| known == column) {
@@ -186,9 +186,9 @@ fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Resul
     Err(named(view, key, column, columns.iter().map(String::as_str)))
 }
 
-/// An error about an option that names no column of the results.
+/// Returns an error about an option whose column the results lack.
 fn named<'a>(view: &str, key: &str, column: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
-    let hint = nearest(column, known).map(|hint| format!("; the nearest column is `{hint}`"));
+    let hint = nearest(column, known).map(|hint| format!("; did you mean `{hint}`?"));
     let hint = hint.unwrap_or_default();
     Error::request(format!("view `{view}`: `{key}` is `{column}`, expected a column of the results{hint}"))
 }

@@ -1,4 +1,4 @@
-//! The options of a view, read with their places.
+//! Reads the options of a view.
 
 use pogema_core::{Error, Words};
 use pogema_maps::nearest;
@@ -13,7 +13,7 @@ use crate::tree::Node;
 const COMMON: [&str; 6] =
     ["type", "drop_keys", "round_digits", "rename_fields", "rename_algorithms", "sort_by"];
 
-/// What columns are called where a view does not say.
+/// Default titles of columns.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
 const TITLES: [(&str, &str); 5] = [
@@ -31,18 +31,18 @@ pub(super) struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// Takes a view's fields if they are all known.
+    /// Wraps a view's fields if all of them are known.
     pub fn new(view: &'a str, node: &'a Node, known: &[&str]) -> Result<Self, Error> {
         check_keys(node, &format!("view `{view}`"), &COMMON, known)?;
         Ok(Self { node, view })
     }
 
-    /// A field that is there and not null.
+    /// Returns a field that is present and not null.
     fn field(&self, key: &str) -> Option<&'a Node> {
         self.node.field(key).filter(|node| !node.value().is_null())
     }
 
-    /// A field's value as `read` understands it.
+    /// Reads a field's value with `read`.
     fn read<T>(
         &self,
         key: &str,
@@ -53,7 +53,7 @@ impl<'a> Options<'a> {
         read(node).map(Some).ok_or_else(|| self.wrong(node, key, expected))
     }
 
-    /// An error about a field that should be something else.
+    /// Returns an error about a field with the expected and the found value.
     fn wrong(&self, node: &Node, key: &str, expected: &str) -> Error {
         let found = node.value().to_string();
         let found = pogema_core::shorten(&found, Error::LONGEST_QUOTE);
@@ -64,24 +64,24 @@ impl<'a> Options<'a> {
         self.read(key, "a text", |node| node.text().map(str::to_owned))
     }
 
-    /// A text that there has to be.
+    /// Reads a required text.
     pub fn required(&self, key: &str) -> Result<String, Error> {
         let missing = || wrong(self.node, self.view, &format!("a field `{key}`"));
         self.text(key)?.ok_or_else(missing)
     }
 
-    /// One of some words.
+    /// Reads one of some keywords.
     pub fn choice(&self, key: &str, words: &[&'static str]) -> Result<Option<&'static str>, Error> {
         let Some(node) = self.field(key) else { return Ok(None) };
         let given = node.text().unwrap_or_default();
         let found = words.iter().copied().find(|&word| word == given);
         found.map(Some).ok_or_else(|| {
             let hint = nearest(given, words.iter().copied()).unwrap_or_default();
-            self.wrong(node, key, &format!("one of {} (such as `{hint}`)", words.join(", ")))
+            self.wrong(node, key, &format!("one of {} (did you mean `{hint}`?)", words.join(", ")))
         })
     }
 
-    /// A word of an enum.
+    /// Reads a keyword of an enum.
     pub fn word<T: Words>(&self, key: &str) -> Result<Option<T>, Error> {
         Ok(self.choice(key, T::NAMES)?.and_then(T::of_word))
     }
@@ -90,26 +90,26 @@ impl<'a> Options<'a> {
         self.read(key, "True or False", |node| node.value().as_bool())
     }
 
-    /// A number above zero.
+    /// Reads a number above zero.
     pub fn size(&self, key: &str) -> Result<Option<f64>, Error> {
         let above_zero = |node: &Node| node.value().as_f64().filter(|&number| number > 0.0 && number < 1e4);
         self.read(key, "a number above 0", above_zero)
     }
 
-    /// A whole number from zero up to a bound.
+    /// Reads a whole number from zero to a bound, included.
     pub fn whole(&self, key: &str, most: u64) -> Result<Option<usize>, Error> {
         let within = |node: &Node| node.value().as_u64().filter(|&number| number <= most);
         Ok(self.read(key, &format!("a whole number from 0 to {most}"), within)?.map(|number| number as usize))
     }
 
-    /// A list of numbers.
+    /// Reads a list of numbers.
     pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, Error> {
         self.read(key, "a list of numbers", |node| {
             node.list()?.iter().map(|node| node.value().as_f64()).collect()
         })
     }
 
-    /// A text or a list of texts.
+    /// Reads a text or a list of texts.
     pub fn words(&self, key: &str) -> Result<Option<Vec<String>>, Error> {
         self.read(key, "a text or a list of texts", |node| match node.text() {
             Some(text) => Some(vec![text.to_owned()]),
@@ -117,7 +117,7 @@ impl<'a> Options<'a> {
         })
     }
 
-    /// Texts by name.
+    /// Reads texts by name.
     pub fn names(&self, key: &str) -> Result<Option<Vec<(String, String)>>, Error> {
         self.read(key, "names and texts", |node| {
             let name = |(key, node): &(String, Node)| Some((key.clone(), node.text()?.to_owned()));
@@ -125,18 +125,18 @@ impl<'a> Options<'a> {
         })
     }
 
-    /// A list of values of any kind, such as `[ci, 95]`.
+    /// Reads a list of values of any kind, such as `[ci, 95]`.
     pub fn values(&self, key: &str) -> Result<Option<Vec<Value>>, Error> {
         self.read(key, "a list", |node| Some(node.list()?.iter().map(Node::value).collect()))
     }
 
-    /// An error about a field, wherever it is.
+    /// Returns an error about a field, or about the view if the field is missing.
     pub fn refuse(&self, key: &str, expected: &str) -> Error {
         self.wrong(self.field(key).unwrap_or(self.node), key, expected)
     }
 }
 
-/// What every view may say.
+/// The options common to all views.
 #[derive(Clone, Debug)]
 pub(super) struct Common {
     pub drop_keys: Vec<String>,
@@ -158,17 +158,17 @@ impl Common {
         })
     }
 
-    /// What a column is called.
+    /// Returns the title of a column.
     pub fn title(&self, column: &str) -> String {
         renamed(&self.titles, column)
     }
 
-    /// What an algorithm is called.
+    /// Returns the display name of an algorithm.
     pub fn algorithm(&self, name: &str) -> String {
         renamed(&self.algorithms, name)
     }
 
-    /// What stands in a column, for people.
+    /// Formats a value in a column for display.
     pub fn shown(&self, column: &str, value: &Value) -> String {
         let text = crate::frame::shown(value);
         if column == crate::results::ALGORITHM { self.algorithm(&text) } else { text }

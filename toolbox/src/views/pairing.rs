@@ -14,7 +14,7 @@ pub(super) struct Pairing<'a> {
 }
 
 impl<'a> Pairing<'a> {
-    /// Pairs rows with the same key; of rows of one algorithm with the same key, the last one counts.
+    /// Pairs rows with the same key. If several rows of one algorithm have the same key, the last one counts.
     pub fn of(
         first: impl IntoIterator<Item = &'a Row>,
         second: impl IntoIterator<Item = &'a Row>,

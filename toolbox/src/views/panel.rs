@@ -1,4 +1,4 @@
-//! One plot with its axes, and the place of its legend.
+//! Draws one plot with its axes, and places its legend.
 
 use kuva::render::layout::ComputedLayout;
 use kuva::render::plots::Plot;
@@ -7,10 +7,10 @@ use kuva::render::render::{Scene, render_multiple};
 use super::axes::Frame;
 use super::legend::Legend;
 
-/// Space between a legend and what is around it. Units: points.
+/// Space around a legend. Units: points.
 const GAP: f64 = 4.0;
 
-/// Where a legend is put if there is room, the first choice first.
+/// Preferred places of a legend, first choice first.
 const CORNERS: [&str; 7] =
     ["upper right", "upper left", "lower left", "lower right", "center right", "center left", "lower center"];
 
@@ -21,7 +21,9 @@ pub(super) fn framed(plots: Vec<Plot>, frame: &Frame) -> Scene {
     scene
 }
 
-/// Draws a legend where it was asked for; if that is left to us, where no line is, or else beside the plot.
+/// Draws a legend at the requested place.
+///
+/// Without a request, or with `best`, draws it where it covers no line; if there is no such place, next to the plot.
 pub(super) fn place_legend(
     mut scene: Scene,
     frame: &Frame,
@@ -52,7 +54,7 @@ pub(super) fn place_legend(
     scene
 }
 
-/// Where in a plot the upper left corner of a legend may be.
+/// The range of positions of a legend's upper left corner within a plot.
 struct Room {
     left: f64,
     right: f64,
@@ -88,7 +90,7 @@ impl Room {
         (x, y)
     }
 
-    /// Whether a legend is within the plot and away from its lines.
+    /// Returns whether a legend is within the plot and away from its lines.
     fn is_free(&self, (x, y): (f64, f64), lines: &[Vec<(f64, f64)>]) -> bool {
         let is_inside = self.left <= self.right && self.top <= self.bottom;
         let size = (self.size.0 + 2.0 * GAP, self.size.1 + 2.0 * GAP);
@@ -96,7 +98,7 @@ impl Room {
     }
 }
 
-/// Whether a line comes into a rectangle, as far as points close together tell.
+/// Returns whether a line enters a rectangle, tested at closely spaced points.
 fn crosses(line: &[(f64, f64)], (left, top): (f64, f64), (width, height): (f64, f64)) -> bool {
     let is_within = |(x, y): (f64, f64)| x >= left && x <= left + width && y >= top && y <= top + height;
     let between = |(one, other): (&(f64, f64), &(f64, f64))| {

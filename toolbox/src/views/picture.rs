@@ -1,4 +1,4 @@
-//! A drawn plot, in one of the formats of pictures.
+//! Drawn plots, and their image files.
 
 use std::fmt;
 
@@ -9,52 +9,54 @@ use pogema_core::Error;
 use super::image_format::ImageFormat;
 use super::style::{INCH, Style};
 
-/// A picture of dots may have so many, 4 bytes each.
-const MOST_DOTS: f64 = 2e8;
+/// Maximum number of pixels of an image, 4 bytes each.
+const MOST_PIXELS: f64 = 2e8;
 
 /// A drawn plot.
 pub struct Picture {
-    /// What is drawn, in points.
+    /// The drawing. Units: points.
     scene: Scene,
-    /// Dots in an inch, where it is drawn with dots.
+    /// Resolution of formats with pixels.
     dots_per_inch: f64,
-    /// The format that its view asks for.
+    /// The format that its view requests.
     pub kind: ImageFormat,
 }
 
 impl Picture {
-    /// A scene as a view's options want it.
+    /// Creates a picture of a scene with a view's style.
     pub(super) fn new(mut scene: Scene, style: &Style) -> Self {
         scene.background_color = Some(style.background.clone());
         Self { scene, dots_per_inch: style.dots_per_inch, kind: style.kind }
     }
 
-    /// The file's content.
+    /// Returns the content of the image file.
     ///
     /// # Errors
-    /// If it is too large, or the library cannot write it.
+    /// If the image is too large, or the library cannot write it.
     pub fn bytes(&self, kind: ImageFormat) -> Result<Vec<u8>, Error> {
-        let told = |reason: String| Error::external("plot", reason);
+        let failed = |reason: String| Error::external("plot", reason);
         match kind {
             ImageFormat::Svg => Ok(SvgBackend::new().render_scene(&self.scene).into_bytes()),
-            ImageFormat::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(told),
+            ImageFormat::Pdf => PdfBackend::new().render_scene(&self.scene).map_err(failed),
             ImageFormat::Png => {
                 let scale = (self.dots_per_inch / INCH) as f32;
-                let dots = self.scene.width * self.scene.height * f64::from(scale).powi(2);
-                if dots > MOST_DOTS {
-                    return Err(told(format!("`{dots:.0}` dots, expected at most {MOST_DOTS:.0}")));
+                let pixels = self.scene.width * self.scene.height * f64::from(scale).powi(2);
+                if pixels > MOST_PIXELS {
+                    return Err(failed(format!("`{pixels:.0}` pixels, expected at most {MOST_PIXELS:.0}")));
                 }
                 PngBackend::new()
                     .with_scale(scale)
                     .render_scene(&with_dashes(&self.scene, scale))
-                    .map_err(told)
+                    .map_err(failed)
             }
         }
     }
 }
 
-/// The scene as the library draws it with dots: there it leaves out the dashes of lines of more than two points, and
-/// does not enlarge those of others.
+/// Returns a scene whose dashes the library draws in formats with pixels.
+///
+/// In these formats, the library ignores the dashes of lines of more than two points and does not scale other dashes.
+/// So such lines are split into pieces with scaled dashes.
 fn with_dashes(scene: &Scene, scale: f32) -> Scene {
     let mut copy = Scene::new(scene.width, scene.height);
     copy.background_color.clone_from(&scene.background_color);

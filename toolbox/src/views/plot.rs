@@ -1,4 +1,4 @@
-//! Plots of means, one or several.
+//! Plots of means, with one or several panels.
 
 use kuva::render::render::Scene;
 use pogema_core::Error;
@@ -18,9 +18,10 @@ use crate::frame::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
-/// `type: plot` and `type: multi-plot`: the mean of a metric over what was varied, a line for each algorithm.
+/// `type: plot` and `type: multi-plot`: the mean of a metric over a varied field, with a line for each algorithm.
 ///
-/// Around each line is the interval of its means. A `multi-plot` has one panel for each value of the column `over`.
+/// A band around each line shows the interval of its means. A `multi-plot` has one panel for each value of the column
+/// `over`.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_plot.py`, `view_multi_plot.py`
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ pub struct PlotView {
     panels: Option<Panels>,
 }
 
-/// What a plot of several panels says beyond one of one.
+/// The options of a plot with several panels.
 #[derive(Clone, Debug)]
 struct Panels {
     over: String,
@@ -67,10 +68,10 @@ impl PlotView {
         })
     }
 
-    /// Draws it.
+    /// Draws the plot.
     ///
     /// # Errors
-    /// If the results have no such columns, or no row has numbers in them.
+    /// If the results lack a column, or no row has values in both `x` and `y`.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         let over = self.panels.as_ref().map(|panels| ("over", &panels.over));
         for (key, column) in [("x", &self.x), ("y", &self.y), ("by", &self.by)].into_iter().chain(over) {
@@ -104,7 +105,7 @@ impl PlotView {
         Ok(Shown { pictures: vec![picture], notes, ..Shown::default() })
     }
 
-    /// What tells lines apart, in the order of their colours, and a note on what has none.
+    /// Returns the values that have a line, in the order of their colours, and notes on values without a line.
     fn lines(&self, results: &Results) -> (Vec<Value>, Vec<String>) {
         let found = distinct(&results.rows, &self.by);
         let Some(order) = &self.style.order else { return (found, Vec::new()) };
@@ -120,7 +121,7 @@ impl PlotView {
         (ordered, notes)
     }
 
-    /// The rows of each panel.
+    /// Returns the rows of each panel.
     fn contents<'a>(&self, results: &'a Results) -> Vec<Content<'a>> {
         let Some(panels) = &self.panels else {
             let title = self.style.title().map(str::to_owned);
@@ -190,7 +191,7 @@ impl PlotView {
         }
     }
 
-    /// Panels side by side, and the legend below them, or above if it was asked for there.
+    /// Arranges panels in a grid, with the legend below, or above if `legend_loc` is at the top.
     fn grid(&self, parts: Vec<Scene>, columns: usize, mut legend: Legend) -> Scene {
         let columns = columns.min(parts.len()).max(1);
         let total = self.style.width * columns as f64;
@@ -221,7 +222,7 @@ impl PlotView {
         scene
     }
 
-    /// What has to be known to read the picture.
+    /// Returns notes that explain the plot.
     fn remarks(&self, name: &str, contents: &[Content<'_>]) -> Vec<String> {
         let mut points =
             contents.iter().flat_map(|content| &content.series).flat_map(|series| &series.points);
@@ -229,9 +230,8 @@ impl PlotView {
             let low = found.interval.map_or(found.mean, |(low, _)| low);
             (self.style.log_x && *x <= 0.0) || (self.style.log_y && low <= 0.0)
         });
-        let linear = is_linear.then(|| {
-            format!("view `{name}`: an axis with values not above 0 cannot be logarithmic, and is not")
-        });
+        let linear = is_linear
+            .then(|| format!("view `{name}`: an axis with values of 0 or less is linear, not logarithmic"));
         let bands = match self.spread {
             Spread::Bootstrap { level } => Some(format!(
                 "view `{name}`: bands are {level} % intervals of the means of {RESAMPLES} samples with replacement"
@@ -254,7 +254,7 @@ impl Panels {
     }
 }
 
-/// Marked where the data is, unless that is in too many places, or the view says where.
+/// Creates the horizontal axis, with the view's ticks, or at the data if there are at most 16 distinct values.
 fn x_axis(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Axis {
     let mut distinct = values.to_vec();
     distinct.sort_by(f64::total_cmp);
@@ -263,7 +263,7 @@ fn x_axis(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> A
     Axis::of_numbers(title, values, is_log, ticks.or(own))
 }
 
-/// What `error_bar` asks for, such as `[ci, 95]`.
+/// Reads `error_bar`, such as `[ci, 95]` [default: `[ci, 95]`].
 fn spread(options: &Options<'_>) -> Result<Spread, Error> {
     let Some(values) = options.values("error_bar")? else { return Ok(Spread::Bootstrap { level: 95.0 }) };
     let level = values.get(1).and_then(Value::as_f64).filter(|&level| level > 0.0);
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn every_format_is_written_and_every_lack_told() {
+    fn every_format_is_written_and_missing_values_are_noted() {
         let shown = show("{type: plot, x: num_agents, y: SoC, name: One, extension: svg}").unwrap();
         let picture = &shown.pictures[0];
         assert_eq!(picture.kind, ImageFormat::Svg);
@@ -307,7 +307,7 @@ mod tests {
         for text in [">One<", ">Number of Agents<", ">SoC<", ">A<"] {
             assert!(svg.contains(text), "{text}: {svg}");
         }
-        // What has no numbers has no line.
+        // An algorithm without numbers has no line.
         assert!(!svg.contains("B &"), "{svg}");
         assert!(picture.bytes(ImageFormat::Pdf).unwrap().starts_with(b"%PDF"));
         assert!(picture.bytes(ImageFormat::Png).unwrap().starts_with(b"\x89PNG"));
@@ -315,26 +315,28 @@ mod tests {
     }
 
     #[test]
-    fn there_are_as_many_panels_as_values() {
+    fn each_value_has_a_panel() {
         let shown = show("{type: multi-plot, x: num_agents, y: SoC, over: num_agents, num_cols: 2}").unwrap();
         let svg = String::from_utf8(shown.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap();
         assert_eq!(svg.matches(">SoC<").count(), 3);
     }
 
     #[test]
-    fn without_data_there_is_a_message_and_no_picture() {
-        let told = |fields: &str| show(fields).unwrap_err();
-        assert!(told("{type: plot, x: num_agent, y: SoC}").contains("the nearest column is `num_agents`"));
-        assert!(told("{type: plot, y: SoC}").contains("expected a field `x`"));
+    fn missing_data_and_invalid_options_are_rejected() {
+        let error_of = |fields: &str| show(fields).unwrap_err();
+        assert!(error_of("{type: plot, x: num_agent, y: SoC}").contains("did you mean `num_agents`?"));
+        assert!(error_of("{type: plot, y: SoC}").contains("expected a field `x`"));
         assert!(
-            told("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
+            error_of("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
                 .contains("no row has numbers")
         );
         assert!(
-            told("{type: plot, x: num_agents, y: SoC, width: -1}")
+            error_of("{type: plot, x: num_agents, y: SoC, width: -1}")
                 .contains("expected a number above 0, found `-1`")
         );
-        assert!(told("{type: plot, x: num_agents, y: SoC, palette: [\"#12\"]}").contains("expected colours"));
-        assert!(told("{type: plot, x: num_agents, y: SoC, over: seed}").contains("unknown key `over`"));
+        assert!(
+            error_of("{type: plot, x: num_agents, y: SoC, palette: [\"#12\"]}").contains("expected colours")
+        );
+        assert!(error_of("{type: plot, x: num_agents, y: SoC, over: seed}").contains("unknown key `over`"));
     }
 }

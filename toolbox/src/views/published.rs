@@ -1,4 +1,4 @@
-//! Results beside published ones.
+//! Comparison of results with published ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,17 +18,18 @@ use crate::results::{RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
 
-/// The metric that is compared on solved instances alone.
+/// The metric that is compared only on solved instances.
 const COST: &str = "SoC";
 
 /// The column of the number of agents.
 const NUM_AGENTS: &str = "num_agents";
 
-/// `type: published`: means beside published means, a row for each folder and number of agents.
+/// `type: published`: means next to published means, with a row for each folder and number of agents.
 ///
-/// `file` has the published means of a `setting`, a `dataset` (by default the name of the folder of results) and an
-/// `algorithm`, beside which stands `ours`. `episodes` is a folder with a folder of published results for each dataset.
-/// With it, sums of costs are compared on the instances that both solve; without it, only where both solve all.
+/// `file` holds the published means of a `setting`, a `dataset` [default: the name of the folder of results] and an
+/// `algorithm`, which is compared with the algorithm `ours` of the results. `episodes` is a folder with a folder of
+/// published results for each dataset. With it, sums of costs are compared on the instances that both solve; without
+/// it, only if both solve all instances.
 #[derive(Clone, Debug)]
 pub struct PublishedView {
     common: Common,
@@ -41,20 +42,20 @@ pub struct PublishedView {
     metrics: Vec<String>,
 }
 
-/// A row of the table before it is text.
+/// A row of the table before it is formatted.
 struct Line<'a> {
     folder: &'a str,
     num_agents: u64,
     rows: Vec<&'a Row>,
-    /// In the order of the metrics.
+    /// The figures in the order of the metrics.
     figures: Vec<Figure>,
 }
 
-/// The mean of one metric beside the published one.
+/// The mean of one metric, and the published one.
 struct Figure {
     ours: Option<f64>,
     published: Option<f64>,
-    /// A lower bound on the ratio of any planner.
+    /// A lower bound on the ratio, for any planner.
     at_least: Option<f64>,
 }
 
@@ -80,16 +81,16 @@ impl PublishedView {
         })
     }
 
-    /// Takes the paths of its files as relative to a folder.
+    /// Resolves the paths of its files relative to a folder.
     pub(super) fn beside(&mut self, folder: &Path) {
         self.file = folder.join(&self.file);
         self.episodes = self.episodes.as_ref().map(|path| folder.join(path));
     }
 
-    /// Reads what is published, and compares.
+    /// Reads the published data and compares the results with them.
     ///
     /// # Errors
-    /// If a file cannot be read or lacks what the view names, or if the results do.
+    /// If a file cannot be read, or if a file or the results lack what the view names.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         for metric in &self.metrics {
             known_column(name, "metrics", metric, results)?;
@@ -109,7 +110,7 @@ impl PublishedView {
             published.as_deref().map_or(Ok(()), |published| check_columns(name, &rows, published))?;
             let mut groups: BTreeMap<u64, Vec<&Row>> = BTreeMap::new();
             for row in rows {
-                // POGEMA's default stands for what is not given.
+                // A missing number of agents means POGEMA's default.
                 let num_agents = row.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1);
                 groups.entry(num_agents).or_default().push(row);
             }
@@ -122,11 +123,11 @@ impl PublishedView {
                 lines.push(line);
             }
         }
-        let remark = format!("`{ours}` beside the published `{}`, {}", self.algorithm, self.setting);
+        let remark = format!("`{ours}` compared with the published `{}`, {}", self.algorithm, self.setting);
         Ok(Shown { tables: vec![self.table(&lines, remark)], notes, ..Shown::default() })
     }
 
-    /// The algorithm of the results that is compared.
+    /// Returns the algorithm of the results that is compared.
     fn ours(&self, name: &str, results: &Results) -> Result<String, Error> {
         let all = results.algorithms();
         let own = self.ours.as_ref().unwrap_or(&self.algorithm);
@@ -141,7 +142,7 @@ impl PublishedView {
         }
     }
 
-    /// The published rows of a dataset, if there is a folder of episodes.
+    /// Reads the published rows of a dataset, if the view has a folder of episodes.
     fn published(&self, name: &str, dataset: &str) -> Result<Option<Vec<Row>>, Error> {
         let Some(folder) = self.episodes.as_ref().map(|folder| folder.join(dataset)) else { return Ok(None) };
         let results = Results::read(std::slice::from_ref(&folder))?;
@@ -149,15 +150,14 @@ impl PublishedView {
         if !all.contains(algorithm) {
             let hint = nearest(algorithm, all.iter().map(String::as_str)).unwrap_or_default();
             let folder = folder.display();
-            let reason = format!(
-                "view `{name}`: no `{algorithm}.json` in `{folder}`; the nearest one is `{hint}.json`"
-            );
+            let reason =
+                format!("view `{name}`: no `{algorithm}.json` in `{folder}`; did you mean `{hint}.json`?");
             return Err(Error::request(reason));
         }
         Ok(Some(results.rows.into_iter().filter(|row| row.algorithm == *algorithm).collect()))
     }
 
-    /// What is not compared in a line, and what is proved.
+    /// Returns notes on figures of a line that are not compared, and on instances that are proved unsolvable.
     fn notes(
         &self,
         line: &Line<'_>,
@@ -167,14 +167,14 @@ impl PublishedView {
         let what = format!("`{}` with {} agents", line.folder, line.num_agents);
         let mut notes = Vec::new();
         if !self.metrics.iter().any(|metric| mean(metric).is_some()) {
-            notes.push(format!("{what}: there are no published means"));
+            notes.push(format!("{what}: no published means"));
         }
         let mut figures = self.metrics.iter().zip(&line.figures);
         let lacks_cost = figures.any(|(metric, figure)| metric == COST && figure.published.is_none());
         if pairing.is_some_and(|pairing| pairing.pairs.is_empty()) {
             notes.push(format!("{what}: none of the instances is among the published episodes"));
         } else if pairing.is_none() && lacks_cost {
-            let why = "some instances are unsolved; `episodes` compares those that both solve";
+            let why = "some instances are unsolved; set `episodes` to compare those that both solve";
             notes.push(format!("{what}: `{COST}` is not compared: {why}"));
         }
         let unsolvable = line.rows.iter().filter_map(|row| Some((row, row.proof.unsolvable.as_ref()?)));
@@ -182,7 +182,7 @@ impl PublishedView {
         notes
     }
 
-    /// Makes the table; columns that would be empty are left out.
+    /// Makes the table without empty columns.
     fn table(&self, lines: &[Line<'_>], remark: String) -> Table {
         let mut columns: Vec<(String, Vec<Cell>)> = Vec::new();
         let mut add = |title: &str, cell: &dyn Fn(&Line<'_>) -> Cell| {
@@ -219,15 +219,15 @@ impl PublishedView {
     }
 }
 
-/// The fields that vary in rows.
+/// Returns the fields that vary in rows.
 fn varied<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeSet<&'a String> {
     rows.into_iter().flat_map(|row| row.settings.keys()).collect()
 }
 
-/// Passes if no field varies in the rows of a folder that does not vary in the published ones.
+/// Checks that every field that varies in the rows of a folder also varies in the published ones.
 ///
 /// # Errors
-/// Names the field: different instances here would be taken for the same published one.
+/// One line with the field. Otherwise, several instances would be compared with the same published one.
 fn check_columns(view: &str, rows: &[&Row], published: &[Row]) -> Result<(), Error> {
     for name in varied(rows.iter().copied()).difference(&varied(published)) {
         let values = rows.iter().filter_map(|row| row.settings.get(*name)).map(shown);
@@ -241,7 +241,7 @@ fn check_columns(view: &str, rows: &[&Row], published: &[Row]) -> Result<(), Err
     Ok(())
 }
 
-/// Pairs rows with the published rows of the same instances, which are known by all fields that vary there.
+/// Pairs rows with the published rows of the same instances, identified by the fields that vary in the published rows.
 fn pair<'a>(rows: &[&'a Row], published: &'a [Row]) -> Pairing<'a> {
     let columns = varied(published);
     let key = |row: &Row| {
@@ -251,7 +251,7 @@ fn pair<'a>(rows: &[&'a Row], published: &'a [Row]) -> Pairing<'a> {
     Pairing::of(rows.iter().copied(), published, key)
 }
 
-/// Compares a metric, sums of costs on solved instances only.
+/// Compares a metric with the published one; sums of costs only on solved instances.
 fn figure(
     metric: &str,
     rows: &[&Row],
@@ -267,7 +267,9 @@ fn figure(
     }
 }
 
-/// The mean costs of the instances that both solve. The bound counts all instances that the published one solves.
+/// Compares mean costs on the instances that both solve.
+///
+/// The bound counts all instances that the published algorithm solves.
 fn figure_of_both_solved(pairing: &Pairing<'_>) -> Figure {
     let means = |cost: fn(&Row) -> Option<f64>| {
         let solved = pairing.pairs.iter().filter(|(_, published)| published.is_solved());
@@ -279,7 +281,7 @@ fn figure_of_both_solved(pairing: &Pairing<'_>) -> Figure {
     Figure { ours, published, at_least: ratio(bound, bounded) }
 }
 
-/// The mean cost of the solved instances, beside a published mean over all of them.
+/// Compares the mean cost of solved instances with a published mean over all instances.
 fn figure_of_all_solved(rows: &[&Row], published: Option<f64>) -> Figure {
     let costs: Vec<f64> = rows.iter().filter_map(|row| solved_cost(row)).collect();
     let bounds: Vec<f64> = rows.iter().filter_map(|row| lower_bound(row)).collect();

@@ -1,4 +1,4 @@
-//! The six metrics of each algorithm, as a table and as a star.
+//! The six metrics of each algorithm, as a table and as a radar plot.
 
 use kuva::plot::radar::RadarPlot;
 use kuva::render::layout::Layout;
@@ -17,9 +17,9 @@ use crate::results::{ALGORITHM, Results};
 use crate::six::{Definition, Metric, Six, six};
 use crate::tree::Node;
 
-/// `type: radar`: the six metrics, which need the folders of a whole evaluation.
+/// `type: radar`: the six metrics. They need the folders of a whole evaluation.
 ///
-/// `definition` is `published` or `paper`.
+/// `definition` is `published` or `paper` [default: `published`].
 #[derive(Clone, Debug)]
 pub struct RadarView {
     common: Common,
@@ -37,10 +37,10 @@ impl RadarView {
         })
     }
 
-    /// Computes and draws them; a definition that is given has precedence over the view's own.
+    /// Computes and draws the metrics; if `definition` is given, it overrides the view's own.
     ///
     /// # Errors
-    /// If no algorithm has any of them.
+    /// If no metric can be computed for any algorithm.
     pub(super) fn show(
         &self,
         name: &str,
@@ -61,7 +61,8 @@ impl RadarView {
         let is_known = |at: &usize| all.iter().any(|six| six.values[*at].is_some());
         let known: Vec<usize> = (0..Metric::NAMES.len()).filter(is_known).collect();
         let pictures = if known.len() < 3 {
-            notes.push(format!("view `{name}`: a star needs 3 metrics, there are {}", known.len()));
+            notes
+                .push(format!("view `{name}`: a radar plot needs at least 3 metrics, found {}", known.len()));
             Vec::new()
         } else {
             vec![self.draw(&all, &known)]
@@ -76,8 +77,8 @@ impl RadarView {
             std::iter::once(name).chain(six.values.map(Cell::Number)).collect()
         };
         let definition = match definition {
-            Definition::Published => "the six metrics as they have been published",
-            Definition::Paper => "the six metrics as the paper's text says them",
+            Definition::Published => "the six metrics as published",
+            Definition::Paper => "the six metrics as defined in the paper's text",
         };
         Table {
             head: std::iter::once(self.common.title(ALGORITHM)).chain(title).collect(),

@@ -1,4 +1,4 @@
-//! Whether all algorithms have played the same instances.
+//! Checks that all algorithms have played the same instances.
 
 use pogema_core::Error;
 
@@ -9,12 +9,12 @@ use crate::frame::group_by;
 use crate::results::{ALGORITHM, Results};
 use crate::tree::Node;
 
-/// The column of the folder, where there is more than one.
+/// Title of the column with the folder, shown if there are several folders.
 const FOLDER: &str = "Folder";
 
-/// `type: seeds`: a table of the instances that an algorithm has not or more than once; no table if there are none.
+/// `type: seeds`: a table of the instances that an algorithm lacks or has more than once; no table if there are none.
 ///
-/// An instance is all that was varied; pogema-toolbox looks at map, number of agents and seed alone.
+/// All varied fields identify an instance; pogema-toolbox compares only map, number of agents and seed.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_utils.py`, `check_seeds`
 #[derive(Clone, Debug)]
@@ -27,8 +27,8 @@ impl SeedsView {
         Ok(Self { common: Common::read(&Options::new(name, node, &[])?)? })
     }
 
-    /// Checks each folder by itself.
-    #[allow(clippy::unnecessary_wraps, reason = "as every view's")]
+    /// Checks each folder separately.
+    #[allow(clippy::unnecessary_wraps, reason = "the same signature as in the other views")]
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         let keys: Vec<String> = results.key_columns().into_iter().filter(|key| key != ALGORITHM).collect();
         let algorithms = results.algorithms();
@@ -49,24 +49,25 @@ impl SeedsView {
                 problems += wrong;
                 let folder = has_folders.then(|| set.to_owned());
                 let places = keys.iter().zip(&group.keys).map(|(key, value)| self.common.shown(key, value));
-                let told = counts.into_iter().map(told);
-                rows.push(folder.into_iter().chain(places).chain(told).map(Cell::Text).collect());
+                let states = counts.into_iter().map(state);
+                rows.push(folder.into_iter().chain(places).chain(states).map(Cell::Text).collect());
             }
         }
         if rows.is_empty() {
-            let note = format!("view `{name}`: every algorithm has each of {instances} instances once");
+            let note = format!("view `{name}`: every algorithm has each of the {instances} instances once");
             return Ok(Shown { notes: vec![note], ..Shown::default() });
         }
         let folder = has_folders.then(|| FOLDER.to_owned());
         let keys = keys.iter().map(|key| self.common.title(key));
         let names = algorithms.iter().map(|name| self.common.algorithm(name));
         let head = folder.into_iter().chain(keys).chain(names).collect();
-        let remark = Some(format!("{problems} results are missing or double, of {instances} instances"));
+        let remark = Some(format!("{problems} results of {instances} instances are missing or duplicated"));
         Ok(Shown { tables: vec![Table { head, rows, remark, ..Table::default() }], ..Shown::default() })
     }
 }
 
-fn told(count: usize) -> String {
+/// Returns the text for the number of an algorithm's results on an instance.
+fn state(count: usize) -> String {
     match count {
         0 => "missing".to_owned(),
         1 => "ok".to_owned(),

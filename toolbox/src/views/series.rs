@@ -1,4 +1,4 @@
-//! Lines of means: one for each algorithm, or for whatever else tells rows apart.
+//! Lines of means, one for each algorithm or each value of another column.
 
 use kuva::plot::band::BandPlot;
 use kuva::plot::line::{LinePlot, LineStyle};
@@ -12,10 +12,10 @@ use crate::bootstrap::{Estimate, Spread};
 use crate::frame::{compare, values};
 use crate::results::{Row, figure};
 
-/// Dashes of lines: a solid one first.
+/// Dash patterns of lines; the first is solid.
 const DASHES: [&str; 6] = ["", "5 2", "1.5 1.5", "5 2 1.5 2", "8 2 2 2", "3 1"];
 
-/// Markers, as different from each other as they can be when small.
+/// Markers that are easy to distinguish even when small.
 const MARKERS: [MarkerShape; 8] = [
     MarkerShape::Circle,
     MarkerShape::Square,
@@ -30,23 +30,23 @@ const MARKERS: [MarkerShape; 8] = [
 /// One line.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
-    /// Its number among all lines of the figure, by which it has its colour.
+    /// Its index among all lines of the plot, which determines its colour.
     pub number: usize,
-    /// Where it goes: along the axis, and the mean there.
+    /// Its points: the position on the horizontal axis, and the mean there.
     pub points: Vec<(f64, Estimate)>,
 }
 
-/// What stands along the horizontal axis.
+/// The kind of values on the horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Places {
-    /// Numbers, where they are.
+    /// Numbers, each at its own position.
     Numbers,
-    /// Anything else, side by side.
+    /// Other values, side by side.
     Names(Vec<Value>),
 }
 
 impl Places {
-    /// Finds out whether all rows have numbers there.
+    /// Determines whether all rows have numbers in a column.
     pub fn of<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Self {
         let found = distinct(rows, column);
         if found.iter().all(Value::is_number) { Self::Numbers } else { Self::Names(found) }
@@ -60,7 +60,7 @@ impl Places {
     }
 }
 
-/// What rows have in a column, sorted, each value once.
+/// Returns the distinct values of a column, sorted.
 pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Vec<Value> {
     let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
     found.sort_by(compare);
@@ -68,7 +68,7 @@ pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str
     found
 }
 
-/// What a row has in a column, be it a metric or not.
+/// Returns the value of a row in a column, metric or not; `None` if it cannot be shown.
 pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
     let value = row.key(column).or_else(|| row.metrics.get(column).cloned())?;
     let is_shown =
@@ -76,18 +76,19 @@ pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
     is_shown.then_some(value)
 }
 
-/// A note for each column about rows that have nothing there, and so no place in the picture.
+/// Returns a note for each column with the number of rows that lack a value there and are not drawn.
 pub(super) fn placeless<'a>(rows: &[Row], columns: impl IntoIterator<Item = &'a String>) -> Vec<String> {
     let lacking = |column: &String| rows.iter().filter(|row| at(row, column).is_none()).count();
-    let told =
+    let counts =
         columns.into_iter().map(|column| (column, lacking(column))).filter(|(_, lacking)| *lacking > 0);
-    told.map(|(column, lacking)| {
-        format!("{lacking} of {} rows have nothing in `{column}` and are not drawn", rows.len())
-    })
-    .collect()
+    counts
+        .map(|(column, lacking)| {
+            format!("{lacking} of {} rows have no value in `{column}` and are not drawn", rows.len())
+        })
+        .collect()
 }
 
-/// The means of a metric at each place, and how sure they are.
+/// Computes the mean of a metric at each position, with its interval.
 pub(super) fn means(
     rows: &[&Row],
     x: &str,
@@ -111,7 +112,7 @@ pub(super) fn means(
 }
 
 impl Series {
-    /// What the library draws for it.
+    /// Returns the elements that the library draws for the line.
     pub fn plots(&self, style: &Style) -> Vec<Plot> {
         let (colour, marker, dashes) = signs(self.number, style);
         let ends = self.points.iter().map(|(_, found)| found.interval.unwrap_or((found.mean, found.mean)));
@@ -126,14 +127,14 @@ impl Series {
             .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
         let mut plots = Vec::new();
         if let (true, [(x, _)]) = (has_band, points.as_slice()) {
-            // A band needs two points; of one, the interval is a line.
+            // A band needs two points. For a single point, the interval is a vertical line.
             let interval = LinePlot::new().with_data([(*x, low[0]), (*x, high[0])]).with_color(colour);
             plots.push(Plot::Line(interval.with_stroke_width(style.line_width * 0.6)));
         } else if has_band {
             plots.push(Plot::Band(BandPlot::new(x, low, high).with_color(colour).with_opacity(0.15)));
         }
         plots.push(Plot::Line(line));
-        // A single point makes no line.
+        // A line with a single point is invisible, so it has a marker.
         if style.has_markers || points.len() == 1 {
             let dots = ScatterPlot::new().with_data(points).with_color(colour);
             plots.push(Plot::Scatter(dots.with_size(style.line_width * 1.6).with_marker(marker)));
@@ -141,7 +142,7 @@ impl Series {
         plots
     }
 
-    /// The legend's line for the series of a number.
+    /// Returns the legend entry for the line with an index.
     pub fn entry(number: usize, label: String, style: &Style) -> Entry {
         let point = |x| (x, Estimate { mean: 0.5, interval: None, count: 1 });
         let mut sign = Self { number, points: vec![point(0.0), point(1.0)] }
@@ -153,7 +154,7 @@ impl Series {
     }
 }
 
-/// The colour, the marker and the dashes of the line of a number.
+/// Returns colour, marker and dash pattern of the line with an index.
 pub(super) fn signs(number: usize, style: &Style) -> (&str, MarkerShape, Option<String>) {
     let dashes = DASHES[number % DASHES.len()];
     let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());

@@ -1,4 +1,4 @@
-//! How plots look.
+//! The style of plots.
 
 use pogema_core::Error;
 use serde_json::Value;
@@ -7,10 +7,10 @@ use super::axes::{Axis, Frame};
 use super::image_format::ImageFormat;
 use super::options::Options;
 
-/// Points in an inch; pictures are measured in points.
+/// Number of points per inch; pictures are measured in points.
 pub(super) const INCH: f64 = 72.0;
 
-/// Colours that most people can tell apart, whatever they see of red and green.
+/// Colours that are safe for most forms of colour blindness.
 ///
 /// Source: Okabe and Ito (2008), "Color Universal Design"; yellow, which is faint on white, is last
 const COLOURS: [&str; 8] =
@@ -23,15 +23,15 @@ const KEYS: &str = "name width height remove_title line_width error_bar plt_styl
     legend_font_size legend_loc legend_columns legend_bbox_to_anchor figure_face_color use_log_scale_x \
     use_log_scale_y markers line_types extension palette hue_order tight_layout ticks remove_legend_title x y by";
 
-/// Where a legend may be.
+/// The places of a legend.
 ///
 /// Source: Matplotlib, `legend`, parameter `loc`
 const PLACES: &str = "best, upper right, upper left, lower left, lower right, right, center left, center right, \
     lower center, upper center, center";
 
-/// How one plot looks; sizes are in points.
+/// The style of one plot. Units: points.
 #[derive(Clone, Debug)]
-#[allow(clippy::struct_excessive_bools, reason = "options of a file that have nothing to do with each other")]
+#[allow(clippy::struct_excessive_bools, reason = "independent options of a file")]
 pub(super) struct Style {
     pub name: Option<String>,
     pub has_title: bool,
@@ -56,14 +56,14 @@ pub(super) struct Style {
 }
 
 impl Style {
-    /// All keys that a plot may have, with some more of its own.
+    /// Returns the keys of all plots, and further keys of one type.
     pub fn keys(more: &[&'static str]) -> Vec<&'static str> {
         KEYS.split(' ').chain(more.iter().copied()).collect()
     }
 
-    /// Reads the options of a plot whose size in inches is given if the view does not say.
+    /// Reads the options of a plot; the given size in inches is the default.
     pub fn read(options: &Options<'_>, (width, height): (f64, f64)) -> Result<Self, Error> {
-        // Of Matplotlib, or settled here once and for all.
+        // These options are checked but have no effect: they concern Matplotlib, or are fixed here.
         options.text("plt_style")?;
         options.flag("tight_layout")?;
         options.numbers("legend_bbox_to_anchor")?;
@@ -93,17 +93,17 @@ impl Style {
         })
     }
 
-    /// The colour of the line of a number.
+    /// Returns the colour of the line with an index.
     pub fn colour(&self, number: usize) -> &str {
         &self.palette[number % self.palette.len()]
     }
 
-    /// The title, if there is one to show.
+    /// Returns the title, if it is shown.
     pub fn title(&self) -> Option<&str> {
         self.name.as_deref().filter(|_| self.has_title)
     }
 
-    /// The frame of a plot that stands alone.
+    /// Returns the frame of a plot with a single panel.
     pub fn frame(&self, x: Axis, y: Axis) -> Frame {
         let Self { width, height, font_size, .. } = *self;
         Frame { width, height, font_size, title: self.title().map(str::to_owned), x, y }
@@ -123,7 +123,7 @@ fn colour_option(options: &Options<'_>, key: &str) -> Result<Option<String>, Err
     colour(&text.into()).map(Some).ok_or_else(|| options.refuse(key, "a colour such as `#0072B2`"))
 }
 
-/// A colour given as `#rrggbb`, by a name, or as three shares.
+/// Reads a colour given as `#rrggbb`, as a name, or as three shares from 0 to 1.
 fn colour(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => {

@@ -10,7 +10,7 @@ use crate::frame::{Group, compare, group_by, lacking, values};
 use crate::results::Results;
 use crate::tree::Node;
 
-/// Names of pogema-toolbox's table formats for each of our formats.
+/// The names of pogema-toolbox's table formats that select each of our formats.
 ///
 /// Source: tabulate 0.9, `tabulate_formats`
 const FORMATS: [(Format, &str); 4] = [
@@ -27,8 +27,8 @@ const FORMATS: [(Format, &str); 4] = [
 
 /// `type: tabular`: the mean of each metric in each group of rows.
 ///
-/// Rows are alike that have the same in all columns but metrics and `drop_keys`. Metrics stand in the order in which
-/// they first appear in any row; pogema-toolbox takes those of the first row alone, and groups by the others.
+/// Rows with equal values in all columns except metrics and `drop_keys` form a group. Metrics are in the order of their
+/// first appearance in any row; pogema-toolbox takes only those of the first row, and groups by the others.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_tabular.py`
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct TableView {
     common: Common,
     spread: Spread,
     skips_zero: bool,
-    /// The format that the view asks for.
+    /// The format that the view requests.
     pub(super) format: Format,
 }
 
@@ -45,7 +45,7 @@ impl TableView {
         let known =
             ["print_results", "table_format", "show_std", "skip_zero_std", "error_method", "error_level"];
         let options = Options::new(name, node, &known)?;
-        // Whoever runs views wants to see them.
+        // Checked but ignored: the table is always shown.
         options.flag("print_results")?;
         let words: Vec<&'static str> = FORMATS.iter().flat_map(|(_, words)| words.split(' ')).collect();
         let word = options.choice("table_format", &words)?.unwrap_or("psql");
@@ -71,7 +71,7 @@ impl TableView {
     /// Makes the table.
     ///
     /// # Errors
-    /// If `sort_by` names no column of it.
+    /// If `sort_by` names a column that the table lacks.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         let kept = |columns: Vec<String>| -> Vec<String> {
             columns.into_iter().filter(|column| !self.common.drop_keys.contains(column)).collect()
@@ -80,7 +80,7 @@ impl TableView {
         let keys: Vec<String> = keys.into_iter().filter(|key| !metrics.contains(key)).collect();
         let mut lines: Vec<Line<'_>> = Vec::new();
         for (number, group) in group_by(&results.rows, &keys).into_iter().enumerate() {
-            // One number for the whole group: metrics that are alike have intervals that are alike.
+            // One number for the whole group, so that metrics with equal values have equal intervals.
             let estimate = |metric| Estimate::of(&values(&group.rows, metric), self.spread, number as u64);
             let estimates = metrics.iter().map(|metric| estimate(metric)).collect();
             lines.push(Line { group, estimates });
@@ -118,7 +118,7 @@ impl TableView {
         }
     }
 
-    /// Sorts by the columns of `sort_by`, the last of them first.
+    /// Sorts by the columns of `sort_by`; the first of them has precedence.
     fn sort(
         &self,
         name: &str,
@@ -146,7 +146,7 @@ impl TableView {
     }
 }
 
-/// A row of the table before it is text.
+/// A row of the table before it is formatted.
 struct Line<'a> {
     group: Group<'a>,
     estimates: Vec<Option<Estimate>>,
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_are_rows_and_metrics_of_any_row_are_columns() {
+    fn each_group_has_a_row_and_each_metric_a_column() {
         let shown = shown("{type: tabular, show_std: False, sort_by: algorithm}").unwrap();
         assert_eq!(
             shown.tables[0].text(Format::Csv).lines().collect::<Vec<_>>(),
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_is_told_and_named() {
+    fn intervals_are_shown_and_explained() {
         let fields = "{type: tabular, drop_keys: [seed, SoC], rename_algorithms: {B: Best}, round_digits: 1}";
         let text = shown(fields).unwrap().tables[0].text(Format::Markdown);
         assert!(text.contains("| 16               | Best      | 0.5 ± 0.5 |"), "{text}");
@@ -192,14 +192,16 @@ mod tests {
     }
 
     #[test]
-    fn wrong_options_are_told_with_their_lines() {
-        let told = |fields: &str| shown(&format!("type: tabular\n{fields}")).unwrap_err();
+    fn wrong_options_are_reported_with_line_numbers() {
+        let error_of = |fields: &str| shown(&format!("type: tabular\n{fields}")).unwrap_err();
         let unknown = "config: line 2: unknown key `round_digit` in view `Table1`";
-        assert!(told("round_digit: 3").starts_with(unknown), "{}", told("round_digit: 3"));
-        assert!(told("round_digits: x").contains("line 2: `Table1.round_digits`, expected a whole number"));
-        assert!(told("table_format: latx").contains("such as `latex`"));
-        assert!(told("show_std: 3").contains("expected True or False, found `3`"));
-        assert!(told("sort_by: SOC").contains("the nearest column is `SoC`"));
-        assert!(shown("type: tablar").unwrap_err().contains("such as `tabular`"));
+        assert!(error_of("round_digit: 3").starts_with(unknown), "{}", error_of("round_digit: 3"));
+        assert!(
+            error_of("round_digits: x").contains("line 2: `Table1.round_digits`, expected a whole number")
+        );
+        assert!(error_of("table_format: latx").contains("did you mean `latex`?"));
+        assert!(error_of("show_std: 3").contains("expected True or False, found `3`"));
+        assert!(error_of("sort_by: SOC").contains("did you mean `SoC`?"));
+        assert!(shown("type: tablar").unwrap_err().contains("did you mean `tabular`?"));
     }
 }

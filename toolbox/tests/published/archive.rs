@@ -1,4 +1,4 @@
-//! The published results, unpacked once.
+//! Unpacks the published results once for all tests.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use pogema_toolbox::Results;
 
-/// The folder that was named, and where its archive has been unpacked.
+/// The folder named by `POGEMA_PUBLISHED`, and a temporary folder with its unpacked archive.
 pub struct Published {
     pub folder: PathBuf,
     unpacked: tempfile::TempDir,
@@ -20,7 +20,7 @@ static PUBLISHED: LazyLock<Option<Published>> = LazyLock::new(|| {
     Some(Published { folder, unpacked })
 });
 
-/// The published results, or a loud word on what is not checked without them.
+/// Returns the published results; without them, prints that `what` is not checked.
 pub fn published(what: &str) -> Option<&'static Published> {
     if PUBLISHED.is_none() {
         eprintln!("SKIPPED: {what}: POGEMA_PUBLISHED does not name the folder of the published results");

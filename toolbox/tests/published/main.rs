@@ -1,7 +1,7 @@
-//! Numbers of the paper and of its web page, from the results that were published with it.
+//! Reproduces numbers of the paper and of its web page from the published results.
 //!
-//! `POGEMA_PUBLISHED` names the folder with `results-mapf.tar.gz` and `meta_metrics_mapf.csv`; without it nothing is
-//! checked, and each test says so.
+//! `POGEMA_PUBLISHED` names the folder with `results-mapf.tar.gz` and `meta_metrics_mapf.csv`. If it is not set, each
+//! test is skipped with a message.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -1,4 +1,4 @@
-//! The six metrics, as published and as the paper words them.
+//! The six metrics, as published and as defined in the paper's text.
 
 use pogema_core::Words;
 use pogema_toolbox::six::{Definition, Metric, six};
@@ -9,8 +9,8 @@ const SETS: [&str; 6] =
     ["01-random", "02-mazes", "03-warehouse", "04-movingai", "05-puzzles", "06-pathfinding"];
 
 #[test]
-fn all_published_metrics_come_out() {
-    let Some(published) = published("the six metrics beside the published ones") else { return };
+fn all_published_metrics_are_reproduced() {
+    let Some(published) = published("the six metrics against the published ones") else { return };
     let (all, notes) = six(&published.read(&SETS), Definition::Published);
     assert_eq!(notes, Vec::<String>::new());
     let rows = published.csv("meta_metrics_mapf.csv");
@@ -31,8 +31,8 @@ fn all_published_metrics_come_out() {
 }
 
 #[test]
-fn the_paper_s_wording_gives_other_values() {
-    let Some(published) = published("the six metrics as the paper words them") else { return };
+fn the_definition_in_the_paper_gives_other_values() {
+    let Some(published) = published("the six metrics as defined in the paper") else { return };
     let (all, _) = six(&published.read(&SETS), Definition::Paper);
     // Computed by another program from the same files.
     let expected = [

@@ -1,4 +1,4 @@
-//! Tables of the paper, made by views as they stand beside the results.
+//! Tables of the paper, reproduced by views of the published results.
 
 use pogema_toolbox::Results;
 use pogema_toolbox::views::{Cell, Shown, View};
@@ -11,7 +11,7 @@ fn table(results: &Results, drop_keys: &str) -> Shown {
     View::read("Table", &Node::parse(&fields).unwrap()).unwrap().show("Table", results, None).unwrap()
 }
 
-/// What a column says of an algorithm, without its interval.
+/// Returns the mean of a column for an algorithm, without its interval.
 fn printed(shown: &Shown, algorithm: &str, column: &str) -> String {
     let table = &shown.tables[0];
     let at = table.head.iter().position(|title| title == column).unwrap();
@@ -22,7 +22,7 @@ fn printed(shown: &Shown, algorithm: &str, column: &str) -> String {
     }
 }
 
-/// The mean of a column over all numbers of agents, from the published means of each number.
+/// Returns the mean of a column over all numbers of agents, from the published means of each number.
 fn published_mean(published: &Published, set: &str, algorithm: &str, column: &str) -> f64 {
     let rows = published.csv("published.csv");
     let at = |title: &str| rows[0].iter().position(|found| found == title).unwrap();
@@ -38,7 +38,7 @@ fn published_mean(published: &Published, set: &str, algorithm: &str, column: &st
 }
 
 #[test]
-fn table_5_comes_out_to_the_printed_digit() {
+fn table_5_is_reproduced_to_the_printed_digit() {
     let Some(published) = published("the paper's table 5") else { return };
     let results = published.read(&["06-pathfinding"]);
     let shown = table(&results, "seed, map_name, num_agents");
@@ -48,13 +48,13 @@ fn table_5_comes_out_to_the_printed_digit() {
         let found: f64 = printed(&shown, &algorithm, "makespan").parse().unwrap();
         assert!((found - expected).abs() < 0.0051, "{algorithm}: {found} {expected}");
     }
-    // In exact numbers 755.975.
+    // The exact value is 755.975.
     let all = results.algorithms();
     assert!(all.iter().any(|algorithm| printed(&shown, algorithm, "makespan") == "755.98"));
 }
 
 #[test]
-fn table_4_is_without_puzzle_06() {
+fn table_4_is_reproduced_without_puzzle_06() {
     let Some(published) = published("the paper's table 4") else { return };
     let results = published.read(&["05-puzzles"]);
     let drop = "seed, map_name, ISR, ep_length, runtime, avg_agents_density, makespan, num_agents, a_collisions, o_collisions";
@@ -67,7 +67,7 @@ fn table_4_is_without_puzzle_06() {
     let without = table(&Results { rows, notes: Vec::new() }, drop);
     assert_eq!(without.tables[0].head, ["Algorithm", "CSR", "SoC"]);
     assert_eq!(printed(&without, "LaCAM", "CSR"), "1.00");
-    // The printed means.
+    // The means printed in the paper.
     let expected = [
         ("DCC", "0.74", "93.50"),
         ("IQL", "0.47", "250.03"),

@@ -55,7 +55,7 @@ function pairLetters(letters, pool) {
     throw new ParseError(...at, reason);
   }
   if (starts.length > 0 && pool) {
-    throw new ParseError(...pool, "the map has letters and one of @$!, expected exact starts and goals or possible ones");
+    throw new ParseError(...pool, "the map has letters and one of @$!, expected either exact or possible starts and goals");
   }
   return starts.map(([, { cell }], agent) => ({ start: cell, goal: goals[agent][1].cell, more: [] }));
 }
