@@ -118,7 +118,6 @@ pub fn parse() -> Result<Arguments, clap::Error> {
 mod tests {
     use std::fmt::Write as _;
     use std::path::Path;
-    use std::process::Command as Process;
     use std::{env, fs};
 
     use super::*;

@@ -144,6 +144,8 @@ def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: 
         "## Smallest counterexamples",
         "",
         *causes(reports),
+        "",
+        "**What next:** [Known defects and contradictions](spec/defects.md), [Check your port](PORTING.md).",
     ]
     return "\n".join(lines).rstrip() + "\n"
 

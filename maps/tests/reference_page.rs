@@ -34,7 +34,8 @@ fn default(name: &str) -> String {
     let words = ["default", "priority", "finish", "as_released", "own"].map(Value::from);
     let numbers = (0..=128).map(Value::from).chain((0..=10).map(|tenth| json!(f64::from(tenth) / 10.0)));
     let candidates = [Value::Null, json!(true), json!(false)].into_iter().chain(words).chain(numbers);
-    let found = candidates.into_iter().find(|value| read(name, value.clone()).is_ok_and(|config| config == absent));
+    let found =
+        candidates.into_iter().find(|value| read(name, value.clone()).is_ok_and(|config| config == absent));
     match found.unwrap_or_else(|| panic!("{name}: the default is not among the candidates")) {
         Value::Null => String::new(),
         value => format!("`{}`", value.to_string().trim_matches('"')),
@@ -44,7 +45,8 @@ fn default(name: &str) -> String {
 /// Returns the doc comment of a field of `GridConfig`.
 fn meaning(name: &str) -> String {
     let body = SOURCE.split_once("pub struct GridConfig {").unwrap().1;
-    let (before, _) = body.split_once(&format!("    pub {name}: ")).unwrap_or_else(|| panic!("{name}: not found"));
+    let (before, _) =
+        body.split_once(&format!("    pub {name}: ")).unwrap_or_else(|| panic!("{name}: not found"));
     let docs = before.rsplit_once(",\n").map_or(before, |(_, docs)| docs);
     docs.lines().filter_map(|line| line.trim().strip_prefix("/// ")).collect::<Vec<_>>().join(" ")
 }
@@ -72,5 +74,8 @@ fn the_page_of_fields_is_up_to_date() {
     if env::var_os("BLESS").is_some() {
         fs::write(&path, &page).unwrap();
     }
-    assert!(fs::read_to_string(&path).unwrap() == page, "docs/reference/config.md is out of date: set BLESS=1");
+    assert!(
+        fs::read_to_string(&path).unwrap() == page,
+        "docs/reference/config.md is out of date: set BLESS=1"
+    );
 }
