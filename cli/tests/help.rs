@@ -43,8 +43,8 @@ results_views:
 
 fn pogema(arguments: &[&str], folder: &Path) -> Output {
     let program = Path::new(PROGRAM).parent().unwrap();
-    let paths = [program.to_path_buf()].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap()));
-    let path = env::join_paths(paths).unwrap();
+    let path = env::var_os("PATH").unwrap();
+    let path = env::join_paths([program.to_path_buf()].into_iter().chain(env::split_paths(&path))).unwrap();
     Command::new(PROGRAM).args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
 }
 
