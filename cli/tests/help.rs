@@ -1,6 +1,6 @@
 //! The examples in the help texts run, and the program shows first steps if it is called without arguments.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 use std::path::Path;
 use std::process::{Command, Output};
