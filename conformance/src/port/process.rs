@@ -77,7 +77,7 @@ impl Process {
     /// Starts a port.
     ///
     /// # Errors
-    /// If the program not_started be started.
+    /// If the program cannot be started.
     pub fn start(command: &Command) -> Result<Self, Misbehaviour> {
         let (program, arguments) = (&command.words[0], &command.words[1..]);
         let mut wrap = CommandWrap::with_new(program, |inner| {
