@@ -43,7 +43,8 @@ results_views:
 
 fn pogema(arguments: &[&str], folder: &Path) -> Output {
     let program = Path::new(PROGRAM).parent().unwrap();
-    let paths = [program.to_path_buf()].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap()));
+    let known = env::var_os("PATH").unwrap();
+    let paths = [program.to_path_buf()].into_iter().chain(env::split_paths(&known));
     let path = env::join_paths(paths).unwrap();
     Command::new(PROGRAM).args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
 }
