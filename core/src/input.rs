@@ -73,7 +73,7 @@ impl<R: BufRead> BufRead for Bounded<R> {
             return Ok(bytes);
         }
         // One byte more than the longest line, for its line feed.
-        let room_in_line = (limit.longest_line + 1).saturating_sub(self.in_line);
+        let room_in_line = limit.longest_line.saturating_add(1).saturating_sub(self.in_line);
         let room_in_all = self.in_all.map_or(u64::MAX, |in_all| limit.largest_file().saturating_sub(in_all));
         match room_in_line.min(room_in_all) {
             0 if room_in_all == 0 => Err(limit.file_error()),
@@ -136,5 +136,7 @@ mod tests {
         assert_eq!(lines(zeros).unwrap_err(), "the line is longer than the input limit of 1 MiB");
         let blank = InputLimit::of_mib(1).file(BufReader::new(repeat(b'\n')));
         assert!(lines(blank).unwrap_err().starts_with("the input is larger than 4 MiB"));
+        let largest = InputLimit::of_mib(u64::MAX);
+        assert_eq!(lines(largest.file(&b"a\nb"[..])).unwrap(), ["a", "b"]);
     }
 }

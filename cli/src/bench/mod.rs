@@ -104,7 +104,7 @@ impl Bench {
         }
         let bar = progress_bar("{bar:40} {pos}/{len} {msg}", self.rounds.saturating_mul(works.len() as u64));
         let rows = Arc::new(Mutex::new(Vec::new()));
-        self.report_on_ctrl_c(Arc::clone(&rows), bar.clone())?;
+        self.report_on_ctrl_c(Arc::clone(&rows), works.len(), bar.clone())?;
         for _ in 0..self.rounds {
             for (index, work) in works.iter().enumerate() {
                 bar.set_message(work.name());
@@ -123,14 +123,22 @@ impl Bench {
     }
 
     /// Reports on Ctrl-C what is measured so far.
-    fn report_on_ctrl_c(&self, rows: Arc<Mutex<Vec<Row>>>, bar: ProgressBar) -> Result<(), Error> {
+    fn report_on_ctrl_c(
+        &self,
+        rows: Arc<Mutex<Vec<Row>>>,
+        num_all: usize,
+        bar: ProgressBar,
+    ) -> Result<(), Error> {
         let bench = self.clone();
         exit_on_ctrl_c(move || {
             bar.finish_and_clear();
             let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
             let num_rows = rows.len();
             let reported = if rows.is_empty() { Ok(()) } else { bench.report(rows) };
-            reported.map_or_else(|error| error.to_string(), |()| format!("{num_rows} rows are measured"))
+            reported.map_or_else(
+                |error| error.to_string(),
+                |()| format!("{num_rows} of {num_all} rows are measured"),
+            )
         })
     }
 
