@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -14,8 +14,9 @@ use pogema_toolbox::{
     Begin, EpisodeConfigs, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
 };
 
+use crate::interrupt::exit_on_ctrl_c;
 use crate::maps::Sources;
-use crate::output::{check_writable, print_line, progress_bar};
+use crate::output::{check_writable, print_line, progress_bar, tell};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
@@ -61,7 +62,9 @@ impl Evaluate {
             _ => Begin::New,
         };
         let store = Arc::new(Store::open(&self.out, &suite, begin)?);
-        let bar = Bar::default();
+        let bar = Arc::new(Bar::default());
+        let (shown, folder) = (Arc::clone(&bar), self.out.clone());
+        exit_on_ctrl_c(move || shown.interrupted(&folder))?;
         let watch = |event: Event<'_>| bar.show(event);
         let stop = AtomicBool::new(false);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -80,7 +83,7 @@ impl Evaluate {
 pub fn environments(suite: &Suite, sources: &Sources) -> Result<EpisodeConfigs, Error> {
     let (environments, warnings) = suite.environments(sources.paths())?;
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        tell(&format!("warning: {warning}"));
     }
     Ok(environments)
 }
@@ -102,7 +105,7 @@ fn write_report(
         .collect();
     bar.finish_and_clear();
     write_whole(path, page(suite, &store.manifest(), &results, &replays)?.as_bytes())?;
-    eprintln!("wrote {}", path.display());
+    tell(&format!("wrote {}", path.display()));
     Ok(())
 }
 
@@ -122,31 +125,52 @@ fn print_summary(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), 
 
 /// A progress bar per algorithm, or a line every [`INTERVAL`] if the output is not a terminal.
 #[derive(Default)]
-struct Bar(Mutex<Option<(ProgressBar, Instant)>>);
+struct Bar(Mutex<Option<Shown>>);
+
+/// The progress of an algorithm.
+struct Shown {
+    bar: ProgressBar,
+    last_line: Instant,
+    num_failed: u64,
+}
 
 /// Time between two progress lines.
 const INTERVAL: Duration = Duration::from_secs(30);
 
 impl Bar {
+    /// Removes the bar, and returns a line on what is stored.
+    fn interrupted(&self, folder: &Path) -> String {
+        let bar = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let played = bar.as_ref().map_or_else(String::new, |Shown { bar, num_failed, .. }| {
+            let (name, all) = (bar.message(), bar.length().unwrap_or_default());
+            let done = bar.position() - num_failed;
+            bar.finish_and_clear();
+            format!("{done} of {all} episodes of `{name}` are stored; ")
+        });
+        format!("{played}`--resume` plays the rest: {}", folder.display())
+    }
+
     fn show(&self, event: Event<'_>) {
-        let mut bar = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        match (event, bar.as_mut()) {
+        let mut shown = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match (event, shown.as_mut()) {
             (Event::Begin { algorithm, total, done }, _) => {
-                *bar = Some((begin(algorithm, total, done), Instant::now()));
+                let bar = begin(algorithm, total, done);
+                *shown = Some(Shown { bar, last_line: Instant::now(), num_failed: 0 });
             }
-            (Event::Played, Some((bar, last_line))) => {
+            (Event::Played, Some(Shown { bar, last_line, .. })) => {
                 bar.inc(1);
                 if bar.is_hidden() && last_line.elapsed() >= INTERVAL {
                     *last_line = Instant::now();
                     let (name, done, all) = (bar.message(), bar.position(), bar.length().unwrap_or_default());
-                    eprintln!("{name}: {done} of {all} episodes, {} left", HumanDuration(bar.eta()));
+                    tell(&format!("{name}: {done} of {all} episodes, {} left", HumanDuration(bar.eta())));
                 }
             }
-            (Event::Failed(failed), Some((bar, _))) => {
-                bar.suspend(|| eprintln!("warning: episode {}: {}", failed.index, failed.error));
+            (Event::Failed(failed), Some(Shown { bar, num_failed, .. })) => {
+                bar.suspend(|| tell(&format!("warning: episode {}: {}", failed.index, failed.error)));
                 bar.inc(1);
+                *num_failed += 1;
             }
-            (Event::End, Some((bar, _))) => bar.finish_and_clear(),
+            (Event::End, Some(Shown { bar, .. })) => bar.finish_and_clear(),
             (_, None) => {}
         }
     }

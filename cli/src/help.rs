@@ -1,8 +1,10 @@
 //! The help texts: examples below each command's options, and the first steps for `pogema` alone.
 
 use clap::{Command, CommandFactory, FromArgMatches};
+use pogema_core::Error;
 
 use crate::Arguments;
+use crate::output::print_bytes;
 
 /// Printed if the program is called without arguments.
 const FIRST_STEPS: &str = "\
@@ -101,17 +103,21 @@ fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
     }
 }
 
-/// Reads the arguments of the program.
+/// Reads the arguments of the program; returns `None` if there are none.
 ///
 /// Errors: what clap reports, help and version included.
-pub fn parse() -> Result<Arguments, clap::Error> {
+pub fn parse() -> Result<Option<Arguments>, clap::Error> {
     if std::env::args_os().len() == 1 {
-        print!("{FIRST_STEPS}");
-        std::process::exit(2);
+        return Ok(None);
     }
     let mut command = command();
     let matches = command.try_get_matches_from_mut(std::env::args_os())?;
-    Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+    Arguments::from_arg_matches(&matches).map(Some).map_err(|error| error.format(&mut command))
+}
+
+/// Prints what a new user may do first.
+pub fn print_first_steps() -> Result<(), Error> {
+    print_bytes(FIRST_STEPS.as_bytes())
 }
 
 #[cfg(test)]

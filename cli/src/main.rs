@@ -1,11 +1,15 @@
 //! `pogema`: runs, checks and inspects POGEMA episodes.
 
 #![forbid(unsafe_code)]
+// Every command prints through `output`, which escapes what it prints and never panics.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
 mod conform;
 mod evaluate;
 mod help;
+mod input;
+mod interrupt;
 mod maps;
 mod output;
 mod plan;
@@ -21,6 +25,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+use pogema_core::Error;
 
 /// Multi-agent pathfinding under the rules of POGEMA 1.4.0, bit for bit
 #[derive(Debug, Parser)]
@@ -57,34 +62,54 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let arguments = match help::parse() {
-        Ok(arguments) => arguments,
-        Err(error) if is_usage_error(&error) => {
-            eprintln!("{}", error.to_string().lines().next().unwrap_or_default());
-            return ExitCode::from(2);
-        }
-        Err(help) => help.exit(),
-    };
-    let result = match arguments.command {
-        Command::Run(run) => run.run().map(|()| ExitCode::SUCCESS),
-        Command::Plan(plan) => plan.run(),
-        Command::Validate(validate) => validate.run(),
-        Command::Maps(maps) => maps.run().map(|()| ExitCode::SUCCESS),
-        Command::Evaluate(evaluate) => evaluate.run().map(|()| ExitCode::SUCCESS),
-        Command::Views(views) => views.run(),
-        Command::Replay(replay) => replay.run().map(|()| ExitCode::SUCCESS),
-        Command::Render(render) => render.run().map(|()| ExitCode::SUCCESS),
-        Command::Conform(conform) => conform.run(),
-        Command::Port(port) => port.run().map(|()| ExitCode::SUCCESS),
-        Command::Bench(bench) => bench.run().map(|()| ExitCode::SUCCESS),
-    };
-    result.unwrap_or_else(|error| {
-        eprintln!("error: {error}");
+    run().unwrap_or_else(|error| {
+        output::tell(&format!("error: {error}"));
         ExitCode::from(2)
     })
+}
+
+fn run() -> Result<ExitCode, Error> {
+    let arguments = match help::parse() {
+        Ok(Some(arguments)) => arguments,
+        Ok(None) => return help::print_first_steps().map(|()| ExitCode::from(2)),
+        Err(error) if is_usage_error(&error) => {
+            output::tell_lines(error.to_string().trim_end());
+            return Ok(ExitCode::from(2));
+        }
+        Err(help) => return print_help(&help),
+    };
+    let done = |()| ExitCode::SUCCESS;
+    match arguments.command {
+        Command::Run(run) => run.run().map(done),
+        Command::Plan(plan) => plan.run(),
+        Command::Validate(validate) => validate.run(),
+        Command::Maps(maps) => maps.run().map(done),
+        Command::Evaluate(evaluate) => evaluate.run().map(done),
+        Command::Views(views) => views.run(),
+        Command::Replay(replay) => replay.run().map(done),
+        Command::Render(render) => render.run().map(done),
+        Command::Conform(conform) => {
+            interrupt::exit_on_ctrl_c(|| {
+                "the cases that were kept so far stay, and no report is written".into()
+            })?;
+            conform.run()
+        }
+        Command::Port(port) => port.run().map(done),
+        Command::Bench(bench) => bench.run().map(done),
+    }
 }
 
 /// Returns whether the arguments are wrong; requests for help or the version are not.
 fn is_usage_error(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+}
+
+/// Prints a help text or the version, and returns clap's exit status.
+fn print_help(help: &clap::Error) -> Result<ExitCode, Error> {
+    match help.print() {
+        // The help on a command without its subcommand goes to standard error, see `output::tell`.
+        _ if help.use_stderr() => {}
+        printed => output::check_printed(printed)?,
+    }
+    Ok(u8::try_from(help.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from))
 }

@@ -5,22 +5,49 @@ use std::path::Path;
 
 use comfy_table::{CellAlignment, Table, TableStyle, presets};
 use indicatif::{ProgressBar, ProgressStyle};
-use pogema_core::{Error, Trace};
-use pogema_toolbox::short;
+use pogema_core::{Error, Trace, one_line, printable_json};
+use pogema_toolbox::{fitted, short};
 use serde::Serialize;
+use serde_json::Value;
 
-/// Prints a line; exits with status 0 if the reader has closed the pipe, as in `pogema conform | head`.
+/// Prints text to standard output, with its unprintable characters escaped, and a line feed.
 pub fn print_line(text: &str) -> Result<(), Error> {
-    let mut output = std::io::stdout().lock();
-    check_printed(writeln!(output, "{text}").and_then(|()| output.flush()))
+    print_bytes(format!("{}\n", escaped(text)).as_bytes())
 }
 
-/// Checks the outcome of a write to standard output; exits with status 0 if the reader has closed the pipe.
+/// Prints a value as JSON on one line; escapes leave its texts as they are.
+pub fn print_json(value: &Value) -> Result<(), Error> {
+    print_bytes(format!("{}\n", printable_json(&value.to_string())).as_bytes())
+}
+
+/// Prints bytes to standard output as they are.
+pub fn print_bytes(bytes: &[u8]) -> Result<(), Error> {
+    let mut output = std::io::stdout().lock();
+    check_printed(output.write_all(bytes).and_then(|()| output.flush()))
+}
+
+/// Checks the outcome of a write to standard output; exits with status 0 if the reader has closed the pipe, as in
+/// `pogema conform | head`.
 pub fn check_printed(outcome: std::io::Result<()>) -> Result<(), Error> {
     match outcome {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
         outcome => outcome.map_err(|error| Error::io("standard output", error)),
     }
+}
+
+/// Prints a line to standard error. If that is closed or full, the line is lost and the program continues.
+pub fn tell(line: &str) {
+    tell_lines(&one_line(line));
+}
+
+/// Prints lines to standard error, see [`tell`].
+pub fn tell_lines(text: &str) {
+    let _ = std::io::stderr().lock().write_all(format!("{}\n", escaped(text)).as_bytes());
+}
+
+/// Escapes all unprintable characters but line feeds.
+fn escaped(text: &str) -> String {
+    text.split('\n').map(one_line).collect::<Vec<_>>().join("\n")
 }
 
 /// Checks that a file can be written at `path`, so that a long run fails at its start and not at its end.
@@ -59,9 +86,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Io`] if it cannot be written.
 pub fn write_trace(path: &Path, trace: &Trace) -> Result<(), Error> {
-    let mut text = Vec::new();
-    trace.write(&mut text)?;
-    pogema_conformance::files::write(path, &text)
+    pogema_conformance::files::write_with(path, |file| trace.write(file))
 }
 
 /// Returns a progress bar with an indicatif template.
@@ -77,6 +102,11 @@ pub fn progress_bar(layout: &str, total: u64) -> ProgressBar {
 pub fn in_one_line<'a>(metrics: impl IntoIterator<Item = (&'a str, f64)>) -> String {
     let shown = metrics.into_iter().map(|(name, value)| format!("{name}={}", short(value)));
     shown.collect::<Vec<_>>().join("  ")
+}
+
+/// Prints a table, at most as wide as the terminal.
+pub fn print_table(table: Table) -> Result<(), Error> {
+    print_line(&fitted(table))
 }
 
 /// Returns a function that names `flag` in errors about a value out of range.

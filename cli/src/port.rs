@@ -6,17 +6,21 @@ use pogema_conformance::port::serve;
 use pogema_core::Error;
 
 use crate::conform::ENGINES;
+use crate::input::Input;
 
 #[derive(Args, Debug)]
 pub struct Port {
     /// Engine that answers
     #[arg(long, default_value = NamedEngine::REFERENCE.name, value_parser = ENGINES.map(|engine| engine.name))]
     engine: String,
+    #[command(flatten)]
+    input: Input,
 }
 
 impl Port {
     pub fn run(&self) -> Result<(), Error> {
         let named = ENGINES.into_iter().find(|engine| engine.name == self.engine);
-        serve(named.unwrap_or(NamedEngine::REFERENCE), std::io::stdin().lock(), std::io::stdout().lock())
+        let input = self.input.limit().lines(std::io::stdin().lock());
+        serve(named.unwrap_or(NamedEngine::REFERENCE), input, std::io::stdout().lock())
     }
 }

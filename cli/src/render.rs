@@ -11,6 +11,7 @@ use pogema_conformance::files;
 use pogema_core::{Error, Trace, shorten};
 use pogema_render::{Ground, check};
 
+use crate::input::Input;
 use crate::output::flagged;
 
 pub use pictures::Pictures;
@@ -25,6 +26,8 @@ pub struct Render {
     /// Draw only these steps, such as `10..20`; `--frame` then counts from the first of them [default: all]
     #[arg(long, value_name = "A..B")]
     steps: Option<Steps>,
+    #[command(flatten)]
+    input: Input,
     #[command(flatten)]
     pictures: Pictures,
 }
@@ -52,7 +55,8 @@ impl FromStr for Steps {
 
 impl Render {
     pub fn run(&self) -> Result<(), Error> {
-        let trace = Trace::read(files::open(&self.trace)?).map_err(|error| Error::io(&self.trace, error))?;
+        let file = files::open_within(&self.trace, self.input.limit())?;
+        let trace = Trace::read(file).map_err(|error| Error::io(&self.trace, error))?;
         check(&trace).map_err(|error| Error::io(&self.trace, error))?;
         self.pictures.check(trace.header.config.num_agents)?;
         let (first, trace) = match self.steps {

@@ -8,7 +8,7 @@ use pogema_toolbox::{Pairs, Results, Suite, differences};
 
 use crate::evaluate::environments;
 use crate::maps::Sources;
-use crate::output::{check_writable, in_one_line, print_line, write_trace};
+use crate::output::{check_writable, in_one_line, print_line, tell, write_trace};
 use crate::render::Pictures;
 
 #[derive(Args, Debug)]
@@ -51,18 +51,16 @@ impl Replay {
     /// Prints how the metrics differ from those in the results.
     fn compare(&self, metrics: &Pairs) {
         let results = Results::read(std::slice::from_ref(&self.folder));
-        let note = |error| eprintln!("note: cannot compare the replay with the results: {error}");
+        let note = |error| tell(&format!("note: cannot compare the replay with the results: {error}"));
         let Ok(results) = results.map_err(note) else { return };
         let row = results.rows.iter().filter(|row| row.algorithm == self.algorithm).nth(self.episode);
         let Some(row) = row else {
-            eprintln!(
-                "note: cannot compare the replay with the results: `{}` is not finished",
-                self.algorithm
-            );
+            let name = &self.algorithm;
+            tell(&format!("note: cannot compare the replay with the results: `{name}` is not finished"));
             return;
         };
         for difference in differences(row, metrics) {
-            eprintln!("note: the replay differs from the results: {difference}");
+            tell(&format!("note: the replay differs from the results: {difference}"));
         }
     }
 }

@@ -12,7 +12,8 @@ use pogema_reference::Reference;
 use pogema_render::Ground;
 use serde_json::json;
 
-use crate::output::{check_writable, in_one_line, print_line, write_trace};
+use crate::input::Input;
+use crate::output::{check_writable, in_one_line, print_json, print_line, tell, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use policy::ActionSource;
@@ -28,6 +29,8 @@ pub struct Run {
     /// Actions for `--policy file`: a trace, or a file with a JSON list of action numbers per line
     #[arg(long, value_name = "FILE")]
     actions: Option<PathBuf>,
+    #[command(flatten)]
+    input: Input,
     #[command(flatten)]
     planner_args: PlannerArgs,
     /// Provide future goals to `--policy rhcr`
@@ -54,7 +57,7 @@ impl Run {
         let settings = self.planner_args.policy_settings(self.future_goals)?;
         let generated = self.settings.generate(&config)?;
         for warning in &generated.warnings {
-            eprintln!("warning: {warning}");
+            tell(&format!("warning: {warning}"));
         }
         let rules = config.rules();
         let mut episode = Episode::new(Reference::new(rules)?).with_density().with_collisions();
@@ -62,8 +65,8 @@ impl Run {
         episode.record(is_recorded);
         episode.start(generated.instance)?;
         let instance = episode.instance()?;
-        let mut policy =
-            ActionSource::new(&self.policy, self.actions.as_deref(), &settings, &config, instance)?;
+        let file = self.actions.as_deref().map(|path| (path, self.input.limit()));
+        let mut policy = ActionSource::new(&self.policy, file, &settings, &config, instance)?;
         let mut screen = self.render.then(|| self.pictures.screen());
         loop {
             if let Some(screen) = &mut screen {
@@ -111,7 +114,7 @@ impl Run {
                 "metrics": episode.metrics(),
                 "warnings": warnings,
             });
-            return print_line(&summary.to_string());
+            return print_json(&summary);
         }
         print_line(&format!("{} steps  {}", episode.num_steps(), in_one_line(episode.metrics().named())))
     }

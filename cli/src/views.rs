@@ -9,7 +9,7 @@ use pogema_toolbox::six::Definition;
 use pogema_toolbox::views::{Format, Gallery, ImageFormat, ShownView, View};
 use pogema_toolbox::{Node, Results};
 
-use crate::output::print_line;
+use crate::output::{print_line, tell};
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -44,14 +44,14 @@ impl Views {
         let gallery = self.gallery()?;
         let results = Results::read(&self.folders)?;
         for note in &results.notes {
-            eprintln!("note: {note}");
+            tell(&format!("note: {note}"));
         }
         let mut status = ExitCode::SUCCESS;
         for (number, (name, view)) in gallery.views.iter().enumerate() {
             match gallery.show(name, view, &results) {
                 Ok(shown) => print_view(&shown, if number == 0 { "" } else { "\n" })?,
                 Err(error) => {
-                    eprintln!("error: {error}");
+                    tell(&format!("error: {error}"));
                     status = ExitCode::from(2);
                 }
             }
@@ -83,10 +83,10 @@ fn print_view(shown: &ShownView, gap: &str) -> Result<(), Error> {
         print_line(&format!("{gap}{table}"))?;
     }
     for path in &shown.files {
-        eprintln!("wrote {}", path.display());
+        tell(&format!("wrote {}", path.display()));
     }
     for note in &shown.notes {
-        eprintln!("note: {note}");
+        tell(&format!("note: {note}"));
     }
     Ok(())
 }

@@ -211,6 +211,7 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
         let (_, error, status) = run(folder.path(), &[&EVALUATE, more].concat());
         assert!(error.contains("holds `letter.json`, which no evaluation wrote"), "{error}");
         assert_eq!((status, fs::read_to_string(out.join("letter.json")).unwrap().as_str()), (2, "{}"));
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "a refused run leaves nothing, not even its lock");
     }
     fs::remove_file(out.join("letter.json")).unwrap();
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);

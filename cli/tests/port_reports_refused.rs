@@ -69,13 +69,18 @@ fn unwritable_reports_are_rejected_before_the_run() {
             "report.html: two reports would be written to this file".into(),
         ),
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
-        ("--html report.html", "the following required arguments were not provided:".into()),
+        (
+            "--html report.html",
+            "the following required arguments were not provided:\n  --port <COMMAND>\n\nUsage: pogema conform --port \
+             <COMMAND> --html <FILE>\n\nFor more information, try '--help'."
+                .into(),
+        ),
     ] {
         assert_rejected(folder.path(), &arguments.split(' ').collect::<Vec<_>>(), &expected);
     }
 }
 
-/// Checks that a run fails with one line before it starts.
+/// Checks that a run fails with a message before it starts.
 fn assert_rejected(folder: &Path, arguments: &[&str], expected: &str) {
     let files = || std::fs::read_dir(folder).unwrap().count();
     let before = files();

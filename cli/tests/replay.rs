@@ -54,7 +54,7 @@ fn an_episode_is_replayed_by_its_number() {
     let throughput = rows[3]["metrics"]["avg_throughput"].as_f64().unwrap();
     assert!(throughput > 0.0 && text.contains(&format!("avg_throughput={throughput:.4}")[..20]), "{text}");
     let trace = fs::read_to_string(folder.path().join("t.jsonl")).unwrap();
-    assert_eq!(trace.lines().count(), 2 + 32, "a header, the start and all steps");
+    assert_eq!(trace.lines().count(), 3 + 32, "a header, the start, all steps and the end");
     assert!(fs::read_to_string(folder.path().join("t.svg")).unwrap().starts_with("<svg"));
     let (_, error, status) = run(folder.path(), &["render", "t.jsonl", "--png", "t.png"]);
     assert_eq!(status, 0, "{error}");

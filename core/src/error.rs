@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::printable::one_line;
+
 /// Any error of the workspace, with a message of one line.
 ///
 /// A call that fails leaves the state unchanged. Control characters in the input are escaped, so the message always
@@ -254,14 +256,4 @@ pub fn shorten(text: &str, longest: usize) -> String {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
     }
-}
-
-/// Escapes the control characters of a text, so that quoted input can neither end the line nor move the cursor.
-fn one_line(text: impl std::fmt::Display) -> String {
-    let is_unfit = |letter: char| letter.is_control() || matches!(letter, '\u{2028}' | '\u{2029}');
-    let mut line = String::new();
-    for letter in text.to_string().chars() {
-        if is_unfit(letter) { line.extend(letter.escape_debug()) } else { line.push(letter) }
-    }
-    line
 }

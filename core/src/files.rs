@@ -1,6 +1,6 @@
 //! Atomic file writes: a file is written completely or not at all.
 
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use tempfile::NamedTempFile;
@@ -29,8 +29,18 @@ pub fn temporary_beside(path: &Path, suffix: &str) -> Result<NamedTempFile, Erro
 /// # Errors
 /// [`Error::Io`] if the file cannot be written. An older file of the same name is then unchanged.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    write_with(path, |file| file.write_all(bytes).map_err(|error| Error::io(path, error)))
+}
+
+/// Lets a function write a file under a temporary name, and renames it when the function returns.
+///
+/// # Errors
+/// Those of the function, and [`Error::Io`] if the file cannot be written. An older file of the same name is then
+/// unchanged.
+pub fn write_with(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), Error>) -> Result<(), Error> {
     let failed = |error: std::io::Error| Error::io(path, error);
-    let mut file = temporary_beside(path, "")?;
-    file.write_all(bytes).map_err(failed)?;
+    let mut file = BufWriter::new(temporary_beside(path, "")?);
+    write(&mut file)?;
+    let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
     file.persist(path).map(|_| ()).map_err(|error| failed(error.error))
 }

@@ -1,20 +1,21 @@
 //! Traces: recorded episodes, the common input of tests, reports, drawings and replays.
 
-use std::io::{BufRead, Write};
+mod file;
+
 use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot, shorten};
+use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
 
-/// The format this version reads and writes.
+/// The format of a header. The files of earlier versions have the same, and no last line.
 const FORMAT: &str = "pogema-trace/1";
 /// The spec whose rules the trace follows.
 const SPEC: &str = "pogema-1.4.0/1";
 
 /// A recorded episode.
 ///
-/// Its file format is JSON Lines: the header, the start, then one line per step.
+/// Its file format is JSON Lines: the header, the start, one line per step, then the number of steps and a hash.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     /// Versions, rules and instance.
@@ -54,7 +55,7 @@ pub struct TraceStart {
     pub observations: Option<Observed>,
 }
 
-/// Each further line of a trace: one step.
+/// Each further line of a trace but the last: one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceStep {
     /// The action of each agent.
@@ -184,26 +185,6 @@ impl TraceHeader {
     }
 }
 
-/// The versions, which are on the first line in every version of the format.
-#[derive(Deserialize)]
-struct Versions {
-    format: String,
-    spec: String,
-}
-
-impl Versions {
-    fn check(&self) -> Result<(), Error> {
-        for (what, got, expected) in [("format", &self.format, FORMAT), ("spec", &self.spec, SPEC)] {
-            if got != expected {
-                let reason =
-                    format!("the {what} is `{}`, expected `{expected}`", shorten(got, Error::LONGEST_QUOTE));
-                return Err(Error::Trace { line: 1, reason });
-            }
-        }
-        Ok(())
-    }
-}
-
 impl Trace {
     /// Creates a trace without steps: the instance before the first step.
     pub fn still(config: Config, instance: &Instance) -> Self {
@@ -249,103 +230,4 @@ impl Trace {
         let start = TraceStart { state: self.state(first)?.clone(), observations: None };
         Ok(Self { header: self.header.clone(), start, steps: self.steps[first..last].to_vec() })
     }
-
-    /// Reads a trace from JSON Lines.
-    ///
-    /// # Errors
-    /// [`Error::Trace`] with the number of the wrong line.
-    pub fn read(input: impl BufRead) -> Result<Self, Error> {
-        let mut lines = (1..).zip(input.lines()).map(|(line, text)| match text {
-            Ok(text) => Ok((line, text)),
-            Err(error) => Err(Error::Trace { line, reason: error.to_string() }),
-        });
-        let ends_before =
-            |line, what| move || Error::Trace { line, reason: format!("the trace ends before {what}") };
-        let (line, text) = lines.next().ok_or_else(ends_before(1, "the header"))??;
-        parse::<Versions>(line, &text)?.check()?;
-        let header: TraceHeader = parse(line, &text)?;
-        header.check().map_err(|error| Error::Trace { line, reason: error.to_string() })?;
-        let num_agents = header.config.num_agents;
-        let (line, text) = lines.next().ok_or_else(ends_before(2, "the start"))??;
-        let start: TraceStart = parse(line, &text)?;
-        check_state(line, num_agents, &start.state)?;
-        let mut steps: Vec<TraceStep> = Vec::new();
-        for line in lines {
-            let (line, text) = line?;
-            if !text.trim().is_empty() {
-                let step: TraceStep = parse(line, &text)?;
-                step.check(line, num_agents)?;
-                steps.push(step);
-            }
-        }
-        Ok(Self { header, start, steps })
-    }
-
-    /// Writes the trace as JSON Lines.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the writer fails.
-    pub fn write(&self, mut output: impl Write) -> Result<(), Error> {
-        write_line(&mut output, &self.header)?;
-        write_line(&mut output, &self.start)?;
-        self.steps.iter().try_for_each(|step| write_line(&mut output, step))
-    }
-}
-
-impl TraceStep {
-    fn check(&self, line: usize, num_agents: usize) -> Result<(), Error> {
-        check_state(line, num_agents, &self.state)?;
-        check_list(line, num_agents, "actions", &self.actions)?;
-        check_list(line, num_agents, "rewards", &self.rewards)?;
-        check_list(line, num_agents, "terminated", &self.terminated)?;
-        check_list(line, num_agents, "truncated", &self.truncated)
-    }
-}
-
-fn check_state(line: usize, num_agents: usize, state: &Snapshot) -> Result<(), Error> {
-    check_list(line, num_agents, "cells", &state.cells)?;
-    check_list(line, num_agents, "goals", &state.goals)?;
-    check_list(line, num_agents, "active", &state.active)?;
-    check_list(line, num_agents, "on_goal", &state.on_goal)
-}
-
-fn check_list<T>(line: usize, num_agents: usize, name: &str, list: &[T]) -> Result<(), Error> {
-    if list.len() == num_agents {
-        return Ok(());
-    }
-    let reason = format!("`{name}` has length {}, expected {num_agents}, one for each agent", list.len());
-    Err(Error::Trace { line, reason })
-}
-
-/// Longest part of a parser message that is quoted, since parsers quote unknown words in full. Units: characters.
-const LONGEST_REASON: usize = 240;
-
-fn parse<T: serde::de::DeserializeOwned>(line: usize, text: &str) -> Result<T, Error> {
-    serde_json::from_str(text).map_err(|error| {
-        // The parser gets one line at a time, so it reports every line as the first.
-        let (column, message) = (error.column(), error.to_string());
-        let bare = message.strip_suffix(&format!(" at line 1 column {column}")).unwrap_or(&message);
-        let reason = match bare.rsplit_once(", expected ") {
-            Some((found, expected)) => format!("{found}, expected {}", in_words(expected)),
-            None => bare.to_owned(),
-        };
-        Error::Trace { line, reason: format!("column {column}: {}", shorten(&reason, LONGEST_REASON)) }
-    })
-}
-
-/// Names a Rust type for readers who write traces in another language.
-fn in_words(expected: &str) -> &str {
-    match expected {
-        "u16" | "i32" | "i64" | "u64" | "usize" => "a whole number",
-        "f32" | "f64" => "a number",
-        "a string" | "variant identifier" => "a text",
-        "a sequence" => "a list",
-        _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
-        _ => expected,
-    }
-}
-
-fn write_line(output: &mut impl Write, value: &impl Serialize) -> Result<(), Error> {
-    let text = serde_json::to_string(value).map_err(|error| Error::io("trace", error))?;
-    writeln!(output, "{text}").map_err(|error| Error::io("trace", error))
 }

@@ -164,7 +164,7 @@ proptest! {
     fn a_written_trace_is_read_back_unchanged(trace in trace()) {
         let mut text = Vec::new();
         trace.write(&mut text).unwrap();
-        prop_assert_eq!(text.split_inclusive(|&byte| byte == b'\n').count(), 2 + trace.steps.len());
+        prop_assert_eq!(text.split_inclusive(|&byte| byte == b'\n').count(), 3 + trace.steps.len());
         prop_assert_eq!(Trace::read(&text[..]).unwrap(), trace);
     }
 

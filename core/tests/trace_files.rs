@@ -26,8 +26,8 @@ const TOKENS: [&str; 16] = [
 const REJECTED: [(&str, &str, &str); 18] = [
     (
         "pogema-trace/1",
-        "pogema-trace/2",
-        "trace: line 1: the format is `pogema-trace/2`, expected `pogema-trace/1`",
+        "pogema-trace/3",
+        "trace: line 1: the format is `pogema-trace/3`, expected `pogema-trace/2` or `pogema-trace/1`",
     ),
     (
         "pogema-1.4.0/1",
@@ -128,6 +128,31 @@ fn wrong_lines_are_rejected_with_their_number() {
     let after_blanks = format!("{}\n{}\n\n \n{{}}", lines[0], lines[1]);
     assert_eq!(read(&after_blanks).unwrap_err(), "trace: line 5: column 2: missing field `actions`");
     assert!(Trace::read(&b"\xff"[..]).unwrap_err().to_string().starts_with("trace: line 1: "));
+}
+
+#[test]
+fn a_cut_or_changed_file_is_told_from_a_whole_one() {
+    let whole = written(&read(VALID).unwrap());
+    assert!(whole.starts_with("{\"format\":\"pogema-trace/2\","), "{whole}");
+    let lines: Vec<&str> = whole.lines().collect();
+    let last = lines[3];
+    assert!(last.starts_with("{\"num_steps\":1,\"sha256\":\""), "{last}");
+    assert_eq!(read(&whole), read(VALID));
+    assert_eq!(read(&whole.replace('\n', "\r\n")), read(VALID));
+    let ends = "the trace ends before its last line, `num_steps` and `sha256`";
+    assert_eq!(read(&lines[..3].join("\n")).unwrap_err(), format!("trace: line 4: {ends}"));
+    assert_eq!(read(&lines[..2].join("\n")).unwrap_err(), format!("trace: line 3: {ends}"));
+    let without_step = [lines[0], lines[1], last].join("\n");
+    let expected = "trace: line 3: `num_steps` is `1`, expected 0, the number of steps before it";
+    assert_eq!(read(&without_step).unwrap_err(), expected);
+    let changed = read(&whole.replacen("\"rewards\":[1.0", "\"rewards\":[0.5", 1)).unwrap_err();
+    assert!(changed.starts_with("trace: line 4: `sha256` is `"), "{changed}");
+    assert_one_line(&changed);
+    let twice = read(&format!("{whole}{last}\n")).unwrap_err();
+    assert_eq!(twice, "trace: line 5: a line after the last one of the trace");
+    // Files of earlier versions have no last line.
+    let old = read(&format!("{VALID}{last}\n")).unwrap_err();
+    assert!(old.starts_with("trace: line 4: column "), "{old}");
 }
 
 #[test]

@@ -9,10 +9,10 @@ use crate::formats::{
     NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
 };
 use crate::text::{MapText, parse_map_text};
-use pogema_core::Error;
+use pogema_core::{Error, InputLimit};
 
-/// Maximum size of a file. Units: bytes.
-const MOST_BYTES: u64 = 1 << 28;
+/// Maximum size of a map file: 256 MiB.
+const LIMIT: u64 = 1 << 28;
 
 /// Options for reading MovingAI maps.
 #[derive(Clone, Copy, Debug, Default)]
@@ -119,9 +119,22 @@ pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Er
 /// Reads a file as text, without a leading byte order mark.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read or is not UTF-8.
+/// [`Error::Io`] if the file cannot be read, is larger than 256 MiB or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, Error> {
-    let text = String::from_utf8(read_bytes(path)?).map_err(|error| {
+    text_of(path, read_bytes(path)?)
+}
+
+/// Reads a file as text within a limit, without a leading byte order mark.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, exceeds the limit or is not UTF-8.
+pub fn read_text_within(path: &Path, limit: InputLimit) -> Result<String, Error> {
+    let bytes = read_at_most(path, limit.largest_file())?;
+    text_of(path, bytes.ok_or_else(|| Error::io(path, limit.file_error()))?)
+}
+
+fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, Error> {
+    let text = String::from_utf8(bytes).map_err(|error| {
         let place = error.utf8_error().valid_up_to();
         Error::io(path, format!("byte {} is not UTF-8 text", place + 1))
     })?;
@@ -129,16 +142,16 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    let reason = || format!("the file is larger than {} MiB, the limit for a map file", LIMIT >> 20);
+    read_at_most(path, LIMIT)?.ok_or_else(|| Error::io(path, reason()))
+}
+
+/// Returns the bytes of a file, or `None` if there are more than `most`.
+fn read_at_most(path: &Path, most: u64) -> Result<Option<Vec<u8>>, Error> {
     let failed = |error: std::io::Error| Error::io(path, error);
     let mut bytes = Vec::new();
-    File::open(path).map_err(failed)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::io(
-            path,
-            format!("the file is larger than {} MiB, the limit for a map file", MOST_BYTES >> 20),
-        ));
-    }
-    Ok(bytes)
+    File::open(path).map_err(failed)?.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= most))
 }
 
 /// Returns the extension of a file, empty if it has none.

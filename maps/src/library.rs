@@ -1,13 +1,14 @@
 //! Maps by name: built-in maps and maps from the user's files.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use pogema_core::{Error, shorten};
+use pogema_core::{Error, Words, shorten};
 use regex::Regex;
 
 use crate::catalogue::named_maps;
 use crate::config::nearest;
 use crate::formats::NamedMap;
+use crate::generators::Preset;
 use crate::text::MapText;
 use pogema_numpy::Generator;
 
@@ -41,6 +42,25 @@ impl Library {
         replaced
     }
 
+    /// Adds the maps of the paper's generators that names or patterns select, if no map of the library matches.
+    ///
+    /// # Errors
+    /// None: the settings of the paper's maps are in range.
+    pub fn add_published<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) -> Result<(), Error> {
+        let is_missing = |name: &&str| !self.maps.contains_key(*name) && self.matching(name).is_err();
+        let missing: BTreeSet<&str> = names.into_iter().filter(is_missing).collect();
+        let published = published_names();
+        // Most suites list whole names, which need no pattern. A wrong pattern is an error where its maps are used.
+        let patterns = missing.iter().filter(|name| !published.contains(**name));
+        let patterns: Vec<Pattern> = patterns.filter_map(|name| Pattern::new(name).ok()).collect();
+        let is_selected =
+            |name: &str| missing.contains(name) || patterns.iter().any(|pattern| pattern.matches(name));
+        for preset in Preset::all() {
+            self.register(preset.selected(is_selected)?);
+        }
+        Ok(())
+    }
+
     /// Returns all names, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.maps.keys().map(String::as_str)
@@ -64,14 +84,8 @@ impl Library {
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.__init__`
     pub fn matching(&self, pattern: &str) -> Result<Vec<&str>, Error> {
-        let expression = Regex::new(&format!("^{pattern}$")).map_err(|error| {
-            let reason = error.to_string();
-            let last = reason.lines().last().unwrap_or_default().trim_start_matches("error: ");
-            Error::config("map_name", pattern, format!("a regular expression: {last}"))
-        })?;
-        // In `^a|b$`, `^` does not anchor the second alternative, so the start of the match is checked.
-        let matches = |name: &&str| expression.find(name).is_some_and(|found| found.start() == 0);
-        let names: Vec<&str> = self.names().filter(matches).collect();
+        let expression = Pattern::new(pattern)?;
+        let names: Vec<&str> = self.names().filter(|name| expression.matches(name)).collect();
         if names.is_empty() {
             return Err(self.unknown(pattern, "a pattern that matches a known map"));
         }
@@ -101,8 +115,33 @@ impl Library {
     }
 
     fn unknown(&self, name: &str, expected: &str) -> Error {
-        let hint = nearest(name, self.names());
+        let published = published_names();
+        let hint = nearest(name, self.names().chain(published.iter().map(String::as_str)));
         let hint = hint.map(|hint| format!("; did you mean `{}`?", shorten(hint, Error::LONGEST_QUOTE)));
         Error::config("map_name", name, format!("{expected}{}", hint.unwrap_or_default()))
+    }
+}
+
+/// Returns the names of the maps of the paper's generators.
+fn published_names() -> BTreeSet<String> {
+    Preset::all().flat_map(Preset::names).map(|(_, name)| name).collect()
+}
+
+/// A pattern of names, see [`Library::matching`].
+struct Pattern(Regex);
+
+impl Pattern {
+    fn new(pattern: &str) -> Result<Self, Error> {
+        Regex::new(&format!("^{pattern}$")).map(Self).map_err(|error| {
+            let reason = error.to_string();
+            let last = reason.lines().last().unwrap_or_default().trim_start_matches("error: ");
+            Error::config("map_name", pattern, format!("a regular expression: {last}"))
+        })
+    }
+
+    /// Returns whether a name matches. In `^a|b$`, `^` does not anchor the second alternative, so the start of the match
+    /// is checked.
+    fn matches(&self, name: &str) -> bool {
+        self.0.find(name).is_some_and(|found| found.start() == 0)
     }
 }

@@ -10,6 +10,7 @@ use pogema_maps::formats::{
     NamedMap, Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
     write_archive, write_movingai, write_scen, write_set,
 };
+use pogema_maps::generators::Preset;
 use pogema_maps::{GridConfig, Library, MapText, Targets, parse_map_text, tiles};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -175,6 +176,35 @@ fn library_holds_built_in_and_registered_maps() {
     let error = library.map("mime").unwrap_err().to_string();
     assert!(error.contains("`mine`"), "{error}");
     assert!(library.matching("(").unwrap_err().to_string().contains("regular expression"));
+}
+
+#[test]
+fn published_maps_are_added_by_name_or_pattern() {
+    let mut library = Library::built_in();
+    let before = library.names().count();
+    let names = ["validation-mazes-seed-005", "validation-random-seed-00.", "four-rooms", "(", "nothing"];
+    library.add_published(names).unwrap();
+    assert_eq!(library.names().count(), before + 11);
+    let mazes = Preset::ValidationMazes.maps().unwrap();
+    assert_eq!(library.map("validation-mazes-seed-005").unwrap(), &mazes[5].text);
+    let mine = MapText::from(Map::from_rows(&["..."]).unwrap());
+    let mut library = Library::empty();
+    library.register([NamedMap { name: "wfi_warehouse".into(), text: mine.clone() }]);
+    library.add_published(["wfi_warehouse"]).unwrap();
+    assert_eq!(library.map("wfi_warehouse").unwrap(), &mine);
+    let error = library.map("wfi_warehose").unwrap_err().to_string();
+    assert!(error.contains("did you mean `wfi_warehouse`?"), "{error}");
+    let error = Library::built_in().matching("validation-mazes-seed-5").unwrap_err().to_string();
+    assert!(error.contains("did you mean `validation-mazes-seed-"), "{error}");
+}
+
+#[test]
+fn unprintable_characters_of_names_are_escaped_in_sets() {
+    let text = MapText::from(Map::from_rows(&["..."]).unwrap());
+    let maps = [NamedMap { name: "a\u{1b}[2J\u{202e}b\n\u{9b}".into(), text }];
+    let written = write_set(&maps).unwrap();
+    assert_eq!(written, "\"a\\u001b[2J\\u202eb\\n\\u009b\": |-\n  ...\n");
+    assert_eq!(read_set(&written).unwrap(), maps);
 }
 
 #[test]

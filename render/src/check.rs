@@ -1,24 +1,55 @@
 //! Checks of traces before drawing.
 
-use pogema_core::{Cell, Error, Trace};
+use pogema_core::{Action, Cell, Error, Snapshot, Trace, TraceStep};
 
-/// Checks that every state has as many agents as the first, and that all agents and goals are on the map.
+/// Checks that a trace can be drawn: every list has one entry per agent, all agents and goals are on the map, and no
+/// agent moves farther than to a neighbouring cell in one step.
 ///
 /// # Errors
-/// [`Error::Length`] or [`Error::OutOfRange`] for the first state that cannot be drawn.
+/// [`Error::Length`], [`Error::OutOfRange`] or [`Error::Trace`] for the first state that cannot be drawn.
 pub fn check(trace: &Trace) -> Result<(), Error> {
-    let (map, num_agents) = (&trace.header.map, trace.start.state.cells.len());
+    let num_agents = trace.header.config.num_agents;
     for (frame, state) in trace.states().enumerate() {
-        Error::check_length("cells", num_agents, state.cells.len())?;
-        Error::check_length("goals", num_agents, state.goals.len())?;
-        Error::check_length("active", num_agents, state.active.len())?;
-        let is_off = |cell: &&Cell| !map.contains(**cell);
-        if let Some(cell) = state.cells.iter().chain(&state.goals).find(is_off) {
-            let expected = format!("a cell of the map of {} rows and {} columns", map.height(), map.width());
-            return Err(Error::out_of_range(&format!("a cell of frame {frame}"), cell, expected));
+        check_state(trace, frame, state, num_agents)?;
+    }
+    // The header and the start are the first two lines of the file.
+    for ((line, before), step) in (3..).zip(trace.states()).zip(&trace.steps) {
+        check_step(step, num_agents)?;
+        let cells = before.cells.iter().zip(&step.state.cells);
+        let mut moves = cells.enumerate();
+        if let Some((agent, (from, to))) = moves.find(|(_, (from, to))| direction(**from, **to).is_none()) {
+            let reason = format!("agent {agent} is on {to}, expected {from} or a cell next to it");
+            return Err(Error::Trace { line, reason });
         }
     }
     Ok(())
+}
+
+fn check_state(trace: &Trace, frame: usize, state: &Snapshot, num_agents: usize) -> Result<(), Error> {
+    Error::check_length("cells", num_agents, state.cells.len())?;
+    Error::check_length("goals", num_agents, state.goals.len())?;
+    Error::check_length("active", num_agents, state.active.len())?;
+    Error::check_length("on_goal", num_agents, state.on_goal.len())?;
+    let map = &trace.header.map;
+    let is_off = |cell: &&Cell| !map.contains(**cell);
+    if let Some(cell) = state.cells.iter().chain(&state.goals).find(is_off) {
+        let expected = format!("a cell of the map of {} rows and {} columns", map.height(), map.width());
+        return Err(Error::out_of_range(&format!("a cell of frame {frame}"), cell, expected));
+    }
+    Ok(())
+}
+
+fn check_step(step: &TraceStep, num_agents: usize) -> Result<(), Error> {
+    Error::check_length("actions", num_agents, step.actions.len())?;
+    Error::check_length("rewards", num_agents, step.rewards.len())?;
+    Error::check_length("terminated", num_agents, step.terminated.len())?;
+    Error::check_length("truncated", num_agents, step.truncated.len())
+}
+
+/// Returns the action that leads from one cell to another.
+pub(crate) fn direction(from: Cell, to: Cell) -> Option<Action> {
+    let to = (i32::from(to.row), i32::from(to.col));
+    Action::ALL.into_iter().find(|&action| from.toward(action) == to)
 }
 
 /// Checks that `agent` is less than `num_agents`.

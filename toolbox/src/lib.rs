@@ -7,6 +7,8 @@
 pub mod bootstrap;
 mod built_in;
 mod episode_configs;
+#[cfg(feature = "views")]
+mod fit;
 pub mod frame;
 mod library;
 mod manifest;
@@ -27,6 +29,8 @@ pub mod views;
 
 pub use built_in::BuiltIn;
 pub use episode_configs::{EpisodeConfig, EpisodeConfigs};
+#[cfg(feature = "views")]
+pub use fit::fitted;
 pub use manifest::{Manifest, RunRecord, machine};
 pub use play::{Played, play, record};
 pub use progress::{Done, Failed, Progress};

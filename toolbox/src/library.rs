@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use pogema_core::{Error, Words};
+use pogema_core::Error;
 use pogema_maps::Library;
 use pogema_maps::files::{Reading, read_maps};
-use pogema_maps::generators::Preset;
 use serde_json::Value;
 
 use crate::suite::Suite;
@@ -28,19 +27,8 @@ impl Suite {
             let warning = |name| format!("{path}: a second map named `{name}` replaces the first");
             warnings.extend(replaced.into_iter().map(warning));
         }
-        for preset in Preset::all() {
-            if self.names_of(preset).any(|name| library.matching(name).is_err()) {
-                let is_new = |name: &str| library.map(name).is_err();
-                let maps: Vec<_> = preset.maps()?.into_iter().filter(|map| is_new(&map.name)).collect();
-                library.register(maps);
-            }
-        }
+        let names = self.environments.values_of("map_name");
+        library.add_published(names.into_iter().filter_map(Value::as_str))?;
         Ok((library, warnings))
-    }
-
-    /// Returns the names of maps that a generator may provide.
-    fn names_of(&self, preset: Preset) -> impl Iterator<Item = &str> {
-        let names = self.environments.values_of("map_name").into_iter().filter_map(Value::as_str);
-        names.filter(move |name| name.contains(preset.word()))
     }
 }

@@ -17,7 +17,8 @@ words! {
         ///
         /// - Instances that no algorithm solved are left out. "Best" is the best of the compared algorithms.
         /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
-        /// - Pathfinding counts a path that was not found as a path of the length of the episode.
+        /// - Pathfinding counts a path that was not found as a path of the length of the episode. In lifelong suites, it
+        ///   counts 0 for every algorithm if any algorithm has an episode of length 0.
         /// - Coordination counts makespan − 1 steps per episode. In the published files, this equals `ep_length`
         ///   wherever they count collisions. In POGEMA 1.4.0, and therefore in our results, `ep_length` is larger by
         ///   one. Makespan is the same in both, so files of both kinds can be compared.
@@ -310,6 +311,28 @@ mod tests {
         assert_eq!(coordination(10, Definition::Published), Some(0.75));
         assert_eq!(coordination(11, Definition::Published), Some(0.75));
         assert_eq!(coordination(10, Definition::Paper), Some(0.75));
+    }
+
+    #[test]
+    fn a_lifelong_episode_of_length_0_counts_0_in_pathfinding_for_every_algorithm() {
+        let lifelong = |algorithm, seed, ep_length: u64| {
+            let metrics = format!(r#"{{"avg_throughput": 0.5, "ep_length": {ep_length}}}"#);
+            row("06-pathfinding", algorithm, seed, &metrics)
+        };
+        // On seed 1, only B starts with a path of length 0; on seed 2, both do.
+        let lengths = [
+            ("A", 0, 10),
+            ("B", 0, 20),
+            ("A", 1, 4),
+            ("B", 1, 0),
+            ("A", 2, 0),
+            ("B", 2, 0),
+            ("A", 3, 6),
+            ("B", 3, 6),
+        ];
+        let rows = lengths.map(|(algorithm, seed, length)| lifelong(algorithm, seed, length)).to_vec();
+        let (all, _) = of(rows, Definition::Published);
+        assert_eq!(all.iter().map(|six| six.values[5]).collect::<Vec<_>>(), [Some(0.5), Some(0.375)]);
     }
 
     #[test]

@@ -60,22 +60,16 @@ impl Store {
     /// If another process writes to the folder; if the folder holds anything that `begin` does not allow, which is left
     /// unchanged.
     pub fn open(folder: &Path, suite: &Suite, begin: Begin) -> Result<Self, Error> {
+        // A run that is refused leaves nothing in the folder, not even the lock.
+        if folder.exists() {
+            admit(folder, suite, begin)?;
+        }
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;
-        let mut manifest = Manifest::of(suite);
-        let known = Manifest::read(folder)?;
-        match (begin, known) {
-            (Begin::Resume, Some(known)) => {
-                manifest.continue_from(known).map_err(|what| refused(folder, &what))?;
-            }
-            (Begin::Anew, Some(known)) => delete(folder, &known)?,
-            (Begin::New, Some(_)) => {
-                let reason = "has results already: `--resume` continues them, `--force` deletes them";
-                return Err(Error::io(folder, reason));
-            }
-            (_, None) => check_empty(folder)?,
-        }
+        // Another process may have written to the folder before the lock was taken.
+        let (manifest, deleted) = admit(folder, suite, begin)?;
+        deleted.map_or(Ok(()), |known| delete(folder, &known))?;
         let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
         let store = Self { folder: folder.to_owned(), journal, versions: Vec::new(), _lock: lock };
         // The manifest comes first, because it marks a folder of results and the run may be killed in between.
@@ -134,6 +128,26 @@ impl Store {
     }
 }
 
+/// Returns the manifest with which a run begins, and that of the results that it deletes first.
+///
+/// # Errors
+/// If the folder holds anything that `begin` does not allow.
+fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option<Manifest>), Error> {
+    let mut manifest = Manifest::of(suite);
+    match (begin, Manifest::read(folder)?) {
+        (Begin::Resume, Some(known)) => {
+            manifest.continue_from(known).map_err(|what| refused(folder, &what))?;
+            Ok((manifest, None))
+        }
+        (Begin::Anew, Some(known)) => Ok((manifest, Some(known))),
+        (Begin::New, Some(_)) => {
+            let reason = "has results already: `--resume` continues them, `--force` deletes them";
+            Err(Error::io(folder, reason))
+        }
+        (_, None) => check_empty(folder).map(|()| (manifest, None)),
+    }
+}
+
 fn refused(folder: &Path, what: &str) -> Error {
     Error::io(folder, format!("{what}; choose another folder, or delete the results with `--force`"))
 }
@@ -155,7 +169,8 @@ fn remove_unfinished(folder: &Path) -> Result<(), Error> {
 }
 
 fn check_empty(folder: &Path) -> Result<(), Error> {
-    match entries(folder)?.iter().map(|path| name_of(path)).find(|name| name != LOCK) {
+    let is_own = |name: &str| name == LOCK || name.starts_with(UNFINISHED);
+    match entries(folder)?.iter().map(|path| name_of(path)).find(|name| !is_own(name)) {
         None => Ok(()),
         Some(name) => {
             let reason = format!("holds `{name}`, which no evaluation wrote; choose an empty folder");

@@ -8,20 +8,23 @@ mod work;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use clap::Args;
+use indicatif::ProgressBar;
 use pogema_conformance::find_oracle_python;
 use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::interrupt::exit_on_ctrl_c;
 use crate::output::{check_writable, print_line, progress_bar, write_json};
 
 use bars::{Bar, bars};
 use work::{Speed, Work};
 
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct Bench {
     /// Also time POGEMA 1.4.0 in the same run; requires Python 3.11
     #[arg(long)]
@@ -99,12 +102,14 @@ impl Bench {
         if works.is_empty() {
             return Err(Error::argument("--rows", &self.rows, "a part of a row's name, such as `64 agents`"));
         }
-        let bar = progress_bar("{bar:40} {pos}/{len} {msg}", self.rounds * works.len() as u64);
-        let mut rows: Vec<Row> = Vec::new();
+        let bar = progress_bar("{bar:40} {pos}/{len} {msg}", self.rounds.saturating_mul(works.len() as u64));
+        let rows = Arc::new(Mutex::new(Vec::new()));
+        self.report_on_ctrl_c(Arc::clone(&rows), works.len(), bar.clone())?;
         for _ in 0..self.rounds {
             for (index, work) in works.iter().enumerate() {
                 bar.set_message(work.name());
                 let row = Row::measure(work, budget, python.as_deref())?;
+                let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
                 match rows.get_mut(index) {
                     Some(best) => best.improve(&row),
                     None => rows.push(row),
@@ -113,6 +118,31 @@ impl Bench {
             }
         }
         bar.finish_and_clear();
+        let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        self.report(rows)
+    }
+
+    /// Reports on Ctrl-C what is measured so far.
+    fn report_on_ctrl_c(
+        &self,
+        rows: Arc<Mutex<Vec<Row>>>,
+        num_all: usize,
+        bar: ProgressBar,
+    ) -> Result<(), Error> {
+        let bench = self.clone();
+        exit_on_ctrl_c(move || {
+            bar.finish_and_clear();
+            let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let num_rows = rows.len();
+            let reported = if rows.is_empty() { Ok(()) } else { bench.report(rows) };
+            reported.map_or_else(
+                |error| error.to_string(),
+                |()| format!("{num_rows} of {num_all} rows are measured"),
+            )
+        })
+    }
+
+    fn report(&self, rows: Vec<Row>) -> Result<(), Error> {
         let path = pogema_fast::SimdPath::from_environment()?.to_string();
         let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
         print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))?;

@@ -1,6 +1,7 @@
 //! Formats the results of `pogema bench` as tables.
 
 use comfy_table::Table;
+use pogema_toolbox::fitted;
 
 use crate::output::markdown_table;
 
@@ -8,8 +9,7 @@ use super::{Bar, Row};
 
 /// Returns the table of speeds and the table of targets as Markdown.
 pub fn tables(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
-    let speeds = speeds(rows);
-    let bars = bar_table(bars);
+    let (speeds, bars) = (fitted(speeds(rows)), fitted(bar_table(bars)));
     format!(
         "{machine}; observations by the {path} path; windows of 11 x 11, density 0.3, random actions\n\n\
          Millions per second: agent steps, observations, both; buffers filled with zeros\n\n{speeds}\n\n\

@@ -4,12 +4,15 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
+use indicatif::HumanBytes;
+use pogema_conformance::files::write_with;
 use pogema_core::Error;
 use pogema_maps::MapText;
-use pogema_maps::formats::{NamedMap, write_set};
-use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, of_seeds};
+use pogema_maps::formats::{NamedMap, set_entry, write_set};
+use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, seed_name};
 
 use super::write_out;
+use crate::output::{check_writable, print_bytes, tell};
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -98,6 +101,9 @@ struct Shelves {
     bays: Bays,
 }
 
+/// The most maps that are generated without a note on how much is to come.
+const MANY: u64 = 10_000;
+
 fn seeds(text: &str) -> Result<Range<u64>, String> {
     let wrong = || "expected two whole numbers such as 0..128, the first one smaller".to_owned();
     let (first, end) = text.split_once("..").ok_or_else(wrong)?;
@@ -116,28 +122,50 @@ macro_rules! given {
 
 impl Generate {
     pub fn run(&self) -> Result<(), Error> {
-        let maps = match self.what.as_str() {
+        match self.what.as_str() {
             "random" => {
                 let ranges = given!(self.ranges => RandomRanges: width_min width_max height_min height_max
                     obstacle_density_min obstacle_density_max);
-                let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
-                of_seeds(self.name.as_deref().unwrap_or("random"), self.seeds.clone(), make)?
+                self.write_seeds(|seed| ranges.sample(seed)?.generate().map(MapText::from))
             }
             "mazes" => {
                 let ranges = given!(self.ranges => MazeRanges: width_min width_max height_min height_max
                     obstacle_density_min obstacle_density_max wall_components_min wall_components_max
                     go_straight_min go_straight_max);
-                let make = |seed| ranges.sample(seed)?.generate().map(MapText::from);
-                of_seeds(self.name.as_deref().unwrap_or("mazes"), self.seeds.clone(), make)?
+                self.write_seeds(|seed| ranges.sample(seed)?.generate().map(MapText::from))
             }
             "shelves" => {
                 let warehouse = given!(self.shelves => Warehouse: wall_width wall_height walls_in_row walls_rows
                     bottom_gap horizontal_gap vertical_gap);
                 let name = self.name.clone().unwrap_or_else(|| "shelves".into());
-                vec![NamedMap { name, text: warehouse.generate(self.shelves.bays)? }]
+                let map = NamedMap { name, text: warehouse.generate(self.shelves.bays)? };
+                write_out(self.out.as_deref(), set_entry(&map)?.as_bytes())
             }
-            preset => Preset::by_name(preset)?.maps()?,
+            preset => {
+                write_out(self.out.as_deref(), write_set(&Preset::by_name(preset)?.maps()?)?.as_bytes())
+            }
+        }
+    }
+
+    /// Writes the map of each seed as soon as it is generated.
+    fn write_seeds(&self, generate: impl Fn(u64) -> Result<MapText, Error>) -> Result<(), Error> {
+        let prefix = self.name.as_deref().unwrap_or(&self.what);
+        let entry =
+            |seed| set_entry(&NamedMap { name: seed_name(prefix, seed, &self.seeds), text: generate(seed)? });
+        let num_maps = self.seeds.end - self.seeds.start;
+        if num_maps > MANY {
+            let bytes = num_maps.saturating_mul(entry(self.seeds.start)?.len() as u64);
+            tell(&format!("note: {num_maps} maps to generate, about {} in all", HumanBytes(bytes)));
+        }
+        let mut entries = self.seeds.clone().map(entry);
+        let Some(path) = &self.out else {
+            return entries.try_for_each(|entry| print_bytes(entry?.as_bytes()));
         };
-        write_out(self.out.as_deref(), write_set(&maps)?.as_bytes())
+        check_writable(path)?;
+        write_with(path, |file| {
+            entries.try_for_each(|entry| {
+                file.write_all(entry?.as_bytes()).map_err(|error| Error::io(path, error))
+            })
+        })
     }
 }

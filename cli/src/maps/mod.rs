@@ -13,7 +13,7 @@ use pogema_maps::Library;
 use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::NamedMap;
 
-use crate::output::{check_printed, check_writable};
+use crate::output::{check_writable, print_bytes, tell};
 
 #[derive(Args, Debug)]
 pub struct Maps {
@@ -70,20 +70,21 @@ impl Sources {
         &self.paths
     }
 
-    /// Returns the built-in maps and those of the files.
-    pub fn library(&self) -> Result<Library, Error> {
+    /// Returns the built-in maps, those of the files, and those of the paper that a name or pattern selects.
+    pub fn library(&self, name: Option<&str>) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {
             for name in library.register(read_maps(path, Reading::default())?) {
-                eprintln!("warning: {}: a second map named `{name}` replaces the first", path.display());
+                tell(&format!("warning: {}: a second map named `{name}` replaces the first", path.display()));
             }
         }
+        library.add_published(name)?;
         Ok(library)
     }
 
     /// Returns the maps that a word selects: the one of that name, those of a file or folder, or all whose names match.
     pub fn resolve(&self, word: &str) -> Result<Vec<NamedMap>, Error> {
-        let library = self.library()?;
+        let library = self.library(Some(word))?;
         if let Ok(text) = library.map(word) {
             return Ok(vec![NamedMap { name: word.into(), text: text.clone() }]);
         }
@@ -103,11 +104,8 @@ fn ambiguous_map(word: &str, found: usize, purpose: &str) -> Error {
 
 /// Writes bytes to a file, or to standard output if there is no path.
 fn write_out(path: Option<&Path>, bytes: &[u8]) -> Result<(), Error> {
-    use std::io::Write;
-    if let Some(path) = path {
-        check_writable(path)?;
-        return pogema_conformance::files::write(path, bytes);
+    match path {
+        Some(path) => check_writable(path).and_then(|()| pogema_conformance::files::write(path, bytes)),
+        None => print_bytes(bytes),
     }
-    let mut output = std::io::stdout().lock();
-    check_printed(output.write_all(bytes).and_then(|()| output.flush()))
 }

@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::CellAlignment;
-use pogema_core::{Config, Error, GoalStream, Instance, Map, Outside, Trace};
+use pogema_core::{Config, Error, GoalStream, Instance, Map, Outside, Trace, one_line};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
 use pogema_render::{Style, html, raster, svg};
 
 use super::{Sources, ambiguous_map, write_out};
-use crate::output::{markdown_table, print_line};
+use crate::output::{markdown_table, print_line, print_table};
 
 #[derive(Args, Debug)]
 pub struct List {
-    /// Pattern that the names have to match, as pogema-toolbox matches `map_name` [default: all maps]
+    /// Pattern that the names have to match, as pogema-toolbox matches `map_name` [default: all maps but the paper's
+    /// generated sets]
     pattern: Option<String>,
     #[command(flatten)]
     sources: Sources,
@@ -22,7 +23,7 @@ pub struct List {
 
 impl List {
     pub fn run(&self) -> Result<(), Error> {
-        let library = self.sources.library()?;
+        let library = self.sources.library(self.pattern.as_deref())?;
         let names: Vec<&str> = match &self.pattern {
             Some(pattern) => library.matching(pattern)?,
             None => library.names().collect(),
@@ -33,7 +34,7 @@ impl List {
             let puzzle = PUZZLES.iter().find(|puzzle| puzzle.name == name);
             let agents = if text.starts.is_empty() { String::new() } else { text.starts.len().to_string() };
             table.add_row([
-                name.to_owned(),
+                one_line(name),
                 text.map.height().to_string(),
                 text.map.width().to_string(),
                 text.map.num_free().to_string(),
@@ -45,7 +46,7 @@ impl List {
         if let Some(task) = table.column_mut(6) {
             task.set_cell_alignment(CellAlignment::Left);
         }
-        print_line(&table.to_string())
+        print_table(table)
     }
 }
 
@@ -74,7 +75,8 @@ impl Show {
         for NamedMap { name, text } in maps {
             let figures = MapStats::of(&text.map);
             print_line(&format!(
-                "{name}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
+                "{}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
+                one_line(&name),
                 figures.height,
                 figures.width,
                 figures.num_free,

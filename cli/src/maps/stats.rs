@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::Table;
-use pogema_core::{Cell, Error, Map, OnGoal, Words};
+use pogema_core::{Cell, Error, Map, OnGoal, Words, one_line};
 use pogema_maps::files::read_scenario;
-use pogema_maps::formats::NamedMap;
-use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats};
+use pogema_maps::formats::{NamedMap, Scenario};
+use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats, Targets};
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
 use super::{Sources, ambiguous_map};
-use crate::output::{markdown_table, print_line};
+use crate::output::{markdown_table, print_json, print_line, print_table};
 use crate::words::word_of;
 
 #[derive(Args, Debug)]
@@ -24,7 +24,8 @@ pub struct Stats {
     /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy` [default: those of the map]
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     scenario: Option<PathBuf>,
-    /// Number of agents: the first N of the scenario [default: all], or with `--seed`, the number that POGEMA places
+    /// Number of agents: the first N of the scenario or map [default: all], or with `--seed`, the number that POGEMA
+    /// places
     #[arg(long, value_name = "N")]
     num_agents: Option<usize>,
     /// Place agents as POGEMA does with this seed; requires `--num-agents`
@@ -52,12 +53,12 @@ impl Stats {
                 .iter()
                 .map(|(map, stats, scenario)| as_json(map, stats, scenario.as_ref()))
                 .collect();
-            return print_line(&json!(all).to_string());
+            return print_json(&json!(all));
         }
-        print_line(&table(&analysed).to_string())?;
+        print_table(table(&analysed))?;
         for (map, _, scenario) in &analysed {
             if let Some(scenario) = scenario {
-                print_line(&format!("{}: {}", map.name, scenario_text(scenario)))?;
+                print_line(&format!("{}: {}", one_line(&map.name), scenario_text(scenario)))?;
             }
         }
         Ok(())
@@ -68,8 +69,7 @@ impl Stats {
         let on_goal = self.on_target;
         let plain_map = &map.text.map;
         if let Some(path) = &self.scenario {
-            let scenario = read_scenario(path, plain_map)?;
-            let scenario = scenario.truncated(self.num_agents.unwrap_or(scenario.starts.len()))?;
+            let scenario = self.first_agents(read_scenario(path, plain_map)?)?;
             return Ok(Some(analyse(plain_map, &scenario.starts, &scenario.goals.first(), on_goal)));
         }
         if let (Some(seed), Some(num_agents)) = (self.seed, self.num_agents) {
@@ -86,9 +86,24 @@ impl Stats {
             let goals = instance.first_goals();
             return Ok(Some(analyse(plain_map, instance.starts(), &goals, on_goal)));
         }
-        let own = (!map.text.starts.is_empty())
-            .then(|| analyse(plain_map, &map.text.starts, &map.text.goals, on_goal));
-        Ok(own)
+        let own =
+            Scenario { starts: map.text.starts.clone(), goals: Targets::Single(map.text.goals.clone()) };
+        let own = self.first_agents(own)?;
+        let has_agents = !own.starts.is_empty();
+        Ok(has_agents.then(|| analyse(plain_map, &own.starts, &own.goals.first(), on_goal)))
+    }
+
+    /// Returns the requested number of agents of a scenario, or all.
+    fn first_agents(&self, scenario: Scenario) -> Result<Scenario, Error> {
+        let found = scenario.starts.len();
+        match self.num_agents {
+            Some(wanted) if wanted > found => {
+                let expected =
+                    format!("at most {found}, the number of agents of the map or scenario, or `--seed`");
+                Err(Error::argument("--num-agents", wanted, expected))
+            }
+            wanted => scenario.truncated(wanted.unwrap_or(found)),
+        }
     }
 }
 
@@ -107,7 +122,7 @@ fn table(analysed: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
     );
     for (map, stats, _) in analysed {
         table.add_row([
-            map.name.clone(),
+            one_line(&map.name),
             stats.height.to_string(),
             stats.width.to_string(),
             stats.num_free.to_string(),

@@ -8,11 +8,12 @@ use clap::Args;
 use pogema_conformance::files;
 use pogema_core::{Episode, Error, Instance, Trace, Words};
 use pogema_maps::GridConfig;
-use pogema_planners::{Outcome, Plan, PlannerName, Problem, validate, write_plan, write_result};
+use pogema_planners::{Budget, Outcome, Plan, PlannerName, Problem, validate, write_plan, write_result};
 use pogema_reference::Reference;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::output::{check_writable, print_line, write_trace};
+use crate::interrupt::Interrupt;
+use crate::output::{check_writable, print_json, print_line, write_trace};
 use crate::render::Pictures;
 use crate::run::Settings;
 use crate::words::word;
@@ -46,13 +47,16 @@ pub struct MakePlan {
 
 impl MakePlan {
     /// Plans and writes the results; exit status 0 if a plan solves the instance, 1 if none exists or none was found.
+    ///
+    /// On Ctrl-C, the planner returns the best plan so far.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
         for path in [&self.out, &self.result, &self.trace].into_iter().flatten() {
             check_writable(path)?;
         }
         self.pictures.check(config.num_agents)?;
-        let budget = self.planner_args.budget()?;
+        let interrupt = Interrupt::watch()?;
+        let budget = Budget { cancelled: Some(interrupt.flag()), ..self.planner_args.budget()? };
         let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
         let problem = match self.settings.max_steps()?.map(usize::try_from) {
@@ -73,12 +77,14 @@ impl MakePlan {
             let text = write_result(&map, self.planner.word(), &problem, &outcome);
             files::write(path, text.as_bytes())?;
         }
-        print_line(&if self.json {
-            as_json(&outcome, seconds)
+        if self.json {
+            print_json(&as_json(&outcome, seconds))?;
         } else {
-            format!("{outcome}; {seconds:.3} s")
-        })?;
-        Ok(if outcome.solution().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+            let note = if interrupt.status().is_some() { "interrupted: " } else { "" };
+            print_line(&format!("{note}{outcome}; {seconds:.3} s"))?;
+        }
+        let status = if outcome.solution().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        Ok(interrupt.status().unwrap_or(status))
     }
 
     fn write(&self, config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<(), Error> {
@@ -116,7 +122,7 @@ fn replay(config: &GridConfig, instance: &Instance, plan: &Plan) -> Result<Trace
     episode.trace()
 }
 
-fn as_json(outcome: &Outcome, seconds: f64) -> String {
+fn as_json(outcome: &Outcome, seconds: f64) -> Value {
     let mut json = match outcome {
         Outcome::Solved { plan, lower_bound } => json!({
             "outcome": "solved",
@@ -129,5 +135,5 @@ fn as_json(outcome: &Outcome, seconds: f64) -> String {
         Outcome::Impossible { reason } => json!({"outcome": "impossible", "reason": reason}),
     };
     json["seconds"] = seconds.into();
-    json.to_string()
+    json
 }

@@ -6,11 +6,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use pogema_core::{Cell, Error, Instance, Map};
-use pogema_maps::files::{Reading, read_maps, read_text};
+use pogema_maps::files::{Reading, read_maps, read_text_within};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::output::print_line;
+use crate::input::Input;
+use crate::output::{print_json, print_line};
 use crate::run::Settings;
 
 /// Rows and columns drawn around a conflict.
@@ -22,6 +23,8 @@ pub struct Validate {
     plan: PathBuf,
     #[command(flatten)]
     settings: Settings,
+    #[command(flatten)]
+    input: Input,
     /// Do not require that agents end on their goals
     #[arg(long)]
     any_end: bool,
@@ -44,14 +47,19 @@ impl Validate {
         let task = self.task()?;
         let goals = (!self.any_end).then_some(task.goals.as_slice());
         let verdict = validate(&task.map, &task.starts, goals, &task.plan);
-        print_line(&if self.json { as_json(&task.plan, &verdict) } else { as_text(&task, &verdict) })?;
+        if self.json {
+            print_json(&as_json(&task.plan, &verdict))?;
+        } else {
+            print_line(&as_text(&task, &verdict))?;
+        }
         Ok(if verdict.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |error| Error::io(&self.plan, error);
-        let text = PlanText::read(&read_text(&self.plan)?).map_err(in_file)?;
+        let text = read_text_within(&self.plan, self.input.limit())?;
+        let text = PlanText::read(&text).map_err(in_file)?;
         let (Some(starts), Some(goals)) = (text.starts, text.goals) else {
             let instance = self.instance(text.plan.num_agents())?;
             let (starts, goals) = (instance.starts().to_vec(), instance.first_goals());
@@ -95,7 +103,7 @@ fn as_text(task: &Task, verdict: &Result<(), Conflict>) -> String {
     }
 }
 
-fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> String {
+fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> Value {
     let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
     let conflict = verdict.as_ref().err().map(|conflict| {
         let Conflict { step, agents, cell, .. } = conflict;
@@ -109,7 +117,6 @@ fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> String {
         "makespan": makespan,
         "conflict": conflict,
     })
-    .to_string()
 }
 
 /// Draws the neighbourhood of a conflict before and after its step.

@@ -1,5 +1,6 @@
 //! The flags that select the pictures of an episode and their style.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -15,6 +16,9 @@ use crate::words::word;
 const LONGER_SIDE_OF_PNG: u32 = 1024;
 const LONGER_SIDE_OF_GIF: u32 = 512;
 const LONGER_SIDE_OF_VIDEO: u32 = 720;
+
+/// Steps per second that can be shown. In files, times are rounded to thousandths of a second.
+const FPS: RangeInclusive<f64> = 0.001..=1000.0;
 
 /// Frames per second in the terminal.
 const TERMINAL_FPS: f64 = 8.0;
@@ -109,8 +113,13 @@ impl Pictures {
                 format!("0 to {}", num_agents.saturating_sub(1)),
             ));
         }
-        if let Some(fps) = self.fps.filter(|fps| self.are_requested() && !(*fps > 0.0 && fps.is_finite())) {
-            return Err(Error::argument("--fps", fps, "more than 0"));
+        // In the terminal, 0 and less mean no pauses.
+        let has_no_pauses = |fps: f64| fps <= 0.0 && !self.are_requested();
+        if let Some(fps) = self.fps.filter(|fps| !has_no_pauses(*fps) && !FPS.contains(fps)) {
+            // As a user writes it: `0`, `1e300`.
+            let shown = format!("{fps:?}");
+            let expected = format!("{} to {}", FPS.start(), FPS.end());
+            return Err(Error::argument("--fps", shown.trim_end_matches(".0"), expected));
         }
         match self.width {
             Some(0) => Err(Error::argument("--width", 0, "at least 1")),

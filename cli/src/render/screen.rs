@@ -6,7 +6,7 @@ use console::Term;
 use pogema_core::{Error, Snapshot};
 use pogema_render::{Ground, text};
 
-use crate::output::{check_printed, print_line};
+use crate::output::{check_printed, print_bytes};
 
 /// Standard output for frames: a terminal overwrites the previous frame, other outputs receive one after another.
 pub struct Screen {
@@ -30,7 +30,9 @@ impl Screen {
 
     pub fn draw(&mut self, ground: Ground<'_>, step: usize, state: &Snapshot) -> Result<(), Error> {
         if !self.terminal.is_term() {
-            return print_line(&text::frame(ground, step, state, &self.style)?);
+            let frame = text::frame(ground, step, state, &self.style)?;
+            // A frame holds only our own characters, and perhaps escape sequences of colours.
+            return print_bytes(format!("{frame}\n").as_bytes());
         }
         // The last line is left to the cursor. The size is read anew, since the user may resize the terminal.
         let size = self.terminal.size_checked();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_conformance::files;
-use pogema_core::{Action, Environment, Episode, Error, Instance, Trace, shorten};
+use pogema_core::{Action, Environment, Episode, Error, InputLimit, Instance, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_numpy::{Generator, SeedSequence};
 use pogema_planners::{NamedPolicy, PolicySettings};
@@ -29,13 +29,15 @@ impl ActionSource {
     /// Returns the named policy, or the actions of `file`, for one episode of an instance.
     pub fn new(
         name: &str,
-        file: Option<&Path>,
+        file: Option<(&Path, InputLimit)>,
         settings: &PolicySettings,
         config: &GridConfig,
         instance: &Instance,
     ) -> Result<Self, Error> {
         match (name, file) {
-            (FILE, Some(path)) => Ok(Self::File(read_actions(path, config.num_agents)?.into_iter())),
+            (FILE, Some((path, limit))) => {
+                Ok(Self::File(read_actions(path, limit, config.num_agents)?.into_iter()))
+            }
             (FILE, None) => Err(Error::request("`--policy file` needs `--actions FILE`")),
             (_, Some(_)) => Err(Error::request("`--actions` needs `--policy file`")),
             (_, None) => {
@@ -65,20 +67,27 @@ fn generator(config: &GridConfig) -> Result<Generator, Error> {
 }
 
 /// Reads actions from a trace, or from a file with a list of numbers per line, one number per agent.
-fn read_actions(path: &Path, num_agents: usize) -> Result<Vec<Vec<Action>>, Error> {
+fn read_actions(path: &Path, limit: InputLimit, num_agents: usize) -> Result<Vec<Vec<Action>>, Error> {
     let failed = |error: std::io::Error| Error::io(path, error);
-    let lines: Vec<String> = files::open(path)?.lines().collect::<Result<_, _>>().map_err(failed)?;
-    if lines.first().is_some_and(|line| line.starts_with('{')) {
-        let trace = Trace::read(lines.join("\n").as_bytes()).map_err(|error| Error::io(path, error))?;
+    let mut file = files::open_within(path, limit)?;
+    if file.fill_buf().map_err(failed)?.first() == Some(&b'{') {
+        let trace = Trace::read(file).map_err(|error| Error::io(path, error))?;
         Error::check_length("actions", num_agents, trace.header.starts.len())
             .map_err(|error| Error::io(path, error))?;
         return Ok(trace.steps.into_iter().map(|step| step.actions).collect());
     }
-    let texts = (1..).zip(&lines).filter(|(_, text)| !text.trim().is_empty());
-    let read = |(line, text): (usize, &String)| {
-        read_step(text, num_agents).map_err(|reason| Error::io(path, format!("line {line}: {reason}")))
-    };
-    texts.map(read).collect()
+    let mut steps = Vec::new();
+    for (line, text) in (1_usize..).zip(file.lines()) {
+        let text: String = text.map_err(failed)?;
+        if !text.trim().is_empty() {
+            let step = read_step(&text, num_agents);
+            steps.push(step.map_err(|reason| Error::io(path, format!("line {line}: {reason}")))?);
+        }
+    }
+    if steps.is_empty() {
+        return Err(Error::io(path, "no actions, expected a trace or a list of action numbers per line"));
+    }
+    Ok(steps)
 }
 
 fn read_step(text: &str, num_agents: usize) -> Result<Vec<Action>, Error> {

@@ -191,7 +191,7 @@ impl Settings {
             fields.remove("map_name");
         }
         let Some(word) = self.map.clone().or(named) else { return Ok(None) };
-        let library = self.sources.library()?;
+        let library = self.sources.library(Some(&word))?;
         let text = if let Ok(text) = library.map(&word) {
             text.clone()
         } else if self.map.is_some() && Path::new(&word).exists() {

@@ -19,4 +19,4 @@ pub use archive::{read_archive, write_archive};
 pub use movingai::{Water, read_movingai, without_ring, write_movingai};
 pub use scen::{Task, read_scen, write_scen};
 pub use scenario::Scenario;
-pub use set::{NamedMap, read_set, write_set};
+pub use set::{NamedMap, read_set, set_entry, write_set};

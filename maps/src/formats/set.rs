@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use pogema_core::{Error, shorten, unknown_letter};
+use pogema_core::{Error, printable_json, shorten, unknown_letter};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
@@ -58,13 +58,19 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
 /// # Errors
 /// [`Error::Instance`] for a map whose starts have no letters.
 pub fn write_set(maps: &[NamedMap]) -> Result<String, Error> {
-    let mut lines = Vec::new();
-    for NamedMap { name, text } in maps {
-        // A quoted JSON string is also a YAML string.
-        lines.push(format!("{}: |-\n", serde_json::Value::from(name.as_str())));
-        lines.extend(text.rows()?.iter().map(|row| format!("  {row}\n")));
-    }
-    Ok(lines.concat())
+    maps.iter().map(set_entry).collect()
+}
+
+/// Writes one map as an entry of a map set; a set is a sequence of entries.
+///
+/// # Errors
+/// [`Error::Instance`] for a map whose starts have no letters.
+pub fn set_entry(NamedMap { name, text }: &NamedMap) -> Result<String, Error> {
+    // A quoted JSON string is also a YAML string.
+    let name = printable_json(&serde_json::Value::from(name.as_str()).to_string());
+    let rows = text.rows()?;
+    let lines = std::iter::once(format!("{name}: |-\n")).chain(rows.iter().map(|row| format!("  {row}\n")));
+    Ok(lines.collect())
 }
 
 /// The place of a map in the file.

@@ -13,7 +13,7 @@ mod random;
 mod warehouse;
 
 pub use maze::{Maze, MazeRanges};
-pub use preset::{Preset, of_seeds, seed_name};
+pub use preset::{Preset, seed_name};
 pub use random::{RandomMap, RandomRanges};
 pub use warehouse::{Bays, Warehouse};
 

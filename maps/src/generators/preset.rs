@@ -64,17 +64,43 @@ impl Preset {
     /// # Errors
     /// None: all settings are in range.
     pub fn maps(self) -> Result<Vec<NamedMap>, Error> {
-        let random = |seed| RandomRanges::default().sample(seed)?.generate().map(MapText::from);
-        let maze = |seed| Self::MAZES.sample(seed)?.generate().map(MapText::from);
+        self.selected(|_| true)
+    }
+
+    /// Generates the maps whose names are selected, in their published order.
+    ///
+    /// # Errors
+    /// None: all settings are in range.
+    pub fn selected(self, is_selected: impl Fn(&str) -> bool) -> Result<Vec<NamedMap>, Error> {
+        let selected = self.names().filter(|(_, name)| is_selected(name));
+        selected.map(|(seed, name)| Ok(NamedMap { name, text: self.generate(seed)? })).collect()
+    }
+
+    /// Returns the seed and the name of each map, in their published order.
+    pub fn names(self) -> impl Iterator<Item = (u64, String)> {
+        let seeds: Range<u64> = match self {
+            Self::ValidationRandom | Self::ValidationMazes => SEEDS_OF_VALIDATION,
+            Self::TrainingRandom => SEEDS_OF_RANDOM_TRAINING,
+            Self::TrainingMazes => SEEDS_OF_MAZE_TRAINING,
+            Self::Warehouse => 0..1,
+        };
+        let all = seeds.clone();
+        let name = move |seed| match self {
+            Self::Warehouse => "wfi_warehouse".to_owned(),
+            _ => seed_name(self.word(), seed, &all),
+        };
+        seeds.map(move |seed| (seed, name(seed)))
+    }
+
+    fn generate(self, seed: u64) -> Result<MapText, Error> {
         match self {
-            Self::ValidationRandom => of_seeds(self.word(), SEEDS_OF_VALIDATION, random),
-            Self::TrainingRandom => of_seeds(self.word(), SEEDS_OF_RANDOM_TRAINING, random),
-            Self::ValidationMazes => of_seeds(self.word(), SEEDS_OF_VALIDATION, maze),
-            Self::TrainingMazes => of_seeds(self.word(), SEEDS_OF_MAZE_TRAINING, maze),
-            Self::Warehouse => {
-                let text = Warehouse::PUBLISHED.generate(Bays::Published)?;
-                Ok(vec![NamedMap { name: "wfi_warehouse".into(), text }])
+            Self::ValidationRandom | Self::TrainingRandom => {
+                RandomRanges::default().sample(seed)?.generate().map(MapText::from)
             }
+            Self::ValidationMazes | Self::TrainingMazes => {
+                Self::MAZES.sample(seed)?.generate().map(MapText::from)
+            }
+            Self::Warehouse => Warehouse::PUBLISHED.generate(Bays::Published),
         }
     }
 }
@@ -85,17 +111,4 @@ impl Preset {
 pub fn seed_name(prefix: &str, seed: u64, seeds: &Range<u64>) -> String {
     let num_digits = seeds.end.saturating_sub(1).to_string().len();
     format!("{prefix}-seed-{seed:0num_digits$}")
-}
-
-/// Generates the maps of a range of seeds.
-///
-/// # Errors
-/// Those of `generate`.
-pub fn of_seeds(
-    prefix: &str,
-    seeds: Range<u64>,
-    generate: impl Fn(u64) -> Result<MapText, Error>,
-) -> Result<Vec<NamedMap>, Error> {
-    let named = |seed| Ok(NamedMap { name: seed_name(prefix, seed, &seeds), text: generate(seed)? });
-    seeds.clone().map(named).collect()
 }

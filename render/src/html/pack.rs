@@ -10,7 +10,7 @@ use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace
 use serde::Serialize;
 
 use crate::blocked_moves::{BlockedMove, Blocker, blocked_moves};
-use crate::check::check;
+use crate::check::{check, direction};
 
 /// Compression level; higher levels take longer and save almost nothing.
 const LEVEL: u8 = 7;
@@ -68,16 +68,13 @@ struct Parts {
 /// # Errors
 /// Those of [`super::replay`].
 pub fn pack(trace: &Trace) -> Result<String, Error> {
-    let num_agents = trace.header.config.num_agents;
     check(trace)?;
-    Error::check_length("cells", num_agents, trace.start.state.cells.len())?;
-    Error::check_length("on_goal", num_agents, trace.start.state.on_goal.len())?;
+    let num_agents = trace.header.config.num_agents;
     let mut parts = Parts::default();
     parts.add_start(trace);
     let mut before = &trace.start.state;
     for (step, after) in (1..).zip(&trace.steps) {
-        check_step(after, num_agents)?;
-        parts.add_step(trace, before, after, step)?;
+        parts.add_step(trace, before, after, step);
         before = &after.state;
     }
     let mut bytes = bits(trace.header.map.obstacles());
@@ -120,13 +117,11 @@ impl Parts {
         self.add_marks(trace, start, 0);
     }
 
-    fn add_step(&mut self, trace: &Trace, before: &Snapshot, step: &TraceStep, at: u32) -> Result<(), Error> {
+    fn add_step(&mut self, trace: &Trace, before: &Snapshot, step: &TraceStep, at: u32) {
         let after = &step.state;
         for (agent, &action) in step.actions.iter().enumerate() {
-            let moved = direction(before.cells[agent], after.cells[agent]).ok_or_else(|| {
-                let (from, to) = (before.cells[agent], after.cells[agent]);
-                trace_error(at, format!("agent {agent} is on {to}, expected {from} or a cell next to it"))
-            })?;
+            // INVARIANT: the trace is checked, so each agent stays or moves to a neighbouring cell.
+            let moved = direction(before.cells[agent], after.cells[agent]).unwrap_or(Action::Stay);
             let flags = u8::from(after.active[agent]) << 6 | u8::from(after.on_goal[agent]) << 7;
             self.moves.push(action as u8 | (moved as u8) << 3 | flags);
             self.ended.push(u8::from(step.terminated[agent]) | u8::from(step.truncated[agent]) << 1);
@@ -141,7 +136,6 @@ impl Parts {
             self.add_blocked(blocked);
         }
         self.add_marks(trace, after, at);
-        Ok(())
     }
 
     fn add_blocked(&mut self, blocked: BlockedMove) {
@@ -179,12 +173,6 @@ impl Parts {
     }
 }
 
-/// Returns the action that leads from one cell to another.
-fn direction(from: Cell, to: Cell) -> Option<Action> {
-    let to = (i32::from(to.row), i32::from(to.col));
-    Action::ALL.into_iter().find(|&action| from.toward(action) == to)
-}
-
 fn put_cell(bytes: &mut Vec<u8>, cell: Cell) {
     bytes.extend(cell.row.to_le_bytes());
     bytes.extend(cell.col.to_le_bytes());
@@ -194,17 +182,4 @@ fn put_cell(bytes: &mut Vec<u8>, cell: Cell) {
 fn bits(flags: &[bool]) -> Vec<u8> {
     let byte = |flags: &[bool]| flags.iter().rev().fold(0, |byte, &flag| byte << 1 | u8::from(flag));
     flags.chunks(8).map(byte).collect()
-}
-
-/// Returns the error for a step, with its line in the trace.
-fn trace_error(step: u32, reason: String) -> Error {
-    Error::Trace { line: step as usize + 2, reason }
-}
-
-fn check_step(step: &TraceStep, num_agents: usize) -> Result<(), Error> {
-    Error::check_length("on_goal", num_agents, step.state.on_goal.len())?;
-    Error::check_length("actions", num_agents, step.actions.len())?;
-    Error::check_length("rewards", num_agents, step.rewards.len())?;
-    Error::check_length("terminated", num_agents, step.terminated.len())?;
-    Error::check_length("truncated", num_agents, step.truncated.len())
 }

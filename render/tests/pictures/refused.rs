@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use pogema_core::{Error, Trace};
-use pogema_render::{Color, Colors, Style, gif, raster, svg, video};
+use pogema_core::{Cell, Error, Trace};
+use pogema_render::{Color, Colors, Style, gif, html, raster, svg, video};
 
 use crate::{played, still};
 
@@ -45,6 +45,30 @@ fn agents_off_the_map_and_lists_of_wrong_length() {
     let mut trace = still(&[".."], &[([0, 0], [0, 1])]);
     trace.start.state.active.clear();
     assert_eq!(refused(&trace, Style::default()), "active has length 0, expected 1");
+}
+
+#[test]
+fn lists_of_wrong_length_and_jumps_are_refused_by_every_picture() {
+    let whole =
+        played("{size: 5, num_agents: 2, seed: 1, density: 0, max_episode_steps: 3, on_target: nothing}");
+    let refused_by_page = |trace: &Trace| {
+        let error = html::replay(trace, "t").unwrap_err();
+        let gif = gif::encode(trace, &Style::default(), 100, &mut |_, _| ()).unwrap_err();
+        assert_eq!((refused(trace, Style::default()), &gif), (error.to_string(), &error));
+        error.to_string()
+    };
+    let mut trace = whole.clone();
+    trace.steps[1].rewards.pop();
+    assert_eq!(refused_by_page(&trace), "rewards has length 1, expected 2");
+    let mut trace = whole.clone();
+    trace.steps[1].actions.pop();
+    assert_eq!(refused_by_page(&trace), "actions has length 1, expected 2");
+    let mut trace = whole;
+    trace.steps[0].state.cells[1] = Cell::new(0, 0);
+    trace.steps[1].state.cells[1] = Cell::new(4, 4);
+    trace.start.state.cells[1] = Cell::new(0, 0);
+    let expected = "trace: line 4: agent 1 is on (4, 4), expected (0, 0) or a cell next to it";
+    assert_eq!(refused_by_page(&trace), expected);
 }
 
 #[test]

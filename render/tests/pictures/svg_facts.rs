@@ -75,6 +75,21 @@ fn agents_and_goals_follow_the_states() {
 }
 
 #[test]
+fn a_picture_holds_nothing_that_runs_or_loads() {
+    let known = ["svg", "g", "path", "circle", "rect", "animate", "animateMotion", "set"];
+    for trace in episodes() {
+        let text = svg::draw(&trace, &Style::default()).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        for element in document.descendants().filter(roxmltree::Node::is_element) {
+            let name = element.tag_name().name();
+            assert!(known.contains(&name), "{name}");
+            let mut names = element.attributes().map(|attribute| attribute.name());
+            assert!(!names.any(|name| name.starts_with("on") || name == "href" || name == "style"), "{name}");
+        }
+    }
+}
+
+#[test]
 fn every_animation_repeats_forever_with_the_same_duration() {
     for trace in episodes() {
         let text = svg::draw(&trace, &Style { egocentric: Some(0), ..Style::default() }).unwrap();

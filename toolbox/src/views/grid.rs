@@ -4,6 +4,7 @@ use comfy_table::{CellAlignment, Table as Drawn, presets};
 use pogema_core::words;
 
 use crate::bootstrap::Estimate;
+use crate::fit::fitted;
 
 words! {
     /// The text format of a table.
@@ -71,7 +72,8 @@ impl Table {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        let gap = if style == presets::ASCII_MARKDOWN { "\n\n" } else { "\n" };
+        let is_markdown = style == presets::ASCII_MARKDOWN;
+        let (table, gap) = if is_markdown { (table.to_string(), "\n\n") } else { (fitted(table), "\n") };
         format!("{table}{}", self.remark.as_ref().map(|remark| format!("{gap}{remark}")).unwrap_or_default())
     }
 

@@ -27,6 +27,7 @@ mod table;
 use std::path::Path;
 
 use pogema_core::Error;
+use pogema_maps::files::read_text;
 use pogema_maps::nearest;
 
 pub use boxes::BoxView;
@@ -93,7 +94,7 @@ pub struct Shown {
 /// # Errors
 /// One line with the file, the line and the key of the error.
 pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let text = read_text(path)?;
     let in_file = |error: Error| in_file(path, error);
     let root = Node::parse(&text).map_err(in_file)?;
     let Some(node) = root.field(VIEWS) else {

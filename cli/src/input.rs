@@ -1,0 +1,18 @@
+//! The flag that bounds input files.
+
+use clap::Args;
+use pogema_core::InputLimit;
+
+#[derive(Args, Debug)]
+pub struct Input {
+    /// Longest line of input, in MiB; a whole file may hold four times as much, decompressed
+    #[arg(long = "input-limit", value_name = "MIB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
+    mib: u64,
+}
+
+impl Input {
+    /// Returns the most that an input file may hold.
+    pub fn limit(&self) -> InputLimit {
+        InputLimit::of_mib(self.mib)
+    }
+}

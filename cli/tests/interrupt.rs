@@ -1,0 +1,100 @@
+//! Ctrl-C ends the long commands with status 130 and one line, and what they have done is kept.
+
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits until something holds, or the process has ended.
+fn wait_until(process: &mut Child, holds: impl Fn(u32) -> bool) {
+    while !holds(process.id()) {
+        assert_eq!(process.try_wait().unwrap(), None, "the process has ended");
+        std::thread::yield_now();
+    }
+}
+
+/// Returns whether a process handles Ctrl-C.
+fn handles_ctrl_c(process: u32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    caught.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0)
+}
+
+/// Presses Ctrl-C; returns the exit status, standard output and standard error.
+fn interrupt(process: Child) -> (Option<i32>, String, String) {
+    assert!(Command::new("kill").args(["-INT", &process.id().to_string()]).status().unwrap().success());
+    let output = process.wait_with_output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+const SUITE: &str = "
+environment: {name: Environment, on_target: nothing, collision_system: soft, size: 32, max_episode_steps: 128,
+              density: 0.3, num_agents: 250, seed: {grid_search: [0, 1, 2]}}
+algorithms:
+  Quick: {name: random}
+  Slow: {name: CBS, seconds: 100}
+";
+
+#[test]
+fn an_evaluation_keeps_its_episodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("suite.yaml"), SUITE).unwrap();
+    let mut process = start(at, &["evaluate", "suite.yaml", "--out", "results", "--threads", "1"]);
+    wait_until(&mut process, |_| at.join("results/Slow.jsonl").exists());
+    let (status, _, error) = interrupt(process);
+    let expected = "interrupted: 0 of 3 episodes of `Slow` are stored; `--resume` plays the rest: results\n";
+    assert_eq!((status, error.as_str()), (Some(130), expected));
+    let kept = fs::read_to_string(at.join("results/Quick.json")).unwrap();
+    assert_eq!(kept.matches("\"metrics\"").count(), 3, "{kept}");
+}
+
+#[test]
+fn a_plan_is_broken_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = [
+        "plan",
+        "--size",
+        "64",
+        "--num-agents",
+        "200",
+        "--density",
+        "0.2",
+        "--seed",
+        "1",
+        "--seconds",
+        "1000",
+    ];
+    let mut process = start(folder.path(), &plan);
+    wait_until(&mut process, handles_ctrl_c);
+    let (status, text, error) = interrupt(process);
+    assert_eq!((status, error.as_str(), text.lines().count()), (Some(130), "", 1), "{text}");
+    assert!(text.starts_with("interrupted: "), "{text}");
+}
+
+#[test]
+fn benchmarks_and_comparisons_end() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["bench", "--rows", "64 agents, 32 x 32", "--seconds", "1000"][..],
+        &["conform", "--cases", "1000000000"],
+    ] {
+        let mut process = start(folder.path(), arguments);
+        wait_until(&mut process, handles_ctrl_c);
+        let (status, text, error) = interrupt(process);
+        assert_eq!(
+            (status, text.as_str(), error.lines().count()),
+            (Some(130), "", 1),
+            "{arguments:?}: {error}"
+        );
+        assert!(error.starts_with("interrupted: "), "{arguments:?}: {error}");
+    }
+}

@@ -1,0 +1,112 @@
+//! Tests of what the program prints: whole messages, escaped text, and no panic where nothing can be printed.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs::{self, File, OpenOptions};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+fn pogema(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.args(arguments).current_dir(folder);
+    command
+}
+
+/// A device that is always full.
+fn full() -> File {
+    OpenOptions::new().write(true).open("/dev/full").unwrap()
+}
+
+/// Writes a pipe whose reader is gone.
+fn closed() -> Stdio {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    writer.into()
+}
+
+fn status(command: &mut Command) -> Option<i32> {
+    command.status().unwrap().code()
+}
+
+const SUITE: &str = "
+environment: {name: Environment, num_agents: 2, size: 8, seed: {grid_search: [0, 1]}, max_episode_steps: 8}
+algorithms: {Random: {name: random}}
+";
+
+#[test]
+fn messages_that_nobody_can_read_are_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("suite.yaml"), SUITE).unwrap();
+    fs::write(folder.path().join("start.yaml"), "{map: '.#.', agents_xy: [[0, 1]], targets_xy: [[0, 2]]}")
+        .unwrap();
+    let at = folder.path();
+    for (arguments, expected) in [
+        (&["run", "bogus.yaml"][..], 2),
+        (&["run", "--bogus"], 2),
+        (&["maps"], 2),
+        (&["run", "start.yaml", "--policy", "stay"], 0),
+        (&["evaluate", "suite.yaml", "--out", "results", "--html", "--force"], 0),
+        (&["evaluate", "suite.yaml", "--out", "results"], 2),
+        (&["replay", "results", "Random", "9"], 2),
+    ] {
+        let run = || pogema(at, arguments);
+        assert_eq!(status(run().stdout(Stdio::null()).stderr(full())), Some(expected), "{arguments:?}, full");
+        assert_eq!(
+            status(run().stdout(Stdio::null()).stderr(closed())),
+            Some(expected),
+            "{arguments:?}, closed"
+        );
+    }
+}
+
+#[test]
+fn results_that_cannot_be_printed_are_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["--help"][..],
+        &["--version"],
+        &["help", "run"],
+        &["run", "--help"],
+        &[],
+        &["maps", "list"],
+        &["maps", "generate", "mazes"],
+        &["run", "--seed", "1", "--json"],
+    ] {
+        let output = pogema(folder.path(), arguments).stdout(full()).stderr(Stdio::piped()).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert_eq!(error, "error: standard output: No space left on device (os error 28)\n", "{arguments:?}");
+        // A reader such as `head` may stop early.
+        let output =
+            pogema(folder.path(), arguments).stdout(closed()).stderr(Stdio::piped()).output().unwrap();
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{arguments:?}");
+    }
+}
+
+#[test]
+fn unprintable_characters_of_map_names_are_escaped() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = "a\u{1b}[2J\u{202e}b\n\u{9b}1m.map";
+    fs::write(folder.path().join(name), "type octile\nheight 1\nwidth 4\nmap\n....\n").unwrap();
+    let output = |arguments: &[&str]| -> Output { pogema(folder.path(), arguments).output().unwrap() };
+    assert!(output(&["maps", "export", name, "--to", "zip", "--out", "maps.zip"]).status.success());
+    for arguments in [
+        &["maps", "list", "a.*", "--maps", "maps.zip"][..],
+        &["maps", "list", "--maps", "maps.zip"],
+        &["maps", "show", "maps.zip"],
+        &["maps", "import", "maps.zip"],
+        &["maps", "stats", "maps.zip"],
+        &["maps", "stats", "maps.zip", "--json"],
+        &["maps", "stats", "maps.zip", "--num-agents", "1", "--seed", "1"],
+        &["maps", "list", "--maps", "maps.zip", "--maps", "maps.zip"],
+        &["maps", "show", "a\u{202e}[", "--maps", "maps.zip"],
+        &["run", "--map", name, "--bogus\u{9b}1m\u{202e}"],
+    ] {
+        let Output { stdout, stderr, .. } = output(arguments);
+        let text = String::from_utf8(stdout).unwrap() + &String::from_utf8(stderr).unwrap();
+        let is_raw = |letter: char| letter.is_control() && letter != '\n' || letter == '\u{202e}';
+        assert!(!text.contains(is_raw), "{arguments:?}: {text:?}");
+        assert!(text.contains("202e"), "{arguments:?}: {text}");
+    }
+}
