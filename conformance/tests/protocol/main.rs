@@ -17,8 +17,11 @@ use serde_json::json;
 use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
 
 fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
-    let subject =
-        Subject { command: "altered".into(), start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))) };
+    let subject = Subject {
+        command: "altered".into(),
+        replay: Vec::new(),
+        start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))),
+    };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }
