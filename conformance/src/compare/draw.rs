@@ -22,7 +22,7 @@ fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
     put(&state.cells, false, Sign::Finished);
     put(&state.goals, true, Sign::Goal);
     put(&state.cells, true, Sign::Agent);
-    let mut signs: Vec<Sign> = map.obstacles().iter().map(ground).collect();
+    let mut signs: Vec<Sign> = map.obstacles().iter().copied().map(ground).collect();
     let mut covered = Vec::new();
     for (at, mut stack) in stacks {
         let Some(top) = stack.pop() else { continue };
@@ -38,7 +38,7 @@ fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
 }
 
 fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
-    let mut signs: Vec<Sign> = map.obstacles().iter().map(ground).collect();
+    let mut signs: Vec<Sign> = map.obstacles().iter().copied().map(ground).collect();
     for &cell in &state.occupied {
         let at = map.index(cell);
         signs[at] = if map.obstacles()[at] { Sign::OccupiedObstacle } else { Sign::Occupied };
@@ -46,7 +46,7 @@ fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
     grid(map, &signs, Vec::new())
 }
 
-fn ground(&is_obstacle: &bool) -> Sign {
+fn ground(is_obstacle: bool) -> Sign {
     if is_obstacle { Sign::Obstacle } else { Sign::Free }
 }
 

@@ -10,6 +10,7 @@ use super::circumstances::circumstances;
 use super::group::{Cause, Example, Share};
 use super::items::Item;
 use super::keep::{file_stem, keep};
+use super::link::Misbehaviour;
 use super::plan::Plan;
 use super::report::PortReport;
 use super::run::judge_item;
@@ -89,7 +90,7 @@ impl Keeper<'_> {
     fn shrink_some(&mut self, mut occurrences: Vec<Example>) -> Vec<Example> {
         occurrences.sort_by_key(Example::size);
         let hangs =
-            occurrences.iter().any(|example| example.fault.as_ref().is_some_and(|fault| fault.is_hang()));
+            occurrences.iter().any(|example| example.fault.as_ref().is_some_and(Misbehaviour::is_hang));
         // Each repetition of a hang costs the time limit. To find the same hang again, a shorter one will do.
         let count = if hangs { 1 } else { occurrences.len().min(MAX_SHRUNK) };
         self.worker.restart(hangs);
