@@ -36,14 +36,19 @@ def run(script: str) -> str:
 
 
 def check(path: Path) -> list[str]:
-    """Runs all commands of one file and returns the errors in its outputs."""
+    """Runs all commands of one file in their order and returns the errors in its outputs."""
     text = path.read_text()
-    for block in BLOCK.findall(text):
-        script = "".join(line for line in block.splitlines(True) if not line.startswith("./check"))
-        print(f"{path}: {script.splitlines()[0] if script else 'nothing to run'}", flush=True)
-        run(script)
-    outputs = {command: run(command) for _, command, _, _ in OUTPUT.findall(text)}
-    expected = OUTPUT.sub(lambda found: found[1] + outputs[found[2]].rstrip() + "\n" + found[4], text)
+    expected = ""
+    end = 0
+    for found in sorted([*BLOCK.finditer(text), *OUTPUT.finditer(text)], key=lambda found: found.start()):
+        if found.re is BLOCK:
+            script = "".join(line for line in found[1].splitlines(True) if not line.startswith("./check"))
+            print(f"{path}: {script.splitlines()[0] if script else 'nothing to run'}", flush=True)
+            run(script)
+        else:
+            expected += text[end : found.start()] + found[1] + run(found[2]).rstrip() + "\n" + found[4]
+            end = found.end()
+    expected += text[end:]
     if expected == text:
         return []
     if os.environ.get("BLESS"):

@@ -89,8 +89,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
 pub fn command() -> Command {
     EXAMPLES.iter().fold(Arguments::command(), |command, (path, examples)| {
         let path: Vec<&str> = path.split(' ').collect();
-        let text = examples.iter().map(|example| format!("\n  {example}")).collect::<String>();
-        with_examples(command, &path, &format!("Examples:{text}"))
+        let text = examples.join("\n  ");
+        with_examples(command, &path, &format!("Examples:\n  {text}"))
     })
 }
 

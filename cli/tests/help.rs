@@ -1,6 +1,6 @@
 //! The examples in the help texts run, and the program shows first steps if it is called without arguments.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -43,8 +43,8 @@ results_views:
 
 fn pogema(arguments: &[&str], folder: &Path) -> Output {
     let program = Path::new(PROGRAM).parent().unwrap();
-    let paths = [program.to_path_buf()].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap()));
-    let path = env::join_paths(paths).unwrap();
+    let path = env::var_os("PATH").unwrap();
+    let path = env::join_paths([program.to_path_buf()].into_iter().chain(env::split_paths(&path))).unwrap();
     Command::new(PROGRAM).args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
 }
 

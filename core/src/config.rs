@@ -104,7 +104,7 @@ pub struct Config {
     pub num_agents: usize,
     /// Number of cells that an agent sees in each direction, 1 to 128.
     pub radius: usize,
-    /// Units: steps. The episode is truncated after this many steps; values ≤ 0 mean after the first.
+    /// The number of steps after which the episode is truncated; values ≤ 0 mean after the first step.
     pub max_steps: i64,
     /// The collision system.
     pub collision: Collision,

@@ -1,7 +1,6 @@
 //! Instances: everything that an episode needs besides its actions.
 
-use std::collections::HashMap;
-
+use rustc_hash::{FxBuildHasher, FxHashMap};
 use serde::{Deserialize, Serialize};
 
 use crate::{Cell, Config, Error, GoalStream, Map};
@@ -44,7 +43,7 @@ impl Instance {
         Error::check_length("goals", starts.len(), goals.len())?;
         check_inside(&map, "start", starts.iter().copied())?;
         check_inside(&map, "goal", goals.iter().map(GoalStream::first))?;
-        let mut seen = HashMap::with_capacity(starts.len());
+        let mut seen = FxHashMap::with_capacity_and_hasher(starts.len(), FxBuildHasher);
         for (agent, &start) in starts.iter().enumerate() {
             if let Some(other) = seen.insert(start, agent) {
                 return Err(Error::agent(agent, format!("start {start} is the start of agent {other} too")));

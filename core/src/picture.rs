@@ -21,7 +21,9 @@ pub enum Mark {
     Goal(usize),
 }
 
-/// Returns the content of each cell of the map, row by row. An agent hides a goal, a lower index hides a higher one.
+/// Returns the content of each cell of the map, row by row.
+///
+/// An agent hides a goal, and a lower index hides a higher one.
 pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
     let ground = |&obstacle: &bool| if obstacle { Mark::Obstacle } else { Mark::Free };
     let mut marks: Vec<Mark> = map.obstacles().iter().map(ground).collect();

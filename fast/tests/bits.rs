@@ -89,7 +89,7 @@ impl RandomInstance {
         Instance::new(map, outside, self.starts.clone(), goals).unwrap()
     }
 
-    /// Returns whether a cell counted from the map's corner is an obstacle, be it on the map, the wall or the outside.
+    /// Returns whether a cell counted from the map's corner is an obstacle: on the map, in the wall or outside.
     fn is_obstacle(&self, row: i32, col: i32) -> bool {
         let (height, width, border) = (self.height as i32, self.width as i32, self.radius as i32);
         if (0..height).contains(&row) && (0..width).contains(&col) {

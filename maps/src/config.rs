@@ -35,7 +35,7 @@ pub struct GridConfig {
     pub size: usize,
     /// Share of obstacles: the requested share, or that of the given map.
     pub density: f64,
-    /// How many cells far an agent sees in each direction.
+    /// Number of cells that an agent sees in each direction.
     pub obs_radius: usize,
     /// Explicit starts.
     pub agents_xy: Option<Vec<Cell>>,

@@ -78,8 +78,8 @@ impl Library {
         Ok(names)
     }
 
-    /// Returns the map with a name. If there is none, the name is a pattern, and the seed chooses a map that matches
-    /// it.
+    /// Returns the map with a name. If no map has this name, the name is a pattern that selects maps, and the
+    /// seed chooses one of them.
     ///
     /// # Errors
     /// Those of [`Library::matching`].

@@ -1,4 +1,4 @@
-//! Figures of maps and of scenarios on them, computed without playing an episode.
+//! Statistics of maps and of scenarios on them, computed without playing an episode.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use pogema_core::{Cell, Map, OnGoal};
 use crate::components::Components;
 use crate::distance::{distances_to, free_neighbours};
 
-/// Figures of a map.
+/// Statistics of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapStats {
     /// Number of rows.
@@ -29,7 +29,7 @@ pub struct MapStats {
 }
 
 impl MapStats {
-    /// Computes the figures of a map.
+    /// Computes the statistics of a map.
     pub fn of(map: &Map) -> Self {
         let num_cells = map.obstacles().len();
         let num_free = map.num_free();
@@ -75,7 +75,7 @@ pub enum Infeasibility {
     WrongOrder(Vec<usize>),
 }
 
-/// Figures of a scenario.
+/// Statistics of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScenarioStats {
     /// Number of agents.
@@ -95,7 +95,7 @@ impl ScenarioStats {
     /// Maximum number of joint states of a component that is passed to the joint search.
     pub const MAX_STATES: usize = 200_000;
 
-    /// Computes the figures of starts and goals on a map.
+    /// Computes the statistics of starts and goals on a map.
     ///
     /// `is_solvable` decides small components by a search through their joint states; it returns `None` if it cannot
     /// decide.

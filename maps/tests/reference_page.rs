@@ -3,7 +3,7 @@
 //!
 //! With the environment variable `BLESS` set, this test writes the page instead of comparing.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Figures of maps and scenarios, and proofs that scenarios cannot be solved.
+//! Statistics of maps and scenarios, and proofs that scenarios cannot be solved.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -16,7 +16,7 @@ fn judge(rows: &[&str], agents: &[[(u16, u16); 2]], on_goal: OnGoal) -> Scenario
 }
 
 #[test]
-fn figures_of_a_map() {
+fn statistics_of_a_map() {
     let figures = MapStats::of(&map(&["...#.", ".#.#.", "...##", "#####", "..###"]));
     assert_eq!((figures.height, figures.width, figures.num_free), (5, 5, 12));
     assert_eq!(figures.density, 13.0 / 25.0);

@@ -12,7 +12,7 @@ use crate::plan::Plan;
 pub struct Budget {
     /// Wall-clock time.
     pub time: Option<Duration>,
-    /// Nodes of the search; each planner documents what a node is. The same number of nodes gives the same plan.
+    /// Nodes of the search; each planner documents what a node is. On one thread, the same number gives the same plan.
     pub nodes: Option<u64>,
     /// A flag that makes the planner stop soon after any thread sets it.
     pub cancelled: Option<Arc<AtomicBool>>,

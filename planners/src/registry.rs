@@ -18,7 +18,7 @@ use crate::rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub struct PlannerSettings {
     /// Seed of all random choices.
     pub seed: u64,
-    /// The limit on threads.
+    /// Maximum number of threads. Only LaCAM* uses more than one, and its plans then differ from run to run.
     pub threads: usize,
 }
 
@@ -49,7 +49,7 @@ words! {
     pub enum LifelongName {
         /// Rolling-horizon planning, improved until the budget is spent.
         Rhcr = "rhcr",
-        /// Millions of steps a second.
+        /// Fast steps of any quality: millions of agent steps per second.
         Pibt = "pibt",
         /// PIBT with traffic guidance, for crowds in warehouses.
         GuidedPibt = "guided-pibt",

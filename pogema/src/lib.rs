@@ -36,7 +36,7 @@
 //! | --- | --- |
 //! | `planners` | [`planners`]: LaCAM*, CBS, RHCR, PIBT and POGEMA's own policies |
 //! | `render` | [`render`]: SVG, PNG, GIF, video and replay pages |
-//! | `reference` | [`reference`](mod@reference): the rules in their plainest form, for comparison with other engines |
+//! | `reference` | [`reference`](mod@reference): the rules as plain code, for comparison with other engines |
 //! | `toolbox` | [`toolbox`]: evaluations of many algorithms on many episodes |
 
 #![forbid(unsafe_code)]

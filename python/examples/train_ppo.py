@@ -1,7 +1,7 @@
 """Trains one policy for all agents with PPO, on 8 x 8 maps with 4 agents, and evaluates it.
 
     pip install torch matplotlib
-    python train_ppo.py --plot learning.svg
+    python train_ppo.py --plot learning.svg --save policy.pt --replay episode.html
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
 network for every agent of every environment. Finished agents do not contribute to the loss. The policy is evaluated on
@@ -197,6 +197,23 @@ def evaluate_agents(make_team, seeds: range) -> float:
     return float(np.mean(shares))
 
 
+@torch.no_grad()
+def replay(policy: Policy, seed: int, path: str) -> None:
+    """Plays one episode with a policy and writes a page that replays it in a browser."""
+    env = pogema_v0(GridConfig(**CONFIG, seed=seed), semantics="2.0")
+    env.enable_animation()
+    observations, infos = env.reset()
+    while "metrics" not in infos[0]:
+        windows = torch.from_numpy(np.stack(observations))
+        radius = CONFIG["obs_radius"]
+        # An action is allowed if the obstacle window, channel 0, is free where it leads.
+        cells = [(radius + down, radius + right) for down, right in env.grid_config.MOVES]
+        masks = torch.stack([windows[:, 0, row, col] == 0 for row, col in cells], dim=1)
+        odds, _ = policy(windows, masks)
+        observations, _, _, _, infos = env.step(odds.sample().tolist())
+    env.save_replay(path, title=f"Seed {seed}: ISR {infos[0]['metrics']['ISR']:.2f}")
+
+
 def plot(curve: list[tuple[float, float]], peers: dict[str, float], path: str) -> None:
     """Draws the learning curve."""
     import matplotlib
@@ -220,6 +237,8 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
+    parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.pt")
+    parser.add_argument("--replay", metavar="FILE", help="write a page that replays an unseen episode, e.g. episode.html")
     parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
     arguments = parser.parse_args()
 
@@ -246,6 +265,10 @@ def main() -> None:
     print(f"{(time.perf_counter() - began) / 60:.1f} minutes in total")
     if arguments.plot:
         plot(curve, peers, arguments.plot)
+    if arguments.save:
+        torch.save(trainer.policy.state_dict(), arguments.save)
+    if arguments.replay:
+        replay(trainer.policy, EVALUATION_SEEDS[0], arguments.replay)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ def collect(
 
     File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
     and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. With a
-    budget of `nodes` the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
+    budget of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
     if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,

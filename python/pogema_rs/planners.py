@@ -107,9 +107,9 @@ class PlannerAgents:
     """Agents of an environment that follow a planner; they need observations of type `MAPF`.
 
     The planner runs in the first step of an episode, and again if agents or goals differ from its plan. For lifelong
-    episodes set `lifelong=True` and choose one of the lifelong planners `rhcr`, `pibt` and `guided-pibt`; `seconds` and
-    `nodes` then limit each step. The planner does not know future goals. `act` and `reset_states` are the methods that
-    pogema-toolbox requires of an algorithm.
+    episodes set `lifelong=True` and choose one of the lifelong planners `rhcr`, `rhcr-pbs`, `rhcr-ecbs`, `pibt` and
+    `guided-pibt`; `seconds` and `nodes` then limit each step. The planner does not know future goals. `act` and
+    `reset_states` are the methods that pogema-toolbox requires of an algorithm.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ class PlannerAgents:
         """
         first = observations[0] if len(observations) else None
         if not isinstance(first, Mapping) or "global_obstacles" not in first:
-            raise TypeError("observations are of another type, expected those of observation_type='MAPF'")
+            raise TypeError("observations have the wrong type, expected those of observation_type='MAPF'")
         cells = [observation["global_xy"] for observation in observations]
         goals = [observation["global_target_xy"] for observation in observations]
         return self._follower.act(first["global_obstacles"], cells, goals)

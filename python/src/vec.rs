@@ -297,7 +297,7 @@ impl<'py> Buffer<'py> {
         }
         let array = array.cast::<PyArrayDyn<u8>>();
         let array = array.map_err(|_| {
-            PyTypeError::new_err("observations are of another type, expected float32 or uint8")
+            PyTypeError::new_err("observations have the wrong type, expected float32 or uint8")
         })?;
         borrow(array).map(Self::U8)
     }

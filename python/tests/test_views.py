@@ -68,14 +68,14 @@ def test_views_respect_their_options(played, tmp_path, caplog):
 
 def test_wrong_options_are_reported(played, tmp_path):
     folder, _ = played
-    for wrong, told in [
+    for wrong, message in [
         ({"names": ["Mean"]}, "no view `Mean`; did you mean `Means`?"),
         ({"table_format": "word"}, "`table_format` is `word`, expected one of `terminal`"),
         ({"plot_format": "gif"}, "`plot_format` is `gif`, expected one of `svg`"),
         ({"six": "mine"}, "`six` is `mine`, expected one of `published`"),
         ({"config": tmp_path / "no.yaml"}, "no.yaml"),
     ]:
-        with pytest.raises((ValueError, OSError), match=re.escape(told)):
+        with pytest.raises((ValueError, OSError), match=re.escape(message)):
             show(folder / "out", **wrong)
     with pytest.raises(ValueError, match="at least one folder"):
         show()

@@ -1,4 +1,4 @@
-//! The rules of POGEMA 1.4.0, written for readers.
+//! The rules of POGEMA 1.4.0 as plain code.
 //!
 //! [`Reference`] plays one environment with plain vectors, one agent after another. It draws no random numbers,
 //! starts no threads and is never optimized: it defines the semantics, and every other engine is compared with it.

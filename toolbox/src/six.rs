@@ -1,4 +1,4 @@
-//! The six metrics of the POGEMA benchmark for comparing algorithms, each between 0 and 1.
+//! The six metrics by which the POGEMA benchmark compares algorithms; higher is better.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -79,7 +79,7 @@ pub struct Six {
     pub unbounded_scalability: Option<f64>,
 }
 
-/// Length of the benchmark's lifelong episodes. The published numbers divide by it whatever the actual length.
+/// Length of the benchmark's lifelong episodes. The published numbers divide by it, regardless of the actual length.
 const LIFELONG_STEPS: f64 = 256.0;
 
 /// Computes the metrics of all algorithms from the folders of one evaluation.

@@ -67,7 +67,7 @@ impl Store {
         let known = Manifest::read(folder)?;
         match (begin, known) {
             (Begin::Resume, Some(known)) => {
-                manifest.continue_from(known).map_err(|what| refused(folder, &what))?
+                manifest.continue_from(known).map_err(|what| refused(folder, &what))?;
             }
             (Begin::Anew, Some(known)) => delete(folder, &known)?,
             (Begin::New, Some(_)) => {

@@ -31,7 +31,7 @@ enum Progress {
     /// The instance of this episode is requested, but no thread has started on it.
     Requested(u64),
     /// The background thread is generating the instance.
-    InProgress,
+    Generating,
     Ready(Result<Instance, Error>),
     Taken,
 }
@@ -65,7 +65,7 @@ impl Shared {
     fn prepare(&self, lane: usize) {
         let mut progress = self.slots[lane].lock();
         let Progress::Requested(episode) = *progress else { return };
-        *progress = Progress::InProgress;
+        *progress = Progress::Generating;
         drop(progress);
         let made = self.make(lane, episode);
         *self.slots[lane].lock() = Progress::Ready(made);
@@ -110,8 +110,8 @@ impl Preparer {
                     drop(progress);
                     return self.shared.make(lane, episode);
                 }
-                Progress::InProgress => {
-                    *progress = Progress::InProgress;
+                Progress::Generating => {
+                    *progress = Progress::Generating;
                     progress = slot.ready.wait(progress).unwrap_or_else(PoisonError::into_inner);
                 }
                 // INVARIANT: a lane requests its next instance before it takes it.

@@ -115,7 +115,9 @@ const OR_AND: i32 = 0xf8;
 /// `a ? b : c`, bit by bit.
 const CHOOSE: i32 = 0xca;
 
-/// Returns all bits of an agent. `APART` only gives each caller a separate copy, so that the copy is inlined.
+/// Returns all bits of an agent.
+///
+/// `APART` is not read: it gives each caller a separate copy of the function, which is then inlined.
 #[target_feature(enable = "avx512f,avx512bw")]
 #[inline]
 fn record<const SIDE: usize, const APART: bool>(

@@ -1,4 +1,4 @@
-//! The path without intrinsics, with which the other paths are compared.
+//! The path without intrinsics. Tests compare the other paths with it.
 
 use std::ops::Range;
 use std::sync::atomic::Ordering::Relaxed;
@@ -60,7 +60,7 @@ fn write_window(strips: &Strips, row: usize, col: usize, side: usize, writer: &m
     }
 }
 
-/// The eight values for each byte of bits.
+/// For each byte, the values of its eight bits.
 pub type Table<V> = [[V; 8]; 256];
 
 pub static FLOATS: Table<f32> = table([0.0, 1.0]);

@@ -3,7 +3,7 @@
 //! | Format | Content | Functions and types |
 //! | --- | --- | --- |
 //! | map text | one map, with letters or pools | [`crate::parse_map_text`], [`crate::MapText::to_text`] |
-//! | map set | map texts by name, in the toolbox's format | [`read_set`], [`write_set`] |
+//! | map set | map texts by name, in pogema-toolbox's format | [`read_set`], [`write_set`] |
 //! | MovingAI `.map` | one map | [`read_movingai`], [`write_movingai`] |
 //! | MovingAI `.scen` | starts and goals | [`read_scen`], [`write_scen`], [`Task`] |
 //! | zip | many `.map` files, as MovingAI distributes them | [`read_archive`], [`write_archive`] |

@@ -8,7 +8,7 @@ words! {
     /// Whether agents may enter water, which MovingAI writes as `W`.
     #[derive(Default)]
     pub enum Water {
-        /// Water is free, as in the toolbox and the published map sets.
+        /// Water is free, as in pogema-toolbox and the published map sets.
         #[default]
         Free = "free",
         /// Water is an obstacle, as MovingAI defines it for walking agents.
@@ -121,7 +121,7 @@ pub fn write_movingai(map: &Map) -> String {
     text
 }
 
-/// Returns the map without its outermost rows and columns, as the toolbox removes them.
+/// Returns the map without its outermost rows and columns, as pogema-toolbox removes them.
 ///
 /// # Errors
 /// [`Error::Instance`] for a map of fewer than three rows or columns, which would leave no cell.

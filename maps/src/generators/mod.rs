@@ -1,6 +1,6 @@
 //! The map generators of pogema-toolbox 0.1.1, with the same map for every seed and setting.
 //!
-//! | Here | In the toolbox |
+//! | Here | In pogema-toolbox |
 //! | --- | --- |
 //! | [`RandomRanges`], [`RandomMap`] | `MapRangeSettings`, `generate_map` |
 //! | [`MazeRanges`], [`Maze`] | `MazeRangeSettings`, `MazeGenerator.generate_maze` |

@@ -34,7 +34,7 @@ words! {
         /// No possible starts and goals are marked.
         #[default]
         None = "none",
-        /// As in the toolbox.
+        /// As in pogema-toolbox.
         ///
         /// Starts are in the gaps at both ends, in two rows of three; goals are along the shelves.
         Toolbox = "toolbox",
@@ -141,7 +141,7 @@ impl Warehouse {
     fn is_toolbox_start(&self, map: &Map, cell: Cell) -> bool {
         let (row, col) = (usize::from(cell.row), usize::from(cell.col));
         let is_inner = row > 0 && row + 1 < map.height();
-        // The toolbox leaves out every third row, whatever the gap between the shelves.
+        // pogema-toolbox leaves out every third row, regardless of the gap between the shelves.
         let is_left = col + 1 < self.bottom_gap;
         let is_right = col + self.bottom_gap > map.width();
         is_inner && row % 3 != 0 && (is_left || is_right)

@@ -9,7 +9,7 @@ pub struct LacamParams {
     pub seed: u64,
     /// Options of a PIBT step.
     pub pibt: PibtRules,
-    /// Number of threads; all but the first only refine. With several threads, plans are not reproducible.
+    /// Number of threads; all but the first only refine. With several threads, plans differ from run to run.
     pub threads: usize,
     /// Whether to refine the first plan.
     pub refine: bool,

@@ -85,7 +85,7 @@ fn why(figure: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option
     parts.join(", ")
 }
 
-/// Returns a text that identifies an environment, whatever the order of its settings.
+/// Returns a text that identifies an environment, regardless of the order of its settings.
 fn environment(settings: &Pairs) -> String {
     let mut parts: Vec<String> = settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
     parts.sort();
