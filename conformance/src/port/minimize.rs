@@ -2,7 +2,7 @@
 //! different causes, and checks that each kept case shows its cause again.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
 
@@ -111,41 +111,46 @@ impl Keeper<'_> {
     fn keep_first_repeated(&mut self, cause: &mut Cause, examples: &[Example]) -> Result<(), Error> {
         // Each attempt may cost the time limit.
         const MAX_ATTEMPTS: usize = 3;
-        let Some(first) = examples.first() else { return Ok(()) };
-        let stem = file_stem(first);
-        let count = self.num_kept.entry(stem.clone()).or_default();
-        *count += 1;
-        let number = if *count == 1 { String::new() } else { format!("-{count}") };
-        let path = self.folder.join(format!("{stem}{number}.yaml"));
-        let attempts = examples.iter().take(MAX_ATTEMPTS - 1).chain(examples.last());
-        let mut is_repeated = false;
-        for example in attempts {
+        let path = self.new_path(&cause.example);
+        let mut repeated = None;
+        for example in examples.iter().take(MAX_ATTEMPTS - 1).chain(examples.last()) {
             keep(example, &self.name, &path)?;
-            if self.shows(&path, example)? {
-                cause.example = example.clone();
-                is_repeated = true;
+            repeated = self.repeat(&path, example)?;
+            if repeated.is_some() {
                 break;
             }
         }
-        if !is_repeated {
-            cause.example = first.clone();
+        cause.is_repeated = Some(repeated.is_some());
+        if let (None, Some(first)) = (&repeated, examples.first()) {
             keep(first, &self.name, &path)?;
         }
+        // The report shows what the replay shows.
+        cause.example =
+            repeated.or_else(|| examples.first().cloned()).unwrap_or_else(|| cause.example.clone());
         let words = self.subject.replay.iter().cloned();
         cause.replay = Some(shell_words::join(words.chain(["--case".into(), path.display().to_string()])));
-        cause.is_repeated = Some(is_repeated);
         cause.kept = Some(path);
         Ok(())
     }
 
-    /// Returns whether a new process of the port shows the cause of an example in its file.
-    fn shows(&mut self, path: &Path, example: &Example) -> Result<bool, Error> {
+    /// Returns a new path for the case of an example.
+    fn new_path(&mut self, example: &Example) -> PathBuf {
+        let stem = file_stem(example);
+        let count = self.num_kept.entry(stem.clone()).or_default();
+        *count += 1;
+        let number = if *count == 1 { String::new() } else { format!("-{count}") };
+        self.folder.join(format!("{stem}{number}.yaml"))
+    }
+
+    /// Plays the case in a file on a new process of the port, and returns what is like the kept example.
+    fn repeat(&mut self, path: &Path, example: &Example) -> Result<Option<Example>, Error> {
         self.worker.restart(false);
         let item = Item::of_file(path)?;
         let (request, expected) = item.request(self.plan.seed)?;
         let played = (&request, &expected);
         let (_, results) = judge_item(&mut self.worker, self.plan, &item, played, |_| false);
-        let mut shown = results.into_iter().flat_map(|(mode, judged)| Example::all_of("", mode, judged));
-        Ok(shown.any(|shown| shown.is_like(example)))
+        let mut shown =
+            results.into_iter().flat_map(|(mode, judged)| Example::all_of(&example.name, mode, judged));
+        Ok(shown.find(|shown| shown.is_like(example)))
     }
 }
