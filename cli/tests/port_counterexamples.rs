@@ -12,10 +12,10 @@ const REFUSING: [&str; 2] = [
     "        # A wall one cell wide",
     "        if any(instance[\"map\"][row][col] == \"#\" for row, col in self.starts):\n            raise ValueError(\"a start is an obstacle\")\n        # A wall one cell wide",
 ];
-/// Ends at random, once in 500 questions.
+/// Ends at the 150th question.
 const CRASHING: [&str; 2] = [
     "    for line in sys.stdin:\n",
-    "    import os, random\n    for line in sys.stdin:\n        if random.random() < 0.002:\n            os._exit(7)\n",
+    "    for number, line in enumerate(sys.stdin):\n        if number == 149:\n            sys.exit(7)\n",
 ];
 /// Ends if two agents move in the first step.
 const CRASHING_IF_TWO_MOVE: [&str; 2] = [

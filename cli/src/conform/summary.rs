@@ -207,7 +207,7 @@ pub fn times(cause: &Cause) -> String {
 
 /// The note on a counterexample that a replay did not show again.
 pub const NOT_REPEATED: &str =
-    "a new process did not differ on the kept case, so the port does not always answer alike";
+    "a new process did not do so on the kept case, so the port does not always answer alike";
 
 /// Returns the names of all rules.
 pub fn rule_names() -> impl Iterator<Item = &'static str> {
