@@ -20,6 +20,8 @@ use crate::runner::Progress;
 
 /// Maximum number of occurrences of one group that are shrunk.
 const MAX_SHRUNK: usize = 8;
+/// The same for misbehaviours, each repetition of which costs a new process.
+const MAX_SHRUNK_FAULTS: usize = 2;
 
 /// Shrinks several occurrences of each cause, keeps the smallest as a case, and splits causes that shrink to different
 /// ones. Calls `progress` after each cause.
@@ -89,10 +91,15 @@ impl Keeper<'_> {
     /// Shrinks some occurrences: the smallest, and others of all sizes.
     fn shrink_some(&mut self, mut occurrences: Vec<Example>) -> Vec<Example> {
         occurrences.sort_by_key(Example::size);
-        let hangs =
-            occurrences.iter().any(|example| example.fault.as_ref().is_some_and(Misbehaviour::is_hang));
+        let fault = occurrences.first().and_then(|example| example.fault.as_ref());
         // Each repetition of a hang costs the time limit. To find the same hang again, a shorter one will do.
-        let count = if hangs { 1 } else { occurrences.len().min(MAX_SHRUNK) };
+        let hangs = fault.is_some_and(Misbehaviour::is_hang);
+        let max_shrunk = match fault {
+            Some(_) if hangs => 1,
+            Some(_) => MAX_SHRUNK_FAULTS,
+            None => MAX_SHRUNK,
+        };
+        let count = occurrences.len().min(max_shrunk);
         self.worker.restart(hangs);
         let mut budget = Budget::FULL;
         let mut shrunk = Vec::new();
@@ -121,12 +128,13 @@ impl Keeper<'_> {
             }
         }
         cause.is_repeated = Some(repeated.is_some());
-        if let (None, Some(first)) = (&repeated, examples.first()) {
-            keep(first, &self.name, &path)?;
+        // The report shows what the replay shows. A misbehaviour that it does not show may depend on the time limit, so
+        // the one of the run is kept.
+        let smallest = examples.first().filter(|example| example.fault.is_none()).unwrap_or(&cause.example);
+        if repeated.is_none() {
+            keep(smallest, &self.name, &path)?;
         }
-        // The report shows what the replay shows.
-        cause.example =
-            repeated.or_else(|| examples.first().cloned()).unwrap_or_else(|| cause.example.clone());
+        cause.example = repeated.unwrap_or_else(|| smallest.clone());
         let words = self.subject.replay.iter().cloned();
         cause.replay = Some(shell_words::join(words.chain(["--case".into(), path.display().to_string()])));
         cause.kept = Some(path);

@@ -23,7 +23,7 @@ pub struct Budget {
 
 impl Budget {
     /// The budget of one group.
-    pub const FULL: Self = Self { plays: 12_000, restarts: 300, hangs: 30 };
+    pub const FULL: Self = Self { plays: 12_000, restarts: 150, hangs: 30 };
 
     /// Returns whether nothing more can be played.
     pub fn is_spent(self) -> bool {

@@ -23,6 +23,8 @@ pub struct Worker<'a> {
     profiles: &'a [Profile],
     hurries: bool,
     running: Option<Running>,
+    /// The answer to `hello` that never came, after which the port is not started again.
+    mute: Option<Misbehaviour>,
 }
 
 struct Running {
@@ -32,7 +34,7 @@ struct Running {
 
 impl<'a> Worker<'a> {
     pub fn new(subject: &'a Subject<'a>, plan: &'a Plan) -> Self {
-        Self { subject, profiles: &plan.profiles, hurries: false, running: None }
+        Self { subject, profiles: &plan.profiles, hurries: false, running: None, mute: None }
     }
 
     /// Ends the process, so that the next question goes to a new one, and sets whether the new one is hurried.
@@ -61,7 +63,9 @@ impl<'a> Worker<'a> {
     fn running(&mut self) -> Result<&mut Running, Misbehaviour> {
         let running = match self.running.take() {
             Some(running) => running,
-            None => self.start()?,
+            None => self.mute.clone().map_or_else(|| self.start(), Err).inspect_err(|fault| {
+                self.mute = fault.is_hang().then(|| fault.clone());
+            })?,
         };
         Ok(self.running.insert(running))
     }
