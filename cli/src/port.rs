@@ -4,6 +4,7 @@ use clap::Args;
 use pogema_conformance::NamedEngine;
 use pogema_conformance::port::serve;
 use pogema_core::Error;
+use pogema_fast::SimdPath;
 
 use crate::conform::ENGINES;
 use crate::input::Input;
@@ -19,6 +20,8 @@ pub struct Port {
 
 impl Port {
     pub fn run(&self) -> Result<(), Error> {
+        // Otherwise the fast engine would refuse every instance.
+        SimdPath::from_environment()?;
         let named = ENGINES.into_iter().find(|engine| engine.name == self.engine);
         let input = self.input.limit().lines(std::io::stdin().lock());
         serve(named.unwrap_or(NamedEngine::REFERENCE), input, std::io::stdout().lock())

@@ -27,7 +27,7 @@ fn invalid_lists_of_known_deviations_are_rejected_with_one_line() {
     let rejected = [
         (
             good.clone() + &entry("until: 2027"),
-            "entry 2: unknown field `until`, expected one of `rule`, `what`, `since`, `reason`, `port`".into(),
+            "entry 2: unknown field `until`, expected one of `rule`, `what`, `when`, `since`, `reason`, `port`".into(),
         ),
         ("- {rule: end/after, what: cell, since: 2026-11-22}".into(), "entry 1: missing field `reason`".into()),
         (

@@ -15,6 +15,7 @@
 //! | [`port`] | implementations in any language, queried over a pipe |
 //! | [`cases`], [`golden`] | cases and recordings on disk |
 //! | [`Tally`] | counts of comparisons, rule by rule |
+//! | [`rules`] | the names of the rules and what they say |
 
 #![forbid(unsafe_code)]
 
@@ -32,11 +33,12 @@ mod oracle;
 mod play;
 pub mod port;
 mod request;
+pub mod rules;
 mod runner;
 mod script;
 mod tally;
 
-pub use compare::{Divergence, Field, FieldPart, agents_grid, compare, compare_in, panel};
+pub use compare::{Divergence, Field, FieldPart, compare, compare_in, panel};
 pub use draw::draw_request;
 pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};

@@ -134,6 +134,7 @@ fn every_rule_has_a_statement_code_a_case_and_a_picture() {
     }
     assert!(rules.len() > 40, "only {} rules found", rules.len());
     check_text(&root().join("docs/spec/index.md"), &index(&rules), &mut wrong);
+    check_text(&root().join("conformance/src/rules.txt"), &table(&rules), &mut wrong);
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
@@ -172,6 +173,34 @@ fn index(rules: &BTreeMap<String, Rule>) -> String {
         let _ = writeln!(text, "| [{id}]({chapter}#{anchor}) | {} | {} |", code.join(" "), rule.cases.len());
     }
     text.push_str("\n**What next:** [Config](config.md), or the chapter of the rule that you look for.\n");
+    text
+}
+
+/// Generates the table of rules that the reports quote: each name with the first sentence, without its links. If that
+/// sentence is short, the next ones follow.
+fn table(rules: &BTreeMap<String, Rule>) -> String {
+    const MIN_LENGTH: usize = 80;
+    let mut text = String::new();
+    for (id, rule) in rules {
+        let mut sentence = String::new();
+        let mut end = 0;
+        for part in rule.statement.split_inclusive(". ") {
+            end += part.len();
+            if end >= MIN_LENGTH {
+                break;
+            }
+        }
+        let mut rest = rule.statement[..end].trim_end();
+        while let Some((before, name, after)) = rest.split_once('[').and_then(|(before, link)| {
+            let (name, target) = link.split_once("](")?;
+            Some((before, name, target.split_once(')')?.1))
+        }) {
+            sentence.push_str(before);
+            sentence.push_str(name);
+            rest = after;
+        }
+        let _ = writeln!(text, "{id}\t{sentence}{rest}");
+    }
     text
 }
 

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
-use pogema_conformance::port::{Ask, Hello, Link, Misbehaviour, Mode, Reply, judge};
+use pogema_conformance::port::{Ask, FaultKind, Hello, Link, Misbehaviour, Mode, Reply, judge};
 use pogema_conformance::{Op, Request, Response, play};
 use serde_json::json;
 
@@ -13,8 +13,8 @@ struct Lines<'a>(std::slice::Split<'a, u8, fn(&u8) -> bool>);
 
 impl Lines<'_> {
     fn read<T: serde::de::DeserializeOwned>(&mut self) -> Result<T, Misbehaviour> {
-        let line = self.0.next().ok_or_else(|| Misbehaviour::new("the end"))?;
-        serde_json::from_slice(line).map_err(|error| Misbehaviour::new(error.to_string()))
+        let line = self.0.next().ok_or_else(|| Misbehaviour::new(FaultKind::Other("the end".into()), ""))?;
+        serde_json::from_slice(line).map_err(|error| Misbehaviour::new(FaultKind::Other(error.to_string()), ""))
     }
 }
 

@@ -1,8 +1,10 @@
-//! SVG drawings of states: dark obstacles, agents as discs, goals as squares, with the letters of the text pictures.
+//! SVG drawings of states: dark obstacles, agents as discs, goals as squares, finished agents as rings, with the letters
+//! of the text pictures. What a sign hides is drawn below it.
 
 use std::fmt::Write as _;
 
-use pogema_conformance::panel::{Grid, Sign};
+use pogema_conformance::panel::{Covered, Grid, Sign};
+use pogema_core::picture::agent_letter;
 
 /// Side of a cell. Units: pixels.
 const CELL: usize = 24;
@@ -11,7 +13,7 @@ const MAX_CELLS: usize = 64;
 
 /// Draws a grid and highlights the cells that differ from `other`; returns `None` if the grid is too large.
 pub fn drawing(title: &str, grid: &Grid, other: &Grid) -> Option<String> {
-    let (height, width) = (grid.len(), grid.first()?.len());
+    let (height, width) = (grid.rows.len(), grid.rows.first()?.len());
     if height.max(width) > MAX_CELLS {
         return None;
     }
@@ -25,49 +27,63 @@ pub fn drawing(title: &str, grid: &Grid, other: &Grid) -> Option<String> {
     let down = (0..=width).map(|column| format!("M{} 0v{bottom}", column * CELL));
     let lines: String = across.chain(down).collect();
     let _ = write!(svg, r#"<path class="lines" d="{lines}"/>"#);
-    for (row, line) in grid.iter().enumerate() {
+    for Covered { row, column, under } in &grid.covered {
+        for &sign in under.iter().rev() {
+            svg.push_str(&shape(column * CELL, row * CELL, sign, false));
+        }
+    }
+    for (row, line) in grid.rows.iter().enumerate() {
         for (column, &sign) in line.iter().enumerate() {
-            let differs = other.get(row).is_some_and(|line| line.get(column) != Some(&sign));
-            svg.push_str(&cell(column * CELL, row * CELL, sign, differs));
+            let (x, y) = (column * CELL, row * CELL);
+            svg.push_str(&shape(x, y, sign, true));
+            if other.rows.get(row).is_some_and(|line| line.get(column) != Some(&sign)) {
+                svg.push_str(&square(x, y, "differs", 1, ""));
+            }
         }
     }
     svg.push_str("</svg>");
     Some(svg)
 }
 
-fn cell(x: usize, y: usize, sign: Sign, differs: bool) -> String {
-    let square = |class: &str, rim: usize, more: &str| {
-        let side = CELL - 2 * rim;
-        format!(
-            r#"<rect class="{class}" x="{}" y="{}" width="{side}" height="{side}"{more}/>"#,
-            x + rim,
-            y + rim
-        )
-    };
+fn square(x: usize, y: usize, class: &str, rim: usize, more: &str) -> String {
+    let side = CELL - 2 * rim;
+    let (x, y) = (x + rim, y + rim);
+    format!(r#"<rect class="{class}" x="{x}" y="{y}" width="{side}" height="{side}"{more}/>"#)
+}
+
+/// Draws a sign. Only the topmost sign of a cell has its letter.
+fn shape(x: usize, y: usize, sign: Sign, has_letter: bool) -> String {
     let (middle, centre) = (x + CELL / 2, y + CELL / 2);
-    let letter = sign.letter();
-    let colour = colour(letter);
-    let lettered = |shape: &str, fill: &str| {
-        format!(r#"{shape}<text x="{middle}" y="{}" fill="{fill}">{letter}</text>"#, centre + 4)
+    let lettered = |shape: String, letter: char, fill: &str| {
+        let text = format!(r#"<text x="{middle}" y="{}" fill="{fill}">{letter}</text>"#, centre + 4);
+        if has_letter { shape + &text } else { shape }
     };
-    let mut shapes = match sign {
-        Sign::Obstacle => square("obstacle", 0, ""),
-        Sign::Goal(_) => lettered(&square("goal", 4, &format!(r#" stroke="{colour}""#)), &colour),
-        Sign::Agent(_) => {
-            lettered(&format!(r#"<circle cx="{middle}" cy="{centre}" r="10" fill="{colour}"/>"#), "#fff")
+    match sign {
+        Sign::Obstacle => square(x, y, "obstacle", 0, ""),
+        Sign::Goal(agent) => {
+            let colour = colour(agent);
+            let shape = square(x, y, "goal", 4, &format!(r#" stroke="{colour}""#));
+            lettered(shape, sign.letter(), &colour)
         }
-        Sign::Free | Sign::Occupied | Sign::Set => String::new(),
-    };
-    if differs {
-        shapes.push_str(&square("differs", 1, ""));
+        Sign::Agent(agent) => {
+            let colour = colour(agent);
+            let shape = format!(r#"<circle cx="{middle}" cy="{centre}" r="9" fill="{colour}"/>"#);
+            lettered(shape, sign.letter(), "#fff")
+        }
+        Sign::Finished(agent) => {
+            let colour = colour(agent);
+            let ring =
+                format!(r#"<circle class="finished" cx="{middle}" cy="{centre}" r="10" stroke="{colour}"/>"#);
+            lettered(ring, agent_letter(agent as usize), &colour)
+        }
+        Sign::Free | Sign::Occupied | Sign::OccupiedObstacle | Sign::Set => String::new(),
     }
-    shapes
 }
 
 /// Returns the colour of an agent and its goal; agents with consecutive letters get very different hues.
-fn colour(letter: char) -> String {
+fn colour(agent: u32) -> String {
     const GOLDEN_ANGLE: usize = 137;
-    let hue = letter.to_ascii_lowercase() as usize * GOLDEN_ANGLE % 360;
+    let hue = agent_letter(agent as usize) as usize * GOLDEN_ANGLE % 360;
     format!("hsl({hue} 65% 33%)")
 }
 
@@ -77,9 +93,20 @@ mod tests {
 
     #[test]
     fn goals_with_digits_are_drawn_as_squares() {
-        let grid = vec![vec![Sign::Agent(26), Sign::Goal(26), Sign::Goal(99)]];
-        let svg = drawing("got", &grid, &Grid::new()).unwrap_or_default();
+        let grid = Grid::of_rows(vec![vec![Sign::Agent(26), Sign::Goal(26), Sign::Goal(99)]]);
+        let svg = drawing("got", &grid, &Grid::default()).unwrap_or_default();
         let shapes = ["<circle", "class=\"goal\"", ">0</text>", ">?</text>", "differs"];
         assert_eq!(shapes.map(|shape| svg.matches(shape).count()), [1, 2, 2, 1, 0]);
+    }
+
+    #[test]
+    fn finished_agents_and_what_an_agent_hides_are_drawn() {
+        let rows = vec![vec![Sign::Agent(0), Sign::Finished(1)]];
+        let covered = vec![Covered { row: 0, column: 0, under: vec![Sign::Goal(2), Sign::Obstacle] }];
+        let svg = drawing("before", &Grid { rows, covered }, &Grid::default()).unwrap_or_default();
+        let shapes =
+            [r#"class="obstacle""#, r#"class="goal""#, r#"class="finished""#, ">b</text>", ">C</text>"];
+        assert_eq!(shapes.map(|shape| svg.matches(shape).count()), [1, 1, 1, 1, 0]);
+        assert!(svg.find("obstacle") < svg.find("goal") && svg.find("goal") < svg.find("<circle"));
     }
 }

@@ -2,15 +2,15 @@
 
 use pogema_conformance::panel::{Content, Grid, Limits, Moment, Panel, text_of_panels};
 use pogema_conformance::port::{Cause, Example, PortReport, text_of};
-use pogema_conformance::{Record, agents_grid, play};
-use pogema_core::{Error, Snapshot, shorten};
+use pogema_conformance::rules;
+use pogema_core::{Error, shorten};
 use serde_json::{Value, json};
 
 use super::grid_svg::drawing;
 use super::known::Leftover;
 use super::summary::{
-    self, OUTCOMES, Standing, counts, fill, is_rule, names, score, shortened, spec_url, standing, times,
-    title, verdict,
+    self, NOT_REPEATED, OUTCOMES, Standing, counts, fill, is_rule, names, score, shortened, spec_url,
+    standing, times, title, verdict,
 };
 
 /// Limits of text pictures: a page can be scrolled, but has to open on a phone.
@@ -72,45 +72,51 @@ fn link(rule: &str) -> Value {
 fn shown(cause: &Cause, port: &str) -> Value {
     json!({
         "rule": cause.rule.as_deref().map(link),
+        "statement": cause.rule.as_deref().and_then(rules::statement_of),
         "what": cause.what,
+        "when": cause.when,
         "times": times(cause),
         "shown_by": cause.cases.keys().map(|rule| link(rule)).collect::<Vec<_>>(),
         "example": cause.example.name,
-        "difference": difference(&cause.example, port),
+        "difference": difference(&cause.example),
+        "case": cause.example.op().map(|_| case(&cause.example, port)),
         "fault": cause.example.fault.as_ref().map(ToString::to_string),
         "kept": cause.kept.as_ref().map(|path| path.display().to_string()),
         "replay": cause.replay,
+        "note": (cause.is_repeated == Some(false)).then_some(NOT_REPEATED),
         "known": cause.known,
     })
 }
 
-fn difference(example: &Example, port: &str) -> Option<Value> {
-    let found = example.divergence.as_ref()?;
+fn case(example: &Example, port: &str) -> String {
     let case = text_of(example, port)
         .unwrap_or_else(|error| format!("# the case cannot be written as YAML: {error}"));
+    shorten(&case, LONGEST_CASE)
+}
+
+fn difference(example: &Example) -> Option<Value> {
+    let found = example.divergence.as_ref()?;
     Some(json!({
         "op": found.op,
         "field": found.field.to_string(),
         "expected": shortened(&found.expected),
         "got": shortened(&found.got),
-        "drawings": drawings(example, &found.picture, found.op),
+        "drawings": drawings(&found.picture),
         "picture": text_of_panels(&found.picture, LIMITS),
-        "case": shorten(&case, LONGEST_CASE),
     }))
 }
 
 /// Draws the state before the operation, the expected one and the one that the port sent, as far as possible.
-fn drawings(example: &Example, panels: &[Panel], op: usize) -> Vec<Value> {
-    let played = play(&example.request);
-    let Some(map) = played.map_at(op) else { return Vec::new() };
-    let expected = played.records.get(op).and_then(Record::state);
-    let grid = |state: Option<&Snapshot>| state.map_or(Grid::new(), |state| agents_grid(&map, state));
-    let [before, expected] = [played.state_before(op), expected].map(grid);
-    let is_got = |panel: &&Panel| (panel.moment, panel.content) == (Moment::Got, Content::State);
-    let got = panels.iter().find(is_got).and_then(|panel| panel.grids.first().cloned()).unwrap_or_default();
-    let drawn = [("before", &before, &Grid::new()), ("expected", &expected, &got), ("got", &got, &expected)];
-    let drawn = drawn.into_iter();
-    drawn
+fn drawings(panels: &[Panel]) -> Vec<Value> {
+    let none = Grid::default();
+    let grid = |moment: Moment| {
+        let mut shown =
+            panels.iter().filter(|panel| (panel.moment, panel.content) == (moment, Content::State));
+        shown.next().and_then(|panel| panel.grids.first()).unwrap_or(&none)
+    };
+    let [before, expected, got] = [Moment::Before, Moment::Expected, Moment::Got].map(grid);
+    [("before", before, &none), ("expected", expected, got), ("got", got, expected)]
+        .into_iter()
         .filter_map(|(what, grid, other)| Some(json!({"what": what, "svg": drawing(what, grid, other)?})))
         .collect()
 }

@@ -1,16 +1,14 @@
 //! Known deviations: reads them from a file, marks the causes they explain, and finds those that no longer occur.
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use jiff::civil::Date;
 use pogema_conformance::port::{Cause, Plan, PortReport};
-use pogema_conformance::{cases, golden};
 use pogema_core::Error;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use super::summary::name_of;
+use super::summary::{name_of, nearest_rule, rule_names};
 
 /// The rule of deviations that break the protocol.
 const PROTOCOL: &str = "protocol";
@@ -29,6 +27,9 @@ struct Deviation {
     #[serde(default)]
     rule: Option<String>,
     what: String,
+    /// The circumstances; `None` for all, if they are the same for all occurrences.
+    #[serde(default)]
+    when: Option<String>,
     #[serde(deserialize_with = "text")]
     since: String,
     reason: String,
@@ -68,11 +69,10 @@ impl Known {
             Value::Null => Vec::new(),
             _ => return Err(failed("expected a list of entries".into())),
         };
-        let rules = rules()?;
         let mut deviations: Vec<Deviation> = Vec::new();
         for (index, entry) in entries.into_iter().enumerate() {
             let failed = |reason: String| failed(format!("entry {}: {reason}", index + 1));
-            let deviation = Deviation::new(entry, &rules).map_err(failed)?;
+            let deviation = Deviation::new(entry).map_err(failed)?;
             if let Some(at) = deviations.iter().position(|earlier| earlier.key() == deviation.key()) {
                 return Err(failed(format!("duplicates entry {}", at + 1)));
             }
@@ -87,7 +87,7 @@ impl Known {
             let port = name_of(report).to_owned();
             for cause in &mut report.causes {
                 let deviation =
-                    self.deviations.iter().find(|known| known.applies_to(&port) && known.explains(cause));
+                    self.deviations.iter().find(|known| known.applies_to(&port) && known.accepts(cause));
                 cause.known = deviation.map(|known| format!("since {}: {}", known.since, known.reason));
             }
         }
@@ -108,27 +108,21 @@ impl Known {
     }
 }
 
-/// Returns all rules; each rule has a case.
-fn rules() -> Result<BTreeSet<String>, Error> {
-    let paths = golden::files(&cases::folder(), ".yaml")?;
-    paths.iter().map(|path| cases::read(path).map(|case| case.rule)).collect()
-}
-
 impl Deviation {
-    fn new(entry: Value, rules: &BTreeSet<String>) -> Result<Self, String> {
+    fn new(entry: Value) -> Result<Self, String> {
         let mut deviation: Self = serde_json::from_value(entry).map_err(|error| error.to_string())?;
         deviation.rule.take_if(|rule| rule == PROTOCOL);
-        if let Some(rule) = deviation.rule.as_ref().filter(|rule| !rules.contains(*rule)) {
-            let likeness = |known: &&String| (strsim::jaro_winkler(known, rule) * 1e6) as u64;
-            let nearest = rules.iter().max_by_key(likeness).map_or(PROTOCOL, String::as_str);
-            return Err(format!("unknown rule `{rule}`; did you mean `{nearest}`?"));
+        if let Some(rule) = deviation.rule.as_ref().filter(|rule| rule_names().all(|known| known != *rule)) {
+            return Err(format!("unknown rule `{rule}`; did you mean `{}`?", nearest_rule(rule)));
         }
         // Only one date format is accepted, so that lists can be sorted and searched by date.
         let is_date = deviation.since.parse::<Date>().is_ok_and(|date| date.to_string() == deviation.since);
         if !is_date {
             return Err(format!("`since` is `{}`, expected a date such as 2026-11-22", deviation.since));
         }
-        for (name, text) in [("what", &mut deviation.what), ("reason", &mut deviation.reason)] {
+        let when = deviation.when.as_mut().map(|when| ("when", when));
+        let texts = [("what", &mut deviation.what), ("reason", &mut deviation.reason)];
+        for (name, text) in texts.into_iter().chain(when) {
             // Folded texts become one line.
             *text = text.split_whitespace().collect::<Vec<_>>().join(" ");
             if text.is_empty() {
@@ -138,16 +132,23 @@ impl Deviation {
         Ok(deviation)
     }
 
-    fn key(&self) -> (&Option<String>, &str, &Option<String>) {
-        (&self.rule, &self.what, &self.port)
+    fn key(&self) -> (&Option<String>, &str, &Option<String>, &Option<String>) {
+        (&self.rule, &self.what, &self.when, &self.port)
     }
 
     fn applies_to(&self, port: &str) -> bool {
         self.port.as_ref().is_none_or(|name| name == port)
     }
 
+    /// Returns whether a cause is of the rule and field of this deviation.
     fn explains(&self, cause: &Cause) -> bool {
         (&self.rule, &self.what) == (&cause.rule, &cause.what)
+    }
+
+    /// Returns whether this deviation accepts a cause. Without `when`, it accepts no group that has several causes, so
+    /// that one entry cannot hide two bugs.
+    fn accepts(&self, cause: &Cause) -> bool {
+        self.explains(cause) && self.when.as_ref().map_or(cause.share.is_none(), |when| *when == cause.when)
     }
 
     /// Returns whether the run would have shown the deviation if it still existed. It would not if only single cases or
@@ -164,7 +165,11 @@ impl Deviation {
 
     fn title(&self) -> String {
         let Self { what, since, reason, .. } = self;
+        let when = self.when.as_ref().map_or(String::new(), |when| format!(" ({when})"));
         let port = self.port.as_ref().map_or(String::new(), |port| format!(" of {port}"));
-        format!("{}: {what}{port}, known since {since}: {reason}", self.rule.as_deref().unwrap_or(PROTOCOL))
+        format!(
+            "{}: {what}{when}{port}, known since {since}: {reason}",
+            self.rule.as_deref().unwrap_or(PROTOCOL)
+        )
     }
 }

@@ -18,6 +18,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::{NamedEngine, Report, cases, find_oracle_python, golden};
 use pogema_core::Error;
+use pogema_fast::SimdPath;
 
 use crate::output::{check_writable, lined_table, print_line, progress_bar, write_json};
 
@@ -57,6 +58,8 @@ pub const ENGINES: [NamedEngine; 3] = [NamedEngine::REFERENCE, FAST, NamedEngine
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
+        // Otherwise every episode of the fast engine would be reported as a divergence.
+        SimdPath::from_environment()?;
         if self.ports.is_requested() {
             let bar = self.bar("cases");
             let shared = ports::Shared {

@@ -27,7 +27,8 @@ pub struct Outputs {
     ///
     /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`; add
     /// `port: name` to limit an entry to one port. Copy `rule` and `what` from the line `FAIL collide/soft: cell
-    /// differs` of the report; for a line `ERROR what` the rule is `protocol`. Listed causes are reported separately
+    /// differs` of the report; for a line `ERROR what` the rule is `protocol`. If the report shows several causes of one
+    /// rule and field, give each its own entry, with `when` copied from the report. Listed causes are reported separately
     /// and do not change the exit status. If no port shows an entry any longer, the exit status is 1, so that the list
     /// stays up to date. This applies only if the run compared the rule of the entry: never with `--case` or `--part`,
     /// nor if `--rules`, `--profile` or the port's claims leave the rule out, nor if a port broke the protocol so

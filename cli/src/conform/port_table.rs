@@ -4,9 +4,12 @@ use std::fmt::Write as _;
 
 use pogema_conformance::panel::{Limits, text_of_panels};
 use pogema_conformance::port::{Cause, PortReport};
+use pogema_conformance::rules;
 
 use super::known::Leftover;
-use super::summary::{self, OUTCOMES, counts, names, printable, shortened, times, title, verdict};
+use super::summary::{
+    self, NOT_REPEATED, OUTCOMES, counts, names, printable, shortened, spec_url, times, title, verdict,
+};
 use crate::output::lined_table;
 
 /// The note on a known deviation that no longer occurs.
@@ -20,7 +23,7 @@ pub fn report_text(reports: &[PortReport], leftover: &Leftover) -> String {
     if let [report] = reports {
         let _ = writeln!(text, "{}\n", title(report));
     }
-    let _ = writeln!(text, "{}\n", rules(reports));
+    let _ = writeln!(text, "{}\n", rule_table(reports));
     let unclaimed = unclaimed(reports);
     let _ = write!(text, "{unclaimed}{}", if unclaimed.is_empty() { "" } else { "\n\n" });
     for (report, name) in reports.iter().zip(names(reports)) {
@@ -36,7 +39,7 @@ pub fn report_text(reports: &[PortReport], leftover: &Leftover) -> String {
 }
 
 /// Returns the table of rules with columns for each port; with several ports, without empty columns.
-fn rules(reports: &[PortReport]) -> String {
+fn rule_table(reports: &[PortReport]) -> String {
     let rows = summary::rows(reports);
     let holds = |report: &PortReport, at: usize| rows.iter().any(|rule| !counts(report, rule)[at].is_empty());
     let is_shown = |report: &PortReport, at: usize| reports.len() == 1 || at == 0 || holds(report, at);
@@ -107,11 +110,18 @@ pub fn cause_text(cause: &Cause) -> String {
         Some(rule) => format!("FAIL {rule}: {} differs, {}\n", cause.what, times(cause)),
         None => format!("ERROR {}, {}\n", cause.what, times(cause)),
     };
+    if let Some(rule) = &cause.rule {
+        let _ = writeln!(text, "  rule: {}", rules::statement_of(rule).unwrap_or_default());
+        let _ = writeln!(text, "  read on: {}", spec_url(rule).unwrap_or_default());
+    }
     if !cause.cases.is_empty() {
         let rules: Vec<&str> = cause.cases.keys().map(String::as_str).collect();
         let _ = writeln!(text, "  shown by the cases of {}", rules.join(", "));
     }
     let _ = writeln!(text, "  smallest: {}", cause.example.name);
+    if !cause.when.is_empty() {
+        let _ = writeln!(text, "  when: {}", cause.when);
+    }
     if let Some(found) = &cause.example.divergence {
         let _ = writeln!(text, "  operation {}: {}", found.op, found.field);
         let (expected, got) = (shortened(&found.expected), shortened(&found.got));
@@ -122,11 +132,17 @@ pub fn cause_text(cause: &Cause) -> String {
         );
     }
     if let Some(fault) = &cause.example.fault {
-        let _ = writeln!(text, "  {fault}");
+        let op = fault.op.map_or(String::new(), |op| format!("operation {op}: "));
+        let _ = writeln!(text, "  {op}{fault}");
     }
     text + &replay_text(cause)
 }
 
 fn replay_text(cause: &Cause) -> String {
-    cause.replay.as_ref().map_or(String::new(), |replay| format!("  play it again: {replay}\n"))
+    let Some(replay) = &cause.replay else { return String::new() };
+    let note = match cause.is_repeated {
+        Some(false) => format!("  not shown again: {NOT_REPEATED}\n"),
+        _ => String::new(),
+    };
+    format!("{note}  play it again: {replay}\n")
 }

@@ -15,12 +15,14 @@ use pogema_core::Error;
 use super::known::Leftover;
 use super::outputs::Outputs;
 use super::port_table;
-use super::summary::{Verdict, score};
+use super::summary::{Verdict, nearest_rule, rule_names, score};
 use crate::output::{check_writable, print_line, write_json};
 use crate::words::word;
 
 /// The exit status if a port breaks the protocol.
 const MISBEHAVES: u8 = 3;
+/// Default time limit of an answer. Units: seconds.
+const DEFAULT_TIMEOUT: f64 = 10.0;
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Ports")]
@@ -29,7 +31,7 @@ pub struct Ports {
     #[arg(long = "port", value_name = "COMMAND")]
     commands: Vec<String>,
     /// Check only the rules that match a pattern, such as `collide/soft*` [default: all rules]
-    #[arg(long, value_name = "PATTERN", requires = "commands", value_parser = glob::Pattern::new)]
+    #[arg(long, value_name = "PATTERN", requires = "commands", value_parser = rule_pattern)]
     rules: Option<glob::Pattern>,
     /// Check only this profile; may be given several times [default: all profiles that the port claims]
     #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = word::<Profile>())]
@@ -37,8 +39,8 @@ pub struct Ports {
     /// Play only this part; may be given several times [default: all parts]
     #[arg(long = "part", value_name = "PART", requires = "commands", value_parser = word::<Part>())]
     parts: Vec<Part>,
-    /// Time limit for one answer of a port, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    /// Time limit for one answer of a port, in seconds; the first answer may take six times as long
+    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_TIMEOUT, value_parser = seconds)]
     timeout: f64,
     /// Play only the case in this file; may be given several times
     #[arg(long = "case", value_name = "FILE", requires = "commands")]
@@ -51,6 +53,14 @@ pub struct Ports {
     traces: Vec<PathBuf>,
     #[command(flatten)]
     outputs: Outputs,
+}
+
+fn rule_pattern(text: &str) -> Result<glob::Pattern, String> {
+    let pattern = glob::Pattern::new(text).map_err(|error| error.to_string())?;
+    if rule_names().any(|rule| pattern.matches(rule)) {
+        return Ok(pattern);
+    }
+    Err(format!("expected a pattern that matches a rule; did you mean `{}`?", nearest_rule(text)))
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -91,12 +101,11 @@ impl Ports {
         let timeout = Duration::from_secs_f64(self.timeout);
         let commands =
             self.commands.iter().map(|text| Command::new(text, timeout)).collect::<Result<Vec<_>, _>>()?;
-        let subjects: Vec<Subject<'_>> = commands.iter().map(subject).collect();
+        let subjects: Vec<Subject<'_>> = commands.iter().map(|command| self.subject(command)).collect();
         let plan = self.plan(shared);
         let mut reports =
             check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
-        let num_causes =
-            reports.iter().flat_map(|report| &report.causes).filter(|cause| cause.rule.is_some()).count();
+        let num_causes: usize = reports.iter().map(|report| report.causes.len()).sum();
         shared.bar.reset();
         shared.bar.set_message("shrinking counterexamples");
         shared.bar.set_length(num_causes as u64);
@@ -129,12 +138,17 @@ impl Ports {
             parts: self.parts.clone(),
         }
     }
-}
 
-fn subject(command: &Command) -> Subject<'_> {
-    Subject {
-        command: command.text.clone(),
-        start: Box::new(|| Process::start(command).map(|process| Box::new(process) as Box<dyn Link>)),
+    fn subject<'a>(&self, command: &'a Command) -> Subject<'a> {
+        let mut replay = ["pogema", "conform", "--port", &command.text].map(str::to_owned).to_vec();
+        if self.timeout != DEFAULT_TIMEOUT {
+            replay.extend(["--timeout".to_owned(), self.timeout.to_string()]);
+        }
+        Subject {
+            command: command.text.clone(),
+            replay,
+            start: Box::new(|| Process::start(command).map(|process| Box::new(process) as Box<dyn Link>)),
+        }
     }
 }
 

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Verdicts, needed_by};
+use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Share, Verdicts, needed_by};
+use pogema_conformance::rules;
 use pogema_core::{Error, shorten, words};
+use pogema_maps::nearest;
 use serde_json::Value;
 
 /// The outcome of a rule for a port, over all its cases.
@@ -196,7 +198,25 @@ pub fn verdict(report: &PortReport) -> String {
 
 /// Formats how often a cause occurred.
 pub fn times(cause: &Cause) -> String {
-    if cause.times == 1 { "once".into() } else { format!("{} times", cause.times) }
+    let times = if cause.times == 1 { "once".into() } else { format!("{} times", cause.times) };
+    match cause.share {
+        Some(Share { alike, shrunk }) => format!("{times}, {alike} of {shrunk} shrunk ones for this cause"),
+        None => times,
+    }
+}
+
+/// The note on a counterexample that a replay did not show again.
+pub const NOT_REPEATED: &str =
+    "a new process did not do so on the kept case, so the port does not always answer alike";
+
+/// Returns the names of all rules.
+pub fn rule_names() -> impl Iterator<Item = &'static str> {
+    rules::all().map(|(name, _)| name)
+}
+
+/// Returns the rule whose name is most similar to a word.
+pub fn nearest_rule(word: &str) -> &'static str {
+    nearest(word, rule_names()).unwrap_or_default()
 }
 
 /// Returns the address of a rule in the published spec.

@@ -1,29 +1,57 @@
 //! Panels that show the states and windows of a difference.
 
-use pogema_core::picture::marks;
+use std::collections::BTreeMap;
+
 use pogema_core::{Cell, Map, Snapshot};
 
-use super::panel::{Content, Grid, Moment, Panel, Sign};
+use super::panel::{Content, Covered, Grid, Moment, Panel, Sign};
 use crate::digits::unpack;
-use crate::request::Response;
+use crate::request::{Record, Response};
 
-/// Returns a grid of the agents and goals of a state.
-pub fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
-    grid(map, marks(map, state).into_iter().map(Sign::from))
+/// Returns a grid of the agents and goals of a state. An agent hides a goal, a goal a finished agent, and a lower index
+/// a higher one; the grid lists what is hidden.
+fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
+    let mut stacks: BTreeMap<usize, Vec<Sign>> = BTreeMap::new();
+    let mut put = |cells: &[Cell], are_active: bool, sign: fn(u32) -> Sign| {
+        for (agent, &cell) in cells.iter().enumerate().rev() {
+            if state.active[agent] == are_active && map.contains(cell) {
+                stacks.entry(map.index(cell)).or_default().push(sign(agent as u32));
+            }
+        }
+    };
+    put(&state.cells, false, Sign::Finished);
+    put(&state.goals, true, Sign::Goal);
+    put(&state.cells, true, Sign::Agent);
+    let mut signs: Vec<Sign> = map.obstacles().iter().copied().map(ground).collect();
+    let mut covered = Vec::new();
+    for (at, mut stack) in stacks {
+        let Some(top) = stack.pop() else { continue };
+        signs[at] = top;
+        // From top to bottom.
+        stack.reverse();
+        stack.extend(map.obstacles()[at].then_some(Sign::Obstacle));
+        if !stack.is_empty() {
+            covered.push(Covered { row: at / map.width(), column: at % map.width(), under: stack });
+        }
+    }
+    grid(map, &signs, covered)
 }
 
 fn occupancy_grid(map: &Map, state: &Snapshot) -> Grid {
-    let sign_of = |&obstacle: &bool| if obstacle { Sign::Obstacle } else { Sign::Free };
-    let mut signs: Vec<Sign> = map.obstacles().iter().map(sign_of).collect();
+    let mut signs: Vec<Sign> = map.obstacles().iter().copied().map(ground).collect();
     for &cell in &state.occupied {
-        signs[map.index(cell)] = Sign::Occupied;
+        let at = map.index(cell);
+        signs[at] = if map.obstacles()[at] { Sign::OccupiedObstacle } else { Sign::Occupied };
     }
-    grid(map, signs.into_iter())
+    grid(map, &signs, Vec::new())
 }
 
-fn grid(map: &Map, signs: impl Iterator<Item = Sign>) -> Grid {
-    let signs: Vec<Sign> = signs.collect();
-    signs.chunks(map.width()).map(<[Sign]>::to_vec).collect()
+fn ground(is_obstacle: bool) -> Sign {
+    if is_obstacle { Sign::Obstacle } else { Sign::Free }
+}
+
+fn grid(map: &Map, signs: &[Sign], covered: Vec<Covered>) -> Grid {
+    Grid { rows: signs.chunks(map.width()).map(<[Sign]>::to_vec).collect(), covered }
 }
 
 /// Returns panels of the state before an operation, and of the expected and received states after it.
@@ -40,10 +68,12 @@ pub fn states(expected: &Response, got: &Response, op: usize) -> Vec<Panel> {
         };
         Some(Panel { moment, content: Content::State, grids })
     };
+    // The state before a reset belongs to another episode, and possibly to another map.
+    let is_reset = matches!(expected.records.get(op), Some(Record::Reset(_)));
     let states = [
-        (Moment::Before, expected.state_before(op)),
-        (Moment::Expected, expected.records[op].state()),
-        (Moment::Got, got.records[op].state()),
+        (Moment::Before, expected.state_before(op).filter(|_| !is_reset)),
+        (Moment::Expected, expected.records.get(op).and_then(Record::state)),
+        (Moment::Got, got.records.get(op).and_then(Record::state)),
     ];
     states.into_iter().filter_map(panel).collect()
 }
@@ -56,7 +86,7 @@ pub fn windows(expected: &str, got: &str, side: usize) -> Vec<Panel> {
     let area = side * side;
     let sign = |&bit: &bool| if bit { Sign::Set } else { Sign::Free };
     let channel =
-        |bits: &[bool]| bits.chunks(side).map(|row| row.iter().map(sign).collect()).collect::<Grid>();
+        |bits: &[bool]| Grid::of_rows(bits.chunks(side).map(|row| row.iter().map(sign).collect()).collect());
     [(Moment::Expected, expected), (Moment::Got, got)]
         .map(|(moment, window)| {
             let grids = unpack(window).chunks_exact(area).map(channel).collect();

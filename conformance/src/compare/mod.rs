@@ -4,11 +4,10 @@ mod draw;
 mod field;
 pub mod panel;
 
-use pogema_core::{Metrics, Observed, ObservedPomapf, OnGoal, Snapshot};
+use pogema_core::{Metrics, Observation, Observed, ObservedPomapf, OnGoal, Snapshot};
 use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
 
-pub use self::draw::agents_grid;
 pub use self::field::{Field, FieldPart};
 use self::panel::{Limits, Panel, text_of_panels};
 use crate::port::{Scope, Told, resolve_hashes};
@@ -90,7 +89,7 @@ pub fn compare_in(
     let op = expected.records.len().min(got.records.len());
     let holds =
         expected.records.len() == got.records.len() && expected.error.is_some() == got.error.is_some();
-    let rule = refusal_rule(request.ops.get(op), expected.error.is_some());
+    let rule = refusal_rule(request.ops.get(op), expected.error.is_some(), scope);
     comparison.tally.count(rule, holds);
     let mut found = comparison.found;
     found.extend((!holds).then(|| ends_differently(rule, op, expected, got)));
@@ -98,7 +97,7 @@ pub fn compare_in(
 }
 
 /// Returns the rule that decides whether an operation is an error.
-fn refusal_rule(op: Option<&Op>, is_refused: bool) -> &'static str {
+fn refusal_rule(op: Option<&Op>, is_refused: bool, scope: &Scope) -> &'static str {
     match op {
         Some(Op::Step(_)) if is_refused => "move/invalid",
         Some(Op::Step(_)) => "move/actions",
@@ -106,8 +105,23 @@ fn refusal_rule(op: Option<&Op>, is_refused: bool) -> &'static str {
         Some(Op::Sample) => "seed/actions",
         Some(Op::Back) => "history/step-back",
         Some(Op::History) => "history/changes",
-        Some(Op::Reset(_)) | None => "config/fields",
+        Some(Op::Reset(_)) | None if scope.drawn => "config/fields",
+        // An instance gives its starts and goals, so a refusal of it has nothing to do with a config.
+        Some(Op::Reset(_)) | None => "place/explicit",
     }
+}
+
+/// Returns the difference of observations that do not have the form of their type, and counts it.
+pub fn misshapen(request: &Request, op: usize, got: String, tally: &mut Tally) -> Divergence {
+    let config = GridConfig::from_value(&request.config).unwrap_or_default();
+    let (rule, side) = (families_of(&config).observe, config.rules().side());
+    let expected = match config.observation_type {
+        Observation::Default => format!("for each agent a window of shape [3, {side}, {side}]"),
+        _ => format!("for each agent two windows of shape [{side}, {side}] and its positions"),
+    };
+    tally.count(rule, false);
+    let field = Field { name: "shape of observations", part: FieldPart::Whole };
+    Divergence { op, field, expected, got, rule: rule.into(), picture: Vec::new() }
 }
 
 fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) -> Divergence {
@@ -122,7 +136,7 @@ fn ends_differently(rule: &str, op: usize, expected: &Response, got: &Response) 
         expected: describe(expected),
         got: describe(got),
         rule: rule.into(),
-        picture: Vec::new(),
+        picture: draw::states(expected, got, op),
     }
 }
 

@@ -3,11 +3,35 @@
 use std::fmt::Write as _;
 use std::ops::Range;
 
-use pogema_core::picture::{Mark, agent_letter};
+use pogema_core::picture::agent_letter;
 use serde::Serializer;
 
-/// Rows of signs, all of one length.
-pub type Grid = Vec<Vec<Sign>>;
+/// One picture: rows of signs, and what these signs hide.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Grid {
+    /// The topmost sign of each place. All rows have the same length.
+    pub rows: Vec<Vec<Sign>>,
+    /// The places where a sign hides others, row by row.
+    pub covered: Vec<Covered>,
+}
+
+impl Grid {
+    /// Creates a grid whose signs hide nothing.
+    pub fn of_rows(rows: Vec<Vec<Sign>>) -> Self {
+        Self { rows, covered: Vec::new() }
+    }
+}
+
+/// A place whose sign hides others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Covered {
+    /// The row of the place.
+    pub row: usize,
+    /// The column of the place.
+    pub column: usize,
+    /// The hidden signs, from top to bottom.
+    pub under: Vec<Sign>,
+}
 
 /// The content of one place of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +44,12 @@ pub enum Sign {
     Agent(u32),
     /// The goal of an active agent, by index.
     Goal(u32),
+    /// A finished agent, by index.
+    Finished(u32),
     /// A mark of the occupancy grid.
     Occupied,
+    /// A mark of the occupancy grid on an obstacle.
+    OccupiedObstacle,
     /// A nonzero value of a window.
     Set,
 }
@@ -34,19 +62,36 @@ impl Sign {
             Self::Obstacle => '#',
             Self::Agent(agent) => agent_letter(agent as usize),
             Self::Goal(agent) => agent_letter(agent as usize).to_ascii_uppercase(),
+            Self::Finished(_) => '*',
             Self::Occupied => 'o',
+            Self::OccupiedObstacle => '%',
             Self::Set => '1',
+        }
+    }
+
+    /// Returns the meaning of the character, for the legend; none for signs that need no explanation.
+    fn meaning(self) -> Option<&'static str> {
+        match self {
+            Self::Free | Self::Set => None,
+            Self::Agent(_) => Some("a, b… agents"),
+            Self::Goal(_) => Some("A, B… their goals"),
+            Self::Finished(_) => Some("* a finished agent"),
+            Self::Obstacle => Some("# an obstacle"),
+            Self::Occupied => Some("o a marked cell"),
+            Self::OccupiedObstacle => Some("% a marked obstacle"),
         }
     }
 }
 
-impl From<Mark> for Sign {
-    fn from(mark: Mark) -> Self {
-        match mark {
-            Mark::Free => Self::Free,
-            Mark::Obstacle => Self::Obstacle,
-            Mark::Agent(agent) => Self::Agent(agent as u32),
-            Mark::Goal(agent) => Self::Goal(agent as u32),
+impl std::fmt::Display for Sign {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::Free | Self::Set => write!(f, "{}", self.letter()),
+            Self::Obstacle => f.write_str("an obstacle"),
+            Self::Agent(agent) => write!(f, "agent {}", agent_letter(agent as usize)),
+            Self::Goal(agent) => write!(f, "the goal of {}", agent_letter(agent as usize)),
+            Self::Finished(agent) => write!(f, "finished agent {}", agent_letter(agent as usize)),
+            Self::Occupied | Self::OccupiedObstacle => f.write_str("a mark"),
         }
     }
 }
@@ -102,13 +147,14 @@ impl Panel {
     /// Returns the numbers of rows and columns of each picture.
     fn size(&self) -> (usize, usize) {
         let first = self.grids.first();
-        (first.map_or(0, Vec::len), first.and_then(|grid| grid.first()).map_or(0, Vec::len))
+        let rows = first.map_or(&[][..], |grid| &grid.rows);
+        (rows.len(), rows.first().map_or(0, Vec::len))
     }
 
     /// Returns the first place where two panels of one size differ.
     fn differs_at(&self, other: &Self) -> Option<(usize, usize)> {
         let differing = |(one, other): (&Grid, &Grid)| {
-            let mut rows = one.iter().zip(other).enumerate();
+            let mut rows = one.rows.iter().zip(&other.rows).enumerate();
             rows.find_map(|(row, (one, other))| {
                 Some((row, one.iter().zip(other).position(|(one, other)| one != other)?))
             })
@@ -131,9 +177,13 @@ impl Limits {
     pub const NONE: Self = Self { rows: usize::MAX, columns: usize::MAX };
 }
 
-/// Formats panels as text. Crops large pictures to the neighbourhood of the first difference.
+/// Maximum number of notes below a panel.
+const MAX_NOTES: usize = 6;
+
+/// Formats panels as text, with a legend. Crops large pictures to the neighbourhood of the first difference.
 pub fn text_of_panels(panels: &[Panel], limits: Limits) -> String {
     let mut text = String::new();
+    let mut meanings: Vec<&str> = Vec::new();
     for panel in panels {
         let (height, width) = panel.size();
         let same_size =
@@ -147,13 +197,55 @@ pub fn text_of_panels(panels: &[Panel], limits: Limits) -> String {
             let _ = write!(text, " (rows {rows} of {height}, columns {columns} of {width})");
         }
         text.push('\n');
-        for row in rows {
-            let part = |grid: &Grid| grid[row][columns.clone()].iter().map(|sign| sign.letter()).collect();
+        for row in rows.clone() {
+            let part =
+                |grid: &Grid| grid.rows[row][columns.clone()].iter().map(|sign| sign.letter()).collect();
             let parts: Vec<String> = panel.grids.iter().map(part).collect();
             let _ = writeln!(text, "    {}", parts.join("   "));
         }
+        let is_shown = |row: usize, column: usize| rows.contains(&row) && columns.contains(&column);
+        add_notes(&mut text, panel, is_shown);
+        let shown = panel.grids.iter().flat_map(|grid| &grid.rows[rows.clone()]);
+        for meaning in shown.flat_map(|row| &row[columns.clone()]).filter_map(|sign| sign.meaning()) {
+            if !meanings.contains(&meaning) {
+                meanings.push(meaning);
+            }
+        }
+    }
+    if !meanings.is_empty() {
+        meanings.sort_unstable_by_key(|meaning| "aA*#o%".find(&meaning[..1]));
+        let _ = writeln!(text, "  ({})", meanings.join("; "));
     }
     text
+}
+
+/// Lists what the letters of a panel do not show: which agents have finished, and what is hidden.
+fn add_notes(text: &mut String, panel: &Panel, is_shown: impl Fn(usize, usize) -> bool) {
+    let mut notes = Vec::new();
+    for grid in &panel.grids {
+        for (row, signs) in grid.rows.iter().enumerate() {
+            for (column, sign) in signs.iter().enumerate() {
+                if let Sign::Finished(_) = sign
+                    && is_shown(row, column)
+                {
+                    notes.push(format!("{} at [{row},{column}]: {sign}", sign.letter()));
+                }
+            }
+        }
+        for Covered { row, column, under } in &grid.covered {
+            if is_shown(*row, *column) {
+                let under = under.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+                let letter = grid.rows[*row][*column].letter();
+                notes.push(format!("{letter} at [{row},{column}] hides {under}"));
+            }
+        }
+    }
+    for note in notes.iter().take(MAX_NOTES) {
+        let _ = writeln!(text, "    {note}");
+    }
+    if notes.len() > MAX_NOTES {
+        let _ = writeln!(text, "    and {} more", notes.len() - MAX_NOTES);
+    }
 }
 
 /// Serializes panels as their text without limits.
@@ -179,9 +271,9 @@ mod tests {
 
     /// Returns two states of a map that differ in one cell.
     fn two_states(height: usize, width: usize, (row, column): (usize, usize)) -> Vec<Panel> {
-        let free = vec![vec![Sign::Free; width]; height];
+        let free = Grid::of_rows(vec![vec![Sign::Free; width]; height]);
         let mut agents = free.clone();
-        agents[row][column] = Sign::Agent(0);
+        agents.rows[row][column] = Sign::Agent(0);
         let panel =
             |moment, agents| Panel { moment, content: Content::State, grids: vec![agents, free.clone()] };
         vec![panel(Moment::Expected, agents), panel(Moment::Got, free.clone())]
@@ -193,8 +285,9 @@ mod tests {
         panels.push(Panel { moment: Moment::Got, content: Content::State, grids: Vec::new() });
         let text = text_of_panels(&panels, Limits { rows: 12, columns: 120 });
         assert_eq!(text, text_of_panels(&panels, Limits::NONE));
-        assert_eq!(text.lines().count(), 27);
-        assert!(text.ends_with("\n  got: an agent, goal or mark is off the map\n"), "{text}");
+        assert_eq!(text.lines().count(), 28);
+        let end = "\n  got: an agent, goal or mark is off the map\n  (a, b… agents)\n";
+        assert!(text.ends_with(end), "{text}");
     }
 
     #[test]
@@ -215,7 +308,26 @@ mod tests {
             empty,
             empty,
             empty,
+            "  (a, b… agents)",
         ];
+        assert_eq!(shown.lines().collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn notes_name_finished_agents_and_hidden_signs() {
+        let rows = vec![vec![Sign::Agent(0), Sign::Finished(1), Sign::Goal(0)]];
+        let under = vec![Sign::Goal(2), Sign::Obstacle];
+        let agents = Grid { rows, covered: vec![Covered { row: 0, column: 0, under }] };
+        let marks = Grid::of_rows(vec![vec![Sign::OccupiedObstacle, Sign::Free, Sign::Free]]);
+        let panel = Panel { moment: Moment::Before, content: Content::State, grids: vec![agents, marks] };
+        let expected = [
+            "  before: agents and goals, then occupancy",
+            "    a*A   %..",
+            "    * at [0,1]: finished agent b",
+            "    a at [0,0] hides the goal of c, an obstacle",
+            "  (a, b… agents; A, B… their goals; * a finished agent; % a marked obstacle)",
+        ];
+        let shown = text_of_panels(&[panel], Limits::NONE);
         assert_eq!(shown.lines().collect::<Vec<_>>(), expected);
     }
 }

@@ -85,7 +85,8 @@ pub fn profile_of(rule: &str) -> Profile {
     match rule.split('/').next().unwrap_or_default() {
         _ if is_any(&SEEDING) => Profile::Seeding,
         _ if rule == "seed/actions" => Profile::Policies,
-        _ if rule == "occupancy/exact" => Profile::Core,
+        // The starts and goals of an instance are explicit.
+        _ if ["occupancy/exact", "place/explicit"].contains(&rule) => Profile::Core,
         "config" | "grid" | "place" | "seed" => Profile::Seeding,
         "observe" | "border" | "occupancy" => Profile::Observations,
         "metrics" => Profile::Metrics,
@@ -105,21 +106,25 @@ pub fn adapt(
     request: &Request,
     expected: &Response,
 ) -> Result<(Request, Vec<Unclaimed>), Unclaimed> {
-    let Ok(config) = GridConfig::from_value(&request.config) else {
-        return check_rejection(hello).map(|()| (request.clone(), Vec::new()));
-    };
+    let config = GridConfig::from_value(&request.config);
+    // An invalid config has no instance to play.
+    let needs_config = config.is_err() || expected.records.is_empty();
+    if mode == Mode::Config || needs_config {
+        check_seeding(hello)?;
+    }
+    let Ok(config) = config else { return Ok((request.clone(), Vec::new())) };
     check_rules(hello, &config)?;
     check_sizes(hello, &config, expected)?;
-    if mode == Mode::Instance && expected.records.is_empty() {
-        return check_rejection(hello).map(|()| (request.clone(), Vec::new()));
+    if mode == Mode::Instance && needs_config {
+        return Ok((request.clone(), Vec::new()));
     }
     let mut request = request.clone();
     let left_out = leave_out(hello, mode, &config, &mut request, expected);
     Ok((request, left_out))
 }
 
-/// Returns an error unless the port claims seeding, because an invalid config has no instance to play.
-fn check_rejection(hello: &Hello) -> Result<(), Unclaimed> {
+/// Returns an error unless the port claims seeding: no other port is asked to reset from a config.
+fn check_seeding(hello: &Hello) -> Result<(), Unclaimed> {
     if hello.profiles.contains(&Profile::Seeding) {
         Ok(())
     } else {

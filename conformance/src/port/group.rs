@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::claims::Mode;
+use super::judge::Judged;
 use super::link::Misbehaviour;
 use crate::compare::Divergence;
 use crate::request::Request;
@@ -17,21 +18,42 @@ pub struct Cause {
     pub rule: Option<String>,
     /// The field that differs, without its index, or the misbehaviour.
     pub what: String,
-    /// Number of occurrences.
+    /// The circumstances that the smallest counterexample needs; empty if it was not shrunk.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub when: String,
+    /// Number of occurrences; with `share`, of all causes with the same rule and field.
     pub times: u64,
+    /// How many of the shrunk occurrences have this cause, if they have several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share: Option<Share>,
     /// Number of hand-written cases that show it, by rule.
     pub cases: BTreeMap<String, u64>,
     /// The smallest occurrence.
     pub example: Example,
+    /// All occurrences, from which those to shrink are chosen.
+    #[serde(skip)]
+    pub(super) occurrences: Vec<Example>,
     /// The file of the smallest counterexample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<PathBuf>,
     /// The command that replays it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replay: Option<String>,
+    /// Whether that command showed the cause again; none if nothing was kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub is_repeated: Option<bool>,
     /// The reason why it is accepted for now, if it is a known deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<String>,
+}
+
+/// The part of the shrunk occurrences that have one cause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Share {
+    /// Occurrences with this cause.
+    pub alike: usize,
+    /// All occurrences that were shrunk.
+    pub shrunk: usize,
 }
 
 /// One occurrence of a defect.
@@ -53,40 +75,65 @@ pub struct Example {
 
 impl Cause {
     fn of(example: Example) -> Self {
-        let (rule, what) = example.key();
-        Self { rule, what, times: 0, cases: BTreeMap::new(), example, kept: None, replay: None, known: None }
+        Self {
+            rule: example.divergence.as_ref().map(|found| found.rule.clone()),
+            what: example.what(),
+            when: String::new(),
+            times: 0,
+            share: None,
+            cases: BTreeMap::new(),
+            example,
+            occurrences: Vec::new(),
+            kept: None,
+            replay: None,
+            is_repeated: None,
+            known: None,
+        }
     }
 }
 
 impl Example {
-    fn key(&self) -> (Option<String>, String) {
+    /// Returns the differences and misbehaviours of a check as examples.
+    pub fn all_of(name: &str, mode: Mode, judged: Judged) -> impl Iterator<Item = Self> + use<> {
+        let Judged { request, divergences, fault, .. } = judged;
+        let example = Self { name: name.to_owned(), mode, request, divergence: None, fault: None };
+        let differing = divergences.into_iter().map({
+            let example = example.clone();
+            move |found| Self { divergence: Some(found), ..example.clone() }
+        });
+        differing.chain(fault.map(|fault| Self { fault: Some(fault), ..example }))
+    }
+
+    /// Returns the field that differs, without its index, or the misbehaviour.
+    pub fn what(&self) -> String {
         match (&self.divergence, &self.fault) {
-            (Some(found), _) => (Some(found.rule.clone()), found.field.kind()),
-            (None, Some(fault)) => (None, kind_of_fault(&fault.what)),
-            (None, None) => (None, String::new()),
+            (Some(found), _) => found.field.kind(),
+            (None, Some(fault)) => fault.kind.to_string(),
+            (None, None) => String::new(),
         }
     }
 
-    /// Returns whether another occurrence has the same cause.
+    /// Returns the operation that shows the defect; none if the port did not start.
+    pub fn op(&self) -> Option<usize> {
+        self.divergence.as_ref().map(|found| found.op).or(self.fault.as_ref().and_then(|fault| fault.op))
+    }
+
+    /// Returns whether another occurrence belongs to the same group.
     pub fn is_like(&self, other: &Self) -> bool {
-        self.key() == other.key()
+        match ((&self.divergence, &self.fault), (&other.divergence, &other.fault)) {
+            ((Some(one), _), (Some(other), _)) => {
+                one.rule == other.rule && one.field.kind() == other.field.kind()
+            }
+            ((None, Some(one)), (None, Some(other))) => one.is_like(other),
+            _ => false,
+        }
     }
 
     /// Returns a measure of size; smaller examples are easier to understand.
-    fn size(&self) -> (usize, usize) {
-        let written = |value: &serde_json::Value| value.to_string().len();
-        (
-            self.divergence.as_ref().map_or(self.request.ops.len(), |found| found.op),
-            written(&self.request.config),
-        )
+    pub fn size(&self) -> (usize, usize) {
+        let length = self.request.config.to_string().len();
+        (self.op().unwrap_or(self.request.ops.len()), length)
     }
-}
-
-/// Returns the description of a misbehaviour without numbers and quoted answers.
-fn kind_of_fault(what: &str) -> String {
-    let head = what.split(": `").next().unwrap_or(what);
-    let words = head.split_whitespace().filter(|word| !word.contains(|letter: char| letter.is_ascii_digit()));
-    words.collect::<Vec<_>>().join(" ").replace(" (exit status:", "").replace(" (signal:", "")
 }
 
 /// Adds an occurrence to the causes. `case_rule` is the rule of the hand-written case, if it is one.
@@ -102,6 +149,7 @@ pub fn add(causes: &mut Vec<Cause>, example: Example, case_rule: Option<&str>) {
         *cause.cases.entry(rule.to_owned()).or_default() += 1;
     }
     if example.size() < cause.example.size() {
-        cause.example = example;
+        cause.example = example.clone();
     }
+    cause.occurrences.push(example);
 }

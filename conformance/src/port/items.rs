@@ -15,14 +15,21 @@ use crate::script::play_script;
 /// One item to check.
 pub enum Item {
     Case(String, Box<Case>),
+    /// A case in a file that the caller names. It is an episode like any other, whatever its rule.
+    File(String, Box<Case>),
     Recorded(String, Box<GoldenRecording>),
     Drawn(u64),
 }
 
 impl Item {
+    /// Reads the case in a file.
+    pub fn of_file(path: &Path) -> Result<Self, Error> {
+        Ok(Self::File(path.display().to_string(), Box::new(cases::read(path)?)))
+    }
+
     pub fn name(&self, seed: u64) -> String {
         match self {
-            Self::Case(name, _) | Self::Recorded(name, _) => name.clone(),
+            Self::Case(name, _) | Self::File(name, _) | Self::Recorded(name, _) => name.clone(),
             Self::Drawn(number) => format!("drawn case {number} of seed {seed}"),
         }
     }
@@ -30,13 +37,13 @@ impl Item {
     pub fn case_rule(&self) -> Option<&str> {
         match self {
             Self::Case(_, case) => Some(&case.rule),
-            Self::Recorded(..) | Self::Drawn(_) => None,
+            Self::File(..) | Self::Recorded(..) | Self::Drawn(_) => None,
         }
     }
 
     pub fn request(&self, seed: u64) -> Result<(Request, Response), Error> {
         match self {
-            Self::Case(_, case) => {
+            Self::Case(_, case) | Self::File(_, case) => {
                 let request = case.request()?;
                 let expected = play(&request);
                 Ok((request, expected))
@@ -51,10 +58,7 @@ impl Item {
 pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
     let mut items = Vec::new();
     if !plan.files.is_empty() {
-        for path in &plan.files {
-            items.push(Item::Case(path.display().to_string(), Box::new(cases::read(path)?)));
-        }
-        return Ok(items);
+        return plan.files.iter().map(|path| Item::of_file(path)).collect();
     }
     let has = |part: Part| plan.parts.is_empty() || plan.parts.contains(&part);
     if has(Part::Cases) {

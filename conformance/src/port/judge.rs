@@ -4,7 +4,7 @@ use super::claims::{Mode, Scope, Unclaimed, adapt};
 use super::link::{Link, Misbehaviour};
 use super::play::play_on_port;
 use super::protocol::Hello;
-use crate::compare::{Divergence, compare_in};
+use crate::compare::{Divergence, compare_in, misshapen};
 use crate::play::play;
 use crate::request::{Request, Response};
 use crate::tally::Tally;
@@ -51,8 +51,12 @@ pub fn judge(
     judged.is_played = true;
     judged.fault = answered.fault;
     if judged.fault.is_none() {
-        let scope = Scope::of(hello, mode);
-        judged.divergences = compare_in(&scope, &adapted, expected, &answered.response, &mut judged.tally);
+        let mut scope = Scope::of(hello, mode);
+        // Observations of another form cannot be compared; everything else can.
+        scope.observations &= answered.misshapen.is_none();
+        let tally = &mut judged.tally;
+        judged.divergences = compare_in(&scope, &adapted, expected, &answered.response, tally);
+        judged.divergences.extend(answered.misshapen.map(|(op, got)| misshapen(&adapted, op, got, tally)));
     }
     judged.request = adapted;
     judged

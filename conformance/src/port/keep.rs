@@ -1,18 +1,21 @@
 //! Writes counterexamples as cases, which can be read, replayed and kept.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use pogema_core::{Action, Error, Map, Observed, ObservedMapf, picture};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::group::Example;
-use crate::compare::{Field, FieldPart};
+use crate::compare::{Divergence, Field, FieldPart};
 use crate::digits::{area_of, unpack};
 use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
+
+/// The `rule` of cases that show a violation of the protocol.
+pub const PROTOCOL_RULE: &str = "protocol";
 
 /// The file of a case, with its keys in reading order.
 #[derive(Serialize)]
@@ -44,22 +47,29 @@ struct StepOfFile {
     expected: BTreeMap<&'static str, Value>,
 }
 
-/// Writes an example as a case into a folder. Returns the path, or `None` if the example breaks no rule.
+/// Writes an example as a case.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written.
-pub fn keep(example: &Example, port: &str, folder: &Path) -> Result<Option<PathBuf>, Error> {
-    let Some(found) = &example.divergence else { return Ok(None) };
-    let text = text_of(example, port).map_err(|error| Error::io(folder, error))?;
-    let field = match found.field {
-        Field { name, part: FieldPart::Window { .. } } => format!("{name} of agent"),
-        field => field.kind(),
+pub fn keep(example: &Example, port: &str, path: &Path) -> Result<(), Error> {
+    let text = text_of(example, port).map_err(|error| Error::io(path, error))?;
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    }
+    files::write(path, text.as_bytes())
+}
+
+/// Returns the name of the file that keeps an example, without its extension.
+pub fn file_stem(example: &Example) -> String {
+    let name = match &example.divergence {
+        Some(Divergence { rule, field: Field { name, part: FieldPart::Window { .. } }, .. }) => {
+            format!("{rule} {name} of agent")
+        }
+        Some(found) => format!("{} {}", found.rule, found.field.kind()),
+        None => format!("{PROTOCOL_RULE} {}", example.what()),
     };
-    let words: Vec<&str> = found.rule.split('/').chain(field.split(' ')).collect();
-    let path = folder.join(format!("{}.yaml", words.join("-")));
-    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-    files::write(&path, text.as_bytes())?;
-    Ok(Some(path))
+    let words = name.split(|letter: char| !letter.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("-")
 }
 
 /// Formats an example as a case.
@@ -71,7 +81,7 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
     let expected = play(request);
     let found = example.divergence.as_ref();
     let field = found.map(|found| found.field);
-    let last = found.map_or(0, |found| found.op);
+    let last = example.op().unwrap_or(0);
     let mut start = BTreeMap::new();
     let mut steps = Vec::new();
     let mut map = None;
@@ -92,8 +102,13 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
         steps.push(step_of(op, BTreeMap::new()));
     }
     let file = CaseFile {
-        rule: found.map(|found| found.rule.clone()).unwrap_or_default(),
-        says: format!("{port} differs in: {}.", field.map(|field| field.to_string()).unwrap_or_default()),
+        rule: found.map_or_else(|| PROTOCOL_RULE.into(), |found| found.rule.clone()),
+        says: match (field, &example.fault) {
+            (None, Some(fault)) => format!("{port} {} in operation {last}.", fault.kind),
+            (field, _) => {
+                format!("{port} differs in: {}.", field.map(|field| field.to_string()).unwrap_or_default())
+            }
+        },
         config: request.config.clone(),
         register: request.register.clone(),
         density: request.density,

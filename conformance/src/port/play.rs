@@ -20,6 +20,8 @@ pub struct Answered {
     pub response: Response,
     /// The misbehaviour that ended the answers.
     pub fault: Option<Misbehaviour>,
+    /// What is wrong with the form of the first observations that could not be read, and the operation they answer.
+    pub misshapen: Option<(usize, String)>,
 }
 
 /// Plays a request on a port.
@@ -32,11 +34,17 @@ pub fn play_on_port(
     request: &Request,
     expected: &Response,
 ) -> Answered {
-    let mut answered = Answered { response: Response::to(request), fault: None };
+    let mut answered = Answered { response: Response::to(request), fault: None, misshapen: None };
     match PortPlay::new(link, hello, mode, request, expected) {
         Ok(mut play) => {
-            answered.response.record(request, |index, op| play.perform(index, op));
-            answered.fault = play.port.fault().cloned();
+            answered.response.record(request, |index, op| {
+                let performed = play.perform(index, op);
+                let misshapen = || Some((index, play.port.misshapen()?.to_owned()));
+                answered.misshapen = answered.misshapen.take().or_else(misshapen);
+                performed
+            });
+            let op = Some(answered.response.records.len());
+            answered.fault = play.port.fault().cloned().map(|fault| Misbehaviour { op, ..fault });
         }
         Err(Unplayable::Config(link)) => refuse_config(link, request, &mut answered),
         Err(Unplayable::Instance(error)) => {
@@ -58,7 +66,7 @@ fn refuse_config(link: &mut dyn Link, request: &Request, answered: &mut Answered
             let failed = |reason| Failure::new(When::Phase("config".into()), &Error::Port { reason });
             answered.response.error = reply.error.map(failed);
         }
-        Err(fault) => answered.fault = Some(fault),
+        Err(fault) => answered.fault = Some(Misbehaviour { op: Some(0), ..fault }),
     }
 }
 

@@ -11,7 +11,7 @@ use pogema_core::{Error, shorten};
 use process_wrap::std::{ChildWrapper, CommandWrap};
 use serde::de::DeserializeOwned;
 
-use super::link::{Link, Misbehaviour};
+use super::link::{FaultKind, Link, Misbehaviour};
 use super::protocol::{Ask, Hello, PROTOCOL, Reply};
 
 /// Maximum length of an answer. Units: bytes.
@@ -20,8 +20,10 @@ const MAX_LINE_LENGTH: usize = 1 << 26;
 const MAX_STDERR_LENGTH: usize = 2048;
 /// Length of the start of a bad answer that is quoted. Units: characters.
 const MAX_QUOTE_LENGTH: usize = 120;
-/// Minimum timeout of the first answer, since imports alone can take seconds.
-const MIN_START_TIMEOUT: Duration = Duration::from_secs(60);
+/// How many times as long as any other answer the first one may take, since imports alone can take seconds.
+const START_FACTOR: u32 = 6;
+/// How many times shorter the time limit of a hurried port is.
+const HURRY_FACTOR: u32 = 10;
 /// Time that a port may take to exit after `bye` before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 /// Interval between checks whether a silent port is still running.
@@ -88,12 +90,13 @@ impl Process {
         wrap.wrap(process_wrap::std::ProcessGroup::leader());
         #[cfg(windows)]
         wrap.wrap(process_wrap::std::JobObject);
-        let not_started =
-            |error: &std::io::Error| Misbehaviour::new(format!("`{program}` cannot be started: {error}"));
-        let mut child = wrap.spawn().map_err(|error| not_started(&error))?;
+        let not_started = |details: &str| {
+            Misbehaviour::new(FaultKind::NotStarted { program: program.clone() }, &format!(": {details}"))
+        };
+        let mut child = wrap.spawn().map_err(|error| not_started(&error.to_string()))?;
         let pipes = (child.stdin().take(), child.stdout().take(), child.stderr().take());
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
-            return Err(Misbehaviour::new(format!("`{program}` has no pipes")));
+            return Err(not_started("it has no pipes"));
         };
         let stderr_end = Arc::default();
         let shared = Arc::clone(&stderr_end);
@@ -107,7 +110,7 @@ impl Process {
     }
 
     fn exchange<T: DeserializeOwned>(&mut self, ask: &Ask) -> Result<T, Misbehaviour> {
-        let kind = kind_of(ask);
+        let question = word_of(ask);
         let unrequested = if self.has_more {
             self.output.recv_timeout(self.timeout).ok()
         } else {
@@ -115,25 +118,28 @@ impl Process {
         };
         match unrequested {
             None | Some(Output::End(_)) => {}
-            Some(Output::TooLong) => return Err(self.misbehaviour("wrote an unrequested line".into())),
+            Some(Output::TooLong) => return Err(self.misbehaviour(FaultKind::Unrequested, "")),
             Some(Output::Line(line, _)) => {
-                return Err(self.misbehaviour(format!("wrote an unrequested line: `{}`", quote(&line))));
+                let details = format!(": `{}`", quote(&line));
+                return Err(self.misbehaviour(FaultKind::Unrequested, &details));
             }
         }
-        let mut line = serde_json::to_vec(ask).map_err(|error| Misbehaviour::new(error.to_string()))?;
+        let mut line = serde_json::to_vec(ask)
+            .map_err(|error| Misbehaviour::new(FaultKind::Other(error.to_string()), ""))?;
         line.push(b'\n');
         if let Some(input) = &self.input {
             // If the port has ended, waiting for its answer reports it.
             let _ = input.send(line);
         }
-        let line = self.wait(kind)?;
+        let line = self.wait(question)?;
         serde_json::from_slice(&line).map_err(|error| {
-            self.misbehaviour(format!("gave no readable answer to `{kind}` ({error}): `{}`", quote(&line)))
+            let details = format!(" ({error}): `{}`", quote(&line));
+            self.misbehaviour(FaultKind::Unreadable { question }, &details)
         })
     }
 
-    fn wait(&mut self, kind: &str) -> Result<Vec<u8>, Misbehaviour> {
-        let timeout = if kind == "hello" { self.timeout.max(MIN_START_TIMEOUT) } else { self.timeout };
+    fn wait(&mut self, question: &'static str) -> Result<Vec<u8>, Misbehaviour> {
+        let timeout = if question == "hello" { self.timeout * START_FACTOR } else { self.timeout };
         let until = Instant::now() + timeout;
         let mut has_ended = false;
         loop {
@@ -144,44 +150,44 @@ impl Process {
                     return Ok(line);
                 }
                 Ok(Output::TooLong) => {
-                    return Err(self.misbehaviour(format!(
-                        "answered `{kind}` with a line of more than {MAX_LINE_LENGTH} bytes"
-                    )));
+                    let kind = FaultKind::TooLong { question, limit: MAX_LINE_LENGTH };
+                    return Err(self.misbehaviour(kind, ""));
                 }
-                Ok(Output::End(rest)) => return Err(self.ended(kind, &rest)),
-                Err(RecvTimeoutError::Disconnected) => return Err(self.ended(kind, b"")),
+                Ok(Output::End(rest)) => return Err(self.ended(question, &rest)),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.ended(question, b"")),
                 // The port's children may keep its output open after it has ended.
-                Err(RecvTimeoutError::Timeout) if has_ended => return Err(self.ended(kind, b"")),
+                Err(RecvTimeoutError::Timeout) if has_ended => return Err(self.ended(question, b"")),
                 Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
-                    let seconds = timeout.as_secs_f64();
-                    return Err(self.misbehaviour(format!("gave no answer to `{kind}` within {seconds} s")));
+                    let kind = FaultKind::NoAnswer { question, limit_ms: timeout.as_millis() };
+                    return Err(self.misbehaviour(kind, ""));
                 }
                 Err(RecvTimeoutError::Timeout) => has_ended = matches!(self.child.try_wait(), Ok(Some(_))),
             }
         }
     }
 
-    fn ended(&mut self, kind: &str, rest: &[u8]) -> Misbehaviour {
+    fn ended(&mut self, question: &'static str, rest: &[u8]) -> Misbehaviour {
         let rest =
             if rest.is_empty() { String::new() } else { format!(", after half a line: `{}`", quote(rest)) };
         let until = Instant::now() + EXIT_TIMEOUT;
-        let status = loop {
+        let kind = loop {
             match self.child.try_wait() {
-                Ok(Some(status)) => break format!("ended ({status})"),
+                Ok(Some(status)) => break FaultKind::Ended { status: status.to_string(), question },
                 Ok(None) if Instant::now() < until => std::thread::sleep(Duration::from_millis(5)),
-                _ => break "closed its output".into(),
+                _ => break FaultKind::ClosedOutput { question },
             }
         };
-        self.misbehaviour(format!("{status} instead of answering `{kind}`{rest}"))
+        self.misbehaviour(kind, &rest)
     }
 
     /// Creates a misbehaviour with the end of stderr.
-    fn misbehaviour(&self, what: String) -> Misbehaviour {
+    fn misbehaviour(&self, kind: FaultKind, details: &str) -> Misbehaviour {
         // The last output on stderr often gives the reason; it may still be in transit.
         std::thread::sleep(Duration::from_millis(20));
         let stderr_end = self.stderr_end.lock().unwrap_or_else(PoisonError::into_inner);
         let bytes: Vec<u8> = stderr_end.iter().copied().collect();
-        Misbehaviour { what, stderr: String::from_utf8_lossy(&bytes).trim_end().to_owned() }
+        let stderr = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+        Misbehaviour { stderr, ..Misbehaviour::new(kind, details) }
     }
 }
 
@@ -191,13 +197,17 @@ impl Link for Process {
         if hello.protocol == PROTOCOL {
             Ok(hello)
         } else {
-            Err(self
-                .misbehaviour(format!("speaks `{}`, expected `{PROTOCOL}`", shorten(&hello.protocol, 60))))
+            let protocol = shorten(&hello.protocol, 60);
+            Err(self.misbehaviour(FaultKind::OtherProtocol { protocol, expected: PROTOCOL }, ""))
         }
     }
 
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
         self.exchange(ask)
+    }
+
+    fn hurry(&mut self) {
+        self.timeout /= HURRY_FACTOR;
     }
 }
 
@@ -218,7 +228,7 @@ impl Drop for Process {
     }
 }
 
-fn kind_of(ask: &Ask) -> &'static str {
+fn word_of(ask: &Ask) -> &'static str {
     match ask {
         Ask::Hello { .. } => "hello",
         Ask::Reset(_) => "reset",

@@ -92,21 +92,18 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
             }
         }
         count_verdicts(report, result.case_rule.as_deref(), &judged, plan);
-        let Judged { request, divergences, fault, .. } = judged;
-        let example = |divergence, fault| {
-            let (name, request) = (result.name.clone(), request.clone());
-            Example { name, mode, request, divergence, fault }
-        };
         let case = result.case_rule.as_deref();
-        for found in divergences.into_iter().filter(|found| case.is_some() || is_selected(plan, &found.rule))
-        {
-            let case_rule = case.filter(|rule| is_about(rule, &found));
-            verdict.failed |= u64::from(case_rule.is_some());
-            group::add(&mut report.causes, example(Some(found), None), case_rule);
-        }
-        if fault.is_some() {
-            verdict.errors = 1;
-            group::add(&mut report.causes, example(None, fault), case);
+        for example in Example::all_of(&result.name, mode, judged) {
+            let Some(found) = &example.divergence else {
+                verdict.errors = 1;
+                group::add(&mut report.causes, example, case);
+                continue;
+            };
+            if case.is_some() || is_selected(plan, &found.rule) {
+                let case_rule = case.filter(|rule| is_about(rule, found));
+                verdict.failed |= u64::from(case_rule.is_some());
+                group::add(&mut report.causes, example, case_rule);
+            }
         }
     }
     if let Some(rule) = result.case_rule {

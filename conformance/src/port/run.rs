@@ -1,31 +1,24 @@
 //! Runs of ports over everything that they claim.
 
-use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pogema_core::Error;
 
 use super::claims::{Mode, needed_by, profile_of};
 use super::items::{Item, items};
-use super::judge::{Judged, judge};
-use super::keep::keep;
-use super::link::{Link, Misbehaviour};
+use super::judge::Judged;
+use super::link::Misbehaviour;
 use super::plan::Plan;
 use super::protocol::{Hello, Profile};
 use super::report::{ItemResult, PortReport, add_result};
-use super::shrink::shrink;
+use super::subject::{Subject, Worker};
+use crate::request::{Request, Response};
 use crate::runner::{Progress, on_workers};
 
 /// Number of misbehaviours after which the other items of a port are skipped.
 const MAX_FAULTS: u64 = 20;
-
-/// A port, and a function that starts it.
-pub struct Subject<'a> {
-    /// The command line; names the port until it answers `hello`.
-    pub command: String,
-    /// Starts the port: once for each worker, and again after each misbehaviour.
-    pub start: Box<dyn Fn() -> Result<Box<dyn Link>, Misbehaviour> + Sync + 'a>,
-}
+/// Number of answers that never came after which the other items are skipped, since each costs the time limit.
+const MAX_HANGS: u64 = 5;
 
 /// Checks ports in parallel. Calls `total` once with the number of checks, and `progress` after each check.
 ///
@@ -44,12 +37,11 @@ pub fn check_ports(
     let results = on_workers(
         plan.num_workers,
         items.len() as u64 * num_subjects,
-        || Ok(subjects.iter().map(|_| None).collect::<Vec<Option<Running>>>()),
-        |running, number| {
+        || Ok(subjects.iter().map(|subject| Worker::new(subject, plan)).collect::<Vec<_>>()),
+        |workers, number| {
             let (item, subject) =
                 (&items[(number / num_subjects) as usize], (number % num_subjects) as usize);
-            let slot = &mut running[subject];
-            let result = check_item(&subjects[subject], subject, slot, &faults[subject], plan, item);
+            let result = check_item(&mut workers[subject], subject, &faults[subject], plan, item);
             progress();
             result
         },
@@ -63,111 +55,82 @@ pub fn check_ports(
     Ok(reports)
 }
 
-/// Shrinks the example of each cause and writes it as a case.
-///
-/// # Errors
-/// If a case cannot be written.
-pub fn shrink_causes(
-    subject: &Subject<'_>,
-    report: &mut PortReport,
-    plan: &Plan,
-    folder: &Path,
-    progress: Progress<'_>,
-) -> Result<(), Error> {
-    let mut slot = None;
-    let name = report.hello.as_ref().map_or_else(|| report.command.clone(), |hello| hello.name.clone());
-    for cause in report.causes.iter_mut().filter(|cause| cause.rule.is_some()) {
-        // If the port cannot be started again, the example stays unchanged.
-        if let Ok(running) = running(subject, &mut slot, plan) {
-            let shrunk = shrink(running.link.as_mut(), &running.hello, &cause.example);
-            cause.example = shrunk.example;
-            if shrunk.has_faulted {
-                slot = None;
-            }
-        }
-        cause.kept = keep(&cause.example, &name, folder)?;
-        cause.replay = cause.kept.as_ref().map(|path| {
-            let quoted = shell_words::join([subject.command.as_str(), "--case", &path.display().to_string()]);
-            format!("pogema conform --port {quoted}")
-        });
-        progress();
-    }
-    Ok(())
-}
-
-/// A started port.
-struct Running {
-    link: Box<dyn Link>,
-    hello: Hello,
-}
-
 fn check_item(
-    subject: &Subject<'_>,
-    index: usize,
-    slot: &mut Option<Running>,
+    worker: &mut Worker<'_>,
+    subject: usize,
     faults: &AtomicU64,
     plan: &Plan,
     item: &Item,
 ) -> Result<ItemResult, Error> {
     let (request, expected) = item.request(plan.seed)?;
-    let mut result = ItemResult {
-        subject: index,
+    let is_over = || faults.load(Ordering::Relaxed) >= MAX_FAULTS;
+    let is_cut_off = is_over();
+    let (mut hello, mut judged) = (None, Vec::new());
+    if !is_cut_off {
+        (hello, judged) = judge_item(worker, plan, item, (&request, &expected), |judged| {
+            faults.fetch_add(judged.fault.as_ref().map_or(0, weight), Ordering::Relaxed);
+            is_over()
+        });
+    }
+    Ok(ItemResult {
+        subject,
         name: item.name(plan.seed),
         case_rule: item.case_rule().map(str::to_owned),
         num_steps: expected.records.iter().filter(|record| record.step().is_some()).count() as u64,
-        judged: Vec::new(),
-        is_cut_off: false,
-        hello: None,
-    };
-    for mode in [Mode::Instance, Mode::Config] {
-        if faults.load(Ordering::Relaxed) >= MAX_FAULTS {
-            result.is_cut_off = result.judged.is_empty();
-            break;
-        }
-        let running = match running(subject, slot, plan) {
-            Ok(running) => running,
-            Err(fault) => {
-                faults.fetch_add(MAX_FAULTS, Ordering::Relaxed);
-                result.judged.push((mode, Judged { fault: Some(fault), request, ..Judged::default() }));
-                break;
-            }
-        };
-        result.hello = Some(running.hello.clone());
-        if !is_played_in(mode, &running.hello, plan, item) {
-            continue;
-        }
-        let mut judged = match item.case_rule().and_then(|rule| needed_by(&running.hello, rule)) {
-            Some(unclaimed) => Judged { not_claimed: vec![unclaimed], ..Judged::default() },
-            None => judge(running.link.as_mut(), &running.hello, mode, &request, &expected),
-        };
-        if let Item::Case(_, case) = item {
-            // Without the features that its rule is about, a case does not test the rule.
-            let missing = judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(&case.rule));
-            judged.is_played &= !missing || !judged.divergences.is_empty();
-        }
-        if judged.fault.is_some() {
-            faults.fetch_add(1, Ordering::Relaxed);
-            *slot = None;
-        }
-        result.judged.push((mode, judged));
-    }
-    Ok(result)
+        judged,
+        is_cut_off,
+        hello,
+    })
 }
 
-fn running<'s>(
-    subject: &Subject<'_>,
-    slot: &'s mut Option<Running>,
+/// Returns how much a misbehaviour counts towards the maximum.
+fn weight(fault: &Misbehaviour) -> u64 {
+    match fault {
+        Misbehaviour { op: None, .. } => MAX_FAULTS,
+        fault if fault.is_hang() => MAX_FAULTS / MAX_HANGS,
+        _ => 1,
+    }
+}
+
+/// Checks a port by an item, in each mode in which the item is played, until `is_over`. Returns the claims of the port,
+/// unless it did not start, and the results.
+pub fn judge_item(
+    worker: &mut Worker<'_>,
     plan: &Plan,
-) -> Result<&'s mut Running, Misbehaviour> {
-    if let Some(running) = slot {
-        return Ok(running);
+    item: &Item,
+    (request, expected): (&Request, &Response),
+    is_over: impl Fn(&Judged) -> bool,
+) -> (Option<Hello>, Vec<(Mode, Judged)>) {
+    let hello = match worker.hello() {
+        Ok(hello) => hello.clone(),
+        Err(fault) => {
+            let judged = Judged { fault: Some(fault), request: request.clone(), ..Judged::default() };
+            is_over(&judged);
+            return (None, vec![(Mode::Instance, judged)]);
+        }
+    };
+    let unclaimed = item.case_rule().and_then(|rule| needed_by(&hello, rule));
+    let mut results = Vec::new();
+    for mode in [Mode::Instance, Mode::Config] {
+        if !is_played_in(mode, &hello, plan, item) {
+            continue;
+        }
+        let mut judged = match unclaimed.clone() {
+            Some(unclaimed) => Judged { not_claimed: vec![unclaimed], ..Judged::default() },
+            None => worker.judge(mode, request, expected),
+        };
+        if let Some(rule) = item.case_rule() {
+            // Without the features that its rule is about, a case does not test the rule.
+            let missing = judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(rule));
+            judged.is_played &= !missing || !judged.divergences.is_empty();
+        }
+        let is_over = is_over(&judged);
+        results.push((mode, judged));
+        if is_over {
+            break;
+        }
     }
-    let mut link = (subject.start)()?;
-    let mut hello = link.hello()?;
-    if !plan.profiles.is_empty() {
-        hello.profiles.retain(|profile| *profile == Profile::Core || plan.profiles.contains(profile));
-    }
-    Ok(slot.insert(Running { link, hello }))
+    (Some(hello), results)
 }
 
 /// Returns whether an item is played in a mode. Items about drawing need a config; all others use every mode.

@@ -2,7 +2,7 @@
 
 use pogema_core::{Cell, Config, Error, Instance, Observed, Snapshot, TraceHeader};
 
-use super::link::{Link, Misbehaviour};
+use super::link::{FaultKind, Link, Misbehaviour};
 use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
 
@@ -18,6 +18,7 @@ pub struct Port<'l> {
     reply: Reply,
     observed: Option<Observed>,
     fault: Option<Misbehaviour>,
+    misshapen: Option<String>,
 }
 
 impl<'l> Port<'l> {
@@ -26,7 +27,8 @@ impl<'l> Port<'l> {
         // The goals that an instance lists for each agent. An agent reaches at most one goal per step.
         let num_goals = usize::try_from(config.max_steps).unwrap_or(0) + 2;
         let (reply, observed) = (Reply::default(), None);
-        Self { link, hello, config, padded_dtype: "float64", num_goals, reply, observed, fault: None }
+        let (padded_dtype, fault, misshapen) = ("float64", None, None);
+        Self { link, hello, config, padded_dtype, num_goals, reply, observed, fault, misshapen }
     }
 
     /// Sets the element type to record for maps with their border, since the protocol does not report it.
@@ -42,6 +44,11 @@ impl<'l> Port<'l> {
     /// Returns the misbehaviour of the port, if any.
     pub fn fault(&self) -> Option<&Misbehaviour> {
         self.fault.as_ref()
+    }
+
+    /// Returns what is wrong with the form of the first observations that cannot be read, if any.
+    pub fn misshapen(&self) -> Option<&str> {
+        self.misshapen.as_deref()
     }
 
     /// Returns the last answer.
@@ -167,21 +174,21 @@ impl<'l> Port<'l> {
         Error::Port { reason }
     }
 
-    fn require<T>(&mut self, key: &str, value: Option<&T>) -> Result<(), Error> {
+    fn require<T>(&mut self, key: &'static str, value: Option<&T>) -> Result<(), Error> {
         if value.is_some() {
             return Ok(());
         }
-        Err(self.misbehaved(Misbehaviour::new(format!("left `{key}` out of an answer that needs it"))))
+        Err(self.misbehaved(Misbehaviour::new(FaultKind::LeftOut { key }, "")))
     }
 
-    fn require_list<T>(&mut self, key: &str, list: Option<&Vec<T>>) -> Result<(), Error> {
+    fn require_list<T>(&mut self, key: &'static str, list: Option<&Vec<T>>) -> Result<(), Error> {
         self.require(key, list)?;
         let (length, expected) = (list.map_or(0, Vec::len), self.config.num_agents);
         if length == expected {
             return Ok(());
         }
-        let what = format!("`{key}` has length {length}, expected {expected}, one for each agent");
-        Err(self.misbehaved(Misbehaviour::new(what)))
+        let details = format!(": it has length {length}, expected {expected}");
+        Err(self.misbehaved(Misbehaviour::new(FaultKind::WrongLength { key }, &details)))
     }
 
     /// Returns an error if an answer consistently has a wrong number of agents. Its form is valid, but it is wrong.
@@ -228,8 +235,13 @@ impl<'l> Port<'l> {
                 self.require("observations", reply.observations.as_ref())?;
             }
             if let Some(value) = reply.observations.take() {
-                let observed = observations::read(&value, &self.config, self.padded_dtype);
-                self.observed = Some(observed.map_err(|what| self.misbehaved(Misbehaviour::new(what)))?);
+                match observations::read(&value, &self.config, self.padded_dtype) {
+                    Ok(observed) => self.observed = Some(observed),
+                    Err(what) => {
+                        self.observed = None;
+                        self.misshapen.get_or_insert(what);
+                    }
+                }
             }
         }
         self.reply = reply;

@@ -5,87 +5,111 @@ use serde_json::{Value, json};
 
 use super::claims::Mode;
 use super::group::Example;
-use super::judge::judge;
-use super::link::Link;
-use super::protocol::Hello;
+use super::subject::Worker;
 use super::test_episode::TestEpisode;
 use crate::play::play;
 use crate::request::{Op, Request, Response};
 
-/// Maximum number of requests played to shrink one counterexample.
-const MAX_PLAYS: usize = 4000;
-
-/// A smaller example, and whether the port misbehaved in the process and must be started again.
-pub struct Shrunk {
-    pub example: Example,
-    pub has_faulted: bool,
-}
-
-/// Shrinks an example as long as it shows the same cause.
-pub fn shrink(link: &mut dyn Link, hello: &Hello, example: &Example) -> Shrunk {
-    let mut shrinker = Shrinker { link, hello, best: example.clone(), plays: 0, has_faulted: false };
-    if let Some(divergence) = &example.divergence {
-        shrinker.shrink_until(divergence.op);
-    }
-    Shrunk { example: shrinker.best, has_faulted: shrinker.has_faulted }
-}
-
-pub struct Shrinker<'a> {
-    link: &'a mut dyn Link,
-    hello: &'a Hello,
-    pub best: Example,
+/// The plays that are left to shrink the occurrences of one group.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    /// Requests played.
     plays: usize,
-    has_faulted: bool,
+    /// Misbehaviours, after each of which the port is started again.
+    restarts: usize,
+    /// Answers that never came, each of which costs the time limit.
+    hangs: usize,
 }
 
-impl Shrinker<'_> {
+impl Budget {
+    /// The budget of one group.
+    pub const FULL: Self = Self { plays: 12_000, restarts: 150, hangs: 30 };
+
+    /// Returns whether nothing more can be played.
+    pub fn is_spent(self) -> bool {
+        self.plays == 0 || self.restarts == 0 || self.hangs == 0
+    }
+}
+
+/// Shrinks an example as long as it shows the same cause. The result is the smallest only if the budget lasts.
+pub fn shrink(worker: &mut Worker<'_>, example: &Example, budget: &mut Budget) -> Example {
+    let mut shrinker = Shrinker { worker, best: example.clone(), budget };
+    if let Some(op) = example.op() {
+        shrinker.shrink_until(op);
+    }
+    shrinker.best
+}
+
+pub struct Shrinker<'a, 'w> {
+    worker: &'a mut Worker<'w>,
+    pub best: Example,
+    budget: &'a mut Budget,
+}
+
+impl Shrinker<'_, '_> {
     /// Removes the operations after `until`, then everything else that the cause does not need.
     fn shrink_until(&mut self, until: usize) {
-        let request = self.best.request.clone();
-        let expected = play(&request);
-        let mut cut = request.clone();
+        let mut cut = self.best.request.clone();
         cut.ops.truncate(until + 1);
         self.accept(&cut);
-        if let Some(episode) = TestEpisode::of(&request, &expected, until) {
-            for mode in [Mode::Instance, Mode::Config] {
-                let before = self.best.mode;
-                self.best.mode = mode;
-                if self.accept(&episode.request()) {
-                    return self.shrink_episode(episode);
-                }
-                self.best.mode = before;
+        if !self.shrink_as_episode() {
+            self.shrink_config();
+            // With fewer fields, an explicit episode may show the cause, too.
+            self.shrink_as_episode();
+        }
+    }
+
+    /// Shrinks the explicit episode that the best request plays; returns false if that does not show the cause.
+    fn shrink_as_episode(&mut self) -> bool {
+        let (request, op) = (self.best.request.clone(), self.best.op().unwrap_or_default());
+        let Some(episode) = TestEpisode::of(&request, &play(&request), op) else { return false };
+        let before = self.best.mode;
+        for mode in [Mode::Instance, Mode::Config] {
+            self.best.mode = mode;
+            if self.accept(&episode.request()) {
+                self.shrink_episode(episode);
+                return true;
             }
         }
-        self.shrink_config();
+        self.best.mode = before;
+        false
     }
 
     /// Returns whether shrinking must end.
     pub fn is_done(&self) -> bool {
-        self.has_faulted || self.plays >= MAX_PLAYS
+        self.budget.is_spent()
     }
 
     /// Makes a request the new best if it shows the same cause.
     pub fn accept(&mut self, request: &Request) -> bool {
-        if self.is_done() {
-            return false;
-        }
+        // A misbehaviour says nothing about another cause, and a port may misbehave only now and then.
+        const MAX_TRIES: usize = 2;
         let expected = play(request);
-        let is_about_errors = self.best.divergence.as_ref().is_some_and(|found| found.field.name == "error");
-        if expected.error.is_some() && !is_about_errors {
+        let may_be_refused = self.best.divergence.as_ref().is_none_or(|found| found.field.name == "error");
+        if expected.error.is_some() && !may_be_refused {
             return false;
         }
-        self.plays += 1;
-        let judged = judge(self.link, self.hello, self.best.mode, request, &expected);
-        self.has_faulted = judged.fault.is_some();
-        let examples = judged.divergences.into_iter().map(|found| Example {
-            request: request.clone(),
-            divergence: Some(found),
-            ..self.best.clone()
-        });
-        let like = examples.into_iter().find(|example| example.is_like(&self.best));
-        let is_like = like.is_some();
-        self.best = like.unwrap_or_else(|| self.best.clone());
-        is_like
+        for _ in 0..MAX_TRIES {
+            if self.is_done() {
+                return false;
+            }
+            self.budget.plays -= 1;
+            let judged = self.worker.judge(self.best.mode, request, &expected);
+            let fault = judged.fault.clone();
+            if let Some(fault) = &fault {
+                self.budget.restarts -= 1;
+                self.budget.hangs -= usize::from(fault.is_hang());
+            }
+            let mut examples = Example::all_of(&self.best.name, self.best.mode, judged);
+            if let Some(like) = examples.find(|example| example.is_like(&self.best)) {
+                self.best = like;
+                return true;
+            }
+            if fault.is_none() {
+                return false;
+            }
+        }
+        false
     }
 
     fn shrink_episode(&mut self, mut episode: TestEpisode) {
@@ -163,7 +187,7 @@ impl Shrinker<'_> {
                 continue;
             }
             let max_steps = episode.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
-            shorter.fields.insert("max_episode_steps".into(), (max_steps - 1).max(1).into());
+            shorter.fields.insert("max_episode_steps".into(), max_steps.saturating_sub(1).max(1).into());
             self.try_episode(episode, shorter);
         }
     }

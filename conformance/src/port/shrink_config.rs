@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::shrink::Shrinker;
 use crate::request::Op;
 
-impl Shrinker<'_> {
+impl Shrinker<'_, '_> {
     /// Shrinks the config: fewer fields and operations, smaller numbers and maps, and a smaller seed.
     pub fn shrink_config(&mut self) {
         loop {

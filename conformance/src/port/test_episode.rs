@@ -1,7 +1,7 @@
 //! An explicit episode that can be shrunk piece by piece.
 
 use pogema_core::{Cell, OnGoal};
-use pogema_maps::GridConfig;
+use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};
 
 use crate::draw::text;
@@ -66,10 +66,8 @@ impl TestEpisode {
     pub fn request(&self) -> Request {
         let mut config = Object::new();
         config.insert("map".into(), text(&self.rows).into());
-        config.insert("agents_xy".into(), json!(self.starts));
-        let first: Vec<Cell> = self.goals.iter().filter_map(|goals| goals.first().copied()).collect();
-        config.insert("targets_xy".into(), if self.restarts { json!(self.goals) } else { json!(first) });
         config.extend(self.fields.clone());
+        config.extend(self.positions());
         let ops = std::iter::once(Op::Reset(None)).chain(self.ops.iter().cloned()).collect();
         Request {
             id: 0,
@@ -79,6 +77,49 @@ impl TestEpisode {
             collisions: self.collisions,
             ops,
         }
+    }
+
+    /// Returns the config fields that give starts and goals.
+    fn positions(&self) -> Object<String, Value> {
+        let first: Vec<Cell> = self.goals.iter().filter_map(|goals| goals.first().copied()).collect();
+        let is_obstacle = |cell: &Cell| self.rows[usize::from(cell.row)][usize::from(cell.col)];
+        // Explicit starts and goals clear the obstacles under them; those of pools do not.
+        let is_on_obstacle = self.starts.iter().chain(&first).any(is_obstacle);
+        let pools = if is_on_obstacle { self.pools(&first) } else { None };
+        pools.unwrap_or_else(|| {
+            let goals = if self.restarts { json!(self.goals) } else { json!(first) };
+            [("agents_xy".into(), json!(self.starts)), ("targets_xy".into(), goals)].into_iter().collect()
+        })
+    }
+
+    /// Returns pools whose shuffled order gives the starts and goals.
+    ///
+    /// Rule: place/pools
+    fn pools(&self, goals: &[Cell]) -> Option<Object<String, Value>> {
+        let seed = self.fields.get("seed").and_then(Value::as_u64).unwrap_or(0);
+        let num_agents = self.num_agents();
+        // The shuffle depends only on the seed and the size of the pools, so numbered pools show where each cell goes.
+        let numbered: Vec<[usize; 2]> = (0..num_agents).map(|index| [0, index]).collect();
+        let config = json!({
+            "map": ".".repeat(num_agents.max(2)), "num_agents": num_agents, "seed": seed,
+            "possible_agents_xy": numbered, "possible_targets_xy": numbered,
+        });
+        let config = GridConfig::from_value(&config).ok()?;
+        let drawn = InstanceSource::new(config, None).ok()?.generate().ok()?.instance;
+        let unshuffled = |drawn: &[Cell], cells: &[Cell]| {
+            let mut pool = cells.to_vec();
+            for (from, &cell) in drawn.iter().zip(cells) {
+                pool[usize::from(from.col)] = cell;
+            }
+            json!(pool)
+        };
+        let fields = [
+            ("num_agents", json!(num_agents)),
+            ("seed", json!(seed)),
+            ("possible_agents_xy", unshuffled(drawn.starts(), &self.starts)),
+            ("possible_targets_xy", unshuffled(&drawn.first_goals(), goals)),
+        ];
+        Some(fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect())
     }
 
     /// Returns the number of agents.
@@ -110,7 +151,9 @@ impl TestEpisode {
             .collect();
         later.keep_actions(&kept);
         let max_steps = self.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
-        later.fields.insert("max_episode_steps".into(), (max_steps - num_ops as i64).max(1).into());
+        later
+            .fields
+            .insert("max_episode_steps".into(), max_steps.saturating_sub(num_ops as i64).max(1).into());
         Some(later)
     }
 

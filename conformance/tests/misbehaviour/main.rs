@@ -18,7 +18,7 @@ fn bad_port(way: &str, folder: &Path) -> Command {
 fn check(way: &str, folder: &Path) -> PortReport {
     let command = bad_port(way, folder);
     let start = || Process::start(&command).map(|process| Box::new(process) as Box<dyn Link>);
-    let subject = Subject { command: command.text.clone(), start: Box::new(start) };
+    let subject = Subject { command: command.text.clone(), replay: Vec::new(), start: Box::new(start) };
     let plan = Plan {
         num_cases: 0,
         seed: 0,
@@ -29,6 +29,10 @@ fn check(way: &str, folder: &Path) -> PortReport {
         parts: vec![Part::Cases],
     };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
+}
+
+fn headings(report: &PortReport) -> Vec<&str> {
+    report.causes.iter().filter(|cause| cause.rule.is_none()).map(|cause| cause.what.as_str()).collect()
 }
 
 /// Checks that a fault is reported and that the run plays further cases after it.
@@ -76,9 +80,8 @@ fn unreadable_answers_are_quoted() {
 
 #[test]
 fn malformed_answers_are_described() {
-    assert_fault("wrong-length", "`rewards` has length");
+    assert_fault("wrong-length", "`rewards` does not have one entry per agent: it has length");
     assert_fault("left-out", "left `truncated` out of an answer that needs it");
-    assert_fault("short-window", "`observations` of agent 0 has 2 values, expected ");
     assert_fault("twice", "wrote an unrequested line");
 }
 
@@ -88,6 +91,36 @@ fn a_flood_on_stderr_neither_blocks_nor_exhausts_memory() {
     let fault = report.causes.iter().find_map(|cause| cause.example.fault.clone()).unwrap();
     assert!(fault.stderr.ends_with("the last words"), "{}", fault.stderr);
     assert!(fault.stderr.len() <= 2048);
+}
+
+#[test]
+fn headings_of_faults_name_numbers_but_not_the_answer() {
+    for (way, heading) in [
+        ("exit", "ended (exit status: 7) instead of answering `step`"),
+        ("hang", "gave no answer to `step` within 1.5 s"),
+        ("garbage", "gave no readable answer to `step`"),
+        ("half-line", "ended (exit status: 0) instead of answering `step`"),
+        ("huge-line", "answered `step` with a line of more than 67108864 bytes"),
+        ("wrong-length", "`rewards` does not have one entry per agent"),
+        ("twice", "wrote an unrequested line"),
+        ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(headings(&check(way, folder.path())), [heading]);
+    }
+}
+
+#[test]
+fn windows_of_another_shape_are_a_difference_and_the_rest_is_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = check("short-window", folder.path());
+    assert!(!report.misbehaves() && report.num_not_run == 0);
+    let shapes: Vec<_> = report.causes.iter().filter(|cause| cause.what == "shape of observations").collect();
+    assert_eq!(shapes.len(), 1);
+    let found = shapes[0].example.divergence.as_ref().unwrap();
+    assert_eq!(found.rule, "observe/default");
+    assert_eq!(found.expected, "for each agent a window of shape [3, 11, 11]");
+    assert_eq!(found.got, "`observations` of agent 0 has 2 values, expected 363");
 }
 
 #[test]

@@ -33,6 +33,7 @@ fn plan() -> Plan {
 fn subject(flaw: Flaw) -> Subject<'static> {
     Subject {
         command: format!("{flaw:?}"),
+        replay: Vec::new(),
         start: Box::new(move || Ok(Box::new(Planted::new(flaw)) as Box<dyn Link>)),
     }
 }

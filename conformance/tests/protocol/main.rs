@@ -17,8 +17,11 @@ use serde_json::json;
 use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
 
 fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
-    let subject =
-        Subject { command: "altered".into(), start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))) };
+    let subject = Subject {
+        command: "altered".into(),
+        replay: Vec::new(),
+        start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))),
+    };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
 }
@@ -115,6 +118,42 @@ fn a_claimed_key_must_be_present() {
     assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
     let report = check(|hello| hello.tells.retain(|key| *key != Key::Occupied), forgets);
     assert_eq!(cause_names(&report), [""; 0]);
+}
+
+/// The reference gives the answers that docs/PORTING.md shows.
+#[test]
+fn the_conversation_in_the_guide_is_right() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/PORTING.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut server = Server::new(NamedEngine::REFERENCE);
+    let (mut question, mut num_answers) = (None, 0);
+    for line in text.lines() {
+        if let Some(line) = line.strip_prefix("> ") {
+            question = serde_json::from_str::<Ask>(line).ok();
+        } else if let (Some(line), Some(ask)) = (line.strip_prefix("< "), question.take()) {
+            if matches!(ask, Ask::Hello { .. }) {
+                serde_json::from_str::<Hello>(line).unwrap();
+                continue;
+            }
+            let shown: Reply = serde_json::from_str(line).unwrap();
+            let given = server.ask(&ask).unwrap();
+            assert_eq!(shown.error.is_some(), given.error.is_some(), "{line}");
+            if shown.error.is_none() {
+                assert_eq!(
+                    (&shown.cells, &shown.goals, &shown.active),
+                    (&given.cells, &given.goals, &given.active)
+                );
+                assert_eq!(
+                    (&shown.rewards, &shown.terminated),
+                    (&given.rewards, &given.terminated),
+                    "{line}"
+                );
+                assert_eq!(shown.truncated, given.truncated, "{line}");
+            }
+            num_answers += 1;
+        }
+    }
+    assert_eq!(num_answers, 4);
 }
 
 /// A port that plays an instance returns the records of the reference.

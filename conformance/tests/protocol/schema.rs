@@ -52,7 +52,7 @@ fn all_messages_fit_the_schema() {
         let link = Recording { server: Server::new(NamedEngine::REFERENCE), messages: Arc::clone(&messages) };
         Ok(Box::new(link) as Box<dyn Link>)
     };
-    let subject = Subject { command: "recording".into(), start: Box::new(start) };
+    let subject = Subject { command: "recording".into(), replay: Vec::new(), start: Box::new(start) };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), &|| ()).unwrap();
     let schema = schema();

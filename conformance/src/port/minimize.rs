@@ -1,0 +1,164 @@
+//! From the occurrences of a group to small cases on disk: shrinks several, splits the group if they shrink to
+//! different causes, and checks that each kept case shows its cause again.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use pogema_core::Error;
+
+use super::circumstances::circumstances;
+use super::group::{Cause, Example, Share};
+use super::items::Item;
+use super::keep::{file_stem, keep};
+use super::link::Misbehaviour;
+use super::plan::Plan;
+use super::report::PortReport;
+use super::run::judge_item;
+use super::shrink::{Budget, shrink};
+use super::subject::{Subject, Worker};
+use crate::runner::Progress;
+
+/// Maximum number of occurrences of one group that are shrunk.
+const MAX_SHRUNK: usize = 8;
+/// The same for misbehaviours, each repetition of which costs a new process.
+const MAX_SHRUNK_FAULTS: usize = 2;
+
+/// Shrinks several occurrences of each cause, keeps the smallest as a case, and splits causes that shrink to different
+/// ones. Calls `progress` after each cause.
+///
+/// # Errors
+/// If a case cannot be written.
+pub fn shrink_causes(
+    subject: &Subject<'_>,
+    report: &mut PortReport,
+    plan: &Plan,
+    folder: &Path,
+    progress: Progress<'_>,
+) -> Result<(), Error> {
+    let name = report.hello.as_ref().map_or_else(|| report.command.clone(), |hello| hello.name.clone());
+    let mut keeper =
+        Keeper { subject, plan, folder, name, worker: Worker::new(subject, plan), num_kept: BTreeMap::new() };
+    let mut causes = Vec::new();
+    for cause in std::mem::take(&mut report.causes) {
+        // A port that does not start has played nothing.
+        if cause.example.op().is_none() {
+            causes.push(cause);
+        } else {
+            causes.extend(keeper.shrink_and_split(cause)?);
+        }
+        progress();
+    }
+    report.causes = causes;
+    Ok(())
+}
+
+/// Keeps the cases of one port.
+struct Keeper<'a> {
+    subject: &'a Subject<'a>,
+    plan: &'a Plan,
+    folder: &'a Path,
+    /// The name of the port.
+    name: String,
+    worker: Worker<'a>,
+    /// The number of cases kept under each file name.
+    num_kept: BTreeMap<String, usize>,
+}
+
+impl Keeper<'_> {
+    fn shrink_and_split(&mut self, mut cause: Cause) -> Result<Vec<Cause>, Error> {
+        let original = cause.example.clone();
+        let mut groups: BTreeMap<String, Vec<Example>> = BTreeMap::new();
+        for example in self.shrink_some(std::mem::take(&mut cause.occurrences)) {
+            groups.entry(circumstances(&example)).or_default().push(example);
+        }
+        let shrunk = groups.values().map(Vec::len).sum();
+        let is_split = groups.len() > 1;
+        let mut groups: Vec<(String, Vec<Example>)> = groups.into_iter().collect();
+        // The most common cause first.
+        groups.sort_by_key(|(_, examples)| std::cmp::Reverse(examples.len()));
+        let mut causes = Vec::new();
+        for (when, mut examples) in groups {
+            examples.sort_by_key(Example::size);
+            let share = is_split.then_some(Share { alike: examples.len(), shrunk });
+            let mut part = Cause { when, share, ..cause.clone() };
+            examples.extend((!is_split).then(|| original.clone()));
+            self.keep_first_repeated(&mut part, &examples)?;
+            causes.push(part);
+        }
+        Ok(causes)
+    }
+
+    /// Shrinks some occurrences: the smallest, and others of all sizes.
+    fn shrink_some(&mut self, mut occurrences: Vec<Example>) -> Vec<Example> {
+        occurrences.sort_by_key(Example::size);
+        let fault = occurrences.first().and_then(|example| example.fault.as_ref());
+        // Each repetition of a hang costs the time limit. To find the same hang again, a shorter one will do.
+        let hangs = fault.is_some_and(Misbehaviour::is_hang);
+        let max_shrunk = match fault {
+            Some(_) if hangs => 1,
+            Some(_) => MAX_SHRUNK_FAULTS,
+            None => MAX_SHRUNK,
+        };
+        let count = occurrences.len().min(max_shrunk);
+        self.worker.restart(hangs);
+        let mut budget = Budget::FULL;
+        let mut shrunk = Vec::new();
+        for index in 0..count {
+            let example =
+                shrink(&mut self.worker, &occurrences[index * occurrences.len() / count], &mut budget);
+            // An example that could not be shrunk to the end says nothing about its cause.
+            if shrunk.is_empty() || !budget.is_spent() {
+                shrunk.push(example);
+            }
+        }
+        shrunk
+    }
+
+    /// Keeps the first example that a new process of the port shows again; the first one if none is.
+    fn keep_first_repeated(&mut self, cause: &mut Cause, examples: &[Example]) -> Result<(), Error> {
+        // Each attempt may cost the time limit.
+        const MAX_ATTEMPTS: usize = 3;
+        let path = self.new_path(&cause.example);
+        let mut repeated = None;
+        for example in examples.iter().take(MAX_ATTEMPTS - 1).chain(examples.last()) {
+            keep(example, &self.name, &path)?;
+            repeated = self.repeat(&path, example)?;
+            if repeated.is_some() {
+                break;
+            }
+        }
+        cause.is_repeated = Some(repeated.is_some());
+        // The report shows what the replay shows. A misbehaviour that it does not show may depend on the time limit, so
+        // the one of the run is kept.
+        let smallest = examples.first().filter(|example| example.fault.is_none()).unwrap_or(&cause.example);
+        if repeated.is_none() {
+            keep(smallest, &self.name, &path)?;
+        }
+        cause.example = repeated.unwrap_or_else(|| smallest.clone());
+        let words = self.subject.replay.iter().cloned();
+        cause.replay = Some(shell_words::join(words.chain(["--case".into(), path.display().to_string()])));
+        cause.kept = Some(path);
+        Ok(())
+    }
+
+    /// Returns a new path for the case of an example.
+    fn new_path(&mut self, example: &Example) -> PathBuf {
+        let stem = file_stem(example);
+        let count = self.num_kept.entry(stem.clone()).or_default();
+        *count += 1;
+        let number = if *count == 1 { String::new() } else { format!("-{count}") };
+        self.folder.join(format!("{stem}{number}.yaml"))
+    }
+
+    /// Plays the case in a file on a new process of the port, and returns what is like the kept example.
+    fn repeat(&mut self, path: &Path, example: &Example) -> Result<Option<Example>, Error> {
+        self.worker.restart(false);
+        let item = Item::of_file(path)?;
+        let (request, expected) = item.request(self.plan.seed)?;
+        let played = (&request, &expected);
+        let (_, results) = judge_item(&mut self.worker, self.plan, &item, played, |_| false);
+        let mut shown =
+            results.into_iter().flat_map(|(mode, judged)| Example::all_of(&example.name, mode, judged));
+        Ok(shown.find(|shown| shown.is_like(example)))
+    }
+}

@@ -1,0 +1,149 @@
+//! Checks that counterexamples become small and stay true: with ports that crash, hang or refuse, and that have several
+//! bugs in one field.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod unreliable;
+
+use std::path::Path;
+
+use pogema_conformance::cases;
+use pogema_conformance::port::{
+    Cause, FaultKind, Misbehaviour, Part, Plan, PortReport, check_ports, shrink_causes,
+};
+
+use unreliable::{Behaviour, Log, subject};
+
+/// Checks a port by cases and drawn episodes, and shrinks what it finds.
+fn check(behaviour: Behaviour, folder: &Path) -> (PortReport, Log) {
+    let log = Log::default();
+    let subject = subject(behaviour, &log);
+    let plan = Plan {
+        num_cases: 400,
+        seed: 3,
+        num_workers: Some(2),
+        parts: vec![Part::Cases, Part::Drawn],
+        ..Plan::default()
+    };
+    let mut report = check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0);
+    let subject = unreliable::subject(behaviour, &log);
+    shrink_causes(&subject, &mut report, &plan, folder, &|| ()).unwrap();
+    (report, log)
+}
+
+fn num_agents(cause: &Cause) -> usize {
+    let played = pogema_conformance::play(&cause.example.request);
+    played.records[0].state().unwrap().cells.len()
+}
+
+/// Checks that a cause is kept, that its file can be read, and that the replay showed it.
+fn assert_repeated(cause: &Cause) {
+    assert_eq!(cause.is_repeated, Some(true), "{:?}", cause.what);
+    let path = cause.kept.as_ref().unwrap();
+    cases::read(path).unwrap().request().unwrap();
+    let words = shell_words::split(cause.replay.as_ref().unwrap()).unwrap();
+    assert_eq!(words, ["check", "--case", path.to_str().unwrap()]);
+}
+
+#[test]
+fn only_what_is_claimed_is_asked_while_shrinking() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, log) = check(Behaviour::RefusesObstacles, folder.path());
+    assert_eq!(log.num_configs(), 0);
+    let causes: Vec<_> = report
+        .causes
+        .iter()
+        .map(|cause| (cause.rule.as_deref(), cause.what.as_str(), cause.when.as_str()))
+        .collect();
+    assert_eq!(causes, [(Some("place/explicit"), "error", "one agent, one on an obstacle")]);
+    let cause = &report.causes[0];
+    assert_repeated(cause);
+    assert_eq!(num_agents(cause), 1);
+    // The picture shows the obstacle under the agent.
+    let shown = cause.example.divergence.as_ref().unwrap().to_string();
+    assert!(shown.contains("a at [0,0] hides the goal of a, an obstacle"), "{shown}");
+}
+
+#[test]
+fn a_port_that_crashes_now_and_then_gets_small_counterexamples() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, log) = check(Behaviour::CrashesAtTimesAndRewardsTwice, folder.path());
+    assert!(log.num_faults() > 20, "the port crashed only {} times", log.num_faults());
+    let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
+    assert!(num_agents(cause) <= 2, "{} agents", num_agents(cause));
+    assert!(cause.example.request.ops.len() <= 3);
+    let crash = report.causes.iter().find(|cause| cause.rule.is_none()).unwrap();
+    assert!(crash.kept.is_some() && crash.is_repeated.is_some());
+}
+
+#[test]
+fn crashes_and_malformed_answers_are_shrunk_and_kept() {
+    for (behaviour, what) in [
+        (Behaviour::CrashesIfTwoMove, "ended (exit status: 1) instead of answering `step`"),
+        (Behaviour::ForgetsActiveIfTwoMove, "left `active` out of an answer that needs it"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (report, _) = check(behaviour, folder.path());
+        assert_eq!(report.causes.len(), 1);
+        let cause = &report.causes[0];
+        assert_eq!((cause.rule.as_deref(), cause.what.as_str()), (None, what));
+        assert_repeated(cause);
+        assert_eq!((num_agents(cause), cause.example.request.ops.len()), (2, 2), "{what}");
+        assert_eq!(cause.example.op(), Some(1));
+    }
+}
+
+#[test]
+fn a_hanging_port_is_asked_a_bounded_number_of_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, log) = check(Behaviour::HangsIfTwoMove, folder.path());
+    // 5 and one per further worker in the run, 30 while shrinking, 3 replays.
+    assert!(log.num_faults() <= 39, "{} answers never came", log.num_faults());
+    assert!(report.num_not_run > 0);
+    let cause = &report.causes[0];
+    assert_eq!(cause.what, "gave no answer to `step` within 10 s");
+    assert_repeated(cause);
+    assert!(num_agents(cause) <= 3, "{} agents", num_agents(cause));
+}
+
+#[test]
+fn a_mute_port_is_started_once_per_worker() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, log) = check(Behaviour::IsMute, folder.path());
+    assert!(log.num_faults() <= 2, "{} answers never came", log.num_faults());
+    assert_eq!((report.num_played, report.causes.len()), (0, 1));
+    let cause = &report.causes[0];
+    assert_eq!(cause.what, "gave no answer to `hello` within 60 s");
+    assert!(cause.kept.is_none() && cause.replay.is_none());
+}
+
+#[test]
+fn several_bugs_in_one_field_are_several_causes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, _) = check(Behaviour::RewardsTwoKindsWrong, folder.path());
+    let causes: Vec<&Cause> = report.causes.iter().filter(|cause| cause.what == "reward").collect();
+    let mut when: Vec<&str> = causes.iter().map(|cause| cause.when.as_str()).collect();
+    when.sort_unstable();
+    assert_eq!(when, ["one agent, one on an obstacle", "several agents, one finished"]);
+    let shares: Vec<_> = causes.iter().map(|cause| cause.share.unwrap()).collect();
+    assert!(shares[0].alike >= shares[1].alike);
+    assert!(shares.iter().all(|share| share.shrunk == shares[0].alike + shares[1].alike));
+    assert_ne!(causes[0].kept, causes[1].kept);
+    causes.into_iter().for_each(assert_repeated);
+}
+
+#[test]
+fn a_difference_that_a_new_process_does_not_show_is_reported_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, _) = check(Behaviour::RewardsTwiceOnlyAtFirst, folder.path());
+    let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
+    assert_eq!(cause.is_repeated, Some(false));
+    assert!(cause.kept.is_some());
+}
+
+#[test]
+fn misbehaviours_are_alike_whatever_the_time_limit() {
+    let hang = |question, limit_ms| Misbehaviour::new(FaultKind::NoAnswer { question, limit_ms }, "");
+    assert!(hang("step", 1000).is_like(&hang("step", 100)));
+    assert!(!hang("step", 1000).is_like(&hang("reset", 1000)));
+}
