@@ -107,6 +107,7 @@ fn skip_message(case: &TestCase) -> Option<&str> {
 /// Reads the page and checks that it is well-formed and loads nothing.
 fn page(folder: &Path) -> String {
     let text = read(folder, "report.html");
+    assert!(text.contains("Content-Security-Policy\" content=\"default-src 'none'"), "{text}");
     assert_loads_nothing(&text);
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
     let page = roxmltree::Document::parse_with_options(&text, options).unwrap();
