@@ -56,11 +56,12 @@ fn features(selection: &[&str]) -> BTreeMap<String, String> {
     pairs.filter(|(package, _)| is_external(package)).map(|(one, other)| (one.into(), other.into())).collect()
 }
 
-/// Other features would build a dependency, and everything above it, a second time.
+/// Other features would build a dependency, and everything above it, a second time. The checks build the program
+/// together with its tests, so those count for its features.
 #[test]
 fn the_program_and_the_wheel_use_the_features_of_the_tests() {
     let tests = features(&["--edges", "all"]);
-    let program = features(&["--package", "pogema-cli", "--edges", "normal,build"]);
+    let program = features(&["--package", "pogema-cli", "--edges", "all"]);
     let wheel =
         ["--package", "pogema-python", "--features", "pyo3/extension-module", "--edges", "normal,build"];
     for (what, theirs) in [("program", program), ("wheel", features(&wheel))] {
