@@ -59,7 +59,7 @@ def test_tables_and_plots(world):
         assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 100)")
         svg = base64.b64decode(page.locator("img").get_attribute("src").split(",")[1]).decode()
         assert "<svg" in svg and "LaCAM" in unescape(svg)
-        assert "nearest column" in page.locator("section", has_text="Absent").locator(".note").first.text_content()
+        assert "did you mean" in page.locator("section", has_text="Absent").locator(".note").first.text_content()
 
 
 def test_replays_match_their_episodes(world):
