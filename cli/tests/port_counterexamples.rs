@@ -2,8 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::path::Path;
 use std::process::Command;
+
+use common::write_wrong_port;
 
 /// Lets agent 1 enter occupied cells.
 const CROWDED: [&str; 2] = ["and there not in taken", "and (there not in taken or agent == 1)"];
@@ -30,13 +34,7 @@ const SHORT_WINDOWS: [&str; 2] = ["packed(bits) for bits", "packed(bits[:-1]).lj
 /// Returns a folder with `port.py`, the template with planted errors.
 fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/ports/template.py");
-    let mut text = std::fs::read_to_string(template).unwrap();
-    for [right, wrong] in wrong {
-        assert_eq!(text.matches(right).count(), 1, "`{right}` in the template");
-        text = text.replace(right, wrong);
-    }
-    std::fs::write(folder.path().join("port.py"), text).unwrap();
+    write_wrong_port(&folder.path().join("port.py"), wrong);
     folder
 }
 

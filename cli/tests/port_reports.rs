@@ -2,10 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+
+use common::write_wrong_port;
 
 /// A built-in engine as a port.
 const CONFORMING: &str = concat!("'", env!("CARGO_BIN_EXE_pogema"), "' port");
@@ -28,13 +32,7 @@ const KNOWN_LATE: &str =
 /// Returns a folder with `wrong.py`, a port with planted errors.
 fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/ports/template.py");
-    let mut text = std::fs::read_to_string(template).unwrap();
-    for [right, wrong] in wrong {
-        assert_eq!(text.matches(right).count(), 1, "`{right}` in the template");
-        text = text.replace(right, wrong);
-    }
-    std::fs::write(folder.path().join("wrong.py"), text).unwrap();
+    write_wrong_port(&folder.path().join("wrong.py"), wrong);
     let python = Command::new("python3.11").arg("--version").output();
     assert!(python.is_ok_and(|output| output.status.success()), "python3.11 is needed");
     folder

@@ -140,7 +140,7 @@ impl Deviation {
         self.port.as_ref().is_none_or(|name| name == port)
     }
 
-    /// Returns whether a cause is of the rule and field of this deviation.
+    /// Returns whether a cause has the rule and the field of this deviation.
     fn explains(&self, cause: &Cause) -> bool {
         (&self.rule, &self.what) == (&cause.rule, &cause.what)
     }

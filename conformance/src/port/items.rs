@@ -15,7 +15,7 @@ use crate::script::play_script;
 /// One item to check.
 pub enum Item {
     Case(String, Box<Case>),
-    /// A case in a file that the caller names. It is an episode like any other, whatever its rule.
+    /// A case in a file that the caller names. It is an episode like any other, regardless of its rule.
     File(String, Box<Case>),
     Recorded(String, Box<GoldenRecording>),
     Drawn(u64),

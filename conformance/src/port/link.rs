@@ -146,7 +146,7 @@ impl Misbehaviour {
         matches!(self.kind, FaultKind::NoAnswer { .. })
     }
 
-    /// Returns whether another misbehaviour is of the same kind, whatever the time limit.
+    /// Returns whether another misbehaviour is of the same kind, regardless of the time limit.
     pub fn is_like(&self, other: &Self) -> bool {
         match (&self.kind, &other.kind) {
             (FaultKind::NoAnswer { question: one, .. }, FaultKind::NoAnswer { question: other, .. }) => {

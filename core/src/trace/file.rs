@@ -52,12 +52,12 @@ impl TraceEnd {
 
     /// Checks the last line of a file against the lines before it.
     fn check(&self, line: usize, found: &Self) -> Result<(), Error> {
-        let (told, counted) = (self.num_steps, found.num_steps);
-        let reason = if told != counted {
-            format!("`num_steps` is `{told}`, expected {counted}, the number of steps before it")
+        let (stated, counted) = (self.num_steps, found.num_steps);
+        let reason = if stated != counted {
+            format!("`num_steps` is `{stated}`, expected {counted}, the number of steps before it")
         } else if self.sha256 != found.sha256 {
-            let told = shorten(&self.sha256, Error::LONGEST_QUOTE);
-            format!("`sha256` is `{told}`, expected `{}`, the hash of the lines before it", found.sha256)
+            let stated = shorten(&self.sha256, Error::LONGEST_QUOTE);
+            format!("`sha256` is `{stated}`, expected `{}`, the hash of the lines before it", found.sha256)
         } else {
             return Ok(());
         };
