@@ -244,29 +244,29 @@ json play(Environment& environment, const json& question) {
     return reply;
 }
 
-json answer(std::unique_ptr<Environment>& environment, const json& question) {
-    const string type = question.at("type");
-    if (type == "hello") return CLAIMS;
-    // A `reset` without an instance resets the current environment.
-    if (question.contains("instance")) environment = std::make_unique<Environment>(question.at("instance"));
-    if (!environment || (type != "reset" && type != "step") || question.contains("config")) {
-        throw std::invalid_argument("this question is not claimed, or arrived before an instance");
+// Answers a question. A refusal is also an answer.
+json answer(const json& question) {
+    static std::unique_ptr<Environment> environment;
+    try {
+        const string type = question.at("type");
+        if (type == "hello") return CLAIMS;
+        // A `reset` without an instance resets the current environment.
+        if (question.contains("instance")) environment = std::make_unique<Environment>(question.at("instance"));
+        if (!environment || (type != "reset" && type != "step") || question.contains("config")) {
+            throw std::invalid_argument("this question is not claimed, or arrived before an instance");
+        }
+        return play(*environment, question);
+    } catch (const std::exception& error) {
+        return {{"error", error.what()}};
     }
-    return play(*environment, question);
 }
 
 // Reads one question per line and writes one answer per line, until `bye`.
 int main() {
-    std::unique_ptr<Environment> environment;
     for (string line; std::getline(std::cin, line);) {
-        json reply;
-        try {
-            const json question = json::parse(line);
-            if (question.at("type") == "bye") break;
-            reply = answer(environment, question);
-        } catch (const std::exception& error) {  // a refusal is also an answer
-            reply = {{"error", error.what()}};
-        }
-        std::cout << reply.dump() << std::endl;
+        const json question = json::parse(line);
+        if (question.at("type") == "bye") break;
+        std::cout << answer(question).dump() << std::endl;
     }
+    return 0;
 }

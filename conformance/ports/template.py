@@ -127,25 +127,35 @@ def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
     return {**state, **results, "observations": [packed(bits) for bits in environment.observe()]}
 
 
+class Port:
+    """Answers questions. A refusal is also an answer."""
+
+    environment: Optional[Environment] = None
+
+    def answer(self, question: dict[str, Any]) -> dict[str, Any]:
+        """Answers one question."""
+        if question["type"] == "hello":
+            return CLAIMS
+        try:
+            if "instance" in question:  # without an instance, `reset` resets the current environment
+                self.environment = Environment(question["instance"])
+            if self.environment and question["type"] in ("reset", "step") and "config" not in question:
+                return play(self.environment, question)
+            raise ValueError("this question is not claimed, or arrived before an instance")
+        except (KeyError, TypeError, ValueError) as error:
+            return {"error": f"{type(error).__name__}: {error}"}
+
+
+answer = Port().answer
+
+
 def main() -> None:
     """Reads one question per line and writes one answer per line, until `bye`."""
-    environment: Optional[Environment] = None
     for line in sys.stdin:
-        try:
-            question = json.loads(line)
-            if question["type"] == "bye":
-                break
-            if "instance" in question:  # without an instance, `reset` resets the current environment
-                environment = Environment(question["instance"])
-            if question["type"] == "hello":
-                reply = CLAIMS
-            elif environment and question["type"] in ("reset", "step") and "config" not in question:
-                reply = play(environment, question)
-            else:
-                raise ValueError("this question is not claimed, or arrived before an instance")
-        except (KeyError, TypeError, ValueError) as error:  # a refusal is also an answer
-            reply = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(reply, separators=(",", ":")), flush=True)
+        question = json.loads(line)
+        if question["type"] == "bye":
+            break
+        print(json.dumps(answer(question), separators=(",", ":")), flush=True)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@
 //! | [`port`] | implementations in any language, queried over a pipe |
 //! | [`cases`], [`golden`] | cases and recordings on disk |
 //! | [`Tally`] | counts of comparisons, rule by rule |
+//! | [`vectors`] | the cases and some recordings as plain JSON, for tests without this kit |
 //! | [`rules`] | the names of the rules and what they say |
 
 #![forbid(unsafe_code)]
@@ -37,6 +38,7 @@ pub mod rules;
 mod runner;
 mod script;
 mod tally;
+pub mod vectors;
 
 pub use compare::{Divergence, Field, FieldPart, compare, compare_in, panel};
 pub use draw::draw_request;

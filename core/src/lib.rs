@@ -57,7 +57,9 @@ pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 pub use observe::{from_border, from_starts};
 pub use printable::{is_unprintable, one_line, printable_json};
 pub use threads::{MAX_THREADS, check_threads, threads_note};
-pub use trace::{Observed, ObservedMapf, ObservedPomapf, Padded, Trace, TraceHeader, TraceStart, TraceStep};
+pub use trace::{
+    Observed, ObservedMapf, ObservedPomapf, Padded, SPEC, Trace, TraceHeader, TraceStart, TraceStep,
+};
 pub use words::{Word, Words, deserialize_word, serialize_word};
 
 /// The README, whose example the tests compile and run.

@@ -10,8 +10,8 @@ use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Out
 
 /// The format of a header. The files of earlier versions have the same, and no last line.
 const FORMAT: &str = "pogema-trace/1";
-/// The spec whose rules the trace follows.
-const SPEC: &str = "pogema-1.4.0/1";
+/// The version of the spec whose rules this workspace follows.
+pub const SPEC: &str = "pogema-1.4.0/1";
 
 /// A recorded episode.
 ///

@@ -16,6 +16,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use indicatif::ProgressBar;
+use pogema_conformance::vectors::{self, Written};
 use pogema_conformance::{NamedEngine, Report, cases, find_oracle_python, golden};
 use pogema_core::Error;
 use pogema_fast::SimdPath;
@@ -45,6 +46,9 @@ pub struct Conform {
     /// Folder for cases that diverge
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
+    /// Write the test vectors to this folder as JSON, and check nothing
+    #[arg(long, value_name = "FOLDER")]
+    vectors: Option<PathBuf>,
     #[command(flatten)]
     ports: ports::Ports,
 }
@@ -60,6 +64,12 @@ impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
         // Otherwise every episode of the fast engine would be reported as a divergence.
         SimdPath::from_environment()?;
+        if let Some(folder) = &self.vectors {
+            let Written { num_rules, num_vectors } = vectors::write(folder)?;
+            let folder = folder.display();
+            print_line(&format!("wrote {num_vectors} vectors of {num_rules} rules to {folder}"))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         if self.ports.is_requested() {
             let bar = self.bar("cases");
             let shared = ports::Shared {

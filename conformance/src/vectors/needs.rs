@@ -1,0 +1,86 @@
+//! What an implementation must claim to hold a conversation.
+
+use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward, Words as _};
+use pogema_maps::GridConfig;
+use serde::Serialize;
+
+use crate::port::{Mode, Profile, Told, profile_of};
+use crate::request::{Op, Record, Request, Response};
+
+/// What an implementation must claim to hold a conversation, under the keys of an answer to `hello`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Needs {
+    profiles: Vec<Profile>,
+    #[serde(flatten)]
+    rules: Option<Rules>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    metrics: Vec<&'static str>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tells: Vec<Told>,
+}
+
+/// The rules and sizes of a valid config.
+#[derive(Clone, Debug, Serialize)]
+struct Rules {
+    collision: [Collision; 1],
+    on_goal: [OnGoal; 1],
+    observation: [Observation; 1],
+    occupancy: [Occupancy; 1],
+    reward: [Reward; 1],
+    noise: bool,
+    max_agents: usize,
+    max_side: usize,
+    max_radius: usize,
+}
+
+impl Needs {
+    /// Returns what a request needs if it is played in a mode to test a rule.
+    pub fn of(rule: &str, mode: Mode, request: &Request, played: &Response) -> Self {
+        let has = |ops: &[Op]| request.ops.iter().any(|op| ops.contains(op));
+        let mut profiles = vec![Profile::Core, profile_of(rule)];
+        profiles.extend((mode == Mode::Config).then_some(Profile::Seeding));
+        profiles.extend(has(&[Op::Back, Op::History]).then_some(Profile::History));
+        profiles.extend(has(&[Op::Astar, Op::Sample]).then_some(Profile::Policies));
+        let mut metrics = Vec::new();
+        metrics.extend(request.density.then_some("avg_agents_density"));
+        metrics.extend(request.collisions.then_some(["a_collisions", "o_collisions"]).into_iter().flatten());
+        profiles.extend((!metrics.is_empty()).then_some(Profile::Metrics));
+        let profiles = Profile::all().filter(|profile| profiles.contains(profile)).collect();
+        let tells = Told::all().filter(|key| is_needed(*key, rule)).collect();
+        let config = GridConfig::from_value(&request.config).ok();
+        Self { profiles, rules: config.map(|config| Rules::of(&config, played)), metrics, tells }
+    }
+}
+
+/// Returns whether a rule can only be tested on an optional key.
+fn is_needed(key: Told, rule: &str) -> bool {
+    let is_of =
+        |prefix: &str| rule.strip_prefix(prefix).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
+    match key {
+        Told::ActionsAfter => is_of("collide/soft/rewrite"),
+        Told::Derived => is_of("config/size"),
+        Told::Foretold => is_of("goal/restart/foretold"),
+        Told::OnGoal | Told::Occupied | Told::Padded => false,
+    }
+}
+
+impl Rules {
+    fn of(config: &GridConfig, played: &Response) -> Self {
+        let rules = config.rules();
+        let sides = played.records.iter().filter_map(|record| match record {
+            Record::Reset(reset) => Some(reset.map.len().max(reset.map.first().map_or(0, String::len))),
+            _ => None,
+        });
+        Self {
+            collision: [rules.collision],
+            on_goal: [rules.on_goal],
+            observation: [rules.observation],
+            occupancy: [rules.occupancy],
+            reward: [rules.reward],
+            noise: !config.empty_outside,
+            max_agents: rules.num_agents,
+            max_side: sides.max().unwrap_or(0),
+            max_radius: config.obs_radius,
+        }
+    }
+}

@@ -1,0 +1,97 @@
+"""Checks an implementation against the test vectors beside this file: python3 check.py PORT.py
+
+PORT.py defines `answer(question)`, which returns the answer to a question, as conformance/ports/template.py does.
+Exits with 1 if an answer is wrong or no vector was checked. Needs Python 3.9 or newer and only the standard library.
+"""
+
+import hashlib
+import json
+import runpy
+import sys
+from pathlib import Path
+from typing import Any
+
+DEFAULTS = {"occupancy": ["as_released"], "reward": ["own"]}
+OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}  # compared if the port tells them
+
+
+def can_play(claims: dict[str, Any], needs: dict[str, Any]) -> bool:
+    """Returns whether a port claims all that a vector needs."""
+
+    for key, need in needs.items():
+        claim = claims.get(key, DEFAULTS.get(key, need if key.startswith("max_") else []))
+        if not (set(need) <= set(claim) if isinstance(need, list) else (claim or 0) >= need):
+            return False
+    return True
+
+
+def compared(claims: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
+    """Returns the part of an expected answer that a port with these claims gives."""
+    left_out = {"error"} | OPTIONAL - set(claims.get("tells", []))
+    left_out |= {key for key in ("observations", "metrics") if key not in claims["profiles"]}
+    kept = {key: answer[key] for key in answer if key not in left_out}
+    if kept.get("metrics"):
+        kept["metrics"] = {name: kept["metrics"][name] for name in kept["metrics"] if name in claims["metrics"]}
+    return kept
+
+
+def bits(window: Any) -> str:
+    """Returns the values of a window, given as hexadecimal digits or as nested lists, as `0` and `1`."""
+    if isinstance(window, str):
+        return "".join(f"{int(digit, 16):04b}" for digit in window)
+    values = [window]
+    while any(isinstance(value, list) for value in values):
+        values = [each for value in values for each in (value if isinstance(value, list) else [value])]
+    return "".join(f"{value:g}" for value in values) + "0" * (-len(values) % 8)
+
+
+def is_same(key: str, expected: Any, got: Any) -> bool:
+    """Compares an expected value with that of an answer."""
+    if isinstance(expected, dict):
+        return isinstance(got, dict) and all(is_same(name, expected[name], got.get(name)) for name in expected)
+    if isinstance(expected, list):
+        if not isinstance(got, list) or len(got) != len(expected):
+            return False
+        if key in ("observations", "obstacles", "agents"):
+            return [bits(window) for window in got] == [bits(window) for window in expected]
+        return all(is_same("", one, other) for one, other in zip(expected, got))
+    if isinstance(expected, (int, float)) and isinstance(got, (int, float)):
+        return abs(expected - got) <= 1e-9 * max(1.0, abs(expected))
+    return bool(expected == got)
+
+
+def first_difference(answer: Any, claims: dict[str, Any], exchanges: list[Any]) -> str:
+    """Plays a vector and describes the first wrong answer; empty if there is none."""
+    for number, exchange in enumerate(exchanges):
+        got, expected = json.loads(json.dumps(answer(exchange["question"]))), exchange["answer"]
+        if ("error" in got) != ("error" in expected):
+            return f"answer {number} has `error` {got.get('error')!r}, expected {expected.get('error')!r}"
+        for key, value in compared(claims, expected).items():
+            if not is_same(key, value, got.get(key)):
+                return f"answer {number} has `{key}` {got.get(key)}, expected {value}"
+    return ""
+
+
+def main() -> int:
+    """Checks all files that the manifest names. Prints the first wrong answer to each vector."""
+    folder = Path(__file__).parent
+    answer = runpy.run_path(sys.argv[1])["answer"]
+    claims = answer({"type": "hello", "protocol": "pogema-conform/1"})
+    counts = dict.fromkeys(["passed", "failed", "not claimed"], 0)
+    for file in json.loads((folder / "manifest.json").read_text())["files"]:
+        text = (folder / file["path"]).read_bytes()
+        assert hashlib.sha256(text).hexdigest() == file["sha256"], f"{file['path']} was changed"
+        for vector in json.loads(text)["vectors"]:
+            if "pogema" in vector or not can_play(claims, vector["needs"]):
+                counts["not claimed"] += 1
+                continue
+            wrong = first_difference(answer, claims, vector["exchanges"])
+            counts["failed" if wrong else "passed"] += 1
+            if wrong:
+                print(f"{file['rule']}: {vector['name']}: {wrong}")
+    print(", ".join(f"{number} {what}" for what, number in counts.items()))
+    return 1 if counts["failed"] or not counts["passed"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
