@@ -226,7 +226,8 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
     def environment(**fields):
         return lambda content: content["environment"].update(fields)
 
-    assert "ValueError" in output(environment(map_name="nowhere")) and "nowhere" in output(environment(map_name="nowhere"))
+    assert "ValueError" in output(environment(map_name="nowhere"))
+    assert "nowhere" in output(environment(map_name="nowhere"))
     assert "unknown key `sise` in environment; did you mean `size`?" in output(environment(sise=8))
     assert "SCRIMP" in output(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
     assert output(lambda content: None, "anew").startswith("4\n")
