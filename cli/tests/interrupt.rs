@@ -58,7 +58,7 @@ fn an_evaluation_keeps_its_episodes() {
 }
 
 #[test]
-fn a_plan_is_broken_off() {
+fn an_interrupted_plan_ends_with_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let plan = [
         "plan",

@@ -35,7 +35,7 @@ algorithms: {Random: {name: random}}
 ";
 
 #[test]
-fn messages_that_nobody_can_read_are_no_panic() {
+fn messages_to_a_full_or_closed_standard_error_cause_no_panic() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("suite.yaml"), SUITE).unwrap();
     fs::write(folder.path().join("start.yaml"), "{map: '.#.', agents_xy: [[0, 1]], targets_xy: [[0, 2]]}")

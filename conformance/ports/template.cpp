@@ -1,5 +1,5 @@
 // A complete port to copy: a small environment with all three collision systems, and the adapter that connects it to
-// the checks. Replace `Environment` by your own environment, and list its abilities in `CLAIMS`. docs/PORTING.md
+// the checks. Replace `Environment` with your own environment, and list its abilities in `CLAIMS`. docs/PORTING.md
 // explains the questions and answers.
 //
 // Needs nlohmann/json (Debian: nlohmann-json3-dev):   g++ -O2 -std=c++17 template.cpp -o template
@@ -18,7 +18,7 @@ using std::size_t;
 using std::string;
 using std::vector;
 
-// ------------------------------------ The environment. Replace it by yours. ---------------------------------------
+// ------------------------------------ The environment. Replace it with yours. --------------------------------------
 
 struct Cell {
     int row, col;

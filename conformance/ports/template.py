@@ -1,6 +1,6 @@
 """A complete port to copy: a small environment, and the adapter that connects it to the checks.
 
-Replace `Environment` by your own environment, and list its abilities in `CLAIMS`; the adapter can stay unchanged.
+Replace `Environment` with your own environment, and list its abilities in `CLAIMS`; the adapter can stay unchanged.
 docs/PORTING.md explains the questions and answers. Needs Python 3.9 or newer and only the standard library.
 """
 
@@ -8,7 +8,7 @@ import json
 import sys
 from typing import Any, Optional
 
-# ------------------------------------ The environment. Replace it by yours. ---------------------------------------
+# ------------------------------------ The environment. Replace it with yours. --------------------------------------
 
 MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))  # stay, up, down, left, right
 

@@ -49,7 +49,7 @@ fn try_fit(dice: &mut Dice, request: &mut Request) -> bool {
             Some(num) if num > 1 && is_crowded && !dice.chance(KEPT_UNPLAYABLE) => {
                 request.config["num_agents"] = json!(num / 2);
             }
-            // POGEMA replaces a named map that is too small by a generated one, so the case cannot be compared.
+            // POGEMA replaces a named map that is too small with a generated one, so the case cannot be compared.
             Some(_) => return is_crowded && request.register.is_none(),
             None => return false,
         }

@@ -36,7 +36,7 @@ pub fn write(path: &Path, text: &[u8]) -> Result<(), Error> {
     write_with(path, |file| file.write_all(text).map_err(|error| Error::io(path, error)))
 }
 
-/// Lets a function write a text file, otherwise as [`write()`] does.
+/// Calls a function that writes a text file; otherwise works like [`write()`].
 ///
 /// # Errors
 /// Those of the function, and [`Error::Io`] if the file cannot be written; an existing file is then unchanged.

@@ -153,7 +153,7 @@ pub struct StepRecord {
     /// The step.
     #[serde(flatten)]
     pub step: TraceStep,
-    /// The caller's action list after the step; `soft` replaces each move it reverts by 0.
+    /// The caller's action list after the step; `soft` replaces each move it reverts with 0.
     pub actions_after: Vec<i64>,
     /// The `is_active` of each agent's info.
     pub infos_active: Vec<bool>,

@@ -194,7 +194,7 @@ fn a_policy_replans_after_an_unexpected_state() {
     play(&rules, &instance, |state| {
         count += 1;
         let actions = policy.act(instance.map(), state).unwrap();
-        // In the fifth step the agents move otherwise than planned.
+        // In the fifth step, the agents deviate from the plan.
         if count == 5 { vec![pogema_core::Action::Up; 4] } else { actions }
     });
     assert!(policy.outcomes().len() > 1);

@@ -32,7 +32,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_with(path, |file| file.write_all(bytes).map_err(|error| Error::io(path, error)))
 }
 
-/// Lets a function write a file under a temporary name, and renames it when the function returns.
+/// Calls a function that writes a file under a temporary name, and then renames the file.
 ///
 /// # Errors
 /// Those of the function, and [`Error::Io`] if the file cannot be written. An older file of the same name is then

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Error, ErrorKind, Read, Result};
 
-/// The most that a reader accepts.
+/// The maximum amount of input that a reader accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputLimit {
     longest_line: u64,

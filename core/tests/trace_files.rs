@@ -131,7 +131,7 @@ fn wrong_lines_are_rejected_with_their_number() {
 }
 
 #[test]
-fn a_cut_or_changed_file_is_told_from_a_whole_one() {
+fn cut_and_changed_files_are_rejected() {
     let whole = written(&read(VALID).unwrap());
     assert!(whole.starts_with("{\"format\":\"pogema-trace/2\","), "{whole}");
     let lines: Vec<&str> = whole.lines().collect();

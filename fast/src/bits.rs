@@ -16,7 +16,7 @@ impl<'a> BitWriter<'a> {
         Self { words, index: 0, word: 0, num_bits: lead as u32 }
     }
 
-    /// Writes the low `number` bits of a value, 1 to 64. The other bits of the value must be 0.
+    /// Writes the low `number` bits of a value; `number` is 1 to 64. The other bits of the value must be 0.
     pub fn push(&mut self, bits: u64, number: u32) {
         self.word |= bits << self.num_bits;
         self.num_bits += number;

@@ -6,7 +6,7 @@
 //! reference, so that you can compare them side by side. Tests play both in lockstep, and check the fast engine against
 //! every recording of POGEMA.
 //!
-//! [`Batch`] plays many environments by one call, each with its own episodes, on a given number of threads.
+//! [`Batch`] plays many environments with one call, each with its own episodes, on a given number of threads.
 //!
 //! | file | phase |
 //! | --- | --- |

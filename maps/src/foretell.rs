@@ -32,12 +32,12 @@ pub fn foretold_from(
     }
     let agents = instance.goals().iter().zip(cells.iter().zip(goals));
     agents
-        .map(|(stream, (&cell, &goal))| foretold_to_one(stream.clone(), cell, goal, config.max_episode_steps))
+        .map(|(stream, (&cell, &goal))| goals_of_agent(stream.clone(), cell, goal, config.max_episode_steps))
         .collect()
 }
 
-fn foretold_to_one(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i64) -> Option<Vec<Cell>> {
-    /// More equal draws in a row than this cannot be chance: no other goal can be drawn.
+fn goals_of_agent(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i64) -> Option<Vec<Cell>> {
+    /// More equal draws in a row than this are not chance: no other goal can be drawn.
     const MOST_REPEATS: usize = 10_000;
     let mut at = goal;
     let mut goals = vec![at];

@@ -31,7 +31,7 @@ impl GridConfig {
         config.with_scenario(&scenario, fields)
     }
 
-    /// Replaces starts and goals by those of a scenario.
+    /// Replaces starts and goals with those of a scenario.
     ///
     /// If the fields of the config include `num_agents`, only that many of the scenario's agents are used.
     ///

@@ -5,8 +5,8 @@ use crate::{Generator, NumpyError};
 impl Generator {
     /// Draws an integer that is at least `lo` and below `hi`.
     ///
-    /// If only one integer is possible, it takes no draw. Up to 2³² possible integers take 32-bit draws, and more take
-    /// 64-bit draws.
+    /// If only one integer is possible, no number is drawn. If up to 2³² integers are possible, 32-bit numbers are
+    /// drawn; otherwise, 64-bit numbers.
     ///
     /// # Errors
     /// [`NumpyError::EmptyRange`] if `hi` is not above `lo`.

@@ -33,9 +33,9 @@ words! {
     pub enum PlannerName {
         /// Fast plans for any number of agents, refined until the budget is spent.
         Lacam = "lacam",
-        /// A plan of any quality within milliseconds, or none.
+        /// A plan within milliseconds, or none; no quality guarantee.
         Pibt = "pibt",
-        /// Good plans for some dozens of agents.
+        /// Good plans for a few dozen agents.
         Pbs = "pbs",
         /// Plans within 1.2 times the least cost, for few agents.
         Ecbs = "ecbs",
@@ -49,9 +49,9 @@ words! {
     pub enum LifelongName {
         /// Rolling-horizon planning, improved until the budget is spent.
         Rhcr = "rhcr",
-        /// Fast steps of any quality: millions of agent steps per second.
+        /// Fast steps without a quality guarantee: millions of agent steps per second.
         Pibt = "pibt",
-        /// PIBT with traffic guidance, for crowds in warehouses.
+        /// PIBT with traffic guidance, for crowded warehouses.
         GuidedPibt = "guided-pibt",
         /// RHCR that plans each window by priority-based search, as in the paper.
         RhcrPbs = "rhcr-pbs",

@@ -218,7 +218,7 @@ def test_failures_are_reported_and_other_episodes_are_played(backend, tmp_path):
 
 
 def test_wrong_suites_and_folders_are_reported(tmp_path):
-    def said(change, begin="new"):
+    def output(change, begin="new"):
         content = suite(num_seeds=1)
         change(content)
         return play(tmp_path, content, begin)[0]
@@ -226,9 +226,10 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
     def environment(**fields):
         return lambda content: content["environment"].update(fields)
 
-    assert "ValueError" in said(environment(map_name="nowhere")) and "nowhere" in said(environment(map_name="nowhere"))
-    assert "unknown key `sise` in environment; did you mean `size`?" in said(environment(sise=8))
-    assert "SCRIMP" in said(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
-    assert said(lambda content: None, "anew").startswith("4\n")
-    assert "OSError" in said(lambda content: None) and "`--resume`" in said(lambda content: None)
-    assert "results of other environments" in said(environment(max_episode_steps=16), "resume")
+    assert "ValueError" in output(environment(map_name="nowhere"))
+    assert "nowhere" in output(environment(map_name="nowhere"))
+    assert "unknown key `sise` in environment; did you mean `size`?" in output(environment(sise=8))
+    assert "SCRIMP" in output(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
+    assert output(lambda content: None, "anew").startswith("4\n")
+    assert "OSError" in output(lambda content: None) and "`--resume`" in output(lambda content: None)
+    assert "results of other environments" in output(environment(max_episode_steps=16), "resume")

@@ -288,7 +288,7 @@ fn small_fields(config: Value) -> Pairs {
     fields.into_iter().filter(is_small).collect()
 }
 
-/// Replaces `NaN` and infinities by null; Python writes them although JSON does not allow them.
+/// Replaces `NaN` and infinities with null; Python writes them although JSON does not allow them.
 fn without_nan(text: &str) -> String {
     let (mut clean, mut rest, mut in_string) = (String::with_capacity(text.len()), text, false);
     while let Some(next) = rest.chars().next() {

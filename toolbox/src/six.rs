@@ -41,7 +41,7 @@ words! {
 words! {
     /// One of the six metrics, in display order.
     pub enum Metric {
-        /// Best sum of costs divided by own, on random maps and mazes.
+        /// Best sum of costs divided by the algorithm's own, on random maps and mazes.
         Performance = "Performance",
         /// The same ratio on tiles of cities.
         OutOfDistribution = "Out-of-Distribution",
@@ -51,7 +51,7 @@ words! {
         Scalability = "Scalability",
         /// One minus the rate of collisions per agent and step, on random maps and mazes.
         Coordination = "Coordination",
-        /// Length of the shortest path divided by own, with one agent on whole cities.
+        /// Length of the shortest path divided by the algorithm's own, with one agent on whole cities.
         Pathfinding = "Pathfinding",
     }
 }
@@ -171,7 +171,7 @@ impl<'a> Joined<'a> {
         mean_of(&found?.into_iter().flatten().collect::<Vec<f64>>())
     }
 
-    /// Computes best sum of costs divided by own, or own throughput divided by the best.
+    /// Computes the best sum of costs divided by the algorithm's own, or its own throughput divided by the best.
     fn ratio(&self, algorithm: &str, definition: Definition) -> Option<f64> {
         let unsolved = (definition == Definition::Paper).then_some(0.0);
         self.mean(|rows| {

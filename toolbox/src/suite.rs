@@ -109,7 +109,7 @@ impl Suite {
         Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
 
-    /// Replaces its algorithms by those of a file that has no other key.
+    /// Replaces its algorithms with those of a file that has no other key.
     ///
     /// # Errors
     /// Those of [`Suite::read`].

@@ -38,7 +38,7 @@ pub struct Bench {
     /// Time per figure, in seconds
     #[arg(long, value_name = "S", default_value_t = 0.1)]
     seconds: f64,
-    /// Number of measurements of everything, of which the best counts; use more on a busy machine
+    /// Number of measurement rounds; each figure is the best of all rounds; use more on a busy machine
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     rounds: u64,
     /// Write all figures to this file as JSON

@@ -206,8 +206,7 @@ pub fn times(cause: &Cause) -> String {
 }
 
 /// The note on a counterexample that a replay did not show again.
-pub const NOT_REPEATED: &str =
-    "a new process did not do so on the kept case, so the port does not always answer alike";
+pub const NOT_REPEATED: &str = "a new process did not show it on the kept case, so the port's answers vary";
 
 /// Returns the names of all rules.
 pub fn rule_names() -> impl Iterator<Item = &'static str> {

@@ -63,10 +63,10 @@ struct Ranges {
     /// Largest number of wall components, mazes only [default: 8]
     #[arg(long, value_name = "N")]
     wall_components_max: Option<i64>,
-    /// Smallest weight of extending a wall straight on, mazes only [default: 0.75]
+    /// Smallest weight of extending a wall straight ahead, mazes only [default: 0.75]
     #[arg(long, value_name = "P")]
     go_straight_min: Option<f64>,
-    /// Largest weight of extending a wall straight on, mazes only [default: 0.85]
+    /// Largest weight of extending a wall straight ahead, mazes only [default: 0.85]
     #[arg(long, value_name = "P")]
     go_straight_max: Option<f64>,
 }
@@ -101,7 +101,7 @@ struct Shelves {
     bays: Bays,
 }
 
-/// The most maps that are generated without a note on how much is to come.
+/// The maximum number of maps that are generated without a note on their number and size.
 const MANY: u64 = 10_000;
 
 fn seeds(text: &str) -> Result<Range<u64>, String> {

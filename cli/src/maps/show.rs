@@ -14,8 +14,8 @@ use crate::output::{markdown_table, print_line, print_table};
 
 #[derive(Args, Debug)]
 pub struct List {
-    /// Pattern that the names have to match, as pogema-toolbox matches `map_name` [default: all maps but the paper's
-    /// generated sets]
+    /// Pattern that the names have to match, as pogema-toolbox matches `map_name` [default: all maps except the
+    /// paper's generated sets]
     pattern: Option<String>,
     #[command(flatten)]
     sources: Sources,

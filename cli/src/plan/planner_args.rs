@@ -14,8 +14,8 @@ pub struct PlannerArgs {
     /// Time budget of one plan, in seconds [default: 1, or no limit if `--nodes` is given]
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Node budget of one plan: the most nodes that the search may expand; on one thread, the same budget gives the
-    /// same plan [default: no limit]
+    /// Node budget of one plan: the maximum number of nodes that the search expands; on one thread, the same budget
+    /// gives the same plan [default: no limit]
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
     /// Maximum number of threads of the planner; LaCAM refines plans on that many

@@ -34,7 +34,7 @@ impl Screen {
             // A frame holds only our own characters, and perhaps escape sequences of colours.
             return print_bytes(format!("{frame}\n").as_bytes());
         }
-        // The last line is left to the cursor. The size is read anew, since the user may resize the terminal.
+        // The last line is left to the cursor. The size is read each time, because the user may resize the terminal.
         let size = self.terminal.size_checked();
         let most =
             size.map(|(rows, cols)| (usize::from(rows).saturating_sub(1).max(1), usize::from(cols).max(1)));

@@ -15,7 +15,7 @@ pub const FILE: &str = "file";
 
 /// Returns a parser of the names of policies.
 pub fn names() -> PossibleValuesParser {
-    let all = NamedPolicy::all().into_iter().chain([(FILE, "actions from a file")]);
+    let all = NamedPolicy::all().into_iter().chain([(FILE, "Actions from a file")]);
     PossibleValuesParser::new(all.map(|(name, help)| PossibleValue::new(name).help(help)))
 }
 

@@ -237,7 +237,7 @@ fn leave_out_metrics(
     }
 }
 
-/// Replaces each policy operation by the actions that the policy chooses.
+/// Replaces each policy operation with the actions that the policy chooses.
 fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Unclaimed> {
     // Records match operations one to one, up to the first error.
     let kept =

@@ -92,7 +92,7 @@ impl Keeper<'_> {
     fn shrink_some(&mut self, mut occurrences: Vec<Example>) -> Vec<Example> {
         occurrences.sort_by_key(Example::size);
         let fault = occurrences.first().and_then(|example| example.fault.as_ref());
-        // Each repetition of a hang costs the time limit. To find the same hang again, a shorter one will do.
+        // Each repetition of a hang costs the time limit. A shorter limit is enough to find the same hang again.
         let hangs = fault.is_some_and(Misbehaviour::is_hang);
         let max_shrunk = match fault {
             Some(_) if hangs => 1,
@@ -150,7 +150,7 @@ impl Keeper<'_> {
         self.folder.join(format!("{stem}{number}.yaml"))
     }
 
-    /// Plays the case in a file on a new process of the port, and returns what is like the kept example.
+    /// Plays the case in a file on a new process of the port, and returns the example that matches the kept one.
     fn repeat(&mut self, path: &Path, example: &Example) -> Result<Option<Example>, Error> {
         self.worker.restart(false);
         let item = Item::of_file(path)?;

@@ -62,7 +62,7 @@ pub fn write(observed: &Observed) -> Value {
     }
 }
 
-/// Replaces each hash of an expected window by that window, so that observations can be compared as a whole.
+/// Replaces each hash of an expected window with that window, so that observations can be compared as a whole.
 pub fn resolve_hashes(expected: &Observed, answer: &mut Observed, side: usize) {
     let area = side * side;
     match (expected, answer) {

@@ -20,7 +20,7 @@ pub struct Answered {
     pub response: Response,
     /// The misbehaviour that ended the answers.
     pub fault: Option<Misbehaviour>,
-    /// What is wrong with the form of the first observations that could not be read, and the operation they answer.
+    /// The first operation whose observations could not be read, and the reason.
     pub misshapen: Option<(usize, String)>,
 }
 
@@ -54,7 +54,7 @@ pub fn play_on_port(
     answered
 }
 
-/// Asks a port to reset an invalid config. The port should answer with an error; no other key is required.
+/// Sends an invalid config to a port. The port should answer with an error; no other key is required.
 fn refuse_config(link: &mut dyn Link, request: &Request, answered: &mut Answered) {
     let beginning = Beginning {
         config: Some(request.config.clone()),

@@ -20,9 +20,9 @@ const MAX_LINE_LENGTH: usize = 1 << 26;
 const MAX_STDERR_LENGTH: usize = 2048;
 /// Length of the start of a bad answer that is quoted. Units: characters.
 const MAX_QUOTE_LENGTH: usize = 120;
-/// How many times as long as any other answer the first one may take, since imports alone can take seconds.
+/// Factor by which the first answer has a longer time limit, because imports alone can take seconds.
 const START_FACTOR: u32 = 6;
-/// How many times shorter the time limit of a hurried port is.
+/// Divisor of the time limit of a hurried port.
 const HURRY_FACTOR: u32 = 10;
 /// Time that a port may take to exit after `bye` before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);

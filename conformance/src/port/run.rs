@@ -17,7 +17,7 @@ use crate::runner::{Progress, on_workers};
 
 /// Number of misbehaviours after which the other items of a port are skipped.
 const MAX_FAULTS: u64 = 20;
-/// Number of answers that never came after which the other items are skipped, since each costs the time limit.
+/// Number of missing answers after which the other items are skipped, because each costs the time limit.
 const MAX_HANGS: u64 = 5;
 
 /// Checks ports in parallel. Calls `total` once with the number of checks, and `progress` after each check.

@@ -10,14 +10,14 @@ use super::test_episode::TestEpisode;
 use crate::play::play;
 use crate::request::{Op, Request, Response};
 
-/// The plays that are left to shrink the occurrences of one group.
+/// The remaining plays for shrinking the occurrences of one group.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     /// Requests played.
     plays: usize,
     /// Misbehaviours, after each of which the port is started again.
     restarts: usize,
-    /// Answers that never came, each of which costs the time limit.
+    /// Missing answers, each of which costs the time limit.
     hangs: usize,
 }
 
@@ -82,7 +82,7 @@ impl Shrinker<'_, '_> {
 
     /// Makes a request the new best if it shows the same cause.
     pub fn accept(&mut self, request: &Request) -> bool {
-        // A misbehaviour says nothing about another cause, and a port may misbehave only now and then.
+        // A misbehaviour gives no information about another cause, and a port may misbehave only sometimes.
         const MAX_TRIES: usize = 2;
         let expected = play(request);
         let may_be_refused = self.best.divergence.as_ref().is_none_or(|found| found.field.name == "error");

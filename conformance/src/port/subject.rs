@@ -23,7 +23,7 @@ pub struct Worker<'a> {
     profiles: &'a [Profile],
     hurries: bool,
     running: Option<Running>,
-    /// The answer to `hello` that never came, after which the port is not started again.
+    /// The missing answer to `hello`, after which the port is not started again.
     mute: Option<Misbehaviour>,
 }
 

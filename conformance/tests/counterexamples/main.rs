@@ -46,7 +46,7 @@ fn assert_repeated(cause: &Cause) {
 }
 
 #[test]
-fn only_what_is_claimed_is_asked_while_shrinking() {
+fn shrinking_respects_claims() {
     let folder = tempfile::tempdir().unwrap();
     let (report, log) = check(Behaviour::RefusesObstacles, folder.path());
     assert_eq!(log.num_configs(), 0);
@@ -142,7 +142,7 @@ fn a_difference_that_a_new_process_does_not_show_is_reported_as_such() {
 }
 
 #[test]
-fn misbehaviours_are_alike_whatever_the_time_limit() {
+fn misbehaviours_match_regardless_of_the_time_limit() {
     let hang = |question, limit_ms| Misbehaviour::new(FaultKind::NoAnswer { question, limit_ms }, "");
     assert!(hang("step", 1000).is_like(&hang("step", 100)));
     assert!(!hang("step", 1000).is_like(&hang("reset", 1000)));

@@ -1,5 +1,5 @@
-//! Files of traces: JSON Lines, which end with the number of steps and a hash, so that a cut file is not taken for a
-//! whole one.
+//! Files of traces: JSON Lines, which end with the number of steps and a hash, so that a cut file is not mistaken
+//! for a complete one.
 
 use std::io::{BufRead, Write};
 
@@ -39,7 +39,7 @@ impl Versions {
 #[derive(Serialize, Deserialize)]
 struct TraceEnd {
     num_steps: usize,
-    /// The hash of all lines before, each with a line feed, in hexadecimal digits.
+    /// The hash of all previous lines, each with a line feed, in hexadecimal digits.
     sha256: String,
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use pogema_core::Error;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Number of spins before the caller sleeps while it waits for the helpers: some tens of microseconds.
+/// Number of spins before the caller sleeps while it waits for the helpers: tens of microseconds.
 const MAX_SPINS: usize = 1000;
 /// Number of further spins, in which the helpers leave the scope.
 const FINAL_SPINS: usize = 5;

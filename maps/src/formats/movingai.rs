@@ -19,7 +19,7 @@ words! {
 /// Reads a `.map` file.
 ///
 /// Ground (`.`, `G`) and swamp (`S`) are free; trees (`T`) and out-of-bounds cells (`@`, `O`) are obstacles. `water`
-/// decides about water (`W`).
+/// determines whether water (`W`) is free.
 ///
 /// # Errors
 /// [`Error::Map`] with line and column for an invalid header, a number or length of rows that contradicts it, and any

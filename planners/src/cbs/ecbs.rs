@@ -98,7 +98,7 @@ pub(crate) fn search(
     clock: &mut Clock,
     mut give_up: impl FnMut(&mut Clock) -> Option<String>,
 ) -> Found {
-    // `max` also replaces NaN by 1.
+    // `max` also replaces NaN with 1.
     let weight = params.weight.max(1.0);
     let mut low = LowLevel::new(sipp, graph, team, Aim::Within(weight));
     if clock.count_node() {

@@ -65,8 +65,7 @@ impl PibtStep {
         Self { rules, random, standing: empty.clone(), taken: empty, next: Vec::new(), stack: Vec::new() }
     }
 
-    /// Returns the next configuration, which satisfies the constraints. PIBT fails only under
-    /// constraints.
+    /// Returns the next configuration, which satisfies the constraints. PIBT fails only under constraints.
     pub fn run<C: Costs>(
         &mut self,
         input: &StepInput<'_, C>,

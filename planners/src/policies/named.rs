@@ -15,9 +15,9 @@ use crate::registry::{LifelongName, PlannerName, PlannerSettings};
 words! {
     /// The policies without a joint plan.
     pub enum SimplePolicy {
-        /// What POGEMA's `sample_actions` draws.
+        /// Random actions, as POGEMA's `sample_actions` draws them.
         Random = "random",
-        /// POGEMA's own A* agent, one for each agent.
+        /// POGEMA's own A* policy, one instance for each agent.
         Astar = "astar",
         /// All agents stay.
         Stay = "stay",

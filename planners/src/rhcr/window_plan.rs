@@ -63,7 +63,7 @@ impl WindowPlan {
         is_as_planned
     }
 
-    /// Replaces all paths by others of the same length.
+    /// Replaces all paths with others of the same length.
     pub(crate) fn replace(&mut self, paths: Vec<Vec<Vertex>>, legs: &[Vec<Leg>]) {
         self.paths = paths;
         self.update(legs);

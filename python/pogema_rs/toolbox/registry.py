@@ -75,7 +75,7 @@ class ToolboxRegistry:
 
     @classmethod
     def recreate_from_state(cls, state: Mapping[str, Any]) -> None:
-        """Replaces the registry by that of another process."""
+        """Replaces the registry with that of another process."""
         cls._maps = dict(state.get("maps", {}))
         cls._algorithms = dict(state.get("algorithms", {}))
         cls._envs = dict(state.get("envs", {}))
@@ -97,7 +97,7 @@ class ToolboxRegistry:
     def create_algorithm(cls, algo_name: str, **kwargs: Any) -> Any:
         """Makes an algorithm from settings.
 
-        Errors: KeyError for an unknown name, with the known ones.
+        Errors: KeyError for an unknown name; it lists the known names.
         """
         make, make_config, _ = cls._known("algorithm", algo_name, cls._algorithms)
         return make(cls.create_algorithm_config(algo_name, **kwargs)) if make_config else make()
@@ -128,7 +128,7 @@ class ToolboxRegistry:
     def create_env(cls, env_name: str, **kwargs: Any) -> Any:
         """Makes an environment from settings.
 
-        Errors: KeyError for an unknown name, with the known ones.
+        Errors: KeyError for an unknown name; it lists the known names.
         """
         if env_name == "Environment" and env_name not in cls._envs:
             from pogema_rs.toolbox.create_env import Environment, create_env_base

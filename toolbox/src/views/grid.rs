@@ -15,7 +15,7 @@ words! {
         Markdown = "markdown",
         /// LaTeX with the rules of the package booktabs.
         Latex = "latex",
-        /// Comma-separated values; a mean has a column each for mean, lower end, upper end and number of values.
+        /// Comma-separated values; separate columns for a mean, the ends of its interval and the number of values.
         Csv = "csv",
     }
 }

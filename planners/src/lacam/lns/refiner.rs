@@ -88,7 +88,7 @@ impl<'a> Refiner<'a> {
         configurations_of(self.solution.paths())
     }
 
-    /// Replaces the plan by a better one, if its paths fit the time span.
+    /// Replaces the plan with a better one, if its paths fit the time span.
     pub fn replace(&mut self, plan: &[Vec<Vertex>]) {
         let paths = paths_of(plan);
         let span = self.solution.span() as usize;
