@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from pogema import GridConfig
@@ -235,6 +236,18 @@ def five_results(result: Any) -> Any:
     return observations, rewards, terminated, truncated, infos
 
 
+def respond(port: Port, question: Any) -> Record:
+    """Answers a question. A refusal is also an answer."""
+    try:
+        return port.answer(question)
+    except (Refusal, Timeout) as error:  # an alarm may fire while it is being stopped
+        set_alarm(0)
+        return {"error": str(error)}
+
+
+answer = partial(respond, Port(raw=False, limit=8.0))
+
+
 def main() -> None:
     """Serves until `bye`."""
     parser = argparse.ArgumentParser(description="Serves the installed POGEMA as a port.")
@@ -249,12 +262,12 @@ def main() -> None:
     for line in sys.stdin:
         try:
             question = json.loads(line)
+        except json.JSONDecodeError as error:
+            reply = {"error": str(error)}
+        else:
             if isinstance(question, dict) and question.get("type") == "bye":
                 return
-            reply = port.answer(question)
-        except (Refusal, Timeout, json.JSONDecodeError) as error:  # an alarm may fire while it is being stopped
-            set_alarm(0)
-            reply = {"error": str(error)}
+            reply = respond(port, question)
         out.write(encode(reply) + "\n")
         out.flush()
 

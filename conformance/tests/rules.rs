@@ -191,8 +191,8 @@ fn table(rules: &BTreeMap<String, Rule>) -> String {
             }
         }
         let mut rest = rule.statement[..end].trim_end();
-        while let Some((before, name, after)) = rest.split_once('[').and_then(|(before, link)| {
-            let (name, target) = link.split_once("](")?;
+        while let Some((before, name, after)) = rest.split_once("](").and_then(|(link, target)| {
+            let (before, name) = link.rsplit_once('[')?;
             Some((before, name, target.split_once(')')?.1))
         }) {
             sentence.push_str(before);
