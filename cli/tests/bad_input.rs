@@ -38,7 +38,7 @@ const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 1000";
 const MORE: &str = "\n\nFor more information, try '--help'.";
 
 /// Arguments and the error message that they cause.
-const REJECTED: [(&str, &str); 60] = [
+const REJECTED: [(&str, &str); 61] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     (
         "run --sped 3",
@@ -125,6 +125,7 @@ const REJECTED: [(&str, &str); 60] = [
         "run --steps 9000000000 --policy stay --trace blank.yaml/x",
         "blank.yaml/x: `blank.yaml` is not a folder",
     ),
+    ("conform --vectors .", ".: contains other files, expected a new or empty folder, or one of vectors"),
     ("conform --cases 9000000000 --json ./", "./: is not a regular file"),
     ("bench --rows nothing", "`--rows` is `nothing`, expected a part of a row's name, such as `64 agents`"),
     ("bench --seconds 0", "`--seconds` is `0`, expected a time above 0"),

@@ -110,7 +110,9 @@ fn page(folder: &Path) -> String {
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
     let page = roxmltree::Document::parse_with_options(&text, options).unwrap();
     for link in page.descendants().filter_map(|node| node.attribute("href")) {
-        assert!(link.starts_with("https://pogema-rs.github.io/pogema-rs/spec/"), "{link}");
+        let is_section = |id: &str| page.descendants().any(|node| node.attribute("id") == Some(id));
+        let leads_on = link.starts_with("https://pogema-rs.github.io/pogema-rs/spec/");
+        assert!(leads_on || link.strip_prefix('#').is_some_and(is_section), "{link}");
     }
     // All rows of a table have the same width, the head included.
     for table in page.descendants().filter(|node| node.has_tag_name("table")) {
@@ -284,4 +286,43 @@ fn known_faults_are_accepted_unless_they_cut_the_run_short() {
         assert!(text.contains("KNOWN protocol: left `active` out") && text.contains(expected), "{text}");
         assert_eq!(failures(&suite(folder.path())), failing);
     }
+}
+
+#[test]
+fn a_site_links_each_failed_rule_to_its_counterexample() {
+    let folder = folder(&[LATE]);
+    let ports = ["--port", WRONG, "--port", CONFORMING, "--port", "python3.11 same.py", "--part", "cases"];
+    std::fs::copy(folder.path().join("wrong.py"), folder.path().join("same.py")).unwrap();
+    let site = ["--site", "new/site"];
+    let (status, _) = status_and_text(&run(folder.path(), &[&ports[..], &site].concat()));
+    assert_eq!(status, Some(1));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("new/site").join(name)).unwrap();
+    let index = read("index.html");
+    for (page, rule) in [("template.html", "end/truncated"), ("template-2.html", "end/truncated")] {
+        let link = index.split(&format!("href=\"{page}#")).nth(1).unwrap();
+        let id = link.split('"').next().unwrap();
+        let (_, article) = read(page)
+            .split_once(&format!("id=\"{id}\""))
+            .map(|(a, b)| (a.to_owned(), b.to_owned()))
+            .unwrap();
+        assert!(article.split("</h3>").next().unwrap().contains(rule), "{page}");
+    }
+    assert!(!index.contains("reference.html#"));
+    let badge: serde_json::Value = serde_json::from_str(&read("template.json")).unwrap();
+    assert_eq!(badge["schemaVersion"], 1);
+    assert!(badge["message"].as_str().unwrap().starts_with("diverges "));
+    assert!(read("template.svg").contains(badge["message"].as_str().unwrap()));
+    let text = read("survey.md");
+    assert!(text.contains("| rule | template | reference | template (2) |"));
+    assert!(text.contains("Shown by template (") && text.contains("template (2) ("));
+}
+
+#[test]
+fn a_site_that_cannot_be_written_is_an_error_before_the_run() {
+    let folder = folder(&[]);
+    std::fs::write(folder.path().join("taken"), "text").unwrap();
+    let output = run(folder.path(), &["--port", "no-such-program", "--site", "taken"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("taken: "));
+    assert_eq!(std::fs::read_to_string(folder.path().join("taken")).unwrap(), "text");
 }

@@ -1,32 +1,21 @@
-"""Runs the conformance kit on POGEMA's releases and writes docs/survey.md: `python3.11 conformance/ports/survey.py`.
+"""Compares implementations with POGEMA 1.4.0 and writes docs/survey.md: `python3.11 conformance/ports/survey.py`.
 
-Creates the virtual environments in target/survey/venvs; `--venvs FOLDER` selects another folder. Needs
-`target/release/pogema`.
+The implementations are the engines of this project, releases of POGEMA, and the templates of ports. Creates the virtual
+environments of the releases in target/survey/venvs; `--venvs FOLDER` selects another folder. Writes the site of
+`pogema conform --site` to target/survey/site. Needs `target/release/pogema`, and what build_template needs.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
-from collections import defaultdict
 from pathlib import Path
-from typing import Any
 
 PORTS = Path(__file__).resolve().parent
 ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
-Report = dict[str, Any]
-
-# Descriptions of known causes. Other causes are described by their rule and field.
-CAUSES = {
-    ("config/fields", "error"): "accepts configs that 1.4.0 rejects, or rejects configs that 1.4.0 accepts",
-    ("metrics/nothing", "metrics"): "`ep_length` under `nothing` is too small by one",
-    ("goal/restart/draw", "goal"): "a next goal may equal the goal just reached",
-    ("place/obstacles", "map"): "`width` and `height` are ignored, maps are square",
-    ("place/obstacles", "number of map entries"): "`width` and `height` are ignored, maps are square",
-}
+PROGRAM = ROOT / "target/release/pogema"
 
 
 def environments(folder: Path) -> dict[str, str]:
@@ -36,84 +25,34 @@ def environments(folder: Path) -> dict[str, str]:
     return dict(line.split("\t", 1) for line in output.splitlines())
 
 
-def survey(pythons: dict[str, str], cases: int, seed: int) -> dict[str, Report]:
-    """Runs the kit on each release; returns the reports."""
-    reports = {}
-    for version, python in pythons.items():
-        print(f"POGEMA {version}", file=sys.stderr, flush=True)
-        path = WORK / f"{version}.json"
-        command = [str(ROOT / "target/release/pogema"), "conform", "--cases", str(cases), "--seed", str(seed)]
-        command += ["--port", f"{python} {PORTS / 'pogema_python.py'}", "--json", str(path)]
-        done = subprocess.run([*command, "--keep", str(WORK / version)], stdout=subprocess.DEVNULL)
-        if done.returncode not in (0, 1):
-            sys.exit(f"survey: POGEMA {version}: exit status {done.returncode}")
-        (reports[version],) = json.loads(path.read_text())
-    return reports
+def commands(pythons: dict[str, str]) -> list[str]:
+    """Returns the command line of each port."""
+    template = subprocess.run([str(PORTS / "build_template")], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return [
+        *(f"{PROGRAM} port --engine {engine}" for engine in ("reference", "fast")),
+        *(f"{python} {PORTS / 'pogema_python.py'}" for python in pythons.values()),
+        f"{sys.executable} {PORTS / 'template.py'}",
+        f"node {PORTS / 'template.mjs'}",
+        template.strip(),
+    ]
 
 
-def mark(report: Report, rule: str) -> str:
-    """Returns one cell of the table."""
-    row = report["rules"].get(rule)
-    if row is None:
-        return ""
-    if row["failed"] or row["errors"]:
-        return f"✗ {row['failed'] + row['errors']}"
-    return "✓" if row["passed"] else "–"
+def run(ports: list[str], cases: int, seed: int) -> str:
+    """Runs the kit on the ports; returns the text form of its site."""
+    site = WORK / "site"
+    command = [str(PROGRAM), "conform", "--cases", str(cases), "--seed", str(seed), "--keep", str(WORK / "kept")]
+    for port in ports:
+        command += ["--port", port]
+    done = subprocess.run([*command, "--site", str(site)], stdout=subprocess.DEVNULL)
+    if done.returncode not in (0, 1):
+        sys.exit(f"survey: exit status {done.returncode}")
+    return (site / "survey.md").read_text()
 
 
-def table(reports: dict[str, Report]) -> list[str]:
-    """Returns the table of rules and releases."""
-    rules = sorted({rule for report in reports.values() for rule in report["rules"]})
-    lines = [f"| rule | {' | '.join(reports)} |", f"| --- |{' --- |' * len(reports)}"]
-    for rule in rules:
-        lines.append(f"| `{rule}` | {' | '.join(mark(report, rule) for report in reports.values())} |")
-    return lines
-
-
-def request_lines(request: Report) -> list[str]:
-    """Returns the lines that describe a request: fields, map and operations."""
-    lines = []
-    for field, value in request["config"].items():
-        if isinstance(value, str) and ("\n" in value or field == "map"):
-            lines += [f"{field}:", *(f"  {row}" for row in value.splitlines())]
-        else:
-            lines.append(f"{field}: {value if isinstance(value, str) else json.dumps(value)}")
-    return [*lines, "", "do: " + ", ".join(json.dumps(op) for op in request["ops"])]
-
-
-def shorten(text: str, longest: int = 160) -> str:
-    """Shortens a value to fit on a line."""
-    return text if len(text) <= longest else text[: longest - 1] + "…"
-
-
-def causes(reports: dict[str, Report]) -> list[str]:
-    """Returns a section for each cause, with its releases and its smallest counterexample."""
-    shown: dict[tuple[str, str], list[tuple[str, Report]]] = defaultdict(list)
-    for version, report in reports.items():
-        for cause in report["causes"]:
-            shown[(cause["rule"] or "(protocol)", cause["what"])].append((version, cause))
-    lines = []
-    for (rule, what), seen in sorted(shown.items()):
-        words = CAUSES.get((rule, what), f"{what} differs")
-        times = ", ".join(f"{version} ({cause['times']}×)" for version, cause in seen)
-        example = min((cause["example"] for _, cause in seen), key=lambda each: len(json.dumps(each["request"])))
-        found = example.get("divergence") or {"expected": "", "got": example.get("fault", {}).get("what", "")}
-        given = "an instance" if example["mode"] == "instance" else "a config"
-        lines += [f"### `{rule}`: {words}", "", f"Releases: {times}. The port was given {given}.", ""]
-        lines += ["```text", *request_lines(example["request"]), ""]
-        if "op" in found:
-            lines.append(f"after operation {found['op']}, {found['field']}:")
-        lines += [f"  expected {shorten(found['expected'])}", f"  got      {shorten(found['got'])}"]
-        picture = found.get("picture", "").rstrip("\n").splitlines()
-        lines += [*picture[:16], "```", ""]
-    return lines
-
-
-def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: int) -> str:
+def page(missing: dict[str, str], survey: str, cases: int, seed: int) -> str:
     """Returns the whole page."""
-    missing = [f"- {version}: {why}" for version, why in pythons.items() if version not in reports]
     lines = [
-        "# Which release follows which rule",
+        "# Which implementation follows which rule",
         "",
         "This page is generated by these commands:",
         "",
@@ -122,37 +61,26 @@ def page(pythons: dict[str, str], reports: dict[str, Report], cases: int, seed: 
         f"python3.11 conformance/ports/survey.py --cases {cases} --seed {seed}",
         "```",
         "",
-        "Each release runs behind `conformance/ports/pogema_python.py`, in its own virtual environment with the "
-        "versions that `conformance/ports/survey_venvs.py` pins. The kit plays every hand-written case, every "
-        f"recording of 1.4.0 and {cases} random cases, once as instances and once as configs. ✓: the release follows "
-        "the rule. ✗ n: n cases or episodes differ. –: the release does not claim the rule, usually because a later "
-        "release introduced it. If the starts of agents differ, the comparison of that episode ends there; so ✓ covers "
-        "only the steps that could be compared.",
+        "It compares the engines of this project, releases of POGEMA, and the templates of ports. Each release runs "
+        "behind `conformance/ports/pogema_python.py`, in its own virtual environment with the versions that "
+        "`conformance/ports/survey_venvs.py` pins. The kit plays every hand-written case, every recording of 1.4.0 and "
+        f"{cases} random cases, as instances and, if the implementation draws them, as configs.",
         "",
-        *(["Releases that could not be installed:", "", *missing, ""] if missing else []),
-        *[
-            f"POGEMA {version}: {report['num_played']} cases and {report['num_steps']} steps played, "
-            f"{len(report['causes'])} causes of differences."
-            + "  "
-            for version, report in reports.items()
-        ],
+        "✓: the implementation follows the rule. ✗ n: n cases or episodes differ. –: the implementation does not claim "
+        "the rule; for a release, usually because a later release introduced it. If the starts of agents differ, the "
+        "comparison of that episode ends there, so ✓ covers only the steps that could be compared.",
         "",
-        "## Rules",
-        "",
-        *table(reports),
-        "",
-        "## Smallest counterexamples",
-        "",
-        *causes(reports),
+        *[f"POGEMA {version} could not be installed: {why}\n" for version, why in missing.items()],
+        survey.strip(),
         "",
         "**What next:** [Known defects and contradictions](spec/defects.md), [Check your port](PORTING.md).",
     ]
-    return "\n".join(lines).rstrip() + "\n"
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     """Creates the environments, runs the kit, writes docs/survey.md."""
-    parser = argparse.ArgumentParser(description="Runs the conformance kit on POGEMA's releases.")
+    parser = argparse.ArgumentParser(description="Runs the conformance kit on all implementations.")
     parser.add_argument("--cases", type=int, default=1000, help="number of random cases [default: 1000]")
     parser.add_argument("--seed", type=int, default=7, help="seed of the random cases [default: 7]")
     venvs = "folder of the virtual environments [default: target/survey/venvs]"
@@ -161,8 +89,9 @@ def main() -> None:
     WORK.mkdir(parents=True, exist_ok=True)
     found = environments(options.venvs)
     pythons = {version: python for version, python in found.items() if Path(python).exists()}
-    reports = survey(pythons, options.cases, options.seed)
-    (ROOT / "docs" / "survey.md").write_text(page(found, reports, options.cases, options.seed))
+    missing = {version: why for version, why in found.items() if version not in pythons}
+    survey = run(commands(pythons), options.cases, options.seed)
+    (ROOT / "docs" / "survey.md").write_text(page(missing, survey, options.cases, options.seed))
 
 
 if __name__ == "__main__":

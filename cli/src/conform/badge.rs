@@ -2,12 +2,15 @@
 
 use pogema_conformance::port::PortReport;
 use pogema_core::Error;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::summary::{Verdict, fill, name_of, score};
 
-/// Returns the badge of a port as SVG.
-pub fn badge(report: &PortReport) -> Result<String, Error> {
+/// The left part of a badge.
+const LABEL: &str = "POGEMA 1.4.0";
+
+/// Returns the right part of the badge of a port, and its colour.
+fn message(report: &PortReport) -> (String, &'static str) {
     let score = score(report);
     let (word, colour) = match score.verdict() {
         Verdict::Conforms => ("conforms", "#2a7d33"),
@@ -16,10 +19,21 @@ pub fn badge(report: &PortReport) -> Result<String, Error> {
         Verdict::Misbehaves => ("misbehaves", "#b35900"),
         Verdict::Unchecked => ("nothing checked", "#6a6a6a"),
     };
-    let (label, message) = ("POGEMA 1.4.0", format!("{word} {}/{} rules", score.passed, score.claimed));
-    let (left, right) = (width(label), width(&message));
+    (format!("{word} {}/{} rules", score.passed, score.claimed), colour)
+}
+
+/// Returns the badge of a port in the form that shields.io reads from a URL.
+pub fn endpoint(report: &PortReport) -> Value {
+    let (message, colour) = message(report);
+    json!({"schemaVersion": 1, "label": LABEL, "message": message, "color": colour})
+}
+
+/// Returns the badge of a port as SVG.
+pub fn badge(report: &PortReport) -> Result<String, Error> {
+    let (message, colour) = message(report);
+    let (left, right) = (width(LABEL), width(&message));
     let values = json!({
-        "label": label,
+        "label": LABEL,
         "message": message,
         "port": name_of(report),
         "colour": colour,

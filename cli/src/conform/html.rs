@@ -9,14 +9,17 @@ use serde_json::{Value, json};
 use super::grid_svg::drawing;
 use super::known::Leftover;
 use super::summary::{
-    self, NOT_REPEATED, OUTCOMES, Standing, counts, fill, is_rule, names, score, shortened, spec_url,
-    standing, times, title, verdict,
+    self, NOT_REPEATED, OUTCOMES, Standing, causes_of, counts, fill, is_rule, names, score, shortened,
+    spec_url, standing, times, title, verdict,
 };
 
 /// Limits of text pictures: a page can be scrolled, but has to open on a phone.
 const LIMITS: Limits = Limits { rows: 64, columns: 128 };
 /// Maximum length of a case in the page; longer ones are shortened. Units: characters.
 const LONGEST_CASE: usize = 20_000;
+
+/// The style of all pages.
+pub const STYLE: &str = include_str!("page.css");
 
 /// Returns the report as an HTML page.
 pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error> {
@@ -26,9 +29,10 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
         json!({"what": what, "counts": reports.iter().map(count).collect::<Vec<_>>()})
     };
     let page = json!({
+        "style": STYLE,
         "title": format!("{} and POGEMA 1.4.0", names.join(", ")),
         "outcomes": OUTCOMES,
-        "ports": reports.iter().zip(&names).map(|(report, name)| port(report, name)).collect::<Vec<_>>(),
+        "ports": reports.iter().zip(&names).enumerate().map(port).collect::<Vec<_>>(),
         "rows": summary::rows(reports).into_iter().map(|rule| row(reports, rule)).collect::<Vec<_>>(),
         "unclaimed": summary::unclaimed(reports).into_iter().map(unclaimed).collect::<Vec<_>>(),
         "stopped": leftover.stopped,
@@ -37,10 +41,12 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
     fill(include_str!("report.html"), page)
 }
 
-fn port(report: &PortReport, name: &str) -> Value {
+fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
     let score = score(report);
-    let (known, new) = report.causes.iter().partition::<Vec<&Cause>, _>(|cause| cause.known.is_some());
-    let shown = |causes: Vec<&Cause>| causes.into_iter().map(|cause| shown(cause, name)).collect::<Vec<_>>();
+    let shown = |is_known: bool| {
+        let causes = report.causes.iter().enumerate().filter(|(_, cause)| cause.known.is_some() == is_known);
+        causes.map(|(number, cause)| shown(cause, &id(index, number), name)).collect::<Vec<_>>()
+    };
     json!({
         "name": name,
         "title": title(report),
@@ -49,28 +55,49 @@ fn port(report: &PortReport, name: &str) -> Value {
         "passed": score.passed,
         "claimed": score.claimed,
         "num_not_run": report.num_not_run,
-        "new": shown(new),
-        "known": shown(known),
+        "new": shown(false),
+        "known": shown(true),
     })
+}
+
+/// Returns the name of the section of a cause in the page.
+fn id(port: usize, cause: usize) -> String {
+    format!("port-{}-cause-{}", port + 1, cause + 1)
+}
+
+/// Returns the address, within the page, of the first cause of the failures of a rule. `port` is the index of the
+/// report in the page.
+pub fn place_of(report: &PortReport, port: usize, rule: &str) -> Option<String> {
+    let first = causes_of(report, rule).next()?;
+    let number = report.causes.iter().position(|cause| std::ptr::eq(cause, first))?;
+    Some(format!("#{}", id(port, number)))
 }
 
 /// Returns a row of the table of rules: one cell per port and outcome.
 fn row(reports: &[PortReport], rule: &str) -> Value {
-    let cells = |report: &PortReport| {
+    let cells = |(port, report): (usize, &PortReport)| {
         let is_known = standing(report, rule) == Standing::Known;
         let [failed, error] = if is_known { ["known"; 2] } else { ["failed", "error"] };
         let cells = counts(report, rule).into_iter().zip(["passed", failed, "unclaimed", error]);
-        cells.map(|(count, class)| json!({"class": class, "count": count})).collect::<Vec<_>>()
+        let place = place_of(report, port, rule);
+        let url = |class: &str, count: &str| {
+            place.clone().filter(|_| ["failed", "error", "known"].contains(&class) && !count.is_empty())
+        };
+        cells
+            .map(|(count, class)| json!({"class": class, "url": url(class, &count), "count": count}))
+            .collect::<Vec<_>>()
     };
-    json!({"rule": link(rule), "cells": reports.iter().map(cells).collect::<Vec<_>>()})
+    json!({"rule": link(rule), "cells": reports.iter().enumerate().map(cells).collect::<Vec<_>>()})
 }
 
-fn link(rule: &str) -> Value {
+/// Returns a rule and the address of its section in the spec.
+pub fn link(rule: &str) -> Value {
     json!({"text": rule, "url": spec_url(rule).filter(|_| is_rule(rule))})
 }
 
-fn shown(cause: &Cause, port: &str) -> Value {
+fn shown(cause: &Cause, id: &str, port: &str) -> Value {
     json!({
+        "id": id,
         "rule": cause.rule.as_deref().map(link),
         "statement": cause.rule.as_deref().and_then(rules::statement_of),
         "what": cause.what,

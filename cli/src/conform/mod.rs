@@ -8,6 +8,7 @@ mod known;
 mod outputs;
 mod port_table;
 mod ports;
+mod site;
 mod summary;
 
 use std::fmt::Write as _;
@@ -47,7 +48,7 @@ pub struct Conform {
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
     /// Write the test vectors to this folder as JSON, and check nothing
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["oracle", "json", "commands", "traces"])]
     vectors: Option<PathBuf>,
     #[command(flatten)]
     ports: ports::Ports,

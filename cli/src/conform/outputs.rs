@@ -9,7 +9,7 @@ use pogema_conformance::port::PortReport;
 use pogema_core::Error;
 
 use super::known::{Known, Leftover};
-use super::{badge, html, junit};
+use super::{badge, html, junit, site};
 use crate::output::check_writable;
 
 #[derive(Args, Debug)]
@@ -23,6 +23,9 @@ pub struct Outputs {
     /// Write the verdict to this file as an SVG badge; requires exactly one port
     #[arg(long, value_name = "FILE", requires = "commands")]
     badge: Option<PathBuf>,
+    /// Write a site to this folder: a table of rules and ports, a page and badges for each port, and a text form
+    #[arg(long, value_name = "FOLDER", requires = "commands")]
+    site: Option<PathBuf>,
     /// Accept the known deviations listed in this file
     ///
     /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`; add
@@ -55,6 +58,7 @@ impl Outputs {
                 return Err(Error::io(path, "two reports would be written to this file"));
             }
         }
+        self.site.as_deref().map_or(Ok(()), site::create)?;
         self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)
     }
 
@@ -69,6 +73,7 @@ impl Outputs {
     pub fn write(&self, reports: &[PortReport], leftover: &Leftover) -> Result<(), Error> {
         write(self.junit.as_deref(), || junit::xml(reports, leftover))?;
         write(self.html.as_deref(), || html::page(reports, leftover))?;
+        self.site.as_deref().map_or(Ok(()), |folder| site::write(folder, reports, leftover))?;
         reports.first().map_or(Ok(()), |report| write(self.badge.as_deref(), || badge::badge(report)))
     }
 }

@@ -95,15 +95,26 @@ pub fn name_of(report: &PortReport) -> &str {
     report.hello.as_ref().map_or(&report.command, |hello| &hello.name)
 }
 
-/// Returns the names of the ports; a repeated name gets a number.
+/// Returns the names of the ports. Ports of one name get their versions if these differ, and numbers otherwise.
 pub fn names(reports: &[PortReport]) -> Vec<String> {
-    let earlier =
-        |until: usize, name: &str| reports[..until].iter().filter(|report| name_of(report) == name).count();
-    let numbered = reports.iter().enumerate().map(|(index, report)| match earlier(index, name_of(report)) {
-        0 => name_of(report).to_owned(),
-        count => format!("{} ({})", name_of(report), count + 1),
-    });
-    numbered.collect()
+    let version =
+        |report: &PortReport| report.hello.as_ref().map_or(String::new(), |hello| hello.version.clone());
+    let versioned = |report: &PortReport| {
+        let name = name_of(report);
+        let is_other = |other: &&PortReport| name_of(other) == name && version(other) != version(report);
+        let differs = reports.iter().any(|other| is_other(&other));
+        if differs { format!("{name} {}", version(report)) } else { name.to_owned() }
+    };
+    let names: Vec<String> = reports.iter().map(versioned).collect();
+    let numbered = |(index, name): (usize, &String)| match names[..index]
+        .iter()
+        .filter(|other| *other == name)
+        .count()
+    {
+        0 => name.clone(),
+        count => format!("{name} ({})", count + 1),
+    };
+    names.iter().enumerate().map(numbered).collect()
 }
 
 /// Returns name, version and command line of a port.

@@ -1,0 +1,200 @@
+//! The standing report: a folder of static pages that compares implementations rule by rule.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use pogema_conformance::panel::{Limits, text_of_panels};
+use pogema_conformance::port::{Cause, Mode, PortReport, Verdicts};
+use pogema_conformance::{Request, files};
+use pogema_core::Error;
+use serde_json::{Value, json};
+
+use super::badge::{badge, endpoint};
+use super::html::{self, STYLE, link, place_of};
+use super::known::Leftover;
+use super::summary::{self, Standing, fill, is_rule, names, printable, score, shortened, standing, verdict};
+use crate::output::write_json;
+
+/// Limits of the pictures in the text form.
+const LIMITS: Limits = Limits { rows: 12, columns: 100 };
+
+/// Creates the folder if it is missing.
+///
+/// # Errors
+/// [`Error::Io`] if that is impossible.
+pub fn create(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))
+}
+
+/// Writes the pages, the badges and the text form to a folder.
+///
+/// # Errors
+/// [`Error::Io`] for the first file that cannot be written.
+pub fn write(folder: &Path, reports: &[PortReport], leftover: &Leftover) -> Result<(), Error> {
+    let files = file_names(&names(reports));
+    for (report, file) in reports.iter().zip(&files) {
+        let page = html::page(std::slice::from_ref(report), &Leftover::default())?;
+        write_text(folder, &format!("{file}.html"), &page)?;
+        write_text(folder, &format!("{file}.svg"), &badge(report)?)?;
+        write_json(&folder.join(format!("{file}.json")), &endpoint(report))?;
+    }
+    write_text(folder, "index.html", &index(reports, &files, leftover)?)?;
+    write_text(folder, "survey.md", &printable(&survey(reports)))?;
+    write_json(&folder.join("reports.json"), &reports)
+}
+
+fn write_text(folder: &Path, name: &str, text: &str) -> Result<(), Error> {
+    files::write(&folder.join(name), text.as_bytes())
+}
+
+/// Returns names of files without ending, one for each port: lower-case letters, digits, `.` and `-`.
+fn file_names(names: &[String]) -> Vec<String> {
+    let mut taken = vec!["index".to_owned(), "reports".to_owned()];
+    for name in names {
+        let letters = name.to_lowercase();
+        let kept = letters.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '.');
+        let stem = kept.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
+        let stem = stem.trim_matches(['.', '-']);
+        let stem = if stem.is_empty() { "port" } else { stem };
+        let mut numbered = (2..).map(|number| format!("{stem}-{number}"));
+        let mut file = stem.to_owned();
+        while taken.contains(&file) {
+            file = numbered.next().unwrap_or_default();
+        }
+        taken.push(file);
+    }
+    taken.split_off(2)
+}
+
+fn index(reports: &[PortReport], files: &[String], leftover: &Leftover) -> Result<String, Error> {
+    let port = |((report, name), file): ((&PortReport, String), &String)| {
+        let version = report.hello.as_ref().map_or("", |hello| &hello.version);
+        json!({
+            "name": name,
+            "version": version,
+            "page": format!("{file}.html"),
+            "badge": format!("{file}.svg"),
+            "message": endpoint(report)["message"],
+        })
+    };
+    let page = json!({
+        "style": STYLE,
+        "title": "Which implementation follows which rule",
+        "ports": reports.iter().zip(names(reports)).zip(files).map(port).collect::<Vec<_>>(),
+        "rows": summary::rows(reports).into_iter().map(|rule| row(reports, files, rule)).collect::<Vec<_>>(),
+        "stopped": leftover.stopped,
+        "not_played": leftover.not_played,
+    });
+    fill(include_str!("site.html"), page)
+}
+
+fn row(reports: &[PortReport], files: &[String], rule: &str) -> Value {
+    let cell = |(report, file): (&PortReport, &String)| {
+        let (mark, class) = mark(report, rule);
+        let is_bad = ["failed", "error", "known"].contains(&class);
+        let url = place_of(report, 0, rule).filter(|_| is_bad).map(|place| format!("{file}.html{place}"));
+        json!({"mark": mark, "class": class, "url": url})
+    };
+    json!({"rule": link(rule), "cells": reports.iter().zip(files).map(cell).collect::<Vec<_>>()})
+}
+
+/// Returns the outcome of a rule as a sign with the number of failures, and its class in the style sheet.
+fn mark(report: &PortReport, rule: &str) -> (String, &'static str) {
+    let Verdicts { failed, errors, .. } = report.rules.get(rule).copied().unwrap_or_default();
+    let bad = format!("✗ {}", failed + errors);
+    match standing(report, rule) {
+        Standing::Passed => ("✓".into(), "passed"),
+        Standing::Failed => (bad, "failed"),
+        Standing::Known => (bad, "known"),
+        Standing::Error => (bad, "error"),
+        Standing::NotClaimed => ("–".into(), "unclaimed"),
+        Standing::Blank => (String::new(), "nothing"),
+    }
+}
+
+/// Returns the report as Markdown: verdicts, the table of rules, and the smallest counterexample of each cause.
+fn survey(reports: &[PortReport]) -> String {
+    let names: Vec<String> = names(reports).iter().map(|name| name.replace('|', "\\|")).collect();
+    let mut text = String::new();
+    for (report, name) in reports.iter().zip(&names) {
+        let score = score(report);
+        let _ =
+            writeln!(text, "- {name}: {} of {} rules hold; {}", score.passed, score.claimed, verdict(report));
+    }
+    let _ = writeln!(
+        text,
+        "\n## Rules\n\n| rule | {} |\n| --- |{}",
+        names.join(" | "),
+        " --- |".repeat(names.len())
+    );
+    for rule in summary::rows(reports).into_iter().filter(|rule| is_rule(rule)) {
+        let marks: Vec<String> = reports.iter().map(|report| mark(report, rule).0).collect();
+        let _ = writeln!(text, "| `{rule}` | {} |", marks.join(" | "));
+    }
+    let _ = writeln!(text, "\n## Smallest counterexamples");
+    let mut groups: BTreeMap<(&str, &str, &str), Vec<(&str, &Cause)>> = BTreeMap::new();
+    for (report, name) in reports.iter().zip(&names) {
+        for cause in &report.causes {
+            let key = (cause.rule.as_deref().unwrap_or("protocol"), cause.what.as_str(), cause.when.as_str());
+            groups.entry(key).or_default().push((name, cause));
+        }
+    }
+    for ((rule, what, when), shown) in groups {
+        let _ = writeln!(text, "\n{}", counterexample(rule, what, when, &shown));
+    }
+    text
+}
+
+fn counterexample(rule: &str, what: &str, when: &str, shown: &[(&str, &Cause)]) -> String {
+    let length = |(_, cause): &&(&str, &Cause)| request_text(&cause.example.request).len();
+    let Some((_, cause)) = shown.iter().min_by_key(length) else { return String::new() };
+    let times: Vec<String> = shown.iter().map(|(name, cause)| format!("{name} ({}×)", cause.times)).collect();
+    let given = if cause.example.mode == Mode::Instance { "an instance" } else { "a config" };
+    let mut text = format!("### `{rule}`: {what}\n\nShown by {}. ", times.join(", "));
+    let _ = write!(text, "The port was given {given}");
+    let _ = writeln!(text, "{}.\n", if when.is_empty() { String::new() } else { format!("; {when}") });
+    let _ = writeln!(text, "```text\n{}", request_text(&cause.example.request));
+    if let Some(found) = &cause.example.divergence {
+        let (expected, got) = (shortened(&found.expected), shortened(&found.got));
+        let _ = writeln!(
+            text,
+            "\nafter operation {}, {}:\n  expected {expected}\n  got      {got}",
+            found.op, found.field
+        );
+        text.push_str(&text_of_panels(&found.picture, LIMITS));
+    }
+    if let Some(fault) = &cause.example.fault {
+        let _ = writeln!(text, "\n{}", fault.what);
+    }
+    format!("{}\n```", text.trim_end())
+}
+
+/// Formats the fields of a config, one per line, and the operations.
+fn request_text(request: &Request) -> String {
+    let mut text = String::new();
+    for (field, value) in request.config.as_object().into_iter().flatten() {
+        match value.as_str() {
+            Some(rows) if rows.contains('\n') || field == "map" => {
+                let rows: Vec<String> = rows.lines().map(|row| format!("  {row}")).collect();
+                let _ = writeln!(text, "{field}:\n{}", rows.join("\n"));
+            }
+            Some(word) => drop(writeln!(text, "{field}: {word}")),
+            None => drop(writeln!(text, "{field}: {value}")),
+        }
+    }
+    let ops: Vec<String> = request.ops.iter().map(|op| json!(op).to_string()).collect();
+    format!("{text}\ndo: {}", ops.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ports_get_names_of_files_that_differ() {
+        let names = ["POGEMA", "pogema", "../../x y", "…", "index", "pogema-2"].map(str::to_owned);
+        let files = file_names(&names);
+        assert_eq!(files, ["pogema", "pogema-2", "x-y", "port", "index-2", "pogema-2-2"]);
+    }
+}
