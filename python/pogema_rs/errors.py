@@ -22,6 +22,7 @@ __all__ = [
     "NotKeptError",
     "NotResetError",
     "OutsideMapError",
+    "OverrideError",
     "RefusedConfigError",
     "StateError",
     "UnknownIntegrationError",
@@ -103,6 +104,10 @@ class JumpedError(IndexError, ValueError):
 
 class AutoResetError(_Quiet, ValueError):
     """`auto_reset` with an integration that does not support it."""
+
+
+class OverrideError(StateError, TypeError):
+    """A method of an environment that a subclass overrides, although it is never called."""
 
 
 class UnknownIntegrationError(_Quiet, ValueError):
