@@ -12,7 +12,8 @@ Key = TypeVar("Key")
 
 def _refuse(self: Any, *_: Any, **__: Any) -> NoReturn:
     """Raises `StateError`."""
-    raise StateError("the state of an environment cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
+    text = "the state of an environment cannot be changed by hand"
+    raise StateError(f"{text}; reset with agents_xy and targets_xy to place agents")
 
 
 class ReadOnlyList(list[Item]):

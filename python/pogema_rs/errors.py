@@ -12,10 +12,12 @@ __all__ = [
     "ActionCountError",
     "ActionError",
     "AutoResetError",
+    "BlockedCellError",
     "ElapsedStepsError",
     "EmptyMapError",
     "InstanceError",
     "JumpedError",
+    "MapShapeError",
     "MapTextError",
     "NoCellError",
     "NoHistoryError",
@@ -57,6 +59,14 @@ class NoCellError(IndexError, ValueError):
 
 class EmptyMapError(ZeroDivisionError, ValueError):
     """A map without cells."""
+
+
+class MapShapeError(AssertionError, ValueError):
+    """A map text with rows of unequal length, or with unequal numbers of starts and goals."""
+
+
+class BlockedCellError(_Quiet, ValueError):
+    """A start or goal on an obstacle."""
 
 
 class MapTextError(_Quiet, ValueError):

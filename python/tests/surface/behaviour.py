@@ -278,6 +278,65 @@ def actions_of_the_caller() -> Any:
     return described(seen)
 
 
+@scenario
+def map_texts() -> Any:
+    """The reader of map texts, for configs and for registered maps."""
+    from pogema import GridConfig
+    from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+    texts = ("", "..\n.#", "a.\n.A", "aB", "abBA\n#...", "a..a A..A", "ab A.", "@.$ ..!", "@@", "a@ $A", "!!", "..\n...", "x.")
+    seen = []
+    for number, text in enumerate(texts):
+        seen += [outcome(GridConfig.str_map_to_list, text, free, obstacle) for free, obstacle in ((0, 1), (7, "x"))]
+        seen.append(outcome(lambda: vars(RegisteredGrid(f"text {number}", text))))  # noqa: B023 - called immediately
+        GRID_STR_REGISTRY.pop(f"text {number}", None)
+    return seen
+
+
+@scenario
+def checks_of_maps() -> Any:
+    """Starts and goals that do not fit each other or the map."""
+    from pogema import GridConfig, utils
+    from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+    pairs = [
+        (None, None), ([], []), ([[0, 0]], None), (None, [[0, 0]]), ([[0, 0]], [[0, 1]]), ([[0, 0]], [[0, 1], [0, 2]]),
+        ([[0, 0], [0, 0]], [[0, 1], [0, 2]]), ([[1, 1]], [[0, 1]]), ([[0, 1]], [[1, 1]]), ([[5, 5]], [[0, 0]]),
+        ([(0, 0), (0, 1)], [(0, 2), (0, 2)]),
+    ]  # fmt: skip
+    obstacles = np.array([[0, 0, 0], [0, 1, 0]])
+    seen = [outcome(utils.check_grid, obstacles, *pair) for pair in pairs]
+    for pair in pairs:
+        seen.append(outcome(lambda: vars(RegisteredGrid("checked", "...\n.#.", *pair))))  # noqa: B023 - called immediately
+        GRID_STR_REGISTRY.pop("checked", None)
+    RegisteredGrid("twice", "...")
+    seen += [outcome(RegisteredGrid, "twice", "..."), outcome(RegisteredGrid, "letters", "a.A", [[0, 1]], None)]
+    GRID_STR_REGISTRY.pop("twice")
+    cells = ([[0, 0]], [(1, 2)], [[2, 0]], [[0, 3]], [[-1, 0]], [[0]], [[0.0, 1]], ["ab"], [None])
+    seen += [outcome(GridConfig.check_positions, cell, 3, 2) for cell in cells]
+    return [*seen, described(utils.CommonSettings().dict())]
+
+
+@scenario
+def search_of_the_policy() -> Any:
+    """The memory and the search of the A* policy."""
+    from pogema import a_star_policy as policy
+
+    generator, seen = np.random.default_rng(4), []
+    for number in range(60):
+        memory = policy.GridMemory(start_r=int(generator.integers(1, 9)))
+        for _ in range(4):
+            window = generator.binomial(1, 0.3, (5, 5))
+            memory.update(*generator.integers(-9, 10, size=2).tolist(), window)
+        places = [(row, col) for row in range(-40, 40, 3) for col in range(-40, 40)]
+        seen.append(described([bool(memory.is_obstacle(*place)) for place in places]))
+        start, goal = (tuple(generator.integers(-9, 10, size=2).tolist()) for _ in range(2))
+        seen += [outcome(policy.a_star, start, goal, memory, steps) for steps in (10000, number, 0)]
+        seen.append(outcome(policy.h, start, goal))
+    node = policy.Node()
+    return [*seen, described([node.i, node.j, node.g, node.h, node.f, policy.INF, node < policy.Node((1, 1))])]
+
+
 def main(package: str) -> None:
     """Plays all scenarios."""
     out, sys.stdout = sys.stdout.buffer, sys.stderr
