@@ -8,8 +8,12 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from pogema_rs import _engine
+from pogema_rs._forward import forwarded
 
 __all__ = ["INF", "AStarAgent", "BatchAStarAgent", "GridMemory", "Node", "a_star", "h"]
+
+# POGEMA's module offers this name too.
+__getattr__, __dir__ = forwarded(__name__, {"GridConfig": "grid_config"})
 
 Cell = tuple[int, int]
 

@@ -14,6 +14,7 @@ import gymnasium
 import numpy as np
 
 from pogema_rs import _engine, _history, grid_registry
+from pogema_rs._forward import forwarded
 from pogema_rs._overrides import Overridable
 from pogema_rs._read_only import ReadOnlyList
 from pogema_rs.errors import NoHistoryError, NotKeptError, NotResetError, StateError
@@ -24,6 +25,25 @@ from pogema_rs.semantics import Semantics
 from pogema_rs.svg_animation.filmed import Filmed
 
 __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "CSRMetric": "wrappers.metrics",
+        "EpLengthMetric": "wrappers.metrics",
+        "ISRMetric": "wrappers.metrics",
+        "LifeLongAverageThroughputMetric": "wrappers.metrics",
+        "MultiTimeLimit": "wrappers.multi_time_limit",
+        "NonDisappearCSRMetric": "wrappers.metrics",
+        "NonDisappearEpLengthMetric": "wrappers.metrics",
+        "NonDisappearISRMetric": "wrappers.metrics",
+        "PersistentWrapper": "wrappers.persistence",
+        "SumOfCostsAndMakespanMetric": "wrappers.metrics",
+        "generate_from_possible_targets": "generator",
+        "generate_new_target": "generator",
+    },
+)
 
 _PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
@@ -211,7 +231,7 @@ class Pogema(PogemaBase):
         """Writes the action to stay over each move that was not carried out; a tuple stays unchanged."""
         if not isinstance(actions, tuple):
             for agent, cell in enumerate(self._engine.cells(0)):
-                if active[agent] and cell == cells[agent] and actions[agent] != 0:
+                if active[agent] and cell == cells[agent] and actions[agent] % 5 != 0:  # 0 and -5 stay
                     actions[agent] = 0
 
     @property

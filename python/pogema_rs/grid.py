@@ -14,6 +14,7 @@ from typing import Any, NoReturn, Optional, Union
 import numpy as np
 
 from pogema_rs import _engine, grid_registry
+from pogema_rs._forward import forwarded
 from pogema_rs._read_only import ReadOnlyDict, ReadOnlyList
 from pogema_rs.errors import StateError
 from pogema_rs.generator import get_components
@@ -21,6 +22,18 @@ from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.utils import render_grid
 
 __all__ = ["Grid", "GridLifeLong"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "generate_from_possible_positions": "generator",
+        "generate_obstacles": "generator",
+        "generate_positions_and_targets_fast": "generator",
+        "get_grid": "grid_registry",
+        "in_registry": "grid_registry",
+    },
+)
 
 Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
