@@ -78,11 +78,53 @@ class ActionsSampler:
         return self._rnd.integers(self._num_actions, size=dim)
 
 
-class PogemaBase(Overridable, Filmed, gymnasium.Env):
-    """The base class of POGEMA's environments."""
+class PogemaBase(Overridable, gymnasium.Env):
+    """The base class of POGEMA's environments, without a step and a reset."""
+
+    metadata = {"render_modes": ["ansi"]}
+
+    def __init__(self, grid_config: Optional[GridConfig] = None) -> None:
+        self.grid_config = GridConfig() if grid_config is None else grid_config
+        self.grid: Optional[Grid] = None
+        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
+        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
+
+    def step(self, action: Any) -> Any:
+        """Plays one step; a subclass defines it."""
+        raise NotImplementedError
+
+    def reset(
+        self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None
+    ) -> Any:
+        """Begins an episode; a subclass defines it."""
+        raise NotImplementedError
+
+    def check_reset(self) -> None:
+        """Raises `NotResetError` if the environment was not reset yet."""
+        if self.grid is None:
+            raise NotResetError("the environment was not reset yet")
+
+    def render(self, mode: str = "human") -> Optional[str]:
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
+        return self._started().render(mode=mode)
+
+    def sample_actions(self) -> np.ndarray:
+        """Returns a random action for each agent, from a generator seeded with the config's seed.
+
+        Shape: `(agents,)`, int64
+        """
+        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
+
+    def get_num_agents(self) -> int:
+        """Returns the number of agents."""
+        return self.grid_config.num_agents
+
+    def _started(self) -> Grid:
+        self.check_reset()
+        return cast(Grid, self.grid)
 
 
-class Pogema(PogemaBase):
+class Pogema(Filmed, PogemaBase):
     """An environment; `pogema_v0` makes one with a time limit and metrics.
 
     A subclass may override `_obs`, `_get_agents_obs`, `_pomapf_obs` and `_get_infos`, which compute what `reset` and
@@ -99,7 +141,6 @@ class Pogema(PogemaBase):
     Source: POGEMA 1.4.0, `envs.py`
     """
 
-    metadata = {"render_modes": ["ansi"]}
     _grid_class = Grid
     # Whether the environment neither truncates episodes nor measures metrics.
     _is_bare = False
@@ -115,9 +156,8 @@ class Pogema(PogemaBase):
         semantics: Union[str, Semantics] = Semantics.RELEASED,
     ) -> None:
         self._check_overrides()
-        self.grid_config = GridConfig(num_agents=2) if grid_config is None else grid_config
+        super().__init__(GridConfig(num_agents=2) if grid_config is None else grid_config)
         self.semantics = Semantics(semantics)
-        self.grid: Optional[Grid] = None
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
         # As in POGEMA, the time limit and the class follow from the config that the environment was made with.
@@ -130,9 +170,7 @@ class Pogema(PogemaBase):
             self._registered(),
             self.semantics.occupancy_is_exact,
         )
-        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self.observation_space = _observation_space(self.grid_config)
-        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
     # POGEMA's users change or replace the config between two resets. The values of the last reset are kept, so that an
     # unchanged config is not read again.
@@ -192,7 +230,7 @@ class Pogema(PogemaBase):
         Rule: seed/reset
         """
         if seed is not None and self.semantics.reset_takes_seed:
-            super().reset(seed=seed)
+            gymnasium.Env.reset(self, seed=seed)
             self.grid_config.seed = seed
             self._sampler.update_seed(seed)
         self._begin_episode()
@@ -238,30 +276,6 @@ class Pogema(PogemaBase):
     def was_on_goal(self) -> Optional[list[bool]]:
         """Whether each agent was active and on its goal after the last move; `None` before the first reset."""
         return None if self.grid is None else ReadOnlyList(self._engine.on_goal)
-
-    def check_reset(self) -> None:
-        """Raises `NotResetError` if the environment was not reset yet."""
-        if self.grid is None:
-            raise NotResetError("the environment was not reset yet")
-
-    def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
-        return self._started().render(mode=mode)
-
-    def sample_actions(self) -> np.ndarray:
-        """Returns a random action for each agent, from a generator seeded with the config's seed.
-
-        Shape: `(agents,)`, int64
-        """
-        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
-
-    def get_num_agents(self) -> int:
-        """Returns the number of agents."""
-        return self.grid_config.num_agents
-
-    def _started(self) -> Grid:
-        self.check_reset()
-        return cast(Grid, self.grid)
 
     def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
         """See `Grid.get_obstacles`."""

@@ -218,6 +218,23 @@ def overridden_methods() -> Any:
 
 
 @scenario
+def base_class() -> Any:
+    """An environment of one's own, on POGEMA's base class."""
+    from pogema.envs import PogemaBase
+    from pogema.grid import Grid
+
+    class Own(PogemaBase):
+        def reset(self, **keywords: Any) -> Any:
+            self.grid = Grid(self.grid_config)
+            return self._get_agents_obs(1), keywords
+
+    env = Own(config())
+    seen = [outcome(env.check_reset), outcome(env.render), outcome(env.step, [0])]
+    seen += [outcome(env.reset, seed=1), outcome(env.check_reset), outcome(env.sample_actions)]
+    return [*seen, env.get_num_agents(), env.metadata, outcome(PogemaBase().reset), PogemaBase().get_num_agents()]
+
+
+@scenario
 def components_of_a_grid() -> Any:
     """Both maps, with the types of their keys and values."""
     seen = []
@@ -284,7 +301,8 @@ def map_texts() -> Any:
     from pogema import GridConfig
     from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 
-    texts = ("", "..\n.#", "a.\n.A", "aB", "abBA\n#...", "a..a A..A", "ab A.", "@.$ ..!", "@@", "a@ $A", "!!", "..\n...", "x.")
+    texts = ("", "..\n.#", "a.\n.A", "aB", "abBA\n#...", "a..a A..A", "ab A.", "@.$ ..!", "@@", "a@ $A", "!!")
+    texts += ("..\n...", "x.", "?.")
     seen = []
     for number, text in enumerate(texts):
         seen += [outcome(GridConfig.str_map_to_list, text, free, obstacle) for free, obstacle in ((0, 1), (7, "x"))]
@@ -299,7 +317,7 @@ def checks_of_maps() -> Any:
     from pogema import GridConfig, utils
     from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 
-    pairs = [
+    pairs: list[Any] = [
         (None, None), ([], []), ([[0, 0]], None), (None, [[0, 0]]), ([[0, 0]], [[0, 1]]), ([[0, 0]], [[0, 1], [0, 2]]),
         ([[0, 0], [0, 0]], [[0, 1], [0, 2]]), ([[1, 1]], [[0, 1]]), ([[0, 1]], [[1, 1]]), ([[5, 5]], [[0, 0]]),
         ([(0, 0), (0, 1)], [(0, 2), (0, 2)]),
@@ -307,7 +325,7 @@ def checks_of_maps() -> Any:
     obstacles = np.array([[0, 0, 0], [0, 1, 0]])
     seen = [outcome(utils.check_grid, obstacles, *pair) for pair in pairs]
     for pair in pairs:
-        seen.append(outcome(lambda: vars(RegisteredGrid("checked", "...\n.#.", *pair))))  # noqa: B023 - called immediately
+        seen.append(outcome(lambda: vars(RegisteredGrid("checked", "...\n.#.", *pair))))  # noqa: B023
         GRID_STR_REGISTRY.pop("checked", None)
     RegisteredGrid("twice", "...")
     seen += [outcome(RegisteredGrid, "twice", "..."), outcome(RegisteredGrid, "letters", "a.A", [[0, 1]], None)]

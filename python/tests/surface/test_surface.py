@@ -156,17 +156,19 @@ def test_walk_finds_the_surface(surfaces: tuple[Surface, Surface]) -> None:
     assert expected <= theirs.keys() and len(theirs) > 1000
 
 
+PARAMETERS = [["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "1"]]
+
+
 @pytest.mark.parametrize(
     ("ours", "fits"),
     [
-        ([["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "1"]], True),
+        (PARAMETERS, True),
         ([["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "2"]], False),
         ([["b", "POSITIONAL_OR_KEYWORD", "1"], ["a", "POSITIONAL_OR_KEYWORD", None]], False),
         ([["a", "POSITIONAL_OR_KEYWORD", None]], False),
-        ([["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "1"], ["c", "KEYWORD_ONLY", None]], False),
-        ([["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "1"], ["c", "KEYWORD_ONLY", "0"]], True),
+        ([*PARAMETERS, ["c", "KEYWORD_ONLY", None]], False),
+        ([*PARAMETERS, ["c", "KEYWORD_ONLY", "0"]], True),
     ],
 )
 def test_parameters_are_compared(ours: list, fits: bool) -> None:
-    theirs = [["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD", "1"]]
-    assert accepts(ours, theirs) is fits
+    assert accepts(ours, PARAMETERS) is fits
