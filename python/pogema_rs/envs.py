@@ -266,7 +266,10 @@ class Pogema(Filmed, PogemaBase):
         return self._completed(result) if self._overridden else result
 
     def _rewrite(self, actions: Any, active: list[bool], cells: list[tuple[int, int]]) -> None:
-        """Writes the action to stay over each move that was not carried out; a tuple stays unchanged."""
+        """Writes the action to stay over each move that was not carried out; a tuple stays unchanged.
+
+        Rule: collide/soft/rewrite
+        """
         if not isinstance(actions, tuple):
             for agent, cell in enumerate(self._engine.cells(0)):
                 if active[agent] and cell == cells[agent] and actions[agent] % 5 != 0:  # 0 and -5 stay
