@@ -2,12 +2,14 @@
 
 The implementations are the engines of this project, releases of POGEMA, and the templates of ports. Creates the virtual
 environments of the releases in target/survey/venvs; `--venvs FOLDER` selects another folder. Writes the site of
-`pogema conform --site` to target/survey/site. Needs `target/release/pogema`, and what build_template needs.
+`pogema conform --site` to target/survey/site. Needs the program
+(POGEMA_PROGRAM, or else `target/release/pogema`), and what build_template needs.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +17,7 @@ from pathlib import Path
 PORTS = Path(__file__).resolve().parent
 ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
-PROGRAM = ROOT / "target/release/pogema"
+PROGRAM = os.environ.get("POGEMA_PROGRAM", ROOT / "target/release/pogema")
 
 
 def environments(folder: Path) -> dict[str, str]:

@@ -1,4 +1,8 @@
-"""Single environments with POGEMA's interface: lists with one entry per agent."""
+"""Single environments with POGEMA's interface: lists with one entry per agent.
+
+`pogema_v0` makes an environment with a time limit and metrics. The classes of this module have neither, as in POGEMA;
+`pogema_rs.wrappers` adds them.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +13,37 @@ from typing import Any, Literal, Optional, Union, cast, overload
 import gymnasium
 import numpy as np
 
-from pogema_rs import _engine, grid_registry
-from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError, NotResetError, StateError
+from pogema_rs import _engine, _history, grid_registry
+from pogema_rs._forward import forwarded
+from pogema_rs._overrides import Overridable
+from pogema_rs._read_only import ReadOnlyList
+from pogema_rs.errors import NoHistoryError, NotKeptError, NotResetError, StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_fields
+from pogema_rs.install import is_installed
 from pogema_rs.semantics import Semantics
 from pogema_rs.svg_animation.filmed import Filmed
-from pogema_rs.wrappers import persistence
 
 __all__ = ["ActionsSampler", "Pogema", "PogemaBase", "PogemaCoopFinish", "PogemaLifeLong"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "CSRMetric": "wrappers.metrics",
+        "EpLengthMetric": "wrappers.metrics",
+        "ISRMetric": "wrappers.metrics",
+        "LifeLongAverageThroughputMetric": "wrappers.metrics",
+        "MultiTimeLimit": "wrappers.multi_time_limit",
+        "NonDisappearCSRMetric": "wrappers.metrics",
+        "NonDisappearEpLengthMetric": "wrappers.metrics",
+        "NonDisappearISRMetric": "wrappers.metrics",
+        "PersistentWrapper": "wrappers.persistence",
+        "SumOfCostsAndMakespanMetric": "wrappers.metrics",
+        "generate_from_possible_targets": "generator",
+        "generate_new_target": "generator",
+    },
+)
 
 _PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
@@ -52,25 +78,76 @@ class ActionsSampler:
         return self._rnd.integers(self._num_actions, size=dim)
 
 
-class PogemaBase(Filmed, gymnasium.Env):
-    """The base class of POGEMA's environments."""
+class PogemaBase(Overridable, gymnasium.Env):
+    """The base class of POGEMA's environments, without a step and a reset."""
+
+    metadata = {"render_modes": ["ansi"]}
+
+    def __init__(self, grid_config: Optional[GridConfig] = None) -> None:
+        self.grid_config = GridConfig() if grid_config is None else grid_config
+        self.grid: Optional[Grid] = None
+        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
+        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
+
+    def step(self, action: Any) -> Any:
+        """Plays one step; a subclass defines it."""
+        raise NotImplementedError
+
+    def reset(
+        self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None
+    ) -> Any:
+        """Begins an episode; a subclass defines it."""
+        raise NotImplementedError
+
+    def check_reset(self) -> None:
+        """Raises `NotResetError` if the environment was not reset yet."""
+        if self.grid is None:
+            raise NotResetError("the environment was not reset yet")
+
+    def render(self, mode: str = "human") -> Optional[str]:
+        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
+        return self._started().render(mode=mode)
+
+    def sample_actions(self) -> np.ndarray:
+        """Returns a random action for each agent, from a generator seeded with the config's seed.
+
+        Shape: `(agents,)`, int64
+        """
+        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
+
+    def get_num_agents(self) -> int:
+        """Returns the number of agents."""
+        return self.grid_config.num_agents
+
+    def _started(self) -> Grid:
+        self.check_reset()
+        return cast(Grid, self.grid)
 
 
-class Pogema(PogemaBase):
-    """An environment with its time limit and metrics; `pogema_v0` makes one.
+class Pogema(Filmed, PogemaBase):
+    """An environment; `pogema_v0` makes one with a time limit and metrics.
+
+    A subclass may override `_obs`, `_get_agents_obs`, `_pomapf_obs` and `_get_infos`, which compute what `reset` and
+    `step` return, and all public methods except `move_agents` and `update_was_on_goal`.
 
     Shape: the `default` observation of each agent is float32 `(3, side, side)` with the channels obstacles, agents and
     goal; `POMAPF` and `MAPF` are dictionaries.
 
-    Errors: those of `pogema_rs.errors`. A call that fails leaves the environment as it was.
+    Errors: those of `pogema_rs.errors`. A call that fails leaves the environment as it was. A subclass that overrides a
+    method that is never called raises `OverrideError`, a `TypeError`, when an object of it is made.
 
     Rule: observe/default, observe/pomapf, observe/mapf
 
     Source: POGEMA 1.4.0, `envs.py`
     """
 
-    metadata = {"render_modes": ["ansi"]}
     _grid_class = Grid
+    # Whether the environment neither truncates episodes nor measures metrics.
+    _is_bare = False
+    # Whether a step under `soft` writes into the caller's actions.
+    _rewrites_actions = False
+    # How many goals of its sequence each agent has reached, if the config gives sequences.
+    _num_reached: Optional[list[int]] = None
 
     def __init__(
         self,
@@ -78,21 +155,22 @@ class Pogema(PogemaBase):
         *,
         semantics: Union[str, Semantics] = Semantics.RELEASED,
     ) -> None:
-        self.grid_config = GridConfig(num_agents=2) if grid_config is None else grid_config
+        self._check_overrides()
+        super().__init__(GridConfig(num_agents=2) if grid_config is None else grid_config)
         self.semantics = Semantics(semantics)
-        self.grid: Optional[Grid] = None
-        self._has_metrics = not self.grid_config.persistent
+        self._is_bare, self._has_metrics = True, False
+        self._rewrites_actions = is_installed()
         # As in POGEMA, the time limit and the class follow from the config that the environment was made with.
         self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
+        if self.grid_config.on_target == "restart" and self.grid_config.targets_xy is not None:
+            self._num_reached = [0] * self.grid_config.num_agents
         self._remember_config()
         self._engine = _engine.Engine(
             engine_fields(self.grid_config, **self._fixed),
             self._registered(),
             self.semantics.occupancy_is_exact,
         )
-        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self.observation_space = _observation_space(self.grid_config)
-        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
     # POGEMA's users change or replace the config between two resets. The values of the last reset are kept, so that an
     # unchanged config is not read again.
@@ -123,6 +201,8 @@ class Pogema(PogemaBase):
             messages = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
         if changed or not is_same:
             self._remember_config()
+        if self._num_reached is not None:
+            self._num_reached = [0] * self.grid_config.num_agents
         for text in messages:
             warnings.warn(text, UserWarning, stacklevel=3)
         self.grid = self._grid_class._of(self._engine, self.grid_config)
@@ -150,57 +230,55 @@ class Pogema(PogemaBase):
         Rule: seed/reset
         """
         if seed is not None and self.semantics.reset_takes_seed:
-            super().reset(seed=seed)
+            gymnasium.Env.reset(self, seed=seed)
             self.grid_config.seed = seed
             self._sampler.update_seed(seed)
         self._begin_episode()
         if self.semantics.reset_clears_metrics:
             self._engine.clear_metrics()
-        observations = self._engine.observe()
-        return (observations, self._engine.infos()) if return_info else observations
+        observations = self._obs()
+        return (observations, self._get_infos()) if return_info else observations
 
     def step(  # type: ignore[override]
         self, action: Sequence[int]
     ) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
-        In the step that ends an episode `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
-        POGEMA writes into them if `collision_system` is `soft`.
+        In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged.
+        After `install_as_pogema()`, they become the actions as carried out if `collision_system` is `soft`, as in
+        POGEMA.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 
         Rule: move/actions, end/terminated, end/truncated
         """
-        return self._engine.step(action, self._has_metrics)
+        if self._rewrites_actions and self.grid_config.collision_system == "soft":
+            before = self._engine.active, self._engine.cells(0)
+            result = self._engine.step(action, self._has_metrics)
+            self._rewrite(action, *before)
+        else:
+            result = self._engine.step(action, self._has_metrics)
+        if self._num_reached is not None:
+            for agent, on_goal in enumerate(self._engine.on_goal):
+                self._num_reached[agent] += on_goal
+        if self._is_bare:
+            result = (*result[:3], [False] * len(result[3]), result[4])
+        return self._completed(result) if self._overridden else result
+
+    def _rewrite(self, actions: Any, active: list[bool], cells: list[tuple[int, int]]) -> None:
+        """Writes the action to stay over each move that was not carried out; a tuple stays unchanged.
+
+        Rule: collide/soft/rewrite
+        """
+        if not isinstance(actions, tuple):
+            for agent, cell in enumerate(self._engine.cells(0)):
+                if active[agent] and cell == cells[agent] and actions[agent] % 5 != 0:  # 0 and -5 stay
+                    actions[agent] = 0
 
     @property
     def was_on_goal(self) -> Optional[list[bool]]:
         """Whether each agent was active and on its goal after the last move; `None` before the first reset."""
-        return None if self.grid is None else self._engine.on_goal
-
-    def check_reset(self) -> None:
-        """Raises `NotResetError` if the environment was not reset yet."""
-        if self.grid is None:
-            raise NotResetError("the environment was not reset yet")
-
-    def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
-        return self._started().render(mode=mode)
-
-    def sample_actions(self) -> np.ndarray:
-        """Returns a random action for each agent, from a generator seeded with the config's seed.
-
-        Shape: `(agents,)`, int64
-        """
-        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
-
-    def get_num_agents(self) -> int:
-        """Returns the number of agents."""
-        return self.grid_config.num_agents
-
-    def _started(self) -> Grid:
-        self.check_reset()
-        return cast(Grid, self.grid)
+        return None if self.grid is None else ReadOnlyList(self._engine.on_goal)
 
     def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
         """See `Grid.get_obstacles`."""
@@ -245,10 +323,7 @@ class Pogema(PogemaBase):
 
         Errors: `ValueError` for a config that is not persistent, and for a number below 0.
         """
-        if not self._fixed["persistent"]:
-            raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
-        if elapsed_steps < 0:
-            raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
+        _history.check_elapsed_steps(self._fixed["persistent"], elapsed_steps)
         self._engine.elapsed = elapsed_steps
 
     def get_history(self) -> list:
@@ -259,21 +334,38 @@ class Pogema(PogemaBase):
         Rule: history/changes
         """
         self._check_kept()
-        return persistence.kept(self._engine, self.grid_config.obs_radius)
+        return _history.kept(self._engine, self.grid_config.obs_radius)
 
     def get_full_history(self) -> list:
         """Returns for each agent its `AgentState` at every step so far, including the reset."""
         num_steps = self._engine.num_steps
-        return [persistence.at_every_step(changes, num_steps) for changes in self.get_history()]
+        return [_history.at_every_step(changes, num_steps) for changes in self.get_history()]
 
-    agent_state_to_full_list = staticmethod(persistence.at_every_step)
-    decompress_history = staticmethod(persistence.PersistentWrapper.decompress_history)
+    agent_state_to_full_list = staticmethod(_history.at_every_step)
+    decompress_history = staticmethod(_history.decompressed)
 
 
 class PogemaLifeLong(Pogema):
     """An environment with `on_target="restart"`."""
 
     _grid_class = GridLifeLong
+    _step_gets_infos = False
+
+    @property
+    def has_custom_sequences(self) -> bool:
+        """Whether the config gave each agent a sequence of goals when the environment was made."""
+        return self._num_reached is not None
+
+    @property
+    def current_goal_indices(self) -> list[int]:
+        """The index of each agent's goal in its sequence of goals; 0 without sequences.
+
+        As in POGEMA, `step_back` does not change it.
+        """
+        counts, sequences = self._num_reached, self.grid_config.targets_xy
+        if counts is None or sequences is None:
+            return ReadOnlyList([0] * self.grid_config.num_agents)
+        return ReadOnlyList(count % len(sequence) for count, sequence in zip(counts, sequences))
 
     def get_lifelong_targets_xy(self, ignore_borders: bool = False) -> list:
         """Returns the goals that each agent gets if it reaches all of them, as POGEMA predicts them.
@@ -287,6 +379,7 @@ class PogemaLifeLong(Pogema):
 class PogemaCoopFinish(Pogema):
     """An environment with `on_target="nothing"`."""
 
+    _step_gets_infos = False
     is_multiagent = True
 
     @property
@@ -303,7 +396,9 @@ def _make_pogema(grid_config: GridConfig, semantics: Union[str, Semantics] = Sem
         made = _CLASSES[grid_config.on_target]
     except (KeyError, TypeError):
         raise StateError(f"on_target is {grid_config.on_target!r}, expected one of {list(_CLASSES)}") from None
-    return made(grid_config, semantics=semantics)
+    env = made(grid_config, semantics=semantics)
+    env._is_bare, env._has_metrics = False, not grid_config.persistent
+    return env
 
 
 def _observation_space(grid_config: GridConfig) -> gymnasium.Space:

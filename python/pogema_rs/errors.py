@@ -12,16 +12,19 @@ __all__ = [
     "ActionCountError",
     "ActionError",
     "AutoResetError",
+    "BlockedCellError",
     "ElapsedStepsError",
     "EmptyMapError",
     "InstanceError",
     "JumpedError",
+    "MapShapeError",
     "MapTextError",
     "NoCellError",
     "NoHistoryError",
     "NotKeptError",
     "NotResetError",
     "OutsideMapError",
+    "OverrideError",
     "RefusedConfigError",
     "StateError",
     "UnknownIntegrationError",
@@ -56,6 +59,14 @@ class NoCellError(IndexError, ValueError):
 
 class EmptyMapError(ZeroDivisionError, ValueError):
     """A map without cells."""
+
+
+class MapShapeError(AssertionError, ValueError):
+    """A map text with rows of unequal length, or with unequal numbers of starts and goals."""
+
+
+class BlockedCellError(_Quiet, ValueError):
+    """A start or goal on an obstacle."""
 
 
 class MapTextError(_Quiet, ValueError):
@@ -103,6 +114,10 @@ class JumpedError(IndexError, ValueError):
 
 class AutoResetError(_Quiet, ValueError):
     """`auto_reset` with an integration that does not support it."""
+
+
+class OverrideError(StateError, TypeError):
+    """A method of an environment that a subclass overrides, although it is never called."""
 
 
 class UnknownIntegrationError(_Quiet, ValueError):

@@ -1,22 +1,41 @@
 """The map and its agents: a view of an environment's state with POGEMA's names.
 
-All coordinates are (row, col) and include the border, unless `ignore_borders` is set.
+All coordinates are (row, col) and include the border, unless `ignore_borders` is set. A grid is read-only: writing into
+one of its attributes raises an error.
 """
 
 from __future__ import annotations
 
 import warnings
 from copy import deepcopy
-from typing import Any, Optional, Union
+from functools import cached_property
+from typing import Any, NoReturn, Optional, Union
 
 import numpy as np
 
 from pogema_rs import _engine, grid_registry
+from pogema_rs._forward import forwarded
+from pogema_rs._read_only import ReadOnlyDict, ReadOnlyList
 from pogema_rs.errors import StateError
+from pogema_rs.generator import get_components
 from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.utils import render_grid
 
 __all__ = ["Grid", "GridLifeLong"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "generate_from_possible_positions": "generator",
+        "generate_obstacles": "generator",
+        "generate_positions_and_targets_fast": "generator",
+        "get_grid": "grid_registry",
+        "in_registry": "grid_registry",
+    },
+)
+
+Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
 
 class Grid:
@@ -29,6 +48,8 @@ class Grid:
 
     Source: POGEMA 1.4.0, `grid.py`, `Grid`
     """
+
+    _seed: Optional[int] = None
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
         engine = _engine.Engine(engine_fields(grid_config), grid_registry.map_text(grid_config.map_name))
@@ -47,10 +68,11 @@ class Grid:
     def _show(self, engine: _engine.Engine, grid_config: GridConfig) -> None:
         self._engine = engine
         self.config = grid_config
+        self._seed = grid_config.seed
         self._obstacles: Optional[np.ndarray] = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_obstacles": None}
+        return {**{name: value for name, value in self.__dict__.items() if name != "_components"}, "_obstacles": None}
 
     @property
     def obstacles(self) -> np.ndarray:
@@ -73,14 +95,12 @@ class Grid:
     @property
     def positions_xy(self) -> list[tuple[int, int]]:
         """The cell of each agent."""
-        return self._engine.cells(self.config.obs_radius)
+        return ReadOnlyList(self._cells())
 
     @property
-    def finishes_xy(self) -> list[tuple[Union[int, np.int64], Union[int, np.int64]]]:
+    def finishes_xy(self) -> list[Goal]:
         """The goal of each agent; a goal drawn since the reset consists of NumPy integers, as in POGEMA."""
-        goals = self._engine.goals(self.config.obs_radius)
-        is_drawn = self._engine.is_drawn
-        return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
+        return ReadOnlyList(self._goals())
 
     @property
     def starts_xy(self) -> list[tuple[int, int]]:
@@ -90,7 +110,23 @@ class Grid:
     @property
     def is_active(self) -> dict[int, bool]:
         """Whether each agent is active, by index."""
-        return dict(enumerate(self._engine.active))
+        return ReadOnlyDict(enumerate(self._engine.active))
+
+    @cached_property
+    def rnd(self) -> np.random.Generator:
+        """A generator in the state of POGEMA's after it drew the border; nothing else draws from it."""
+        rnd = np.random.default_rng(self._seed)
+        if not self._engine.is_free_outside:
+            rnd.binomial(1, self.config.density, self.obstacles.shape)
+        return rnd
+
+    def _cells(self) -> list[tuple[int, int]]:
+        return self._engine.cells(self.config.obs_radius)
+
+    def _goals(self) -> list[Goal]:
+        goals = self._engine.goals(self.config.obs_radius)
+        is_drawn = self._engine.is_drawn
+        return [(np.int64(row), np.int64(col)) if drawn else (row, col) for (row, col), drawn in zip(goals, is_drawn)]
 
     def get_obstacles(self, ignore_borders: bool = False) -> np.ndarray:
         """Returns a copy of `obstacles`, with or without the border."""
@@ -103,11 +139,11 @@ class Grid:
 
         `only_active` omits inactive agents; POGEMA's own flag drops agent 0 or raises.
         """
-        return self._prepared(self.positions_xy, only_active, ignore_borders)
+        return self._prepared(self._cells(), only_active, ignore_borders)
 
     def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
         """Returns the goal of each agent, as a tuple, or as a list with `ignore_borders`."""
-        return self._prepared(self.finishes_xy, only_active, ignore_borders)
+        return self._prepared(self._goals(), only_active, ignore_borders)
 
     def _prepared(self, places: list, only_active: bool, ignore_borders: bool) -> list:
         if only_active:
@@ -210,15 +246,57 @@ class Grid:
         """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
-    def _refuse(self, *_: Any, **__: Any) -> None:
-        """Raises `StateError`, because a grid is read-only."""
-        raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
+    def move(self, agent_id: int, action: int) -> None:
+        """Raises `StateError`, because only the step of an environment moves agents."""
+        _refuse()
 
-    move = move_without_checks = move_agent_to_cell = hide_agent = show_agent = add_artificial_border = _refuse
+    def move_without_checks(self, agent_id: int, action: int) -> None:
+        """Raises `StateError`, because only the step of an environment moves agents."""
+        _refuse()
+
+    def move_agent_to_cell(self, agent_id: int, x: int, y: int) -> None:
+        """Raises `StateError`, because a grid is read-only."""
+        _refuse()
+
+    def hide_agent(self, agent_id: int) -> None:
+        """Raises `StateError`, because a grid is read-only."""
+        _refuse()
+
+    def show_agent(self, agent_id: int) -> None:
+        """Raises `StateError`, because a grid is read-only."""
+        _refuse()
+
+    def add_artificial_border(self) -> None:
+        """Raises `StateError`, because a grid always has its border."""
+        _refuse()
+
+
+def _refuse() -> NoReturn:
+    raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
 
 
 class GridLifeLong(Grid):
     """The map and its agents with `on_target="restart"`."""
+
+    @cached_property
+    def _components(self) -> tuple[dict, dict]:
+        return get_components(self.config, self.obstacles)
+
+    @property
+    def component_to_points(self) -> dict[int, list[tuple[int, int]]]:
+        """The cells of each component, with those of the border.
+
+        Rule: place/components
+        """
+        return self._components[0]
+
+    @property
+    def point_to_component(self) -> dict[tuple[int, int], int]:
+        """The component of each cell; obstacles form a component of their own.
+
+        Rule: place/components
+        """
+        return self._components[1]
 
 
 def given_goals(config: GridConfig, ignore_borders: bool) -> Optional[list]:

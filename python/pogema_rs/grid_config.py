@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, Optional, Union
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ConfigDict, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from pogema_rs import _engine
+from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
-from pogema_rs.errors import EmptyMapError, MapTextError, RefusedConfigError
+from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
+from pogema_rs.utils import CommonSettings
 
 __all__ = ["GridConfig"]
 
 
-class GridConfig(BaseModel):
+class GridConfig(CommonSettings):
     """The complete description of an environment.
 
     Fields, defaults and derivations are those of POGEMA 1.4.0. Unknown fields are ignored, as in POGEMA, but trigger a
@@ -33,10 +34,6 @@ class GridConfig(BaseModel):
 
     model_config = ConfigDict(extra="ignore", arbitrary_types_allowed=True, protected_namespaces=())
 
-    MOVES: list = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]
-    FREE: Literal[0] = 0
-    OBSTACLE: Literal[1] = 1
-    empty_outside: bool = True
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
     width: int = 8
@@ -86,6 +83,41 @@ class GridConfig(BaseModel):
         updated = GridConfig(**{**merged, **fields})
         for name in GridConfig.model_fields:
             setattr(self, name, getattr(updated, name))
+
+    @staticmethod
+    def str_map_to_list(
+        str_map: str, free: Any, obstacle: Any
+    ) -> tuple[list, list, list, Optional[list], Optional[list]]:
+        """Returns the rows, the starts, the goals and the two pools of a map text.
+
+        The pools are `None` without one of the signs `@`, `$` and `!`.
+
+        Errors: `KeyError` for an unknown character, `AssertionError` for unequal rows or unequal numbers of letters.
+
+        Rule: grid/text, grid/letters, grid/pools
+        """
+        rows, cells = _map_text.read(str_map, _map_text.SIGNS + _map_text.POOL_SIGNS)
+        obstacles = [[obstacle if sign == "#" else free for sign in row] for row in rows]
+        starts = _map_text.lettered(cells, _map_text.LETTERS)
+        goals = _map_text.lettered(cells, _map_text.LETTERS.upper())
+        if len(starts) != len(goals):
+            raise MapShapeError(f"the map has {len(starts)} starts and {len(goals)} goals, expected as many of each")
+        if not any(sign in cells for sign in _map_text.POOL_SIGNS):
+            return obstacles, starts, goals, None, None
+        agents, targets = (
+            sorted(cell for sign in cells if sign not in others for cell in cells[sign]) for others in ("#$!", "#@!")
+        )
+        return obstacles, starts, goals, agents, targets
+
+    @staticmethod
+    def check_positions(v: Sequence, width: int, height: int) -> None:
+        """Raises an error if a cell is not a pair of integers (`ValueError`) or not on the map (`IndexError`)."""
+        for cell in v:
+            is_pair = isinstance(cell, (list, tuple)) and len(cell) == 2
+            if not is_pair or not all(isinstance(number, int) for number in cell):
+                raise ValueError(f"the position is {cell!r}, expected a pair (row, col) of whole numbers")
+            if not (0 <= cell[0] < height and 0 <= cell[1] < width):
+                raise OutsideMapError(f"the position is {cell!r}, expected a cell of {height} rows and {width} columns")
 
     def dict(self, **kwargs: Any) -> dict[str, Any]:  # noqa: A003 - the name in POGEMA
         """Returns all fields by name, like `model_dump`."""

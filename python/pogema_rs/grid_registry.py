@@ -6,8 +6,10 @@ from typing import Optional
 
 import numpy as np
 
+from pogema_rs import _engine, _map_text
+from pogema_rs._map_text import Cell
 from pogema_rs.errors import MapTextError, StateError
-from pogema_rs.grid_config import GridConfig
+from pogema_rs.utils import check_grid, render_grid
 
 __all__ = ["GRID_STR_REGISTRY", "RegisteredGrid", "get_grid", "in_registry", "register_grid"]
 
@@ -18,7 +20,7 @@ class RegisteredGrid:
     """A named map; its constructor registers it.
 
     Errors: `ValueError` for a name that is taken, or for letters in addition to positions; `KeyError` for an unknown
-    character.
+    character; `AssertionError` for rows of unequal length; those of `check_grid` for starts and goals that do not fit.
 
     Rule: grid/named
     """
@@ -29,21 +31,36 @@ class RegisteredGrid:
     def __init__(
         self,
         name: str,
-        grid_str: str,
+        grid_str: Optional[str] = None,
         agents_positions: Optional[list] = None,
         agents_targets: Optional[list] = None,
     ) -> None:
+        if grid_str is None:
+            raise MapTextError(f"the map {name!r} has no text, expected rows of `.`, `#` and letters")
         self.name = name
         self.grid_str = grid_str
         self.agents_positions = agents_positions
         self.agents_targets = agents_targets
-        read = GridConfig(map=grid_str)
-        if agents_positions and read.agents_xy or agents_targets and read.targets_xy:
+        rows, starts, goals = self.str_to_grid(grid_str)
+        if agents_positions and starts or agents_targets and goals:
             raise StateError(f"the map {name!r} has letters alongside positions, expected one or the other")
-        self.obstacles = np.array(read.map, dtype=np.int32)
-        self.agents_xy = read.agents_xy or agents_positions
-        self.targets_xy = read.targets_xy or agents_targets
+        self.obstacles = np.array(rows, dtype=np.int32)
+        self.agents_xy = _sorted(starts) or agents_positions
+        self.targets_xy = _sorted(goals) or agents_targets
+        if not in_registry(name):  # otherwise registering it is the error
+            check_grid(self.obstacles, self.agents_xy, self.targets_xy)
         register_grid(self)
+
+    def str_to_grid(self, grid_str: str) -> tuple[list[list[int]], dict[str, Cell], dict[str, Cell]]:
+        """Returns the rows of a map text, and the starts and goals by lower-case letter.
+
+        Errors: `KeyError` for an unknown character, `AssertionError` for rows of unequal length.
+        """
+        rows, cells = _map_text.read(grid_str, _map_text.SIGNS)
+        obstacles = [[self.OBSTACLE if sign == "#" else self.FREE for sign in row] for row in rows]
+        last = {sign: cells[sign][-1] for sign in cells}
+        starts = {sign: cell for sign, cell in last.items() if sign.islower()}
+        return obstacles, starts, {sign.lower(): cell for sign, cell in last.items() if sign.isupper()}
 
     def get_obstacles(self) -> np.ndarray:
         """Returns the map, 1 for an obstacle: int32 `(height, width)`."""
@@ -57,6 +74,14 @@ class RegisteredGrid:
         """Returns the goals given with the map."""
         return self.targets_xy
 
+    def render(self) -> None:
+        """Prints the map with its starts and goals in colours."""
+        render_grid(self.get_obstacles(), self.get_agents_xy(), self.get_targets_xy())
+
+
+def _sorted(cells: dict[str, Cell]) -> list[list[int]]:
+    return [list(cell) for _, cell in sorted(cells.items())]
+
 
 def in_registry(name: Optional[str]) -> bool:
     """Returns whether a map of this name is registered."""
@@ -66,7 +91,9 @@ def in_registry(name: Optional[str]) -> bool:
 def get_grid(name: str) -> RegisteredGrid:
     """Returns the map of a name; raises `KeyError` for an unknown name."""
     if not in_registry(name):
-        raise MapTextError(f"no map named {name!r} is registered")
+        nearest = _engine.nearest_name(str(name), list(GRID_STR_REGISTRY)) if GRID_STR_REGISTRY else ""
+        hint = f"; did you mean {nearest!r}?" if nearest else ", expected a `RegisteredGrid` before"
+        raise MapTextError(f"no map named {name!r} is registered{hint}")
     return GRID_STR_REGISTRY[name]
 
 

@@ -11,7 +11,7 @@ from typing import Any, Optional
 
 import gymnasium
 
-__all__ = ["install_as_pogema"]
+__all__ = ["install_as_pogema", "is_installed"]
 
 _OURS = __name__.partition(".")[0]
 _THEIRS = "pogema"
@@ -44,6 +44,8 @@ class _Alias(MetaPathFinder, Loader):
 def install_as_pogema() -> None:
     """Redirects imports of `pogema` and its modules to this package in the running process.
 
+    Environments then rewrite the actions of a step under `soft` as POGEMA does.
+
     Gymnasium's wrappers again forward unknown attributes to the inner environment, as they did before release 1.0.
     Code for POGEMA 1.4.0 relies on this.
 
@@ -52,10 +54,15 @@ def install_as_pogema() -> None:
     imported = sys.modules.get(_THEIRS)
     if imported is not None and imported is not sys.modules[_OURS]:
         raise RuntimeError("pogema is already imported, expected a call of install_as_pogema() before the import")
-    if not any(isinstance(finder, _Alias) for finder in sys.meta_path):
+    if not is_installed():
         sys.meta_path.insert(0, _Alias())
     if not hasattr(gymnasium.Wrapper, "__getattr__"):
         setattr(gymnasium.Wrapper, "__getattr__", _forward)
+
+
+def is_installed() -> bool:
+    """Returns whether imports of `pogema` are redirected to this package."""
+    return any(isinstance(finder, _Alias) for finder in sys.meta_path)
 
 
 def _forward(self: gymnasium.Wrapper, name: str) -> Any:

@@ -1,16 +1,57 @@
-"""Renders maps as text with terminal colours."""
+"""Checks maps with starts and goals, and renders them as text with terminal colours."""
 
 from __future__ import annotations
 
 import string
 from collections.abc import Mapping, Sequence
-from typing import Any, Optional, Union
+from typing import Any, Literal, Optional, Union
 
 from gymnasium.utils import colorize
+from pydantic import BaseModel
 
-__all__ = ["grid_to_str", "render_grid"]
+from pogema_rs.errors import BlockedCellError, InstanceError
+
+__all__ = ["AgentsTargetsSizeError", "CommonSettings", "check_grid", "grid_to_str", "render_grid"]
 
 _NAMES = string.digits + string.ascii_letters + string.punctuation
+
+
+class CommonSettings(BaseModel):
+    """The fields that all configs have."""
+
+    MOVES: list = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]
+    FREE: Literal[0] = 0
+    OBSTACLE: Literal[1] = 1
+    empty_outside: bool = True
+
+
+class AgentsTargetsSizeError(ValueError):
+    """Starts without goals, or goals without starts."""
+
+
+def check_grid(obstacles: Any, agents_xy: Optional[Sequence], targets_xy: Optional[Sequence]) -> None:
+    """Raises an error if starts and goals do not fit each other or the map.
+
+    Errors: `AgentsTargetsSizeError` if only one of them is given, `IndexError` for unequal numbers, `ValueError` for
+    two equal starts, `KeyError` for a start or goal on an obstacle.
+
+    Source: POGEMA 1.4.0, `utils.py`, `check_grid`
+    """
+    if bool(agents_xy) != bool(targets_xy):
+        given, missing = ("agents_xy", "targets_xy") if agents_xy else ("targets_xy", "agents_xy")
+        raise AgentsTargetsSizeError(f"`{given}` is given without `{missing}`, expected both or neither")
+    if not agents_xy or not targets_xy:
+        return
+    if len(agents_xy) != len(targets_xy):
+        raise InstanceError(f"there are {len(agents_xy)} starts and {len(targets_xy)} goals, expected as many of each")
+    starts = [tuple(start) for start in agents_xy]
+    for agent, start in enumerate(starts):
+        if start in starts[:agent]:
+            raise InstanceError(f"agents {starts.index(start)} and {agent} both start at {start}, expected other cells")
+    for start, goal in zip(starts, targets_xy):
+        for what, cell in (("start", start), ("goal", tuple(goal))):
+            if obstacles[cell]:
+                raise BlockedCellError(f"the {what} {cell} is an obstacle, expected a free cell")
 
 
 def grid_to_str(grid: Any) -> str:

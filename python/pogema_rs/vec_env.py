@@ -31,6 +31,8 @@ def _engine_config(config: Any) -> _Config:
     """Returns the fields that the engine reads, and the text of the map that the config names."""
     if not isinstance(config, GridConfig):
         config = GridConfig(**_fields(config))
+    if config.map_name is not None:
+        grid_registry.get_grid(config.map_name)  # an unknown name is an error, which a single environment ignores
     return engine_fields(config), grid_registry.map_text(config.map_name)
 
 
@@ -94,8 +96,8 @@ class VecEnv(VectorEnv):
         radius and rules. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
         number of threads [default: one per core, at most one per environment].
 
-        Errors: ValueError or TypeError for wrong arguments. A config without an instance raises `InstanceError` only at
-        the first reset.
+        Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
+        without an instance raises `InstanceError` only at the first reset.
         """
         self.closed = True
         if semantics not in [known.value for known in Semantics]:

@@ -205,6 +205,18 @@ def test_config_may_name_a_registered_map():
     np.testing.assert_array_equal(named.reset(seed=2)[0], given.reset(seed=2)[0])
 
 
+def test_map_name_has_to_be_registered():
+    RegisteredGrid("rooms of a batch", "....\n....")
+    try:
+        with pytest.raises(ValueError, match="named 'room of a batch' is registered; did you mean 'rooms of a batch'"):
+            VecEnv(GridConfig(map_name="room of a batch"), 2)
+        VecEnv(GridConfig(map_name="rooms of a batch"), 2).close()
+    finally:
+        del GRID_STR_REGISTRY["rooms of a batch"]
+    with pytest.raises(ValueError, match="no map named 'rooms of a batch' is registered, expected"):
+        VecEnv(GridConfig(map_name="rooms of a batch"), 2)
+
+
 def test_calls_before_a_reset_or_after_close_are_rejected():
     env = VecEnv(CONFIG, 2)
     actions, some = np.zeros((2, 5), int), {"reset_mask": np.array([True, False])}

@@ -7,6 +7,7 @@ from typing import Any, Optional, Union
 
 import gymnasium
 
+from pogema_rs._forward import forwarded
 from pogema_rs.envs import _make_pogema
 from pogema_rs.errors import AutoResetError, UnknownIntegrationError
 from pogema_rs.grid_config import GridConfig
@@ -19,6 +20,15 @@ from pogema_rs.semantics import Semantics
 from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = ["SingleAgentWrapper", "make_pogema", "make_single_agent_gym", "pogema_v0"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "PyMarlPogema": "integrations.pymarl",
+        "parallel_env": "integrations.pettingzoo",
+    },
+)
 
 
 class SingleAgentWrapper(Wrapper):

@@ -7,10 +7,15 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Optional, Union
 
+from pogema_rs._forward import forwarded
+
 if TYPE_CHECKING:
     from pogema_rs import _engine
 
 __all__ = ["AnimationConfig", "SvgAnimation"]
+
+# POGEMA's module offers this name too.
+__getattr__, __dir__ = forwarded(__name__, {"GridConfig": "grid_config"})
 
 
 @dataclass

@@ -6,11 +6,21 @@ import os
 from os import PathLike
 from typing import Any, Optional, Union
 
+from pogema_rs._forward import forwarded
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.svg_animation.animation_drawer import AnimationConfig
 from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = ["AnimationConfig", "AnimationMonitor"]
+
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "AgentState": "wrappers.persistence",
+        "PersistentWrapper": "wrappers.persistence",
+    },
+)
 
 
 class AnimationMonitor(Wrapper):

@@ -1,106 +1,88 @@
-"""The history of an environment with `persistent` in its config."""
+"""The history of an environment as a wrapper."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Union
+from typing import Any, Optional
 
-import numpy as np
-
-from pogema_rs import _engine
+from pogema_rs._history import AgentState, History, at_every_step, decompressed
+from pogema_rs.errors import NoHistoryError
+from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = ["AgentState", "PersistentWrapper"]
 
-# A goal drawn since the reset consists of NumPy integers, as in POGEMA.
-_Whole = Union[int, np.int64]
 
+class PersistentWrapper(Wrapper):
+    """Records the history of an environment; with `persistent` in the config, the environment also keeps its own.
 
-class AgentState:
-    """The cell, goal and activity of an agent from a step on; cells are (row, col) and include the border.
-
-    Two states are equal if they differ at most in their steps.
+    `xy_offset` is added to each coordinate [default: none].
 
     Rule: history/changes
+
+    Source: POGEMA 1.4.0, `wrappers/persistence.py`, `PersistentWrapper`
     """
 
-    def __init__(self, x: int, y: int, tx: _Whole, ty: _Whole, step: int, active: bool) -> None:
-        self.x = x
-        self.y = y
-        self.tx = tx
-        self.ty = ty
-        self.step = step
-        self.active = active
+    def __init__(self, env: Any, xy_offset: Optional[int] = None) -> None:
+        super().__init__(env)
+        self._xy_offset = xy_offset
+        self._step: Optional[int] = None
+        self._changes: Optional[History] = None
 
-    def get_xy(self) -> tuple[int, int]:
-        """Returns the cell of the agent."""
-        return self.x, self.y
+    def reset(self, **kwargs: Any) -> Any:
+        """Resets the inner environment and begins a new history."""
+        result = self.env.reset(**kwargs)
+        self._step = 0
+        self._changes = [[state] for state in self._now()]
+        return result
 
-    def get_target_xy(self) -> tuple[_Whole, _Whole]:
-        """Returns the goal of the agent."""
-        return self.tx, self.ty
+    def step(self, action: Any) -> Any:
+        """Plays one step of the inner environment and records it."""
+        history = self._started()
+        result = self.env.step(action)
+        self._step = (self._step or 0) + 1
+        for changes, state in zip(history, self._now()):
+            if state != changes[-1]:
+                changes.append(state)
+        return result
 
-    def is_active(self) -> bool:
-        """Returns whether the agent is active."""
-        return self.active
+    def step_back(self) -> bool:
+        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
 
-    def get_step(self) -> int:
-        """Returns the number of steps since the reset."""
-        return self.step
+        Rule: history/step-back
+        """
+        history = self._started()
+        if not self._step:
+            return False
+        self.unwrapped.step_back()
+        self._step -= 1
+        for changes in history:
+            if changes[-1].step > self._step:
+                changes.pop()
+        return True
 
-    def _key(self) -> tuple:
-        return self.x, self.y, self.tx, self.ty, self.active
+    def get_history(self) -> Optional[History]:
+        """Returns for each agent its state after the reset and after each later step that changed it.
 
-    def __eq__(self, other: object) -> bool:
-        return self._key() == other._key() if isinstance(other, AgentState) else NotImplemented
+        Before the first reset it returns `None`.
+        """
+        return self._changes
 
-    __hash__ = None  # type: ignore[assignment]
-
-    def __str__(self) -> str:
-        numbers = [str(number) for number in (self.x, self.y, self.tx, self.ty, self.step)]
-        return f"[{', '.join(numbers)}, {self.active}]"
-
-    def __repr__(self) -> str:
-        return f"AgentState{self}"
-
-
-History = list[list[AgentState]]
-
-
-def kept(engine: _engine.Engine, shift: int) -> History:
-    """Returns for each agent its first state and each later state that differs from the one before."""
-    return [[_state(shift, *change) for change in changes] for changes in engine.history()]
-
-
-def _state(shift: int, row: int, col: int, goal_row: int, goal_col: int, *rest: Any) -> AgentState:
-    step, active, is_drawn = rest
-    goal: tuple[_Whole, _Whole] = (goal_row + shift, goal_col + shift)
-    if is_drawn:
-        goal = (np.int64(goal[0]), np.int64(goal[1]))
-    return AgentState(row + shift, col + shift, *goal, step, active)
-
-
-def at_every_step(changes: Iterable[AgentState], num_steps: int) -> list[AgentState]:
-    """Returns the state of one agent at each step from 0 to `num_steps`, both included."""
-    first, *rest = changes
-    states = [first]
-    for step in range(1, num_steps + 1):
-        if rest and rest[0].step == step:
-            states.append(rest.pop(0))
-        else:
-            states.append(states[-1])
-    return states
-
-
-class PersistentWrapper:
-    """The two static methods of POGEMA's class; the environment itself keeps the history."""
+    def get_full_history(self) -> History:
+        """Returns for each agent its state at every step so far, including the reset."""
+        return [at_every_step(changes, self._step or 0) for changes in self._started()]
 
     agent_state_to_full_list = staticmethod(at_every_step)
+    decompress_history = staticmethod(decompressed)
 
-    @staticmethod
-    def decompress_history(history: History) -> History:
-        """Returns the state of each agent at each step, up to the last step with a change.
+    def _started(self) -> History:
+        if self._changes is None:
+            raise NoHistoryError("the environment was not reset yet")
+        return self._changes
 
-        Rule: history/changes
-        """
-        num_steps = max(changes[-1].step for changes in history)
-        return [at_every_step(changes, num_steps) for changes in history]
+    def _now(self) -> list[AgentState]:
+        grid, shift, step = self.unwrapped._started(), self._xy_offset or 0, self._step or 0
+        return [
+            AgentState(row + shift, col + shift, goal_row + shift, goal_col + shift, step, active)
+            for (row, col), (goal_row, goal_col), active in zip(
+                grid.positions_xy, grid.finishes_xy, grid.is_active.values()
+            )
+        ]

@@ -50,10 +50,11 @@ def described(value: Any) -> Described:
         return ("array", value.dtype.str, value.shape, flags, value.tobytes())
     if isinstance(value, np.generic):
         return (type(value).__name__.rstrip("_"), repr(value.item()))
+    # A read-only list or dictionary counts as the list or dictionary that it is.
     if isinstance(value, dict):
         return ("dict", tuple((described(key), described(item)) for key, item in value.items()))
     if isinstance(value, (list, tuple)):
-        return (type(value).__name__, tuple(described(item) for item in value))
+        return ("list" if isinstance(value, list) else "tuple", tuple(described(item) for item in value))
     if type(value).__name__ == "AgentState":
         return ("AgentState", str(value), tuple(described(item) for item in vars(value).values()))
     if type(value).__name__ == "Box":

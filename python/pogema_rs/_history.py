@@ -1,0 +1,107 @@
+"""The states of agents at the steps of an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Union
+
+import numpy as np
+
+from pogema_rs import _engine
+from pogema_rs.errors import ElapsedStepsError, NotKeptError
+
+# A goal drawn since the reset consists of NumPy integers, as in POGEMA.
+_Whole = Union[int, np.int64]
+
+
+class AgentState:
+    """The cell, goal and activity of an agent from a step on; cells are (row, col) and include the border.
+
+    Two states are equal if they differ at most in their steps.
+
+    Rule: history/changes
+    """
+
+    def __init__(self, x: int, y: int, tx: _Whole, ty: _Whole, step: int, active: bool) -> None:
+        self.x = x
+        self.y = y
+        self.tx = tx
+        self.ty = ty
+        self.step = step
+        self.active = active
+
+    def get_xy(self) -> tuple[int, int]:
+        """Returns the cell of the agent."""
+        return self.x, self.y
+
+    def get_target_xy(self) -> tuple[_Whole, _Whole]:
+        """Returns the goal of the agent."""
+        return self.tx, self.ty
+
+    def is_active(self) -> bool:
+        """Returns whether the agent is active."""
+        return self.active
+
+    def get_step(self) -> int:
+        """Returns the number of steps since the reset."""
+        return self.step
+
+    def _key(self) -> tuple:
+        return self.x, self.y, self.tx, self.ty, self.active
+
+    def __eq__(self, other: object) -> bool:
+        return self._key() == other._key() if isinstance(other, AgentState) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        numbers = [str(number) for number in (self.x, self.y, self.tx, self.ty, self.step)]
+        return f"[{', '.join(numbers)}, {self.active}]"
+
+    def __repr__(self) -> str:
+        return f"AgentState{self}"
+
+
+History = list[list[AgentState]]
+
+
+def kept(engine: _engine.Engine, shift: int) -> History:
+    """Returns for each agent its first state and each later state that differs from the one before."""
+    return [[_state(shift, *change) for change in changes] for changes in engine.history()]
+
+
+def _state(shift: int, row: int, col: int, goal_row: int, goal_col: int, *rest: Any) -> AgentState:
+    step, active, is_drawn = rest
+    goal: tuple[_Whole, _Whole] = (goal_row + shift, goal_col + shift)
+    if is_drawn:
+        goal = (np.int64(goal[0]), np.int64(goal[1]))
+    return AgentState(row + shift, col + shift, *goal, step, active)
+
+
+def at_every_step(agent_states: Iterable[AgentState], num_steps: int) -> list[AgentState]:
+    """Returns the state of one agent at each step from 0 to `num_steps`, both included."""
+    first, *rest = agent_states
+    states = [first]
+    for step in range(1, num_steps + 1):
+        if rest and rest[0].step == step:
+            states.append(rest.pop(0))
+        else:
+            states.append(states[-1])
+    return states
+
+
+def decompressed(history: History) -> History:
+    """Returns the state of each agent at each step, up to the last step with a change.
+
+    Rule: history/changes
+    """
+    num_steps = max(changes[-1].step for changes in history)
+    return [at_every_step(changes, num_steps) for changes in history]
+
+
+def check_elapsed_steps(is_persistent: object, elapsed_steps: int) -> None:
+    """Raises an error if the elapsed steps cannot be set to a number."""
+    if not is_persistent:
+        raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
+    if elapsed_steps < 0:
+        raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")

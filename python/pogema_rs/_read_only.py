@@ -1,0 +1,40 @@
+"""Lists and dictionaries that show the state of an environment, and cannot be written into."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn, TypeVar
+
+from pogema_rs.errors import StateError
+
+Item = TypeVar("Item")
+Key = TypeVar("Key")
+
+
+def _refuse(self: Any, *_: Any, **__: Any) -> NoReturn:
+    """Raises `StateError`."""
+    text = "the state of an environment cannot be changed by hand"
+    raise StateError(f"{text}; reset with agents_xy and targets_xy to place agents")
+
+
+class ReadOnlyList(list[Item]):
+    """A list whose changing methods raise `StateError`; its copies are plain lists."""
+
+    __slots__ = ()
+
+    __setitem__ = __delitem__ = __iadd__ = __imul__ = _refuse
+    append = extend = insert = remove = pop = clear = sort = reverse = _refuse
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        return list, (list(self),)
+
+
+class ReadOnlyDict(dict[Key, Item]):
+    """A dictionary whose changing methods raise `StateError`; its copies are plain dictionaries."""
+
+    __slots__ = ()
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    update = setdefault = pop = popitem = clear = _refuse
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        return dict, (dict(self),)

@@ -1,0 +1,368 @@
+"""Plays scenarios with POGEMA, or with pogema_rs under its name, and pickles what they return: behaviour.py PACKAGE
+
+Each scenario uses names of POGEMA that random cases (`tests/oracle`) do not reach.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pickle
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "oracle"))
+from player import described  # noqa: E402 - found through the line above
+
+SCENARIOS: dict[str, Callable[[], Any]] = {}
+MODES = ("finish", "nothing", "restart")
+
+
+def scenario(function: Callable[[], Any]) -> Callable[[], Any]:
+    """Adds a function to the scenarios."""
+    SCENARIOS[function.__name__] = function
+    return function
+
+
+def outcome(call: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
+    """Returns what a call returns, or the classes of its error."""
+    try:
+        return described(call(*arguments, **keywords))
+    except Exception as error:  # noqa: BLE001 - the errors are what is compared
+        return ("error", [kind.__name__ for kind in type(error).__mro__])
+
+
+def config(**fields: Any) -> Any:
+    """Returns a small config, changed by `fields`."""
+    from pogema import GridConfig
+
+    small = {"size": 6, "num_agents": 4, "obs_radius": 2, "density": 0.2, "seed": 3, "max_episode_steps": 12}
+    return GridConfig(**{**small, **fields})
+
+
+def bare(**fields: Any) -> Any:
+    """Returns an environment without wrappers."""
+    from pogema import envs
+
+    made = config(**fields)
+    classes = {"finish": envs.Pogema, "nothing": envs.PogemaCoopFinish, "restart": envs.PogemaLifeLong}
+    return classes[made.on_target](made)
+
+
+def greedy(env: Any) -> list[int]:
+    """Returns for each agent a move to its goal along a row or column, if one is free."""
+    base, moves = env.unwrapped, ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+    obstacles, actions = base.get_obstacles(), []
+    for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
+        ways = [(abs(row + d - goal[0]) + abs(col + r - goal[1]), a) for a, (d, r) in enumerate(moves)
+                if not obstacles[row + d, col + r]]
+        actions.append(int(min(ways)[1]))
+    return actions
+
+
+def played(env: Any, num_steps: int, num_random: int = 3) -> Iterator[Any]:
+    """Yields what an environment returns, with random actions first."""
+    generator = np.random.default_rng(5)
+    yield described(env.reset())
+    for step in range(num_steps):
+        count = env.unwrapped.get_num_agents()
+        yield described(env.step(generator.integers(5, size=count).tolist() if step < num_random else greedy(env)))
+
+
+@scenario
+def environment_without_wrappers() -> Any:
+    """It has neither a time limit nor metrics."""
+    return [list(played(bare(on_target=mode, max_episode_steps=4), 9)) for mode in MODES]
+
+
+@scenario
+def metric_wrappers() -> Any:
+    """They count as the metrics of `pogema_v0`, also after an episode that did not end."""
+    from pogema.wrappers import metrics
+    from pogema.wrappers.multi_time_limit import MultiTimeLimit
+
+    names = {
+        "finish": ("ISRMetric", "CSRMetric", "EpLengthMetric"),
+        "nothing": (
+            *("NonDisappearISRMetric", "NonDisappearCSRMetric", "NonDisappearEpLengthMetric"),
+            "SumOfCostsAndMakespanMetric",
+        ),
+        "restart": ("LifeLongAverageThroughputMetric",),
+    }
+    seen = []
+    for mode in MODES:
+        for num_agents in (1, 4):
+            env = MultiTimeLimit(bare(on_target=mode, num_agents=num_agents), 12)
+            for name in names[mode]:
+                env = getattr(metrics, name)(env)
+            seen += [list(played(env, num_steps)) for num_steps in (4, 13, 15)]
+    return seen
+
+
+@scenario
+def own_metric() -> Any:
+    """A subclass of `AbstractMetric` is called with the step, the agents on goals and the end."""
+    from pogema import pogema_v0
+    from pogema.wrappers.metrics import AbstractMetric
+
+    calls: list[Any] = []
+
+    class Own(AbstractMetric):
+        def _compute_stats(self, step: int, is_on_goal: Any, finished: bool) -> Any:
+            calls.append((step, list(is_on_goal), finished))
+            return {"on_goal": sum(is_on_goal)} if step % 2 else None
+
+    return [[*played(Own(pogema_v0(config(on_target=mode))), 14), described(calls)] for mode in MODES]
+
+
+@scenario
+def metric_without_stats() -> Any:
+    """A metric has to compute something."""
+    from pogema import pogema_v0
+    from pogema.wrappers.metrics import AbstractMetric
+
+    env = AbstractMetric(pogema_v0(config()))
+    env.reset()
+    return outcome(env.step, [0] * 4)
+
+
+@scenario
+def agents_density() -> Any:
+    """`count_agents` can be called with observations."""
+    from pogema import pogema_v0
+    from pogema.wrappers.metrics import AgentsDensityWrapper
+
+    env = AgentsDensityWrapper(pogema_v0(config(observation_type="POMAPF")))
+    seen, _ = env.reset()
+    env.count_agents(seen)
+    env.count_agents(seen[:1])
+    ends = [env.step([0] * 4) for _ in range(12)]
+    return described([infos for *_, infos in ends])
+
+
+@scenario
+def time_limit_wrapper() -> Any:
+    """The limit counts from the reset, and can be set if the config is persistent."""
+    from pogema.wrappers.multi_time_limit import MultiTimeLimit
+
+    seen = []
+    for persistent in (False, True):
+        env = MultiTimeLimit(bare(persistent=persistent), 6)
+        seen += [*played(env, 8), *played(env, 3)]
+        seen += [outcome(env.set_elapsed_steps, steps) for steps in (-1, 5)]
+        seen += [described(env.step([0] * 4)), described(env.step([0] * 4))]
+    return seen
+
+
+@scenario
+def history_wrapper() -> Any:
+    """A history around any environment, shifted by an offset."""
+    from pogema import pogema_v0
+    from pogema.wrappers.persistence import PersistentWrapper
+
+    seen = []
+    for mode in MODES:
+        for offset in (None, -1):
+            env = PersistentWrapper(pogema_v0(config(on_target=mode)), xy_offset=offset)
+            seen += [outcome(env.get_history), outcome(env.get_full_history)]
+            seen += [*played(env, 7), described(env.get_history()), described(env.get_full_history())]
+            seen += [described(env.decompress_history(env.get_history())), outcome(env.step_back)]
+    return seen
+
+
+@scenario
+def history_wrapper_steps_back() -> Any:
+    """With `persistent` in the config, steps can be taken back."""
+    from pogema.wrappers.persistence import PersistentWrapper
+    from pogema.wrappers.multi_time_limit import MultiTimeLimit
+
+    env = PersistentWrapper(MultiTimeLimit(bare(persistent=True), 12))
+    seen = list(played(env, 8))
+    while env.step_back():
+        seen.append(described([env.get_history(), env.get_agents_xy(), env.get_targets_xy(), env.grid.is_active]))
+    return [*seen, described(env.step([1] * 4))]
+
+
+@scenario
+def overridden_methods() -> Any:
+    """A subclass that overrides a method is called as in POGEMA."""
+    from pogema import envs
+
+    seen = []
+    for base, mode in zip((envs.Pogema, envs.PogemaCoopFinish, envs.PogemaLifeLong), ("finish", "nothing", "restart")):
+
+        class Observed(base):  # type: ignore[misc, valid-type]
+            def _obs(self) -> Any:
+                return [self.was_on_goal, *super()._obs()]
+
+        class Windows(base):  # type: ignore[misc, valid-type]
+            def _get_agents_obs(self, agent_id: int = 0) -> Any:
+                return super()._get_agents_obs(agent_id)[1:] + agent_id
+
+        class Places(base):  # type: ignore[misc, valid-type]
+            def _pomapf_obs(self) -> Any:
+                return [{"agent": agent, **one} for agent, one in enumerate(super()._pomapf_obs())]
+
+        class Infos(base):  # type: ignore[misc, valid-type]
+            def _get_infos(self) -> Any:
+                return [{**info, "extra": agent} for agent, info in enumerate(super()._get_infos())]
+
+        for kind in ("default", "POMAPF", "MAPF"):
+            for made in (Observed, Windows, Places, Infos):
+                seen += played(made(config(on_target=mode, observation_type=kind)), 6)
+    return seen
+
+
+@scenario
+def base_class() -> Any:
+    """An environment of one's own, on POGEMA's base class."""
+    from pogema.envs import PogemaBase
+    from pogema.grid import Grid
+
+    class Own(PogemaBase):
+        def reset(self, **keywords: Any) -> Any:
+            self.grid = Grid(self.grid_config)
+            return self._get_agents_obs(1), keywords
+
+    env = Own(config())
+    seen = [outcome(env.check_reset), outcome(env.render), outcome(env.step, [0])]
+    seen += [outcome(env.reset, seed=1), outcome(env.check_reset), outcome(env.sample_actions)]
+    return [*seen, env.get_num_agents(), env.metadata, outcome(PogemaBase().reset), PogemaBase().get_num_agents()]
+
+
+@scenario
+def components_of_a_grid() -> Any:
+    """Both maps, with the types of their keys and values."""
+    seen = []
+    for fields in ({}, {"empty_outside": False}, {"density": 0.5, "num_agents": 2}, {"obs_radius": 1}):
+        env = bare(on_target="restart", **fields)
+        env.reset()
+        grid = env.grid
+        seen += [described(dict(grid.component_to_points)), described(grid.point_to_component)]
+    return seen
+
+
+@scenario
+def generator_of_a_grid() -> Any:
+    """It continues after the border."""
+    seen = []
+    for empty_outside in (True, False):
+        env = bare(empty_outside=empty_outside)
+        env.reset()
+        seen.append(described(env.grid.rnd.integers(1000, size=5)))
+    return seen
+
+
+@scenario
+def sequences_of_goals() -> Any:
+    """Which goal of its sequence an agent is at."""
+    sequences = [[[0, 1], [0, 0]], [[1, 2], [1, 3], [1, 2]]]
+    env = bare(
+        map="....\n....", agents_xy=[[0, 0], [1, 3]], targets_xy=sequences, on_target="restart", num_agents=2
+    )
+    other = bare(on_target="restart")
+    seen: list[Any] = [env.has_custom_sequences, other.has_custom_sequences, env.current_goal_indices]
+    for current in (env, other):
+        current.reset()
+        for _ in range(9):
+            current.step(greedy(current))
+            seen.append(list(current.current_goal_indices))
+    env.reset()
+    return described([*seen, env.current_goal_indices])
+
+
+@scenario
+def actions_of_the_caller() -> Any:
+    """Under `soft`, a step writes what agents carried out into the caller's actions."""
+    from pogema import pogema_v0
+
+    seen = []
+    generator = np.random.default_rng(9)
+    for collisions in ("soft", "priority", "block_both"):
+        for mode in MODES:
+            for container in (list, np.array, lambda plan: [np.int64(action) for action in plan]):
+                env = pogema_v0(config(on_target=mode, collision_system=collisions, size=4, density=0.1, seed=1))
+                env.reset()
+                for step in range(12):
+                    plan = generator.integers(5, size=4).tolist() if step < 4 else greedy(env)
+                    actions = container(plan)
+                    env.step(actions)
+                    seen.append([int(action) for action in actions])
+    return described(seen)
+
+
+@scenario
+def map_texts() -> Any:
+    """The reader of map texts, for configs and for registered maps."""
+    from pogema import GridConfig
+    from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+    texts = ("", "..\n.#", "a.\n.A", "aB", "abBA\n#...", "a..a A..A", "ab A.", "@.$ ..!", "@@", "a@ $A", "!!")
+    texts += ("..\n...", "x.", "?.")
+    seen = []
+    for number, text in enumerate(texts):
+        seen += [outcome(GridConfig.str_map_to_list, text, free, obstacle) for free, obstacle in ((0, 1), (7, "x"))]
+        seen.append(outcome(lambda: vars(RegisteredGrid(f"text {number}", text))))  # noqa: B023 - called immediately
+        GRID_STR_REGISTRY.pop(f"text {number}", None)
+    return seen
+
+
+@scenario
+def checks_of_maps() -> Any:
+    """Starts and goals that do not fit each other or the map."""
+    from pogema import GridConfig, utils
+    from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
+
+    pairs: list[Any] = [
+        (None, None), ([], []), ([[0, 0]], None), (None, [[0, 0]]), ([[0, 0]], [[0, 1]]), ([[0, 0]], [[0, 1], [0, 2]]),
+        ([[0, 0], [0, 0]], [[0, 1], [0, 2]]), ([[1, 1]], [[0, 1]]), ([[0, 1]], [[1, 1]]), ([[5, 5]], [[0, 0]]),
+        ([(0, 0), (0, 1)], [(0, 2), (0, 2)]),
+    ]  # fmt: skip
+    obstacles = np.array([[0, 0, 0], [0, 1, 0]])
+    seen = [outcome(utils.check_grid, obstacles, *pair) for pair in pairs]
+    for pair in pairs:
+        seen.append(outcome(lambda: vars(RegisteredGrid("checked", "...\n.#.", *pair))))  # noqa: B023
+        GRID_STR_REGISTRY.pop("checked", None)
+    RegisteredGrid("twice", "...")
+    seen += [outcome(RegisteredGrid, "twice", "..."), outcome(RegisteredGrid, "letters", "a.A", [[0, 1]], None)]
+    GRID_STR_REGISTRY.pop("twice")
+    cells = ([[0, 0]], [(1, 2)], [[2, 0]], [[0, 3]], [[-1, 0]], [[0]], [[0.0, 1]], ["ab"], [None])
+    seen += [outcome(GridConfig.check_positions, cell, 3, 2) for cell in cells]
+    return [*seen, described(utils.CommonSettings().dict())]
+
+
+@scenario
+def search_of_the_policy() -> Any:
+    """The memory and the search of the A* policy."""
+    from pogema import a_star_policy as policy
+
+    generator, seen = np.random.default_rng(4), []
+    for number in range(60):
+        memory = policy.GridMemory(start_r=int(generator.integers(1, 9)))
+        for _ in range(4):
+            window = generator.binomial(1, 0.3, (5, 5))
+            memory.update(*generator.integers(-9, 10, size=2).tolist(), window)
+        places = [(row, col) for row in range(-40, 40, 3) for col in range(-40, 40)]
+        seen.append(described([bool(memory.is_obstacle(*place)) for place in places]))
+        start, goal = (tuple(generator.integers(-9, 10, size=2).tolist()) for _ in range(2))
+        seen += [outcome(policy.a_star, start, goal, memory, steps) for steps in (10000, number, 0)]
+        seen.append(outcome(policy.h, start, goal))
+    node = policy.Node()
+    return [*seen, described([node.i, node.j, node.g, node.h, node.f, policy.INF, node < policy.Node((1, 1))])]
+
+
+def main(package: str) -> None:
+    """Plays all scenarios."""
+    out, sys.stdout = sys.stdout.buffer, sys.stderr
+    warnings.simplefilter("ignore")
+    if package == "pogema_rs":
+        importlib.import_module(package).install_as_pogema()
+    pickle.dump({name: play() for name, play in SCENARIOS.items()}, out)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
