@@ -23,7 +23,7 @@ type Listed = (String, String, String, Option<usize>, String);
 type Replayed = (String, String, String);
 
 /// A suite and the folder with its results.
-#[pyclass(frozen, module = "pogema_rs._engine")]
+#[pyclass(frozen, weakref, module = "pogema_rs._engine")]
 pub struct Evaluation {
     suite: Suite,
     environments: EpisodeConfigs,
@@ -61,6 +61,11 @@ impl Evaluation {
         let store = Store::open(&folder, &suite, begin).map_err(|error| to_py_error(&error))?;
         let store = Arc::new(store.with(versions));
         Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
+    }
+
+    /// Closes the lock of the folder in a forked child; the parent keeps it.
+    fn release_in_child(&self) {
+        self.store.release_in_child();
     }
 
     /// Returns the number of episodes of each algorithm.
