@@ -89,6 +89,9 @@ pub enum Error {
     /// Data from another source is wrong.
     #[error("{}", one_line(format_args!("{what}: {reason}")))]
     Corrupt { what: String, reason: String },
+    /// The caller cancelled the work.
+    #[error("the work was cancelled")]
+    Cancelled,
     /// The operating system or a library failed.
     #[error("{}", one_line(format_args!("{what}: {cause}")))]
     External {

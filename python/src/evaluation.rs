@@ -1,7 +1,7 @@
 //! Suites and the results of their episodes, both of built-in algorithms and of policies in Python.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pogema_core::files::write_whole;
@@ -15,6 +15,8 @@ use pogema_toolbox::{
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::interrupt;
 
 /// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
 type Listed = (String, String, String, Option<usize>, String);
@@ -159,18 +161,22 @@ impl Evaluation {
     /// if this method has to play it.
     fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Replayed>>) -> PyResult<()> {
         let results = self.results()?;
+        let stop = Arc::default();
         let write = || {
             let picks = picks(&results, SHOWN).into_iter();
             let replay = |(pick, again): (Pick, Option<Replayed>)| match again {
-                None => Ok(Replay::of(pick, &results, &self.suite, &self.environments)),
+                None => Ok(Replay::of(pick, &results, &self.suite, &self.environments, &stop)),
                 Some((_, _, error)) if !error.is_empty() => Ok(Replay::failed(pick, error)),
                 Some((metrics, film, _)) => Ok(Replay::played(pick, &results, &from_json(&metrics)?, film)),
             };
             let replays = picks.zip(again).map(replay).collect::<Result<Vec<_>, Error>>()?;
+            if stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
             let page = page(&self.suite, &self.store.manifest(), &results, &replays)?;
             write_whole(&path, page.as_bytes())
         };
-        py.detach(write).map_err(|error| to_py_error(&error))
+        interrupt::detach_scoped(py, &stop, write)?.map_err(|error| to_py_error(&error))
     }
 
     /// Returns whether an algorithm of the suite is built in.
@@ -192,7 +198,7 @@ impl Evaluation {
         watch: Py<PyAny>,
     ) -> PyResult<Option<(usize, usize, bool)>> {
         let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
-        let stop = AtomicBool::new(false);
+        let stop = Arc::<AtomicBool>::default();
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
         let report = |event: Event<'_>| {
             let error = match event {
@@ -201,16 +207,15 @@ impl Evaluation {
                 Event::Begin { .. } | Event::End => return,
             };
             Python::attach(|py| {
-                let outcome = py.check_signals().and_then(|()| watch.call1(py, (error,)).map(|_| ()));
-                if let (Err(error), Ok(mut raised)) = (outcome, raised.lock()) {
-                    stop.store(true, std::sync::atomic::Ordering::Relaxed);
+                if let (Err(error), Ok(mut raised)) = (watch.call1(py, (error,)), raised.lock()) {
+                    stop.store(true, Relaxed);
                     raised.get_or_insert(error);
                 }
             });
         };
         let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
         let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);
-        let summary = py.detach(run).map_err(|error| to_py_error(&error))?;
+        let summary = interrupt::detach_scoped(py, &stop, run)?.map_err(|error| to_py_error(&error))?;
         match raised.into_inner() {
             Ok(Some(error)) => Err(error),
             _ => Ok(Some((summary.num_played, summary.num_failed, summary.is_whole))),
@@ -300,13 +305,14 @@ pub fn machine() -> &'static str {
 /// `suite` contains that episode alone, and `maps` are map texts by name.
 #[pyfunction]
 pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
-    let play = || {
-        let suite = Suite::parse(std::path::Path::new("suite.yaml"), suite)?;
+    let suite = suite.to_owned();
+    let play = move || {
+        let suite = Suite::parse(std::path::Path::new("suite.yaml"), &suite)?;
         let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?);
         let (played, runtime) = suite.play_one(&environments)?;
         let played = serde_json::to_string(&played)
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;
         Ok((played, runtime.as_secs_f64()))
     };
-    py.detach(play).map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, play)?.map_err(|error: Error| to_py_error(&error))
 }

@@ -6,6 +6,7 @@ mod engine;
 mod errors;
 mod evaluation;
 mod fields;
+mod interrupt;
 mod lists;
 mod planners;
 mod vec;

@@ -8,6 +8,7 @@ use pogema_toolbox::{Results, six::Definition};
 use pyo3::prelude::*;
 
 use crate::evaluation::to_py_error;
+use crate::interrupt;
 
 /// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
@@ -25,7 +26,7 @@ pub fn show_views(
     out: Option<PathBuf>,
     six: Option<String>,
 ) -> PyResult<(Vec<String>, Vec<Listed>)> {
-    let show = || {
+    let show = move || {
         let gallery = Gallery {
             format: formats.0.map(|word| Format::read("table_format", &word)).transpose()?,
             kind: formats.1.map(|word| ImageFormat::read("plot_format", &word)).transpose()?,
@@ -44,5 +45,5 @@ pub fn show_views(
         let listed = listed.collect();
         Ok((results.notes, listed))
     };
-    py.detach(show).map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, show)?.map_err(|error: Error| to_py_error(&error))
 }

@@ -86,6 +86,13 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
                 yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
             for task in islice(rest, 1):
                 under_way.add(send(task))
+    except BaseException:
+        # Closing a worker waits for seconds until its episode ends.
+        for worker in cluster.workers.values() if cluster is not None else ():
+            worker.auto_restart = False
+            if worker.pid:
+                os.kill(worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+        raise
     finally:
         client.close()
         if cluster is not None:

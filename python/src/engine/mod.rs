@@ -16,7 +16,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use self::drawn::Drawn;
 use crate::fields::Fields;
 use crate::lists::{Pairs, infos, pairs, read_actions};
-use crate::{config, errors};
+use crate::{config, errors, interrupt};
 
 /// Row, column, goal's row and column, step, whether the agent is active, whether the goal was drawn.
 type Change = (u16, u16, u16, u16, u64, bool, bool);
@@ -247,7 +247,7 @@ impl Engine {
     ) -> PyResult<String> {
         let style =
             pogema_render::Style { egocentric, static_frame, show_agents, show_lines, ..Default::default() };
-        self.drawn_by(py, |trace| pogema_render::svg::draw(trace, &style))
+        self.drawn_by(py, move |trace| pogema_render::svg::draw(trace, &style))
     }
 
     /// Supports pickling and copying: returns the restoring function and the bytes to pass to it.
@@ -262,7 +262,8 @@ impl Engine {
 
     /// Draws the recorded episode as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
-        self.drawn_by(py, |trace| pogema_render::html::replay(trace, title))
+        let title = title.to_owned();
+        self.drawn_by(py, move |trace| pogema_render::html::replay(trace, &title))
     }
 }
 
@@ -286,9 +287,10 @@ impl Engine {
     fn drawn_by(
         &self,
         py: Python<'_>,
-        draw: impl FnOnce(&Trace) -> Result<String, Error>,
+        draw: impl FnOnce(&Trace) -> Result<String, Error> + Send + 'static,
     ) -> PyResult<String> {
-        self.episode.trace().and_then(|trace| draw(&trace)).map_err(|error| errors::call(py, &error))
+        let trace = self.episode.trace().map_err(|error| errors::call(py, &error))?;
+        interrupt::detach(py, move || draw(&trace))?.map_err(|error| errors::call(py, &error))
     }
 
     fn begin(
@@ -301,7 +303,11 @@ impl Engine {
             Some(config) => config::source(config, registered).map_err(|error| errors::config(py, &error))?,
             None => self.source.clone(),
         };
-        let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
+        let num_cells = source.config().height.saturating_mul(source.config().width);
+        let generate = move || source.generate().map(|generated| (source, generated));
+        let generated =
+            if num_cells < interrupt::LONG { py.detach(generate) } else { interrupt::detach(py, generate)? };
+        let (source, generated) = generated.map_err(|error| errors::instance(py, &error))?;
         let rules = rules(&source, self.exact, self.time_limit);
         self.start(rules, generated.instance).map_err(|error| match error {
             Error::Config { .. } | Error::CellOutside { .. } => errors::config(py, &error),
