@@ -4,6 +4,9 @@ mod drawn;
 mod observe;
 pub mod state;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
 use numpy::PyArray2;
 use pogema_core::{
     Action, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
@@ -43,11 +46,21 @@ pub struct Engine {
 impl Engine {
     /// Makes an environment from the fields of a config.
     ///
-    /// `registered` is the text of the map that `map_name` names, and `exact` selects exact occupancy.
+    /// `registered` is the text of the map that `map_name` names, and `exact` selects exact occupancy. `num_retries`
+    /// limits the further attempts to place the agents [default: POGEMA's].
     #[new]
-    #[pyo3(signature = (config, registered=None, exact=false))]
-    fn new(py: Python<'_>, config: Fields, registered: Option<&str>, exact: bool) -> PyResult<Self> {
-        let source = config::source(&config, registered).map_err(|error| errors::config(py, &error))?;
+    #[pyo3(signature = (config, registered=None, exact=false, num_retries=None))]
+    fn new(
+        py: Python<'_>,
+        config: Fields,
+        registered: Option<&str>,
+        exact: bool,
+        num_retries: Option<usize>,
+    ) -> PyResult<Self> {
+        let mut source = config::source(&config, registered).map_err(|error| errors::config(py, &error))?;
+        if let Some(num_retries) = num_retries {
+            source = source.with_retries(num_retries);
+        }
         let time_limit = source.config().max_episode_steps;
         Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
@@ -303,10 +316,15 @@ impl Engine {
             Some(config) => config::source(config, registered).map_err(|error| errors::config(py, &error))?,
             None => self.source.clone(),
         };
-        let num_cells = source.config().height.saturating_mul(source.config().width);
+        let stop = Arc::<AtomicBool>::default();
+        source = source.cancelled_by(&stop);
+        let num_cells = source.num_cells_drawn();
         let generate = move || source.generate().map(|generated| (source, generated));
-        let generated =
-            if num_cells < interrupt::LONG { py.detach(generate) } else { interrupt::detach(py, generate)? };
+        let generated = if num_cells < interrupt::LONG {
+            py.detach(generate)
+        } else {
+            interrupt::detach(py, generate).inspect_err(|_| stop.store(true, Relaxed))?
+        };
         let (source, generated) = generated.map_err(|error| errors::instance(py, &error))?;
         let rules = rules(&source, self.exact, self.time_limit);
         self.start(rules, generated.instance).map_err(|error| match error {
