@@ -15,6 +15,7 @@ __all__ = [
     "PlanFollower",
     "WORDS",
     "__version__",
+    "_panic",
     "check_plan",
     "cost_to_go",
     "derive_config",
@@ -90,7 +91,8 @@ class Batch:
     def __new__(
         cls,
         configs: list[tuple[dict[str, Any], Optional[str]]],
-        of_env: list[int],
+        of_env: Optional[list[int]],
+        num_envs: int,
         autoreset: str,
         exact: bool,
         num_threads: int,
@@ -195,5 +197,6 @@ def show_views(
     out: Optional[str],
     six: Optional[str],
 ) -> tuple[list[str], list[tuple[str, list[str], list[str], list[str], Optional[str]]]]: ...
+def _panic(text: str) -> None: ...
 def num_cores() -> int: ...
 def restore_engine(saved: bytes) -> Engine: ...

@@ -15,6 +15,7 @@ __all__ = [
     "ElapsedStepsError",
     "EmptyMapError",
     "InstanceError",
+    "InternalError",
     "JumpedError",
     "MapTextError",
     "NoCellError",
@@ -67,6 +68,10 @@ class MapTextError(_Quiet, ValueError):
 
 class InstanceError(OverflowError, IndexError, ValueError):
     """A config without an instance: the map has no room, or starts and goals do not match."""
+
+
+class InternalError(RuntimeError):
+    """A defect of this package; please report it. The object that was called may be in any state."""
 
 
 class ActionCountError(AssertionError, ValueError):

@@ -16,6 +16,7 @@ use pogema_toolbox::{
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::guard::guarded;
 use crate::interrupt;
 
 /// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
@@ -34,6 +35,7 @@ pub struct Evaluation {
     progress: Mutex<Option<Progress>>,
 }
 
+guarded! {
 #[pymethods]
 impl Evaluation {
     /// Reads a suite and opens the folder of its results.
@@ -66,32 +68,33 @@ impl Evaluation {
     }
 
     /// Closes the lock of the folder in a forked child; the parent keeps it.
-    fn release_in_child(&self) {
+    fn release_in_child(&self) -> PyResult<()> {
         self.store.release_in_child();
+        Ok(())
     }
 
     /// Returns the number of episodes of each algorithm.
-    fn num_episodes(&self) -> usize {
-        self.environments.len()
+    fn num_episodes(&self) -> PyResult<usize> {
+        Ok(self.environments.len())
     }
 
     /// Returns whether the suite uses environments other than POGEMA's.
-    fn is_foreign(&self) -> bool {
-        self.suite.is_foreign()
+    fn is_foreign(&self) -> PyResult<bool> {
+        Ok(self.suite.is_foreign())
     }
 
     /// Returns whether the suite has views of its results.
-    fn has_views(&self) -> bool {
-        !self.suite.views.is_empty()
+    fn has_views(&self) -> PyResult<bool> {
+        Ok(!self.suite.views.is_empty())
     }
 
     /// Returns the address of the Dask scheduler that the suite names.
-    fn dask(&self) -> Option<String> {
-        self.suite.dask.clone()
+    fn dask(&self) -> PyResult<Option<String>> {
+        Ok(self.suite.dask.clone())
     }
 
     /// Returns the algorithms, in the order of the suite.
-    fn algorithms(&self) -> Vec<Listed> {
+    fn algorithms(&self) -> PyResult<Vec<Listed>> {
         let all = self.suite.algorithms.iter().map(|algorithm| {
             let parameters = algorithm.parameters.iter().map(|(key, node)| (key.clone(), node.value()));
             let parameters: Pairs = parameters.collect();
@@ -99,7 +102,7 @@ impl Evaluation {
             let parameters = serde_json::to_string(&parameters).unwrap_or_default();
             (key.clone(), name.clone(), parameters, algorithm.num_processes, backend.word().to_owned())
         });
-        all.collect()
+        Ok(all.collect())
     }
 
     /// Returns all fields of an episode's environment, in JSON, as the suite has them.
@@ -222,6 +225,7 @@ impl Evaluation {
         }
     }
 }
+}
 
 impl Evaluation {
     fn results(&self) -> PyResult<Results> {
@@ -294,12 +298,15 @@ pub fn to_py_error(error: &Error) -> PyErr {
     }
 }
 
+guarded! {
 /// Returns the processor of this machine and its number of threads.
 #[pyfunction]
-pub fn machine() -> &'static str {
-    pogema_toolbox::machine()
+pub fn machine() -> PyResult<&'static str> {
+    Ok(pogema_toolbox::machine())
+}
 }
 
+guarded! {
 /// Plays one episode of a built-in algorithm; returns its metrics in JSON and its time in seconds.
 ///
 /// `suite` contains that episode alone, and `maps` are map texts by name.
@@ -315,4 +322,5 @@ pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -
         Ok((played, runtime.as_secs_f64()))
     };
     interrupt::detach(py, play)?.map_err(|error: Error| to_py_error(&error))
+}
 }

@@ -15,11 +15,14 @@ use pogema_planners::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::guard::guarded;
+use crate::memory::check_aligned;
 use crate::{errors, interrupt};
 
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
+guarded! {
 /// Runs a planner and returns its outcome as a dictionary.
 #[pyfunction]
 #[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed))]
@@ -74,6 +77,7 @@ pub fn make_plan<'py>(
     }
     Ok(result)
 }
+}
 
 /// Adds a plan's cells, actions and costs.
 fn add_plan(result: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
@@ -93,6 +97,7 @@ fn add_plan(result: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
     result.set_item("makespan", plan.makespan())
 }
 
+guarded! {
 /// Returns the first conflict of a plan, or `None` if it is valid.
 #[pyfunction]
 pub fn check_plan(
@@ -111,7 +116,9 @@ pub fn check_plan(
     let verdict = interrupt::detach(py, validate)?;
     Ok(verdict.err().map(|conflict| conflict.to_string()))
 }
+}
 
+guarded! {
 /// Returns the number of steps to a goal from every cell, -1 where no path leads to it.
 #[pyfunction]
 pub fn cost_to_go<'py>(
@@ -132,6 +139,7 @@ pub fn cost_to_go<'py>(
     };
     let (map, grid) = interrupt::detach(py, search)?.map_err(|error: Error| errors::plan(&error))?;
     PyArray1::from_vec(py, grid).reshape([map.height(), map.width()])
+}
 }
 
 /// A planner that drives an environment.
@@ -172,6 +180,7 @@ impl Policy {
     }
 }
 
+guarded! {
 #[pymethods]
 impl PlanFollower {
     #[new]
@@ -238,6 +247,7 @@ impl PlanFollower {
         Ok(())
     }
 }
+}
 
 fn read_budget(
     (seconds, nodes): (Option<f64>, Option<u64>),
@@ -251,11 +261,13 @@ fn read_budget(
 }
 
 fn map(obstacles: &Obstacles<'_>) -> Result<Map, Error> {
+    check_aligned("obstacles", obstacles)?;
     let [height, width] = [obstacles.shape()[0], obstacles.shape()[1]];
     Map::new(height, width, obstacles.as_array().iter().map(|&value| value != 0.0).collect())
 }
 
 fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
+    check_aligned(what, places)?;
     let [_, numbers] = [places.shape()[0], places.shape()[1]];
     if numbers != 2 {
         return Err(Error::config(
@@ -277,6 +289,7 @@ fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
 }
 
 fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
+    check_aligned("cells", steps)?;
     let shape = steps.shape();
     if shape[2] != 2 {
         let found = format!("an array of shape ({}, {}, {})", shape[0], shape[1], shape[2]);

@@ -15,7 +15,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::fields::Fields;
-use crate::{config, errors, interrupt};
+use crate::guard::guarded;
+use crate::{config, errors, interrupt, memory};
 
 /// Output arrays of a step: rewards, terminated, truncated.
 ///
@@ -51,23 +52,25 @@ struct Next {
     seeded: Option<(EnvSource, Firsts)>,
 }
 
+guarded! {
 #[pymethods]
 impl Batch {
     /// Makes environments from configs.
     ///
     /// Each config comes with the text of the map that its `map_name` names. `of_env` holds the index of each
-    /// environment's config.
+    /// environment's config; without it, all have the first.
     #[new]
     fn new(
         py: Python<'_>,
         configs: Vec<(Fields, Option<String>)>,
-        of_env: Vec<usize>,
+        of_env: Option<Vec<usize>>,
+        num_envs: usize,
         autoreset: &str,
         exact: bool,
         num_threads: usize,
     ) -> PyResult<Self> {
         let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
-        let make = move || Inner::new(&configs, of_env, exact, num_threads);
+        let make = move || Inner::new(&configs, of_env, num_envs, exact, num_threads);
         let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
         Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process: std::process::id() })
@@ -207,6 +210,7 @@ impl Batch {
         Ok(())
     }
 }
+}
 
 impl Batch {
     fn is_inherited(&self) -> bool {
@@ -250,13 +254,18 @@ impl Drop for Batch {
 impl Inner {
     fn new(
         configs: &[(Fields, Option<String>)],
-        of_env: Vec<usize>,
+        of_env: Option<Vec<usize>>,
+        num_envs: usize,
         exact: bool,
         num_threads: usize,
     ) -> Result<Self, Error> {
-        let num_envs = of_env.len();
         let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
-        let source = EnvSource::new(configs.iter().map(read).collect::<Result<_, _>>()?, of_env)?;
+        let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        // A batch of several configs holds a list of them, and is therefore small: the largest map counts for all.
+        let largest = configs.iter().max_by_key(|(config, _)| config.height.saturating_mul(config.width));
+        let bytes = largest.and_then(|(config, _)| memory::of_environments(config, num_envs));
+        memory::check("the batch", bytes)?;
+        let source = EnvSource::new(configs, of_env.unwrap_or_else(|| vec![0; num_envs]))?;
         let rules = source.config(0).rules();
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
         let rules = Config { occupancy, ..rules };
@@ -391,10 +400,12 @@ fn write_ended_masks(batch: &pogema_fast::Batch, envs: &[usize], out: &mut [i8])
         .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }
 
+guarded! {
 /// Returns the number of threads that this process can run in parallel.
 #[pyfunction]
-pub fn num_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+pub fn num_cores() -> PyResult<usize> {
+    Ok(std::thread::available_parallelism().map_or(1, usize::from))
+}
 }
 
 /// Reads Gymnasium's name of an autoreset mode.

@@ -8,11 +8,13 @@ use pogema_toolbox::{Results, six::Definition};
 use pyo3::prelude::*;
 
 use crate::evaluation::to_py_error;
+use crate::guard::guarded;
 use crate::interrupt;
 
 /// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
 
+guarded! {
 /// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
 ///
 /// Without `names` shows all views of `config`, by default of the suite that is stored with the results.
@@ -46,4 +48,5 @@ pub fn show_views(
         Ok((results.notes, listed))
     };
     interrupt::detach(py, show)?.map_err(|error: Error| to_py_error(&error))
+}
 }

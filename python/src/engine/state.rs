@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::Engine;
 use super::drawn::Drawn;
+use crate::guard::guarded;
 use crate::{errors, interrupt};
 
 const FORMAT: &str = "pogema-rs environment";
@@ -51,6 +52,7 @@ struct SavedEpisode {
     streams: Vec<StreamState>,
 }
 
+guarded! {
 /// Restores the environment that [`save`] turned into these bytes.
 ///
 /// # Errors
@@ -64,6 +66,7 @@ pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
         interrupt::detach(py, move || restored(&saved))?
     };
     restored.map_err(|error| errors::call(py, &error))
+}
 }
 
 /// Returns the complete state as versioned JSON.
