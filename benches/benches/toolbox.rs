@@ -41,7 +41,7 @@ fn environments(suite: &Suite) -> EpisodeConfigs {
 fn evaluate(suite: &Suite) {
     let folder = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(folder.path(), suite, Begin::New).unwrap());
-    let running = Running { threads: 1, stop: &AtomicBool::new(false), watch: &|_| {} };
+    let running = Running { threads: 1, stop: &Arc::<AtomicBool>::default(), watch: &|_| {} };
     assert!(run(suite, &environments(suite), &store, running).unwrap().is_whole);
 }
 

@@ -66,7 +66,7 @@ impl Evaluate {
         let (shown, folder) = (Arc::clone(&bar), self.out.clone());
         exit_on_ctrl_c(move || shown.interrupted(&folder))?;
         let watch = |event: Event<'_>| bar.show(event);
-        let stop = AtomicBool::new(false);
+        let stop = Arc::<AtomicBool>::default();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = self.threads.unwrap_or(cores);
         note_threads(threads);
@@ -100,7 +100,7 @@ fn write_report(
     let bar = begin("replays", picks.len(), 0);
     let replays: Vec<Replay> = picks
         .into_iter()
-        .map(|pick| Replay::of(pick, &results, suite, environments))
+        .map(|pick| Replay::of(pick, &results, suite, environments, &Arc::default()))
         .inspect(|_| bar.inc(1))
         .collect();
     bar.finish_and_clear();

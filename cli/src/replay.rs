@@ -1,6 +1,7 @@
 //! `pogema replay`: replays an episode of an evaluation.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use pogema_core::Error;
@@ -34,7 +35,8 @@ impl Replay {
         let environments = environments(&suite, &self.sources)?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(environments.at(self.episode)?.config.num_agents)?;
-        let (metrics, trace) = suite.play_again(&environments, &self.algorithm, self.episode)?;
+        let (metrics, trace) =
+            suite.play_again(&environments, &self.algorithm, self.episode, &Arc::default())?;
         if let Some(path) = &self.trace {
             write_trace(path, &trace)?;
         }

@@ -89,6 +89,12 @@ pub enum Error {
     /// Data from another source is wrong.
     #[error("{}", one_line(format_args!("{what}: {reason}")))]
     Corrupt { what: String, reason: String },
+    /// The caller cancelled the work.
+    #[error("the work was cancelled")]
+    Cancelled,
+    /// The system does not provide the memory. The number of bytes is unknown if it cannot be counted.
+    #[error("{}", one_line(format_args!("not enough memory: {what} needs {}", number_of_bytes(*bytes))))]
+    Memory { what: String, bytes: Option<usize> },
     /// The operating system or a library failed.
     #[error("{}", one_line(format_args!("{what}: {cause}")))]
     External {
@@ -106,6 +112,10 @@ pub enum Error {
     /// A trace cannot be read.
     #[error("{}", one_line(format_args!("trace: line {line}: {reason}")))]
     Trace { line: usize, reason: String },
+}
+
+fn number_of_bytes(bytes: Option<usize>) -> String {
+    bytes.map_or("more bytes than can be counted".into(), |bytes| format!("{bytes} bytes"))
 }
 
 /// Any error, or a text.

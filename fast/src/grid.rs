@@ -225,9 +225,7 @@ pub fn reserve<T>(number: Option<usize>, entry: impl FnMut() -> T) -> Result<Vec
         Some(number) if is_reserved => list.resize_with(number, entry),
         _ => {
             let bytes = number.and_then(|number| number.checked_mul(size_of::<T>()));
-            let bytes =
-                bytes.map_or("more bytes than can be counted".into(), |bytes| format!("{bytes} bytes"));
-            return Err(Error::instance(format!("not enough memory: the environment needs {bytes}")));
+            return Err(Error::Memory { what: "the environment".into(), bytes });
         }
     }
     Ok(list)

@@ -50,7 +50,7 @@ mod observe;
 mod simd;
 mod step;
 
-pub use batch::{Autoreset, Batch, Instances, ObservationBuffers, Observations};
+pub use batch::{Autoreset, Batch, Firsts, Instances, ObservationBuffers, Observations};
 pub use observe::words_per_agent;
 pub use simd::{SimdPath, Value};
 pub use step::Engine;

@@ -1,6 +1,7 @@
 //! Generates the instances of a config, one for each reset.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside, StreamState};
 use serde::{Deserialize, Serialize};
@@ -11,8 +12,8 @@ use crate::place::{capacity, place_at_random};
 use crate::streams::{Choice, DrawnGoals, Reach};
 use pogema_numpy::{Generator, SeedSequence};
 
-/// Number of attempts to place the agents before POGEMA gives up.
-const NUM_ATTEMPTS: usize = 11;
+/// POGEMA's default number of further attempts to place the agents.
+const NUM_RETRIES: usize = 10;
 /// Upper bound, excluded, of the seeds of the agents' generators: the largest `int32`.
 const AGENT_SEEDS: i64 = i32::MAX as i64;
 
@@ -62,6 +63,8 @@ pub struct InstanceSource {
     config: GridConfig,
     registered: Option<Map>,
     pools: Option<Pools>,
+    num_retries: usize,
+    cancelled: Option<Arc<AtomicBool>>,
 }
 
 /// Possible starts and goals in their current order. Every reset shuffles them again.
@@ -91,7 +94,23 @@ impl InstanceSource {
             _ => None,
         };
         let registered = registered.filter(|_| config.map_name.is_some());
-        Ok(Self { config, registered, pools })
+        Ok(Self { config, registered, pools, num_retries: NUM_RETRIES, cancelled: None })
+    }
+
+    /// Sets the number of further attempts to place the agents on new random maps [default: 10].
+    ///
+    /// Rule: place/retries
+    #[must_use]
+    pub fn with_retries(mut self, num_retries: usize) -> Self {
+        self.num_retries = num_retries;
+        self
+    }
+
+    /// Makes [`InstanceSource::generate`] end before its next attempt after any thread sets a flag.
+    #[must_use]
+    pub fn cancelled_by(mut self, flag: &Arc<AtomicBool>) -> Self {
+        self.cancelled = Some(Arc::clone(flag));
+        self
     }
 
     /// Returns the config.
@@ -104,6 +123,12 @@ impl InstanceSource {
     /// Rule: seed/streams
     pub fn reseed(&mut self, seed: Option<u64>) {
         self.config.seed = seed;
+    }
+
+    /// Returns the largest number of cells that [`InstanceSource::generate`] draws, all attempts included.
+    pub fn num_cells_drawn(&self) -> usize {
+        let num_cells = self.config.height.saturating_mul(self.config.width);
+        num_cells.saturating_mul(self.num_retries.saturating_add(1))
     }
 
     /// Returns the possible starts and goals, in the order to which resets have shuffled them so far.
@@ -138,7 +163,7 @@ impl InstanceSource {
     ///
     /// # Errors
     /// If there are too many agents for the map, if starts or goals do not fit the map or each other, or if a next goal
-    /// could never be drawn. An error leaves the source unchanged.
+    /// could never be drawn; [`Error::Cancelled`] if a thread has cancelled it. An error leaves the source unchanged.
     ///
     /// Rule: place/obstacles, place/explicit, place/pools, place/retries
     pub fn generate(&mut self) -> Result<Generated, Error> {
@@ -267,15 +292,18 @@ impl InstanceSource {
         let num_agents = self.config.num_agents;
         let draws_map = self.registered.is_none() && self.config.map.is_none();
         // With a seed all attempts are equal, and on a given map the room never changes.
-        let num_attempts = if draws_map && self.config.seed.is_none() { NUM_ATTEMPTS } else { 1 };
+        let num_retries = if draws_map && self.config.seed.is_none() { self.num_retries } else { 0 };
         let mut room = 0;
-        for attempt in 0..num_attempts {
+        for attempt in 0..=num_retries {
+            if self.cancelled.as_ref().is_some_and(|flag| flag.load(Relaxed)) {
+                return Err(Error::Cancelled);
+            }
             let map = self.ground()?;
             let components = Components::of(&map);
             room = room.max(capacity(&components));
             let placed = place_at_random(&map, &components, num_agents, &mut self.stream()?);
             if let Some((starts, goals)) = placed {
-                if (1..NUM_ATTEMPTS - 1).contains(&attempt) {
+                if (1..num_retries).contains(&attempt) {
                     warnings.push(format!("the agents were placed only at attempt {}", attempt + 1));
                 }
                 return Ok((map, starts, goals));

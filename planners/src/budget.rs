@@ -29,6 +29,11 @@ impl Budget {
         Self { nodes: Some(nodes), ..Self::default() }
     }
 
+    /// Returns whether a thread has cancelled the work.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
     /// Starts the clock of this budget.
     pub(crate) fn start(&self) -> Clock {
         Clock { budget: self.clone(), started: Instant::now(), num_nodes: 0, is_spent: false }
@@ -61,8 +66,7 @@ impl Clock {
     /// Reads the time; returns whether the budget is spent.
     pub fn is_spent(&mut self) -> bool {
         let is_late = self.budget.time.is_some_and(|time| self.started.elapsed() >= time);
-        let is_cancelled = self.budget.cancelled.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
-        self.is_spent |= is_late || is_cancelled;
+        self.is_spent |= is_late || self.budget.is_cancelled();
         self.is_spent
     }
 

@@ -46,7 +46,7 @@ def read_actions(actions: Any, shape: tuple[int, int]) -> np.ndarray:
     if array.dtype == np.uint64:
         # Otherwise large numbers would become negative, and the message would quote a wrong number.
         array = np.minimum(array, np.uint64(_LARGEST))
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return np.require(array, np.int64, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def _as_array(actions: Any) -> np.ndarray:

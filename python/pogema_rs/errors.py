@@ -16,6 +16,7 @@ __all__ = [
     "ElapsedStepsError",
     "EmptyMapError",
     "InstanceError",
+    "InternalError",
     "JumpedError",
     "MapShapeError",
     "MapTextError",
@@ -78,6 +79,10 @@ class MapTextError(_Quiet, ValueError):
 
 class InstanceError(OverflowError, IndexError, ValueError):
     """A config without an instance: the map has no room, or starts and goals do not match."""
+
+
+class InternalError(RuntimeError):
+    """A defect of this package; please report it. The object that was called may be in any state."""
 
 
 class ActionCountError(AssertionError, ValueError):

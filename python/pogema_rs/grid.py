@@ -6,6 +6,8 @@ one of its attributes raises an error.
 
 from __future__ import annotations
 
+import operator
+import sys
 import warnings
 from copy import deepcopy
 from functools import cached_property
@@ -42,9 +44,10 @@ class Grid:
     """The map and its agents.
 
     A grid of an environment shows that environment's current state; a grid made from a config shows the state after a
-    reset. It is read-only: the methods with which POGEMA's users change a grid raise an error here.
+    reset. It is read-only: the methods with which POGEMA's users change a grid raise an error here. If the config has
+    neither a map nor a seed, up to `num_retries` further maps are drawn until one has room for all agents.
 
-    Rule: border/ring, border/outside, grid/coordinates
+    Rule: border/ring, border/outside, grid/coordinates, place/retries
 
     Source: POGEMA 1.4.0, `grid.py`, `Grid`
     """
@@ -52,7 +55,9 @@ class Grid:
     _seed: Optional[int] = None
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
-        engine = _engine.Engine(engine_fields(grid_config), grid_registry.map_text(grid_config.map_name))
+        num_retries = min(max(operator.index(num_retries), 0), sys.maxsize)
+        named = grid_registry.map_text(grid_config.map_name)
+        engine = _engine.Engine(engine_fields(grid_config), named, num_retries=num_retries)
         for text in engine.reset():
             warnings.warn(text, UserWarning, stacklevel=2)
         self._show(engine, grid_config)

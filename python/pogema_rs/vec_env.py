@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -106,11 +107,15 @@ class VecEnv(VectorEnv):
         self.semantics = Semantics(semantics)
         self._dtype = _read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
-        configs, of_env = _read_configs(grid_config, num_envs)
-        self.num_envs = len(of_env)
+        configs, of_env, self.num_envs = _read_configs(grid_config, num_envs)
         self.num_threads = _read_threads(num_threads, self.num_envs)
         self._batch = _engine.Batch(
-            configs, of_env, self.autoreset_mode.value, self.semantics.occupancy_is_exact, self.num_threads
+            configs,
+            of_env,
+            self.num_envs,
+            self.autoreset_mode.value,
+            self.semantics.occupancy_is_exact,
+            self.num_threads,
         )
         self.num_agents, radius = self._batch.sizes()
         side = 2 * radius + 1
@@ -275,23 +280,22 @@ def _read_dtype(dtype: Any) -> np.dtype:
     raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'uint8'")
 
 
-def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Config], list[int]]:
-    """Returns the distinct configs, and the index of each environment's config."""
-    if isinstance(grid_config, (list, tuple)):
-        if num_envs not in (None, len(grid_config)):
-            raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-        configs = [_engine_config(config) for config in grid_config]
-    else:
+def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Config], Optional[list[int]], int]:
+    """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
+    if not isinstance(grid_config, (list, tuple)):
         num_envs = 1 if num_envs is None else num_envs
         _check_whole("num_envs", num_envs)
-        configs = [_engine_config(grid_config)] * num_envs
+        return [_engine_config(grid_config)], None, min(int(num_envs), sys.maxsize)
+    if num_envs not in (None, len(grid_config)):
+        raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
+    configs = [_engine_config(config) for config in grid_config]
     if not configs:
         raise ValueError("num_envs is 0, expected at least 1")
     # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
     keys = [pickle.dumps(config) for config in configs]
     places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
     first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}
-    return [first[place] for place in range(len(places))], [places[key] for key in keys]
+    return [first[place] for place in range(len(places))], [places[key] for key in keys], len(configs)
 
 
 def _read_threads(num_threads: Optional[int], num_envs: int) -> int:

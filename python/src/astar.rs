@@ -11,6 +11,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::guard::guarded;
+use crate::memory::check_aligned;
 
 /// An agent that follows shortest paths around the obstacles it has seen, with the same actions as POGEMA's.
 #[pyclass(module = "pogema_rs._engine")]
@@ -20,10 +22,11 @@ pub struct AStarAgent {
     was_random: Arc<AtomicBool>,
 }
 
+guarded! {
 #[pymethods]
 impl AStarAgent {
     #[new]
-    fn new(seed: u64) -> Self {
+    fn new(seed: u64) -> PyResult<Self> {
         let was_random = Arc::new(AtomicBool::new(false));
         let (mut generator, flag) = (Generator::seeded(seed), Arc::clone(&was_random));
         let random_action = move || {
@@ -33,7 +36,7 @@ impl AStarAgent {
             Action::ALL[index as usize]
         };
         let agent = pogema_planners::AStarAgent::new(Box::new(random_action));
-        Self { agent: Mutex::new(agent), was_random }
+        Ok(Self { agent: Mutex::new(agent), was_random })
     }
 
     /// Returns the action for an observation of type `POMAPF`, and whether it was drawn at random.
@@ -50,6 +53,7 @@ impl AStarAgent {
                 "obstacles have shape ({rows}, {side}), expected a square with an odd side"
             )));
         }
+        check_aligned("obstacles", &obstacles).map_err(|error| errors::plan(&error))?;
         let obstacles = obstacles.to_vec()?;
         let view = PomapfObservation { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
         self.was_random.store(false, Relaxed);
@@ -58,9 +62,11 @@ impl AStarAgent {
     }
 
     /// Forgets the seen map before a new episode; the random generator continues its stream.
-    fn clear_state(&mut self) {
+    fn clear_state(&mut self) -> PyResult<()> {
         self.agent().forget();
+        Ok(())
     }
+}
 }
 
 impl AStarAgent {

@@ -7,7 +7,9 @@ use pyo3::types::PyDict;
 
 use crate::errors;
 use crate::fields::Fields;
+use crate::guard::guarded;
 
+guarded! {
 /// Returns the fields that POGEMA derives from a config.
 #[pyfunction]
 pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDict>> {
@@ -32,11 +34,14 @@ pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDic
     derived.set_item("targets_xy", goals)?;
     Ok(derived)
 }
+}
 
+guarded! {
 /// Returns the known name that is closest to `name`.
 #[pyfunction]
-pub fn nearest_name(name: &str, known: Vec<String>) -> String {
-    nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned()
+pub fn nearest_name(name: &str, known: Vec<String>) -> PyResult<String> {
+    Ok(nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned())
+}
 }
 
 /// Returns the instance source of a config.

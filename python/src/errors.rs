@@ -1,8 +1,8 @@
 //! Converts errors to the Python classes that POGEMA's users catch.
 
-use pogema_core::Error;
+use pogema_core::{Error, one_line};
 use pyo3::PyErrArguments;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -21,6 +21,7 @@ fn made(py: Python<'_>, class: &str, arguments: impl PyErrArguments + 'static) -
 /// Converts an error in a config; the Python side turns it into the class that POGEMA raises.
 pub fn config(py: Python<'_>, error: &Error) -> PyErr {
     match error {
+        Error::Memory { .. } => memory(error),
         Error::CellOutside { .. } => of_class(py, "OutsideMapError", error),
         Error::UnknownLetter { .. } => of_class(py, "MapTextError", error),
         _ => {
@@ -32,7 +33,10 @@ pub fn config(py: Python<'_>, error: &Error) -> PyErr {
 
 /// Converts an error from making an instance.
 pub fn instance(py: Python<'_>, error: &Error) -> PyErr {
-    of_class(py, "InstanceError", error)
+    match error {
+        Error::Memory { .. } => memory(error),
+        _ => of_class(py, "InstanceError", error),
+    }
 }
 
 /// Converts an error from any other call.
@@ -45,6 +49,17 @@ pub fn call(py: Python<'_>, error: &Error) -> PyErr {
         _ => "StateError",
     };
     of_class(py, class, error)
+}
+
+/// Converts an error about memory.
+pub fn memory(error: &Error) -> PyErr {
+    PyMemoryError::new_err(error.to_string())
+}
+
+/// Returns the error of an entry that panicked.
+pub fn internal(text: &str) -> PyErr {
+    let text = one_line(format_args!("internal error, please report it: {text}"));
+    Python::attach(|py| of_class(py, "InternalError", text))
 }
 
 /// Returns the error of a call that was made during a call of another thread.

@@ -1,7 +1,7 @@
 //! Suites and the results of their episodes, both of built-in algorithms and of policies in Python.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pogema_core::files::write_whole;
@@ -16,6 +16,9 @@ use pogema_toolbox::{
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::guard::guarded;
+use crate::interrupt;
+
 /// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
 type Listed = (String, String, String, Option<usize>, String);
 
@@ -23,7 +26,7 @@ type Listed = (String, String, String, Option<usize>, String);
 type Replayed = (String, String, String);
 
 /// A suite and the folder with its results.
-#[pyclass(frozen, module = "pogema_rs._engine")]
+#[pyclass(frozen, weakref, module = "pogema_rs._engine")]
 pub struct Evaluation {
     suite: Suite,
     environments: EpisodeConfigs,
@@ -32,6 +35,7 @@ pub struct Evaluation {
     progress: Mutex<Option<Progress>>,
 }
 
+guarded! {
 #[pymethods]
 impl Evaluation {
     /// Reads a suite and opens the folder of its results.
@@ -63,28 +67,34 @@ impl Evaluation {
         Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
     }
 
+    /// Closes the lock of the folder in a forked child; the parent keeps it.
+    fn release_in_child(&self) -> PyResult<()> {
+        self.store.release_in_child();
+        Ok(())
+    }
+
     /// Returns the number of episodes of each algorithm.
-    fn num_episodes(&self) -> usize {
-        self.environments.len()
+    fn num_episodes(&self) -> PyResult<usize> {
+        Ok(self.environments.len())
     }
 
     /// Returns whether the suite uses environments other than POGEMA's.
-    fn is_foreign(&self) -> bool {
-        self.suite.is_foreign()
+    fn is_foreign(&self) -> PyResult<bool> {
+        Ok(self.suite.is_foreign())
     }
 
     /// Returns whether the suite has views of its results.
-    fn has_views(&self) -> bool {
-        !self.suite.views.is_empty()
+    fn has_views(&self) -> PyResult<bool> {
+        Ok(!self.suite.views.is_empty())
     }
 
     /// Returns the address of the Dask scheduler that the suite names.
-    fn dask(&self) -> Option<String> {
-        self.suite.dask.clone()
+    fn dask(&self) -> PyResult<Option<String>> {
+        Ok(self.suite.dask.clone())
     }
 
     /// Returns the algorithms, in the order of the suite.
-    fn algorithms(&self) -> Vec<Listed> {
+    fn algorithms(&self) -> PyResult<Vec<Listed>> {
         let all = self.suite.algorithms.iter().map(|algorithm| {
             let parameters = algorithm.parameters.iter().map(|(key, node)| (key.clone(), node.value()));
             let parameters: Pairs = parameters.collect();
@@ -92,7 +102,7 @@ impl Evaluation {
             let parameters = serde_json::to_string(&parameters).unwrap_or_default();
             (key.clone(), name.clone(), parameters, algorithm.num_processes, backend.word().to_owned())
         });
-        all.collect()
+        Ok(all.collect())
     }
 
     /// Returns all fields of an episode's environment, in JSON, as the suite has them.
@@ -154,18 +164,22 @@ impl Evaluation {
     /// if this method has to play it.
     fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Replayed>>) -> PyResult<()> {
         let results = self.results()?;
+        let stop = Arc::default();
         let write = || {
             let picks = picks(&results, SHOWN).into_iter();
             let replay = |(pick, again): (Pick, Option<Replayed>)| match again {
-                None => Ok(Replay::of(pick, &results, &self.suite, &self.environments)),
+                None => Ok(Replay::of(pick, &results, &self.suite, &self.environments, &stop)),
                 Some((_, _, error)) if !error.is_empty() => Ok(Replay::failed(pick, error)),
                 Some((metrics, film, _)) => Ok(Replay::played(pick, &results, &from_json(&metrics)?, film)),
             };
             let replays = picks.zip(again).map(replay).collect::<Result<Vec<_>, Error>>()?;
+            if stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
             let page = page(&self.suite, &self.store.manifest(), &results, &replays)?;
             write_whole(&path, page.as_bytes())
         };
-        py.detach(write).map_err(|error| to_py_error(&error))
+        interrupt::detach_scoped(py, &stop, write)?.map_err(|error| to_py_error(&error))
     }
 
     /// Returns whether an algorithm of the suite is built in.
@@ -187,7 +201,7 @@ impl Evaluation {
         watch: Py<PyAny>,
     ) -> PyResult<Option<(usize, usize, bool)>> {
         let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
-        let stop = AtomicBool::new(false);
+        let stop = Arc::<AtomicBool>::default();
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
         let report = |event: Event<'_>| {
             let error = match event {
@@ -196,21 +210,21 @@ impl Evaluation {
                 Event::Begin { .. } | Event::End => return,
             };
             Python::attach(|py| {
-                let outcome = py.check_signals().and_then(|()| watch.call1(py, (error,)).map(|_| ()));
-                if let (Err(error), Ok(mut raised)) = (outcome, raised.lock()) {
-                    stop.store(true, std::sync::atomic::Ordering::Relaxed);
+                if let (Err(error), Ok(mut raised)) = (watch.call1(py, (error,)), raised.lock()) {
+                    stop.store(true, Relaxed);
                     raised.get_or_insert(error);
                 }
             });
         };
         let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
         let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);
-        let summary = py.detach(run).map_err(|error| to_py_error(&error))?;
+        let summary = interrupt::detach_scoped(py, &stop, run)?.map_err(|error| to_py_error(&error))?;
         match raised.into_inner() {
             Ok(Some(error)) => Err(error),
             _ => Ok(Some((summary.num_played, summary.num_failed, summary.is_whole))),
         }
     }
+}
 }
 
 impl Evaluation {
@@ -284,24 +298,29 @@ pub fn to_py_error(error: &Error) -> PyErr {
     }
 }
 
+guarded! {
 /// Returns the processor of this machine and its number of threads.
 #[pyfunction]
-pub fn machine() -> &'static str {
-    pogema_toolbox::machine()
+pub fn machine() -> PyResult<&'static str> {
+    Ok(pogema_toolbox::machine())
+}
 }
 
+guarded! {
 /// Plays one episode of a built-in algorithm; returns its metrics in JSON and its time in seconds.
 ///
 /// `suite` contains that episode alone, and `maps` are map texts by name.
 #[pyfunction]
 pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
-    let play = || {
-        let suite = Suite::parse(std::path::Path::new("suite.yaml"), suite)?;
+    let suite = suite.to_owned();
+    let play = move || {
+        let suite = Suite::parse(std::path::Path::new("suite.yaml"), &suite)?;
         let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?);
         let (played, runtime) = suite.play_one(&environments)?;
         let played = serde_json::to_string(&played)
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;
         Ok((played, runtime.as_secs_f64()))
     };
-    py.detach(play).map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, play)?.map_err(|error: Error| to_py_error(&error))
+}
 }

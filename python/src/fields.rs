@@ -49,7 +49,12 @@ fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if let Ok(plain) = object.call_method0("tolist") {
         return value(&plain, depth + 1);
     }
-    let items = object.try_iter()?.map(|item| value(&item?, depth + 1));
+    let items = object.try_iter()?.map(|item| {
+        if depth == 0 {
+            object.py().check_signals()?;
+        }
+        value(&item?, depth + 1)
+    });
     Ok(Value::Array(items.collect::<PyResult<_>>()?))
 }
 

@@ -6,7 +6,10 @@ mod engine;
 mod errors;
 mod evaluation;
 mod fields;
+mod guard;
+mod interrupt;
 mod lists;
+mod memory;
 mod planners;
 mod vec;
 mod views;
@@ -27,6 +30,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
     module.add_function(wrap_pyfunction!(views::show_views, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
+    module.add_function(wrap_pyfunction!(guard::force_panic, module)?)?;
     module.add("MAX_THREADS", pogema_core::MAX_THREADS)?;
     module.add("WORDS", words(module.py())?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;

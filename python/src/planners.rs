@@ -1,6 +1,7 @@
 //! Plans for all agents, and policies that follow them.
 
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use numpy::{
@@ -14,11 +15,14 @@ use pogema_planners::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors;
+use crate::guard::guarded;
+use crate::memory::check_aligned;
+use crate::{errors, interrupt};
 
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
+guarded! {
 /// Runs a planner and returns its outcome as a dictionary.
 #[pyfunction]
 #[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed))]
@@ -34,20 +38,25 @@ pub fn make_plan<'py>(
     num_threads: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let stop = Arc::<AtomicBool>::default();
     let arguments = || {
-        let problem = Problem::new(&map(&obstacles)?, &cells("starts", &starts)?, &cells("goals", &goals)?)?;
+        let places = (map(&obstacles)?, cells("starts", &starts)?, cells("goals", &goals)?);
         let settings = PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? };
-        Ok((
-            Problem { max_steps: most_steps, ..problem },
-            PlannerName::read("planner", planner)?.make(settings),
-            read_budget(budget)?,
-        ))
+        Ok((places, PlannerName::read("planner", planner)?.make(settings), read_budget(budget, &stop)?))
     };
-    let (problem, mut planner, budget) = arguments().map_err(|error: Error| errors::plan(&error))?;
-    let began = Instant::now();
-    let outcome = py.detach(|| planner.plan(&problem, &budget));
+    let ((map, starts, goals), mut planner, budget) =
+        arguments().map_err(|error: Error| errors::plan(&error))?;
+    let plan = move || {
+        let problem = Problem { max_steps: most_steps, ..Problem::new(&map, &starts, &goals)? };
+        let began = Instant::now();
+        let outcome = planner.plan(&problem, &budget);
+        Ok((outcome, began.elapsed()))
+    };
+    // An interrupted call does not leave the planner running.
+    let finished = interrupt::detach(py, plan).inspect_err(|_| stop.store(true, Relaxed))?;
+    let (outcome, seconds) = finished.map_err(|error: Error| errors::plan(&error))?;
     let result = PyDict::new(py);
-    result.set_item("seconds", began.elapsed().as_secs_f64())?;
+    result.set_item("seconds", seconds.as_secs_f64())?;
     if let Some(lower_bound) = outcome.lower_bound() {
         result.set_item("lower_bound", lower_bound)?;
     }
@@ -68,6 +77,7 @@ pub fn make_plan<'py>(
     }
     Ok(result)
 }
+}
 
 /// Adds a plan's cells, actions and costs.
 fn add_plan(result: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
@@ -87,6 +97,7 @@ fn add_plan(result: &Bound<'_, PyDict>, plan: &Plan) -> PyResult<()> {
     result.set_item("makespan", plan.makespan())
 }
 
+guarded! {
 /// Returns the first conflict of a plan, or `None` if it is valid.
 #[pyfunction]
 pub fn check_plan(
@@ -101,10 +112,13 @@ pub fn check_plan(
         Ok((map(&obstacles)?, cells("starts", &starts)?, goals, read_plan(&steps)?))
     };
     let (map, starts, goals, plan) = arguments().map_err(|error: Error| errors::plan(&error))?;
-    let verdict = py.detach(|| pogema_planners::validate(&map, &starts, goals.as_deref(), &plan));
+    let validate = move || pogema_planners::validate(&map, &starts, goals.as_deref(), &plan);
+    let verdict = interrupt::detach(py, validate)?;
     Ok(verdict.err().map(|conflict| conflict.to_string()))
 }
+}
 
+guarded! {
 /// Returns the number of steps to a goal from every cell, -1 where no path leads to it.
 #[pyfunction]
 pub fn cost_to_go<'py>(
@@ -112,8 +126,8 @@ pub fn cost_to_go<'py>(
     obstacles: Obstacles<'_>,
     goal: (i64, i64),
 ) -> PyResult<Bound<'py, PyArray2<i32>>> {
-    let search = || {
-        let map = map(&obstacles)?;
+    let map = map(&obstacles).map_err(|error| errors::plan(&error))?;
+    let search = move || {
         let graph = std::sync::Arc::new(Graph::new(&map));
         let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1])?])?[0];
         let costs = Distances::new(graph.clone(), 0).to(goal);
@@ -123,8 +137,9 @@ pub fn cost_to_go<'py>(
         }
         Ok((map, grid))
     };
-    let (map, grid) = search().map_err(|error: Error| errors::plan(&error))?;
+    let (map, grid) = interrupt::detach(py, search)?.map_err(|error: Error| errors::plan(&error))?;
     PyArray1::from_vec(py, grid).reshape([map.height(), map.width()])
+}
 }
 
 /// A planner that drives an environment.
@@ -133,6 +148,8 @@ pub fn cost_to_go<'py>(
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct PlanFollower {
     inner: Mutex<Follower>,
+    /// Cancels the planner.
+    stop: Arc<AtomicBool>,
 }
 
 struct Follower {
@@ -163,6 +180,7 @@ impl Policy {
     }
 }
 
+guarded! {
 #[pymethods]
 impl PlanFollower {
     #[new]
@@ -174,10 +192,11 @@ impl PlanFollower {
         seed: u64,
         lifelong: bool,
     ) -> PyResult<Self> {
+        let stop = Arc::default();
         let made = || {
             let (settings, budget) = (
                 PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? },
-                read_budget(budget)?,
+                read_budget(budget, &stop)?,
             );
             Ok(if lifelong {
                 Policy::Lifelong(LifelongPolicy::new(
@@ -194,17 +213,19 @@ impl PlanFollower {
             })
         };
         let policy = made().map_err(|error: Error| errors::plan(&error))?;
-        Ok(Self { inner: Mutex::new(Follower { policy, step: 0 }) })
+        Ok(Self { inner: Mutex::new(Follower { policy, step: 0 }), stop })
     }
 
     /// Chooses the actions of all agents for one step.
+    ///
+    /// If a signal handler raises, a lifelong planner forgets its plan; no other state changes.
     fn act(
         &self,
         py: Python<'_>,
         obstacles: Obstacles<'_>,
         positions: Cells<'_>,
         goals: Cells<'_>,
-    ) -> PyResult<Vec<u8>> {
+    ) -> PyResult<Vec<i64>> {
         let arguments = || Ok((map(&obstacles)?, cells("positions", &positions)?, cells("goals", &goals)?));
         let (map, cells, goals) = arguments().map_err(|error: Error| errors::plan(&error))?;
         let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
@@ -212,9 +233,10 @@ impl PlanFollower {
         let follower = &mut *inner;
         let step = follower.step;
         let now = State { step, cells: &cells, goals: &goals, active: &active, on_goal: &[] };
-        let actions = py.detach(|| follower.policy.act(&map, now)).map_err(|error| errors::plan(&error))?;
+        let actions = interrupt::detach_scoped(py, &self.stop, || follower.policy.act(&map, now))?;
+        let actions = actions.map_err(|error| errors::plan(&error))?;
         follower.step += 1;
-        Ok(actions.into_iter().map(u8::from).collect())
+        Ok(actions.into_iter().map(|action| i64::from(u8::from(action))).collect())
     }
 
     /// Forgets the last episode.
@@ -225,21 +247,27 @@ impl PlanFollower {
         Ok(())
     }
 }
+}
 
-fn read_budget((seconds, nodes): (Option<f64>, Option<u64>)) -> Result<Budget, Error> {
+fn read_budget(
+    (seconds, nodes): (Option<f64>, Option<u64>),
+    stop: &Arc<AtomicBool>,
+) -> Result<Budget, Error> {
     let time = |seconds: f64| {
         Duration::try_from_secs_f64(seconds)
             .map_err(|_| Error::argument("seconds", seconds, "a time of 0 or more"))
     };
-    Ok(Budget { time: seconds.map(time).transpose()?, nodes, cancelled: None })
+    Ok(Budget { time: seconds.map(time).transpose()?, nodes, cancelled: Some(Arc::clone(stop)) })
 }
 
 fn map(obstacles: &Obstacles<'_>) -> Result<Map, Error> {
+    check_aligned("obstacles", obstacles)?;
     let [height, width] = [obstacles.shape()[0], obstacles.shape()[1]];
     Map::new(height, width, obstacles.as_array().iter().map(|&value| value != 0.0).collect())
 }
 
 fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
+    check_aligned(what, places)?;
     let [_, numbers] = [places.shape()[0], places.shape()[1]];
     if numbers != 2 {
         return Err(Error::config(
@@ -261,6 +289,7 @@ fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
 }
 
 fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
+    check_aligned("cells", steps)?;
     let shape = steps.shape();
     if shape[2] != 2 {
         let found = format!("an array of shape ({}, {}, {})", shape[0], shape[1], shape[2]);

@@ -1,5 +1,6 @@
 //! The batch of environments behind `VecEnv`.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use numpy::{
@@ -8,13 +9,14 @@ use numpy::{
 };
 use pogema::{EnvSource, Seed};
 use pogema_core::{Action, Config, Error, Occupancy, StepOut};
-use pogema_fast::{Autoreset, ObservationBuffers, Observations};
+use pogema_fast::{Autoreset, Firsts, ObservationBuffers, Observations};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::fields::Fields;
-use crate::{config, errors};
+use crate::guard::guarded;
+use crate::{config, errors, interrupt, memory};
 
 /// Output arrays of a step: rewards, terminated, truncated.
 ///
@@ -31,6 +33,8 @@ type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyRea
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Batch {
     inner: Mutex<Option<Inner>>,
+    /// Stops a reset.
+    stop: AtomicBool,
     /// Id of the process that owns the threads.
     process: u32,
 }
@@ -41,26 +45,35 @@ struct Inner {
     actions: Vec<Action>,
 }
 
+/// The next episodes of some environments, before they begin.
+struct Next {
+    chosen: Vec<bool>,
+    /// The source with new seeds, if there are any, and its first instances.
+    seeded: Option<(EnvSource, Firsts)>,
+}
+
+guarded! {
 #[pymethods]
 impl Batch {
     /// Makes environments from configs.
     ///
     /// Each config comes with the text of the map that its `map_name` names. `of_env` holds the index of each
-    /// environment's config.
+    /// environment's config; without it, all have the first.
     #[new]
     fn new(
         py: Python<'_>,
         configs: Vec<(Fields, Option<String>)>,
-        of_env: Vec<usize>,
+        of_env: Option<Vec<usize>>,
+        num_envs: usize,
         autoreset: &str,
         exact: bool,
         num_threads: usize,
     ) -> PyResult<Self> {
         let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
-        let made = py.detach(|| Inner::new(&configs, of_env, exact, num_threads));
-        let mut inner = made.map_err(|error| errors::config(py, &error))?;
+        let make = move || Inner::new(&configs, of_env, num_envs, exact, num_threads);
+        let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
-        Ok(Self { inner: Mutex::new(Some(inner)), process: std::process::id() })
+        Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process: std::process::id() })
     }
 
     /// Begins the next episode in all environments, or in the chosen ones.
@@ -77,7 +90,10 @@ impl Batch {
     ) -> PyResult<()> {
         let mut guard = self.lock()?;
         let inner = Self::open(&mut guard)?;
-        py.detach(|| inner.reset(chosen, seed, seeds)).map_err(|error| errors::batch(py, &error))?;
+        let fetched =
+            interrupt::detach_scoped(py, &self.stop, || inner.fetch(chosen, seed, seeds, &self.stop))?;
+        let reset = fetched.and_then(|next| py.detach(|| inner.begin(next)));
+        reset.map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
         let mut buffer = Buffer::new(&observations)?;
         let view =
@@ -113,6 +129,11 @@ impl Batch {
             ObservationBuffers { observations: buffer.observations_mut()?, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
+        if inner.ends_take_long() {
+            let fetched =
+                interrupt::detach_scoped(py, &self.stop, || inner.batch.fetch_truncated(&self.stop))?;
+            fetched.map_err(|error| errors::batch(py, &error))?;
+        }
         let (batch, actions) = (&mut inner.batch, &inner.actions);
         let played = py.detach(|| batch.step(actions, out, view));
         let shown = played.and_then(|()| write_active(batch, None, active));
@@ -189,6 +210,7 @@ impl Batch {
         Ok(())
     }
 }
+}
 
 impl Batch {
     fn is_inherited(&self) -> bool {
@@ -232,13 +254,18 @@ impl Drop for Batch {
 impl Inner {
     fn new(
         configs: &[(Fields, Option<String>)],
-        of_env: Vec<usize>,
+        of_env: Option<Vec<usize>>,
+        num_envs: usize,
         exact: bool,
         num_threads: usize,
     ) -> Result<Self, Error> {
-        let num_envs = of_env.len();
         let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
-        let source = EnvSource::new(configs.iter().map(read).collect::<Result<_, _>>()?, of_env)?;
+        let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        // A batch of several configs holds a list of them, and is therefore small: the largest map counts for all.
+        let largest = configs.iter().max_by_key(|(config, _)| config.height.saturating_mul(config.width));
+        let bytes = largest.and_then(|(config, _)| memory::of_environments(config, num_envs));
+        memory::check("the batch", bytes)?;
+        let source = EnvSource::new(configs, of_env.unwrap_or_else(|| vec![0; num_envs]))?;
         let rules = source.config(0).rules();
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
         let rules = Config { occupancy, ..rules };
@@ -246,28 +273,48 @@ impl Inner {
         Ok(Self { batch, source, actions: Vec::with_capacity(num_envs * rules.num_agents) })
     }
 
-    fn reset(
+    /// Fetches the instances of a reset, and changes no episode.
+    fn fetch(
         &mut self,
         chosen: Option<Vec<bool>>,
         seed: Option<u64>,
         seeds: Option<Vec<u64>>,
-    ) -> Result<(), Error> {
+        stop: &AtomicBool,
+    ) -> Result<Next, Error> {
         let num_envs = self.batch.num_lanes();
         let chosen = chosen.unwrap_or_else(|| vec![true; num_envs]);
         Error::check_length("chosen environments", num_envs, chosen.len())?;
         let given: Vec<Seed> = match (seed, seeds) {
             (Some(seed), _) => vec![Seed::Shared(seed); num_envs],
             (None, Some(seeds)) => seeds.into_iter().map(Seed::Own).collect(),
-            (None, None) => return self.batch.reset_lanes(&chosen),
+            (None, None) => {
+                self.batch.fetch(&chosen, stop)?;
+                return Ok(Next { chosen, seeded: None });
+            }
         };
         Error::check_length("seeds", num_envs, given.len())?;
         let mut source = self.source.clone();
         for ((seed, given), chosen) in source.seeds_mut().iter_mut().zip(given).zip(&chosen) {
             *seed = if *chosen { given } else { *seed };
         }
-        self.batch.reset_with(source.clone(), &chosen)?;
+        let firsts = self.batch.fetch_with(source.clone(), &chosen, stop)?;
+        Ok(Next { chosen, seeded: Some((source, firsts)) })
+    }
+
+    fn begin(&mut self, next: Next) -> Result<(), Error> {
+        let Some((source, firsts)) = next.seeded else { return self.batch.reset_lanes(&next.chosen) };
+        self.batch.begin_with(firsts)?;
         self.source = source;
         Ok(())
+    }
+
+    /// Returns whether the next step ends episodes whose next instances may take long.
+    fn ends_take_long(&self) -> bool {
+        let config = self.source.config(0);
+        let num_cells = config.height.saturating_mul(config.width);
+        let num_ends = || self.batch.num_truncated();
+        num_cells.saturating_mul(self.batch.num_lanes()) >= interrupt::LONG
+            && num_ends().saturating_mul(num_cells) >= interrupt::LONG
     }
 
     /// Stores actions, or returns the index and the number of the first invalid one.
@@ -353,10 +400,12 @@ fn write_ended_masks(batch: &pogema_fast::Batch, envs: &[usize], out: &mut [i8])
         .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }
 
+guarded! {
 /// Returns the number of threads that this process can run in parallel.
 #[pyfunction]
-pub fn num_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+pub fn num_cores() -> PyResult<usize> {
+    Ok(std::thread::available_parallelism().map_or(1, usize::from))
+}
 }
 
 /// Reads Gymnasium's name of an autoreset mode.

@@ -8,10 +8,13 @@ use pogema_toolbox::{Results, six::Definition};
 use pyo3::prelude::*;
 
 use crate::evaluation::to_py_error;
+use crate::guard::guarded;
+use crate::interrupt;
 
 /// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
 
+guarded! {
 /// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
 ///
 /// Without `names` shows all views of `config`, by default of the suite that is stored with the results.
@@ -25,7 +28,7 @@ pub fn show_views(
     out: Option<PathBuf>,
     six: Option<String>,
 ) -> PyResult<(Vec<String>, Vec<Listed>)> {
-    let show = || {
+    let show = move || {
         let gallery = Gallery {
             format: formats.0.map(|word| Format::read("table_format", &word)).transpose()?,
             kind: formats.1.map(|word| ImageFormat::read("plot_format", &word)).transpose()?,
@@ -44,5 +47,6 @@ pub fn show_views(
         let listed = listed.collect();
         Ok((results.notes, listed))
     };
-    py.detach(show).map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, show)?.map_err(|error: Error| to_py_error(&error))
+}
 }

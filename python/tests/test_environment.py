@@ -9,6 +9,7 @@ import numpy as np
 import pogema_rs
 import pytest
 from pogema_rs import AnimationConfig, AnimationMonitor, BatchAStarAgent, GridConfig, pogema_v0
+from pogema_rs.grid import Grid
 from pydantic import ValidationError
 
 
@@ -238,6 +239,32 @@ def test_warnings_about_the_instance_reach_the_user():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         pogema_v0(GridConfig(seed=1)).reset()
+
+
+def _num_without_room(config, num_retries):
+    """Makes grids without a seed, and returns for how many of them no attempt had room."""
+    num_failed = 0
+    for _ in range(200):
+        try:
+            Grid(config, num_retries=num_retries)
+        except OverflowError:
+            num_failed += 1
+    return num_failed
+
+
+@pytest.mark.filterwarnings("ignore:the agents were placed only at attempt")
+def test_grid_tries_as_often_as_num_retries_says():
+    # One random map of seven has room for all agents.
+    config = GridConfig(size=4, density=0.5, num_agents=5)
+    never, default, always = (_num_without_room(config, number) for number in (0, 10, 10_000))
+    assert never > 100 > default > always == 0
+    assert _num_without_room(config, -1) > 100
+    with pytest.warns(UserWarning, match="placed only at attempt"):
+        _num_without_room(config, 5)
+    with pytest.raises(TypeError):
+        Grid(config, num_retries="10")
+    # With a seed, all attempts are equal.
+    assert _num_without_room(GridConfig(size=4, density=0.9, num_agents=5, seed=1), 10_000) == 200
 
 
 def test_grid_is_read_only():

@@ -1,7 +1,6 @@
-"""Tests of suites with policies in Python: on all backends, interrupted and resumed."""
+"""Tests of suites with policies in Python, on all backends."""
 
 import json
-import random
 import subprocess
 import sys
 import time
@@ -78,30 +77,6 @@ def test_every_backend_gets_the_results_of_the_built_in_policy(backend, played, 
     assert {"ISR", "CSR", "ep_length", "SoC", "makespan", "avg_agents_density", "a_collisions", "o_collisions"} == set(
         rows[0]["metrics"]
     )
-
-
-@pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing"])
-def test_killed_and_resumed_run_gives_the_same_bytes(backend, played, tmp_path):
-    content = suite(backend, seconds=0.002)
-    write(tmp_path, content)
-    lines, dice, num_killed = tmp_path / "out" / "A star.jsonl", random.Random(1), 0
-    while not (tmp_path / "out" / "A star.json").exists() and num_killed < 5:
-        begin = "resume" if (tmp_path / "out" / "about.json").exists() else "new"
-        # A separate process group, so that its children are killed with it.
-        child = subprocess.Popen(command(tmp_path, begin), stderr=subprocess.DEVNULL, start_new_session=True)
-        before = len(lines.read_bytes()) if lines.exists() else 0
-        deadline = time.monotonic() + 60
-        while child.poll() is None and time.monotonic() < deadline:
-            if lines.exists() and len(lines.read_bytes()) > before:
-                time.sleep(dice.uniform(0, 0.1))
-                break
-            time.sleep(0.001)
-        subprocess.run(["pkill", "-9", "-g", str(child.pid)], check=False)
-        num_killed += child.wait() != 0
-    assert num_killed >= 2
-    output, status = play(tmp_path, content, "resume")
-    assert status == 0, output
-    assert results(tmp_path) == played
 
 
 def test_dead_process_is_replaced_and_no_episode_is_lost(played, tmp_path):

@@ -1,5 +1,7 @@
 //! The built-in algorithms: planners, and POGEMA's own policies.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use pogema_core::{Error, MAX_THREADS};
@@ -36,6 +38,13 @@ impl BuiltIn {
         };
         let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
         is_known.then(|| Self::read(name, algorithm))
+    }
+
+    /// Makes its policies stop soon after any thread sets a flag.
+    #[must_use]
+    pub fn cancelled_by(mut self, stop: &Arc<AtomicBool>) -> Self {
+        self.settings.budget.cancelled = Some(Arc::clone(stop));
+        self
     }
 
     fn read(name: String, algorithm: &Algorithm) -> Result<Self, Error> {

@@ -27,7 +27,7 @@ pub struct Played {
 /// Plays an episode to its end.
 ///
 /// # Errors
-/// If no instance can be generated, or the algorithm cannot play it.
+/// If no instance can be generated, or the algorithm cannot play it; [`Error::Cancelled`] if its budget is cancelled.
 pub fn play(config: &GridConfig, algorithm: &BuiltIn) -> Result<Played, Error> {
     run(config, algorithm, false).map(|(played, _)| played)
 }
@@ -57,6 +57,9 @@ fn run(
     let mut policy = NamedPolicy::new(name, settings, &rules, episode.instance()?, rng)?;
     let mut runtime = began.elapsed();
     while !episode.is_over() {
+        if settings.budget.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
         let began = Instant::now();
         let actions = policy.act(&episode)?;
         runtime += began.elapsed();

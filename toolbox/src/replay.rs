@@ -1,6 +1,8 @@
 //! Replays episodes of results.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use pogema_core::{Error, Trace};
@@ -38,21 +40,24 @@ impl Suite {
         Ok((EpisodeConfigs::new(self, library)?, warnings))
     }
 
-    /// Plays an episode of one of its algorithms and records it.
+    /// Plays an episode of one of its algorithms and records it. Another thread may set `stop` to end the call soon.
     ///
     /// # Errors
-    /// If there is no such algorithm or episode, or the algorithm runs only in Python.
+    /// If there is no such algorithm or episode, or the algorithm runs only in Python; [`Error::Cancelled`] if the call
+    /// was stopped.
     pub fn play_again(
         &self,
         environments: &EpisodeConfigs,
         key: &str,
         index: usize,
+        stop: &Arc<AtomicBool>,
     ) -> Result<(Pairs, Trace), Error> {
         let algorithm = self.algorithm(key).ok_or_else(|| {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
             Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
-        let (played, trace) = record(&environments.at(index)?.config, &built_in(algorithm)?)?;
+        let (played, trace) =
+            record(&environments.at(index)?.config, &built_in(algorithm)?.cancelled_by(stop))?;
         Ok((measured(&played), trace))
     }
 

@@ -40,8 +40,8 @@ pub enum Event<'a> {
 pub struct Running<'a> {
     /// Number of threads; an algorithm may set a lower limit.
     pub threads: usize,
-    /// Set it to stop the run after the current episodes.
-    pub stop: &'a AtomicBool,
+    /// Set it to stop the run soon. Unfinished episodes are discarded.
+    pub stop: &'a Arc<AtomicBool>,
     /// Called for each event.
     pub watch: &'a (dyn Fn(Event<'_>) + Sync),
 }
@@ -122,13 +122,14 @@ pub fn run_one(
     };
     (running.watch)(Event::Begin { algorithm: &algorithm.key, total, done: progress.num_done() });
     let tasks = environments.by_cost(progress.to_do());
+    let built_in = built_in.clone().cancelled_by(running.stop);
     let (num_played, num_failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let progress = Mutex::new(progress);
     let one = |index: usize| {
         if running.stop.load(Relaxed) {
             return Ok(());
         }
-        let played = played(index, environments, built_in);
+        let played = played(index, environments, &built_in);
         let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
         match played {
             Ok(played) => {
@@ -136,6 +137,7 @@ pub fn run_one(
                 num_played.fetch_add(1, Relaxed);
                 (running.watch)(Event::Played);
             }
+            Err(_) if running.stop.load(Relaxed) => {}
             Err(failed) => {
                 progress.note(&failed)?;
                 num_failed.fetch_add(1, Relaxed);

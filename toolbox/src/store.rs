@@ -34,8 +34,8 @@ pub struct Store {
     journal: Mutex<Journal>,
     /// Versions of further software that plays, by name.
     versions: Vec<(String, String)>,
-    /// Held as long as the store lives.
-    _lock: File,
+    /// Held as long as the store lives, except in a forked child.
+    lock: Mutex<Option<File>>,
 }
 
 /// The manifest and the state of its last run.
@@ -71,7 +71,8 @@ impl Store {
         let (manifest, deleted) = admit(folder, suite, begin)?;
         deleted.map_or(Ok(()), |known| delete(folder, &known))?;
         let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
-        let store = Self { folder: folder.to_owned(), journal, versions: Vec::new(), _lock: lock };
+        let store =
+            Self { folder: folder.to_owned(), journal, versions: Vec::new(), lock: Mutex::new(Some(lock)) };
         // The manifest comes first, because it marks a folder of results and the run may be killed in between.
         store.write_manifest(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
@@ -92,6 +93,16 @@ impl Store {
     /// Returns the manifest of the results.
     pub fn manifest(&self) -> Manifest {
         self.journal().manifest.clone()
+    }
+
+    /// Closes the lock in a forked child; the parent keeps it.
+    ///
+    /// Otherwise the folder would stay locked until the child ends, even if the parent has died.
+    pub fn release_in_child(&self) {
+        // A thread of the parent that was inside this function at the fork does not exist in the child.
+        if let Ok(mut lock) = self.lock.try_lock() {
+            *lock = None;
+        }
     }
 
     /// Returns the index of this process's run. The first call adds the run to the manifest.

@@ -76,6 +76,12 @@ impl Lane {
         Ok(())
     }
 
+    /// Returns whether the next step is the last of the episode because of the limit of steps.
+    pub fn is_at_limit(&self) -> bool {
+        let max_steps = self.engine.config.max_steps;
+        !self.is_over && i64::try_from(self.engine.step).is_ok_and(|step| step.saturating_add(1) >= max_steps)
+    }
+
     /// Begins the next episode if it is ready, and otherwise leaves the environment as it ended.
     fn step_after_end(&mut self, out: StepOut<'_>) {
         out.rewards.fill(0.0);

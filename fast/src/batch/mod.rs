@@ -5,7 +5,9 @@ mod lane;
 mod prepare;
 mod team;
 
-use pogema_core::{Action, Config, Error, Metrics, StepOut, check_threads};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
 use crate::{Engine, SimdPath};
 
@@ -107,11 +109,7 @@ impl Batch {
     /// # Errors
     /// As for [`Batch::reset`]; also if there is not one flag per lane, or if the first call leaves out a lane.
     pub fn reset_lanes(&mut self, chosen: &[bool]) -> Result<(), Error> {
-        self.check_chosen(chosen)?;
-        let preparer = &self.preparer;
-        over_lanes(&self.team, &mut self.lanes, |lane| {
-            if chosen[lane.index] { lane.fetch_next(preparer) } else { Ok(()) }
-        })?;
+        self.fetch(chosen, &AtomicBool::new(false))?;
         over_lanes(
             &self.team,
             &mut self.lanes,
@@ -123,6 +121,45 @@ impl Batch {
         Ok(())
     }
 
+    /// Fetches the next instances of the chosen lanes, so that their reset takes little time. Changes no episode.
+    ///
+    /// Another thread may set `stop` to end the call soon.
+    ///
+    /// # Errors
+    /// As for [`Batch::reset_lanes`]; also [`Error::Cancelled`] if the call was stopped.
+    pub fn fetch(&mut self, chosen: &[bool], stop: &AtomicBool) -> Result<(), Error> {
+        self.check_chosen(chosen)?;
+        let preparer = &self.preparer;
+        let fetch = |lane: &mut Lane| lane.fetch_next(preparer);
+        over_chosen(&self.team, &mut self.lanes, chosen, stop, fetch).map(|_| ())
+    }
+
+    /// Returns the number of lanes whose episodes reach their limit of steps in the next step.
+    pub fn num_truncated(&self) -> usize {
+        self.lanes.iter().filter(|lane| lane.is_at_limit()).count()
+    }
+
+    /// Fetches the next instances of the lanes whose episodes reach their limit of steps in the next step.
+    ///
+    /// That step then takes little time. Another thread may set `stop` to end the call soon. A lane without a next
+    /// instance fails only after its episode has ended.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the call was stopped.
+    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+        if self.autoreset == Autoreset::Off {
+            return Ok(());
+        }
+        let chosen: Vec<bool> = self.lanes.iter().map(Lane::is_at_limit).collect();
+        let preparer = &self.preparer;
+        let fetch = |lane: &mut Lane| {
+            // The lane reports the error when its episode has ended.
+            let _ = lane.fetch_next(preparer);
+            Ok(())
+        };
+        over_chosen(&self.team, &mut self.lanes, &chosen, stop, fetch).map(|_| ())
+    }
+
     /// Begins episode 0 of another source in the chosen lanes, and leaves the current episodes of the others unchanged.
     ///
     /// The later episodes of the other lanes come from the new source, too, and their numbers continue. Only an episode
@@ -131,22 +168,44 @@ impl Batch {
     /// # Errors
     /// As for [`Batch::reset_lanes`]; also if the thread of the source cannot be started.
     pub fn reset_with(&mut self, source: impl Instances + 'static, chosen: &[bool]) -> Result<(), Error> {
+        let firsts = self.fetch_with(source, chosen, &AtomicBool::new(false))?;
+        self.begin_with(firsts)
+    }
+
+    /// Fetches the first instances of another source for the chosen lanes. Changes no episode.
+    ///
+    /// Another thread may set `stop` to end the call soon.
+    ///
+    /// # Errors
+    /// As for [`Batch::reset_with`]; also [`Error::Cancelled`] if the call was stopped.
+    pub fn fetch_with(
+        &mut self,
+        source: impl Instances + 'static,
+        chosen: &[bool],
+        stop: &AtomicBool,
+    ) -> Result<Firsts, Error> {
         self.check_chosen(chosen)?;
-        let (team, config) = (&self.team, &self.config);
+        let config = &self.config;
         let preparer = Preparer::new(Box::new(source), self.lanes.len())?;
         let first = |lane: &mut Lane| {
             let instance = preparer.take(lane.index)?;
-            instance.check_fits(config).map(|()| Some(instance))
+            instance.check_fits(config).map(|()| instance)
         };
-        let firsts =
-            over_lanes(
-                team,
-                &mut self.lanes,
-                |lane| if chosen[lane.index] { first(lane) } else { Ok(None) },
-            )?;
+        let instances = over_chosen(&self.team, &mut self.lanes, chosen, stop, first)?;
+        Ok(Firsts { preparer, instances })
+    }
+
+    /// Begins the episodes whose instances [`Batch::fetch_with`] has fetched.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for the instances of a batch of another size; if there is not enough memory for a lane's map,
+    /// which is then unchanged.
+    pub fn begin_with(&mut self, firsts: Firsts) -> Result<(), Error> {
+        let Firsts { preparer, instances } = firsts;
+        Error::check_length("first instances", self.lanes.len(), instances.len())?;
         self.preparer = preparer;
         let mut begun = Ok(());
-        for (lane, instance) in self.lanes.iter_mut().zip(firsts) {
+        for (lane, instance) in self.lanes.iter_mut().zip(instances) {
             match instance {
                 Some(instance) => begun = begun.and(lane.begin_with(instance, &self.preparer)),
                 None => self.preparer.request(lane.index, lane.requested),
@@ -289,6 +348,28 @@ impl Batch {
         let parts = out.chunks_mut(per_part).enumerate().collect();
         self.team.share(parts, |(part, out)| write(part, out)).into_iter().collect()
     }
+}
+
+/// The first instances of another source, for some lanes of a batch.
+pub struct Firsts {
+    preparer: Preparer,
+    instances: Vec<Option<Instance>>,
+}
+
+/// Calls a function for the chosen lanes, until another thread sets `stop`.
+fn over_chosen<T: Send + Sync>(
+    team: &Team,
+    lanes: &mut [Lane],
+    chosen: &[bool],
+    stop: &AtomicBool,
+    work: impl Fn(&mut Lane) -> Result<T, Error> + Sync,
+) -> Result<Vec<Option<T>>, Error> {
+    over_lanes(team, lanes, |lane| {
+        if !chosen[lane.index] {
+            return Ok(None);
+        }
+        if stop.load(Relaxed) { Err(Error::Cancelled) } else { work(lane).map(Some) }
+    })
 }
 
 /// Calls a function for all lanes on the threads of a team. If several lanes fail, the error is that of the first.

@@ -57,7 +57,8 @@ impl LifelongPolicy {
     ///
     /// # Errors
     /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are
-    /// provided and the state is not the next one of their episode.
+    /// provided and the state is not the next one of their episode; [`Error::Cancelled`] if the budget is cancelled
+    /// while the planner runs, which then forgets its plan.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let future = self.forecast.as_mut().map(|forecast| {
@@ -76,6 +77,10 @@ impl LifelongPolicy {
         } else {
             planner.next(&cells, &graph.vertices_of("goal", &of(now.goals))?, &budget)?
         };
+        if budget.is_cancelled() {
+            planner.reset();
+            return Err(Error::Cancelled);
+        }
         let mut actions = vec![Action::Stay; now.cells.len()];
         for (&agent, (&from, &to)) in agents.iter().zip(cells.iter().zip(&next)) {
             actions[agent] = graph.action(from, to);

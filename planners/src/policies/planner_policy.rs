@@ -66,7 +66,8 @@ impl PlannerPolicy {
     /// Returns the actions of all agents. Inactive agents stay; without a plan, all agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent or a goal that is not on a free cell.
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::Cancelled`] if the budget is
+    /// cancelled while the planner runs.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         if !self.current.as_ref().is_some_and(|plan| plan.is_followed(now)) {
             self.current = Some(self.plan(map, now)?);
@@ -94,6 +95,9 @@ impl PlannerPolicy {
             max_steps: self.max_steps.map(|limit| limit.saturating_sub(now.step) as usize),
         };
         let outcome = self.planner.plan(&problem, &self.budget);
+        if self.budget.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
         let is_unfinished = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
         let is_partial = is_unfinished && !(self.is_single_attempt && outcome.best().is_none());
         let plan = outcome.best().cloned().map_or_else(|| Plan::new(vec![cells]), Ok)?;

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from itertools import islice
+from multiprocessing.connection import Connection
 from typing import Any, Optional
 
 from pogema_rs.toolbox._work import Outcome, Task, play, play_with
@@ -28,10 +33,9 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
     waiting, deaths = list(tasks), 0
     waiting.reverse()
     while waiting:
-        state = ToolboxRegistry.get_state()
         under_way: dict[Future[Outcome], Task] = {}
         try:
-            with ProcessPoolExecutor(num_processes, initializer=_initialize, initargs=(state,)) as pool:
+            with _pool(num_processes) as pool:
                 while waiting or under_way:
                     while waiting and len(under_way) < _AHEAD * num_processes:
                         task = waiting.pop()
@@ -82,13 +86,43 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
                 yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
             for task in islice(rest, 1):
                 under_way.add(send(task))
+    except BaseException:
+        # Closing a worker waits for seconds until its episode ends.
+        for worker in cluster.workers.values() if cluster is not None else ():
+            worker.auto_restart = False
+            if worker.pid:
+                os.kill(worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+        raise
     finally:
         client.close()
         if cluster is not None:
             cluster.close()
 
 
-def _initialize(state: dict[str, Any]) -> None:
+@contextmanager
+def _pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Yields a process pool whose workers end with this process, and immediately after an exception."""
+    # Only this process keeps the writer open. The workers wait for its end, which also comes if this process is killed.
+    reader, writer = multiprocessing.Pipe(duplex=False)
+    arguments = (ToolboxRegistry.get_state(), reader, writer)
+    with reader, writer, ProcessPoolExecutor(num_processes, initializer=_initialize, initargs=arguments) as pool:
+        try:
+            yield pool
+        except BaseException:
+            writer.close()
+            raise
+
+
+def _initialize(state: dict[str, Any], reader: Connection, writer: Connection) -> None:
+    writer.close()
+    # Ctrl-C reaches all processes of a terminal; the parent ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, args=(reader,), daemon=True).start()
     # Otherwise NumPy uses all cores in every process.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     ToolboxRegistry.recreate_from_state(state)
+
+
+def _end_with_parent(reader: Connection) -> None:
+    reader.poll(None)
+    os._exit(1)

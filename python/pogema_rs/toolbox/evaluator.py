@@ -7,6 +7,7 @@ import os
 import platform
 import sys
 import time
+import weakref
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
@@ -23,6 +24,19 @@ from pogema_rs.toolbox.views import show
 __all__ = ["EvaluationError", "evaluation"]
 
 _Path = Union[str, os.PathLike[str]]
+
+
+#: The open evaluations, whose locks a forked child must not keep.
+_open: weakref.WeakSet[Evaluation] = weakref.WeakSet()
+
+
+def _release_in_child() -> None:
+    for suite in _open:
+        suite.release_in_child()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_release_in_child)
 
 
 class EvaluationError(RuntimeError):
@@ -63,6 +77,7 @@ def evaluation(
     grids = [(name, _map_text(grid)) for name, grid in ToolboxRegistry.get_maps().items()]
     files = [str(file) for file in maps]
     suite = Evaluation(str(path), text, str(eval_dir), begin, grids, files, _versions())
+    _open.add(suite)
     address = dask or suite.dask()
     num_failed = 0
     results: list[dict[str, Any]] = []

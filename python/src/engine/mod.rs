@@ -4,6 +4,9 @@ mod drawn;
 mod observe;
 pub mod state;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
 use numpy::PyArray2;
 use pogema_core::{
     Action, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
@@ -15,8 +18,9 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use self::drawn::Drawn;
 use crate::fields::Fields;
+use crate::guard::guarded;
 use crate::lists::{Pairs, infos, pairs, read_actions};
-use crate::{config, errors};
+use crate::{config, errors, interrupt, memory};
 
 /// Row, column, goal's row and column, step, whether the agent is active, whether the goal was drawn.
 type Change = (u16, u16, u16, u16, u64, bool, bool);
@@ -39,15 +43,26 @@ pub struct Engine {
     actions: Vec<Action>,
 }
 
+guarded! {
 #[pymethods]
 impl Engine {
     /// Makes an environment from the fields of a config.
     ///
-    /// `registered` is the text of the map that `map_name` names, and `exact` selects exact occupancy.
+    /// `registered` is the text of the map that `map_name` names, and `exact` selects exact occupancy. `num_retries`
+    /// limits the further attempts to place the agents [default: POGEMA's].
     #[new]
-    #[pyo3(signature = (config, registered=None, exact=false))]
-    fn new(py: Python<'_>, config: Fields, registered: Option<&str>, exact: bool) -> PyResult<Self> {
-        let source = config::source(&config, registered).map_err(|error| errors::config(py, &error))?;
+    #[pyo3(signature = (config, registered=None, exact=false, num_retries=None))]
+    fn new(
+        py: Python<'_>,
+        config: Fields,
+        registered: Option<&str>,
+        exact: bool,
+        num_retries: Option<usize>,
+    ) -> PyResult<Self> {
+        let mut source = config::source(&config, registered).map_err(|error| errors::config(py, &error))?;
+        if let Some(num_retries) = num_retries {
+            source = source.with_retries(num_retries);
+        }
         let time_limit = source.config().max_episode_steps;
         Self::of(source, exact, time_limit).map_err(|error| errors::config(py, &error))
     }
@@ -76,8 +91,9 @@ impl Engine {
     }
 
     /// Clears the counters of the metrics.
-    fn clear_metrics(&mut self) {
+    fn clear_metrics(&mut self) -> PyResult<()> {
         self.episode.meters_mut().episode.reset();
+        Ok(())
     }
 
     /// Plays one step and returns observations, rewards, terminated, truncated and infos.
@@ -134,47 +150,47 @@ impl Engine {
 
     /// Returns for each agent whether it is active.
     #[getter]
-    fn active(&self) -> Vec<bool> {
-        self.episode.state().active.to_vec()
+    fn active(&self) -> PyResult<Vec<bool>> {
+        Ok(self.episode.state().active.to_vec())
     }
 
     /// Returns for each agent whether it was active and on its goal after the last move, before goals changed.
     #[getter]
-    fn on_goal(&self) -> Vec<bool> {
-        self.episode.state().on_goal.to_vec()
+    fn on_goal(&self) -> PyResult<Vec<bool>> {
+        Ok(self.episode.state().on_goal.to_vec())
     }
 
     /// Returns the number of steps since the reset.
     #[getter]
-    fn num_steps(&self) -> u64 {
-        self.episode.num_steps()
+    fn num_steps(&self) -> PyResult<u64> {
+        Ok(self.episode.num_steps())
     }
 
     /// Returns the size of the map without its border: rows, columns.
     #[getter]
-    fn size(&self) -> (usize, usize) {
-        self.episode.engine().size()
+    fn size(&self) -> PyResult<(usize, usize)> {
+        Ok(self.episode.engine().size())
     }
 
     /// Returns the cell of each agent, with `shift` added to both coordinates.
-    fn cells(&self, shift: i64) -> Pairs {
-        pairs(self.episode.state().cells, shift)
+    fn cells(&self, shift: i64) -> PyResult<Pairs> {
+        Ok(pairs(self.episode.state().cells, shift))
     }
 
     /// Returns the start of each agent, with `shift` added to both coordinates.
-    fn starts(&self, shift: i64) -> Pairs {
-        self.episode.instance().map_or_else(|_| Vec::new(), |instance| pairs(instance.starts(), shift))
+    fn starts(&self, shift: i64) -> PyResult<Pairs> {
+        Ok(self.episode.instance().map_or_else(|_| Vec::new(), |instance| pairs(instance.starts(), shift)))
     }
 
     /// Returns the goal of each agent, with `shift` added to both coordinates.
-    fn goals(&self, shift: i64) -> Pairs {
-        pairs(self.episode.state().goals, shift)
+    fn goals(&self, shift: i64) -> PyResult<Pairs> {
+        Ok(pairs(self.episode.state().goals, shift))
     }
 
     /// Returns for each agent whether its goal was drawn since the reset.
     #[getter]
-    fn is_drawn(&self) -> Vec<bool> {
-        self.drawn.now().to_vec()
+    fn is_drawn(&self) -> PyResult<Vec<bool>> {
+        Ok(self.drawn.now().to_vec())
     }
 
     /// Returns the map with its border, 1 for an obstacle.
@@ -186,33 +202,35 @@ impl Engine {
     }
 
     /// Returns the marked cells of the occupancy grid, in the coordinates of the map with its border.
-    fn occupied(&self) -> Pairs {
-        pairs(&self.episode.engine().occupied(), self.episode.config().radius as i64)
+    fn occupied(&self) -> PyResult<Pairs> {
+        Ok(pairs(&self.episode.engine().occupied(), self.episode.config().radius as i64))
     }
 
     /// Returns whether the area beyond the wall is free.
     #[getter]
-    pub(crate) fn is_free_outside(&self) -> bool {
-        self.episode.instance().map_or(true, |instance| *instance.outside() == Outside::Free)
+    fn is_free_outside(&self) -> PyResult<bool> {
+        Ok(self.has_free_outside())
     }
 
     /// Returns the future goals of each agent as POGEMA predicts them, or `None` if the list would be infinite.
-    fn foretold_goals(&self) -> Option<Vec<Pairs>> {
-        let (instance, state) = (self.episode.instance().ok()?, self.episode.state());
-        let goals = foretold_from(self.source.config(), instance, state.cells, state.goals)?;
-        Some(goals.iter().map(|goals| pairs(goals, 0)).collect())
+    fn foretold_goals(&self) -> PyResult<Option<Vec<Pairs>>> {
+        let state = self.episode.state();
+        let goals = self.episode.instance().ok().and_then(|instance| {
+            foretold_from(self.source.config(), instance, state.cells, state.goals)
+        });
+        Ok(goals.map(|goals| goals.iter().map(|goals| pairs(goals, 0)).collect()))
     }
 
     /// Returns the pools in the order to which resets have shuffled them.
-    fn pools(&self) -> Option<(Pairs, Pairs)> {
-        self.source.pools().map(|(starts, goals)| (pairs(starts, 0), pairs(goals, 0)))
+    fn pools(&self) -> PyResult<Option<(Pairs, Pairs)>> {
+        Ok(self.source.pools().map(|(starts, goals)| (pairs(starts, 0), pairs(goals, 0))))
     }
 
     /// Returns for each agent its first state and each later state that differs from the one before.
     ///
     /// A state holds row, column, goal's row and column, step, whether the agent is active, and whether the goal was
     /// drawn.
-    fn history(&self) -> Vec<Vec<Change>> {
+    fn history(&self) -> PyResult<Vec<Vec<Change>>> {
         let changes = pogema_core::changes(self.episode.past());
         let of_agent = |(agent, changes): (usize, Vec<pogema_core::Change>)| {
             let is_drawn = self.drawn.kept(agent).iter().chain(std::iter::repeat(&false));
@@ -222,17 +240,19 @@ impl Engine {
             };
             changes.into_iter().zip(is_drawn).map(change).collect()
         };
-        changes.into_iter().enumerate().map(of_agent).collect()
+        Ok(changes.into_iter().enumerate().map(of_agent).collect())
     }
 
     /// Sets whether the episodes from the next reset on are recorded.
-    fn film(&mut self, is_wanted: bool) {
+    fn film(&mut self, is_wanted: bool) -> PyResult<()> {
         self.is_filmed = is_wanted;
+        Ok(())
     }
 
     /// Measures density and collisions, in addition to other metrics, in the episodes from the next reset on.
-    fn measure(&mut self) {
+    fn measure(&mut self) -> PyResult<()> {
         self.is_measured = true;
+        Ok(())
     }
 
     /// Draws the recorded episode as an animated SVG, or one frame of it.
@@ -247,12 +267,14 @@ impl Engine {
     ) -> PyResult<String> {
         let style =
             pogema_render::Style { egocentric, static_frame, show_agents, show_lines, ..Default::default() };
-        self.drawn_by(py, |trace| pogema_render::svg::draw(trace, &style))
+        self.drawn_by(py, move |trace| pogema_render::svg::draw(trace, &style))
     }
 
     /// Supports pickling and copying: returns the restoring function and the bytes to pass to it.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        Ok((py.import("pogema_rs._engine")?.getattr("restore_engine")?, (state::save(self, py)?,)))
+    fn __reduce__<'py>(this: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let py = this.py();
+        let engine = this.try_borrow().map_err(|_| errors::busy(py))?;
+        Ok((py.import("pogema_rs._engine")?.getattr("restore_engine")?, (state::save(&engine, py)?,)))
     }
 
     /// Packs the recorded episode for a page with many replays.
@@ -262,8 +284,10 @@ impl Engine {
 
     /// Draws the recorded episode as a page that replays it.
     fn draw_html(&self, py: Python<'_>, title: &str) -> PyResult<String> {
-        self.drawn_by(py, |trace| pogema_render::html::replay(trace, title))
+        let title = title.to_owned();
+        self.drawn_by(py, move |trace| pogema_render::html::replay(trace, &title))
     }
+}
 }
 
 impl Engine {
@@ -282,13 +306,18 @@ impl Engine {
         })
     }
 
+    pub(crate) fn has_free_outside(&self) -> bool {
+        self.episode.instance().map_or(true, |instance| *instance.outside() == Outside::Free)
+    }
+
     /// Draws the recorded episode with `draw`.
     fn drawn_by(
         &self,
         py: Python<'_>,
-        draw: impl FnOnce(&Trace) -> Result<String, Error>,
+        draw: impl FnOnce(&Trace) -> Result<String, Error> + Send + 'static,
     ) -> PyResult<String> {
-        self.episode.trace().and_then(|trace| draw(&trace)).map_err(|error| errors::call(py, &error))
+        let trace = self.episode.trace().map_err(|error| errors::call(py, &error))?;
+        interrupt::detach(py, move || draw(&trace))?.map_err(|error| errors::call(py, &error))
     }
 
     fn begin(
@@ -301,7 +330,18 @@ impl Engine {
             Some(config) => config::source(config, registered).map_err(|error| errors::config(py, &error))?,
             None => self.source.clone(),
         };
-        let generated = py.detach(|| source.generate()).map_err(|error| errors::instance(py, &error))?;
+        let bytes = memory::of_environments(source.config(), 1);
+        memory::check("the environment", bytes).map_err(|error| errors::memory(&error))?;
+        let stop = Arc::<AtomicBool>::default();
+        source = source.cancelled_by(&stop);
+        let num_cells = source.num_cells_drawn();
+        let generate = move || source.generate().map(|generated| (source, generated));
+        let generated = if num_cells < interrupt::LONG {
+            py.detach(generate)
+        } else {
+            interrupt::detach(py, generate).inspect_err(|_| stop.store(true, Relaxed))?
+        };
+        let (source, generated) = generated.map_err(|error| errors::instance(py, &error))?;
         let rules = rules(&source, self.exact, self.time_limit);
         self.start(rules, generated.instance).map_err(|error| match error {
             Error::Config { .. } | Error::CellOutside { .. } => errors::config(py, &error),

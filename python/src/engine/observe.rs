@@ -1,6 +1,6 @@
 //! Observations as the arrays, tuples and dictionaries that POGEMA returns.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pogema_core::{Environment, Instance, from_border, from_starts};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -8,12 +8,13 @@ use pyo3::types::{PyDict, PyList};
 use super::Engine;
 use crate::errors;
 use crate::lists::{Pairs, tuples};
+use crate::memory::zeros;
 
 impl Engine {
     pub(crate) fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
-        let array = PyArray4::<f32>::zeros(py, [num_agents, 3, side, side], false);
+        let array = zeros::<f32, _>(py, [num_agents, 3, side, side])?;
         {
             let mut values = array.readwrite();
             let values = values.as_slice_mut()?;
@@ -29,8 +30,8 @@ impl Engine {
     ) -> PyResult<Bound<'py, PyList>> {
         let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
-        let obstacles = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
-        let agents = PyArray3::<f32>::zeros(py, [num_agents, side, side], false);
+        let obstacles = zeros::<f32, _>(py, [num_agents, side, side])?;
+        let agents = zeros::<f32, _>(py, [num_agents, side, side])?;
         {
             let (mut obstacles, mut agents) = (obstacles.readwrite(), agents.readwrite());
             let (obstacles, agents) = (obstacles.as_slice_mut()?, agents.as_slice_mut()?);
@@ -77,8 +78,7 @@ impl Engine {
         self.check_started(py)?;
         let config = self.episode.config();
         let (height, width) = self.episode.engine().size();
-        let padded =
-            PyArray2::<u8>::zeros(py, [height + 2 * config.radius, width + 2 * config.radius], false);
+        let padded = zeros::<u8, _>(py, [height + 2 * config.radius, width + 2 * config.radius])?;
         {
             let mut obstacles = padded.readwrite();
             let written = self.episode.engine().observe_map(obstacles.as_slice_mut()?);
@@ -93,7 +93,7 @@ impl Engine {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyList>, Bound<'py, PyList>)> {
         let (padded, cells, goals) = self.global(py)?;
-        let dtype = if self.is_free_outside() { "float64" } else { "int64" };
+        let dtype = if self.has_free_outside() { "float64" } else { "int64" };
         let padded = padded.call_method1("astype", (dtype,))?;
         Ok((padded, tuples(py, &cells)?, self.goal_tuples(py, &goals)?))
     }

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use super::Engine;
 use super::drawn::Drawn;
-use crate::errors;
+use crate::guard::guarded;
+use crate::{errors, interrupt};
 
 const FORMAT: &str = "pogema-rs environment";
 const VERSION: u32 = 1;
@@ -51,13 +52,21 @@ struct SavedEpisode {
     streams: Vec<StreamState>,
 }
 
+guarded! {
 /// Restores the environment that [`save`] turned into these bytes.
 ///
 /// # Errors
 /// `ValueError` for any other bytes.
 #[pyfunction]
 pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
-    restored(saved).map_err(|error| errors::call(py, &error))
+    let restored = if saved.len() < interrupt::LONG {
+        restored(saved)
+    } else {
+        let saved = saved.to_vec();
+        interrupt::detach(py, move || restored(&saved))?
+    };
+    restored.map_err(|error| errors::call(py, &error))
+}
 }
 
 /// Returns the complete state as versioned JSON.

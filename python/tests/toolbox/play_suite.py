@@ -52,6 +52,27 @@ class Mortal(BatchAStarAgent):
         return super().act(observations)
 
 
+class ForkingConfig(AlgoBase):
+    """Settings of `Forking`: the file for the process id."""
+
+    pid: str
+
+
+class Forking(BatchAStarAgent):
+    """POGEMA's A*, which forks a process that sleeps."""
+
+    def __init__(self, config):
+        super().__init__()
+        pid = Path(config.pid)
+        if not pid.exists():
+            child = os.fork()
+            if child == 0:
+                os.closerange(0, 3)
+                time.sleep(600)
+                os._exit(0)
+            pid.write_text(str(child))
+
+
 class Crowded:
     """A policy that stays, and fails with more than 6 agents."""
 
@@ -69,6 +90,7 @@ def register():
     """Registers the policies and a map."""
     ToolboxRegistry.register_algorithm("Slow", Slow, SlowConfig)
     ToolboxRegistry.register_algorithm("Mortal", Mortal, MortalConfig)
+    ToolboxRegistry.register_algorithm("Forking", Forking, ForkingConfig)
     ToolboxRegistry.register_algorithm("Crowded", Crowded)
     ToolboxRegistry.register_maps({"hall": [[0] * 9 for _ in range(9)]})
 

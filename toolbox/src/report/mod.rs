@@ -3,6 +3,8 @@
 mod picks;
 
 use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -36,9 +38,15 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Replays an episode if its algorithm is built in.
-    pub fn of(pick: Pick, results: &Results, suite: &Suite, environments: &EpisodeConfigs) -> Self {
-        let again = suite.play_again(environments, &pick.algorithm, pick.episode);
+    /// Replays an episode if its algorithm is built in. Another thread may set `stop` to end the call soon.
+    pub fn of(
+        pick: Pick,
+        results: &Results,
+        suite: &Suite,
+        environments: &EpisodeConfigs,
+        stop: &Arc<AtomicBool>,
+    ) -> Self {
+        let again = suite.play_again(environments, &pick.algorithm, pick.episode, stop);
         match again.and_then(|(metrics, trace)| Ok((metrics, pack(&trace)?))) {
             Ok((metrics, film)) => Self::played(pick, results, &metrics, film),
             Err(error) => Self::failed(pick, error.to_string()),

@@ -1,0 +1,133 @@
+"""Tests that sizes beyond the memory raise MemoryError, that no panic leaves the engine, and that odd arrays are errors."""
+
+import pickle
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pogema_rs import GridConfig, _engine, pogema_v0
+from pogema_rs.errors import InternalError, StateError
+from pogema_rs.planners import cost_to_go, plan, validate
+from pogema_rs.vec_env import VecEnv
+
+SOURCES = Path(__file__).resolve().parent.parent / "src"
+
+
+def limited(code):
+    """Runs code in a process with 4 GB of address space, and returns the last line of its error."""
+    program = f"import resource; resource.setrlimit(resource.RLIMIT_AS, (4_000_000_000,) * 2)\n{code}"
+    done = subprocess.run([sys.executable, "-B", "-c", program], capture_output=True, text=True, timeout=60)
+    return done.stderr.strip().splitlines()[-1] if done.stderr.strip() else f"status {done.returncode}"
+
+
+@pytest.mark.parametrize("num_envs", [10**7, 10**9, 10**18, 10**30])
+def test_too_many_environments_raise_memory_error(num_envs):
+    said = limited(f"from pogema_rs.vec_env import VecEnv\nVecEnv({{'size': 8, 'num_agents': 1}}, {num_envs})")
+    assert re.fullmatch(r"MemoryError: not enough memory: the batch needs (\d+ bytes|more .* counted)", said), said
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"size": 8, "num_agents": 1, "obs_radius": 1},
+        {"size": 64, "num_agents": 64, "obs_radius": 1, "on_target": "restart"},
+        {"size": 500, "num_agents": 2, "obs_radius": 3, "max_episode_steps": 2},
+    ],
+)
+def test_no_number_of_environments_ends_the_process(config):
+    code = f"""
+from pogema_rs.vec_env import VecEnv
+resource.setrlimit(resource.RLIMIT_AS, (1_200_000_000,) * 2)
+num_envs = 10
+while True:
+    env = VecEnv({config}, num_envs, dtype="uint8", num_threads=2)
+    env.reset(seed=1)
+    for _ in range(3):
+        env.step(env.sample_actions())
+    env.close()
+    num_envs = num_envs * 3 // 2
+"""
+    assert "MemoryError: " in limited(code)
+
+
+def test_array_beyond_the_memory_raises_memory_error():
+    code = """
+from pogema_rs import GridConfig, pogema_v0
+env = pogema_v0(GridConfig(size=1500, num_agents=200_000, obs_radius=30, density=0.0))
+env.reset()
+"""
+    assert re.fullmatch(r"MemoryError: not enough memory: an array needs \d+ bytes", limited(code)), limited(code)
+
+
+def test_a_panic_is_an_internal_error():
+    with pytest.raises(InternalError, match="internal error, please report it: two lines"):
+        _engine._panic("two lines")
+
+
+def test_every_entry_is_guarded():
+    entry = re.compile(r"^#\[py(methods|function)\]$", re.MULTILINE)
+    guarded = re.compile(r"^ *(crate::guard::)?guarded! \{\n(?:.*\n)*?^ *\}\n\}$", re.MULTILINE)
+    num_entries = 0
+    for source in SOURCES.rglob("*.rs"):
+        text = source.read_text()
+        num_entries += len(entry.findall(text))
+        assert not entry.findall(guarded.sub("", text)), source
+    assert num_entries > 10
+
+
+def unaligned(array):
+    """Returns a copy of an array whose elements are not at multiples of their size."""
+    array = np.asarray(array)
+    raw = np.zeros(array.nbytes + 1, np.uint8)[1:].view(array.dtype).reshape(array.shape)
+    raw[...] = array
+    assert not raw.flags.aligned
+    return raw
+
+
+def test_unaligned_arrays_are_errors_or_copied():
+    free, start, goal = np.zeros((4, 4), np.float32), np.zeros((1, 2), np.int64), np.ones((1, 2), np.int64)
+    expected = "is `an unaligned array`, expected an aligned array"
+    for arguments in [(unaligned(free), start, goal), (free, unaligned(start), goal), (free, start, unaligned(goal))]:
+        with pytest.raises(ValueError, match=expected):
+            plan(*arguments)
+    with pytest.raises(ValueError, match=expected):
+        cost_to_go(unaligned(free), (0, 0))
+    with pytest.raises(ValueError, match=expected):
+        validate(free, start, goal, unaligned(np.zeros((1, 1, 2), np.int64)))
+    with pytest.raises(ValueError, match=expected):
+        _engine.AStarAgent(0).act((0, 0), (1, 1), unaligned(np.zeros((3, 3), np.float32)))
+    env, twin = VecEnv({"size": 8, "seed": 1}, 3), VecEnv({"size": 8, "seed": 1}, 3)
+    actions = np.ones((3, 1), np.int64)
+    for one in (env, twin):
+        one.reset()
+    np.testing.assert_array_equal(env.step(unaligned(actions))[0], twin.step(actions)[0])
+
+
+def test_pickling_during_a_step_of_another_thread_is_a_state_error():
+    env = pogema_v0(GridConfig(size=256, num_agents=4000, density=0.1, max_episode_steps=10**6, on_target="restart"))
+    env.reset()
+    engine, is_over, said = env.unwrapped._engine, threading.Event(), []
+
+    def play():
+        while not is_over.is_set():
+            env.step([1] * 4000)
+
+    thread = threading.Thread(target=play)
+    thread.start()
+    try:
+        for _ in range(300):
+            try:
+                pickle.dumps(engine)
+            except StateError as error:
+                said.append(str(error))
+                break
+    except RuntimeError as error:
+        said.append(f"{type(error).__name__}: {error}")
+    finally:
+        is_over.set()
+        thread.join()
+    assert said == ["another thread is using this environment, expected one thread at a time"]
