@@ -8,6 +8,7 @@ import traceback
 
 from playwright.sync_api import sync_playwright
 
+import conform
 import editor
 import editor_files
 import pictures
@@ -29,7 +30,7 @@ def main(folder, *names):
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in ((speed,) if names == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report))
+            for module in ((speed,) if names == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report, conform))
             for name, test in tests_of(module)
             if not names or any(part in f"{module.__name__}.{name}" for part in names)
         ]

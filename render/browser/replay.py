@@ -90,6 +90,44 @@ def test_agents_glide_between_steps(world):
         )
 
 
+def test_goals_have_the_numbers_of_their_agents(world):
+    with world.open("restart") as page:
+        def around(cell):
+            # The middle of the ring, without the ring.
+            x, y = page.evaluate("([row, col]) => replay.center(row, col)", cell)
+            reach = page.evaluate("replay.scale") / 5
+            return page.evaluate(
+                """([x, y, reach]) => {
+                  const canvas = document.getElementById("actors");
+                  const ratio = canvas.width / canvas.clientWidth;
+                  const part = [x - reach, y - reach, 2 * reach, 2 * reach].map((value) => Math.round(value * ratio));
+                  return canvas.getContext("2d").getImageData(...part).data.some((value) => value > 0);
+                }""",
+                [x, y, reach],
+            )
+
+        state = world.film("restart")["states"][0]
+        free = [goal for goal in state["goals"] if goal not in state["cells"]]
+        assert free
+        for goal in free:
+            assert around(goal), f"no number at {goal}"
+        page.uncheck("#numbers")
+        settle(page)
+        for goal in free:
+            assert not around(goal), f"a number at {goal}"
+
+
+def test_the_list_of_agents_uses_the_free_space(world):
+    for height in (500, 800):
+        with world.open("restart", viewport={"width": 1200, "height": height}) as page:
+            is_whole = page.evaluate("(({ scrollHeight, clientHeight }) => scrollHeight <= clientHeight)(document.getElementById('agents'))")
+            spare = page.evaluate(
+                "document.querySelector('aside').getBoundingClientRect().bottom"
+                " - document.getElementById('no-agent').parentElement.getBoundingClientRect().bottom"
+            )
+            assert is_whole or spare < 2, (height, spare)
+
+
 def test_zoom_pan_and_fit(world):
     with world.open("restart") as page:
         x, y = on_screen(page, "replay", 3, 4)

@@ -62,6 +62,16 @@ def test_tables_and_plots(world):
         assert "did you mean" in page.locator("section", has_text="Absent").locator(".note").first.text_content()
 
 
+def test_episodes_say_by_which_metric_they_are_ranked(world):
+    path, rows = report(world)
+    with world.open("report", path=path) as page:
+        assert "ranked by ISR (higher is better), then by SoC (lower is better)" in page.content()
+        badges = page.locator(".worst, .best").all_text_contents()
+        equal(len(badges), 2 * 6)
+        assert set(badges) <= {"worst by ISR", "worst by SoC", "best by ISR", "best by SoC"}, badges
+        assert "best by SoC" in badges, badges
+
+
 def test_replays_match_their_episodes(world):
     path, rows = report(world)
     with world.open("report", path=path) as page:
@@ -101,6 +111,7 @@ def test_the_report_fits_a_phone(world):
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
         wide = page.locator(".wide").first
         assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "a wide table scrolls on its own"
+        equal(wide.evaluate("(box) => getComputedStyle(box).backgroundAttachment"), "local, scroll", "its end has a shadow")
         page.locator("[data-replay]").first.tap()
         page.frame_locator("#player iframe").locator("body.ready").wait_for()
         settle(page)

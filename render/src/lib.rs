@@ -21,6 +21,7 @@ pub mod gif;
 mod ground;
 pub mod html;
 mod motion;
+mod numbers;
 pub mod raster;
 mod scene;
 mod style;

@@ -4,6 +4,7 @@ use pogema_core::{Error, Trace};
 use tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
 use crate::ground::Ground;
+use crate::numbers;
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 
@@ -95,14 +96,34 @@ impl<'a> Painter<'a> {
             let ([col, row], opacity) = self.place(agent, look, time)?;
             Some((PathBuilder::from_circle(col, row, size::AGENT as f32)?, self.scene.color(agent), opacity))
         };
-        for (path, color, opacity) in self.agents.iter().filter_map(|&agent| circle(agent, Scene::agent)) {
-            fill(&mut canvas, &path, color, opacity, self.transform);
+        for &agent in &self.goals {
+            if let Some((path, color, opacity)) = circle(agent, Scene::goal) {
+                stroke(&mut canvas, &path, color, opacity, None, self.transform);
+                self.paint_number(&mut canvas, agent, self.place(agent, Scene::goal, time), color);
+            }
         }
-        for (path, color, opacity) in self.goals.iter().filter_map(|&agent| circle(agent, Scene::goal)) {
-            stroke(&mut canvas, &path, color, opacity, None, self.transform);
+        for &agent in &self.agents {
+            if let Some((path, color, opacity)) = circle(agent, Scene::agent) {
+                fill(&mut canvas, &path, color, opacity, self.transform);
+                self.paint_number(
+                    &mut canvas,
+                    agent,
+                    self.place(agent, Scene::agent, time),
+                    numbers::ink(color),
+                );
+            }
         }
         self.paint_window(&mut canvas, time);
         canvas
+    }
+
+    /// Writes the index of an agent, if the style says so.
+    fn paint_number(&self, canvas: &mut Pixmap, agent: usize, place: Option<([f32; 2], f64)>, color: Color) {
+        let Some((place, opacity)) = place.filter(|_| self.scene.style.show_numbers) else { return };
+        let font_size = numbers::font_size(self.scene.num_agents());
+        if let Some(path) = numbers::outline(agent, place, font_size) {
+            fill(canvas, &path, color, opacity, self.transform);
+        }
     }
 
     /// Draws the white background, the lines and the obstacles that never change.
@@ -114,7 +135,7 @@ impl<'a> Painter<'a> {
         if scene.style.show_lines
             && let Some(path) = lines(scene)
         {
-            stroke(&mut self.background, &path, color, 1.0, None, transform);
+            stroke(&mut self.background, &path, color, size::LINES, None, transform);
         }
         for Obstacles { seen, cells } in scene.obstacles() {
             for shape in cells.iter().filter_map(|&(row, col)| obstacle(row, col)) {

@@ -19,6 +19,8 @@ pub mod size {
     pub const AGENT: f64 = 0.35;
     /// Width of lines and of goals' rings.
     pub const STROKE: f64 = 0.1;
+    /// Opacity of lines, so that agents and goals stand out.
+    pub const LINES: f64 = 0.4;
     /// Side of an obstacle.
     pub const OBSTACLE: f64 = 0.7;
     /// Radius of an obstacle's corners and of the window's.
@@ -58,6 +60,11 @@ pub struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
+    /// Returns the number of agents of the episode.
+    pub fn num_agents(&self) -> usize {
+        self.states.first().map_or(0, |state| state.cells.len())
+    }
+
     /// # Errors
     /// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
     pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {

@@ -55,7 +55,15 @@ pub struct Colors {
     pub others: Color,
 }
 
-/// POGEMA's colours.
+/// The colours of agents: POGEMA's seven; then each later colour is the one most distant from all before it.
+#[allow(clippy::unreadable_literal, reason = "a colour is read as three pairs of digits")]
+const AGENTS: [u32; 24] = [
+    0xc1433c, 0x2e6f9e, 0x6e81af, 0x00b9c8, 0x72d5c8, 0x0ea08c, 0x8f7b66, 0xfca800, 0xfc90f0, 0x903090,
+    0x007800, 0x90b40c, 0xfc7878, 0xcc60b4, 0xa890fc, 0x249cfc, 0x845400, 0xcc8418, 0x6c9024, 0x6c54c0,
+    0xe4a8b4, 0x90c0fc, 0x00cc84, 0x84546c,
+];
+
+/// POGEMA's colours, and more for agents.
 ///
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
 impl Default for Colors {
@@ -63,9 +71,7 @@ impl Default for Colors {
     fn default() -> Self {
         Self {
             obstacle: Color::of_rgb(0x84a1ae),
-            agents: [0xc1433c, 0x2e6f9e, 0x6e81af, 0x00b9c8, 0x72d5c8, 0x0ea08c, 0x8f7b66]
-                .map(Color::of_rgb)
-                .to_vec(),
+            agents: AGENTS.map(Color::of_rgb).to_vec(),
             own: Color::of_rgb(0xc1433c),
             others: Color::of_rgb(0x6e81af),
         }
@@ -81,6 +87,8 @@ pub struct Style {
     pub egocentric: Option<usize>,
     /// Whether agents and goals are drawn.
     pub show_agents: bool,
+    /// Whether the index of each agent is written into the agent and its goal.
+    pub show_numbers: bool,
     /// Whether lines are drawn between the cells.
     pub show_lines: bool,
     /// The part of the border that is drawn.
@@ -97,6 +105,7 @@ impl Default for Style {
             static_frame: None,
             egocentric: None,
             show_agents: true,
+            show_numbers: false,
             show_lines: true,
             border: Border::default(),
             step_time: 0.25,

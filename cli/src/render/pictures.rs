@@ -49,6 +49,9 @@ pub struct Pictures {
     /// Leave out the lines between cells
     #[arg(long, help_heading = "Pictures")]
     no_lines: bool,
+    /// Write the number of each agent into the agent and its goal
+    #[arg(long, help_heading = "Pictures")]
+    numbers: bool,
     /// Leave out agents and goals
     #[arg(long, help_heading = "Pictures")]
     no_agents: bool,
@@ -169,6 +172,7 @@ impl Pictures {
             static_frame: self.frame,
             egocentric: self.egocentric,
             show_agents: !self.no_agents,
+            show_numbers: self.numbers,
             show_lines: !self.no_lines,
             border: self.border,
             step_time: self.fps.map_or(default.step_time, f64::recip),

@@ -10,8 +10,9 @@ use std::fmt::Write as _;
 
 use pogema_core::{Error, Trace};
 
+use crate::numbers::{self, FONT};
 use crate::scene::{Look, Obstacles, SHADED, Scene, size};
-use crate::style::Style;
+use crate::style::{Color, Style};
 use timing::{Timing, number};
 
 /// The longer side of a picture unless the viewer sets another. Units: pixels.
@@ -33,8 +34,8 @@ pub fn draw(trace: &Trace, style: &Style) -> Result<String, Error> {
         picture.lines();
     }
     picture.obstacles();
-    picture.agents();
     picture.goals();
+    picture.agents();
     picture.window();
     picture.text.push_str("</svg>\n");
     Ok(picture.text)
@@ -76,8 +77,9 @@ impl Picture<'_> {
         }
         let color = self.scene.style.colors.obstacle;
         self.put(format_args!(
-            "<path class=\"lines\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\" transform=\"translate(.5 .5)\" d=\"{path}\"/>\n",
+            "<path class=\"lines\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\"{} transform=\"translate(.5 .5)\" d=\"{path}\"/>\n",
             number(size::STROKE),
+            opacity_attribute(size::LINES),
         ));
     }
 
@@ -110,6 +112,9 @@ impl Picture<'_> {
         self.put(format_args!("<g class=\"agents\">\n"));
         for agent in self.scene.agents() {
             self.circle("a", "fill", agent, |scene, frame| scene.agent(agent, frame));
+            self.number(agent, numbers::ink(self.scene.color(agent)), |scene, frame| {
+                scene.agent(agent, frame)
+            });
         }
         self.put(format_args!("</g>\n"));
     }
@@ -121,6 +126,7 @@ impl Picture<'_> {
         ));
         for agent in self.scene.goals() {
             self.circle("g", "stroke", agent, |scene, frame| scene.goal(agent, frame));
+            self.number(agent, self.scene.color(agent), |scene, frame| scene.goal(agent, frame));
         }
         self.put(format_args!("</g>\n"));
     }
@@ -135,7 +141,24 @@ impl Picture<'_> {
             opacity_attribute(first.opacity),
             visibility_attribute(first),
         ));
-        self.animate("circle", look);
+        self.animate("circle", "", look);
+    }
+
+    /// Writes the index of an agent, if the style says so.
+    fn number(&mut self, agent: usize, color: Color, look: impl Fn(&Scene<'_>, usize) -> Look) {
+        if !self.scene.style.show_numbers {
+            return;
+        }
+        let (first, font_size) = (look(self.scene, 0), numbers::font_size(self.scene.num_agents()));
+        self.put(format_args!(
+            "<text x=\"{}\" y=\"{}\" font-family=\"{FONT}\" font-size=\"{}\" text-anchor=\"middle\" stroke=\"none\" fill=\"{color}\"{}{}",
+            first.cell.col,
+            number(f64::from(first.cell.row) + numbers::baseline(font_size)),
+            number(font_size),
+            opacity_attribute(first.opacity),
+            visibility_attribute(first),
+        ));
+        self.animate("text", &agent.to_string(), look);
     }
 
     /// Draws the dashed square around the cells that the agent sees.
@@ -153,17 +176,17 @@ impl Picture<'_> {
             number(size::DASH),
             visibility_attribute(first),
         ));
-        self.animate("rect", |scene, frame| scene.agent(agent, frame));
+        self.animate("rect", "", |scene, frame| scene.agent(agent, frame));
     }
 
-    /// Closes the open element, with its animations inside.
-    fn animate(&mut self, tag: &str, look: impl Fn(&Scene<'_>, usize) -> Look) {
-        let Some(timing) = &self.timing else { return self.close(tag, &[]) };
+    /// Closes the open element, with its text and its animations inside.
+    fn animate(&mut self, tag: &str, text: &str, look: impl Fn(&Scene<'_>, usize) -> Look) {
+        let Some(timing) = &self.timing else { return self.close(tag, &[Some(text.to_owned())]) };
         let look = |frame| look(self.scene, frame);
         let motion = timing.motion(|frame| look(frame).cell);
         let visibility = timing.visibility(|frame| look(frame).is_visible);
         let opacity = timing.numbers("opacity", |frame| look(frame).opacity);
-        self.close(tag, &[motion, visibility, opacity]);
+        self.close(tag, &[Some(text.to_owned()), motion, visibility, opacity]);
     }
 
     fn close(&mut self, tag: &str, changes: &[Option<String>]) {

@@ -7,6 +7,7 @@ mod common;
 mod drawn;
 mod ground;
 mod moving;
+mod numbers;
 mod pixels;
 mod refused;
 mod snapshots;

@@ -64,7 +64,7 @@ fn agents_and_goals_follow_the_states() {
             for node in circles {
                 let agent: usize = node.attribute("id").unwrap()[1..].parse().unwrap();
                 let circle = Circle::of(node);
-                assert_eq!(circle.color, Colors::default().agents[agent % 7].to_string());
+                assert_eq!(circle.color, Colors::default().agents[agent].to_string());
                 let cells = |state: &Snapshot| {
                     if class == "agents" { state.cells[agent] } else { state.goals[agent] }
                 };

@@ -12,6 +12,7 @@ use pogema_core::Error;
 use pogema_render::html::{Album, fill, pack};
 use serde_json::{Value, json};
 
+use picks::ranking;
 pub use picks::{Pick, picks};
 
 use crate::episode_configs::EpisodeConfigs;
@@ -92,6 +93,7 @@ pub fn page(
     let page = json!({
         "facts": facts(suite, results),
         "notes": results.notes,
+        "ranking": ranking(results),
         "views": sections(suite, results)?,
         "algorithms": suite.algorithms.iter().map(algorithm).collect::<Vec<_>>(),
         "runs": manifest.runs,
@@ -157,7 +159,7 @@ fn grid(table: &Table) -> Value {
 }
 
 fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Value {
-    let Pick { algorithm, episode, is_worst, why, .. } = &replay.pick;
+    let Pick { algorithm, episode, is_worst, by, why, .. } = &replay.pick;
     let settings = row.settings.iter().map(|(name, value)| format!("{name} {}", plain_text(value)));
     let place = replay.film.as_ref().ok().map(|film| {
         album.replays.push((format!("{algorithm}, episode {episode}: {why}"), film.clone()));
@@ -171,6 +173,7 @@ fn episode(replay: &Replay, row: &Row, album: &mut Album) -> Value {
     json!({
         "number": episode,
         "is_worst": is_worst,
+        "by": by,
         "settings": settings.collect::<Vec<_>>().join(", "),
         "why": why,
         "replay": place,

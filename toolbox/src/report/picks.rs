@@ -24,6 +24,8 @@ pub struct Pick {
     pub row: usize,
     /// Whether it is one of the worst rather than one of the best.
     pub is_worst: bool,
+    /// The metric that ranks it.
+    pub by: String,
     /// The metrics that rank it, as a short text.
     pub why: String,
 }
@@ -33,10 +35,7 @@ pub struct Pick {
 /// Episodes are ranked by three criteria: the share of agents that reached their goals; the ratio of the metric to that
 /// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
 pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
-    let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
-    let Some(&(figure, is_less_better)) = RANKED_BY.iter().find(|(name, _)| has(name)) else {
-        return Vec::new();
-    };
+    let Some((figure, is_less_better)) = figure(results) else { return Vec::new() };
     let best = best_of(results, figure, is_less_better);
     let mut of_algorithms: IndexMap<&str, Vec<Ranked>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
@@ -51,10 +50,30 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
             why(figure, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
         let worth = if is_less_better { value } else { -value };
         let badness = [-solved.unwrap_or(1.0), ratio, worth];
-        let pick = Pick { algorithm: name.into(), episode: episodes.len(), row: at, is_worst: true, why };
+        let by = if solved.is_some_and(|share| share < 1.0) { SOLVED } else { figure };
+        let (algorithm, by) = (name.into(), by.into());
+        let pick = Pick { algorithm, episode: episodes.len(), row: at, is_worst: true, by, why };
         episodes.push(Ranked { pick, badness });
     }
     of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
+}
+
+/// Returns the metric that ranks the episodes, and whether less is better.
+fn figure(results: &Results) -> Option<(&'static str, bool)> {
+    let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
+    RANKED_BY.into_iter().find(|(name, _)| has(name))
+}
+
+/// Returns a sentence about the order of the episodes, if they have one.
+pub(super) fn ranking(results: &Results) -> Option<String> {
+    let (figure, is_less_better) = figure(results)?;
+    let better = if is_less_better { "lower" } else { "higher" };
+    let has_share = results.rows.iter().any(|row| row.metric(SOLVED).is_some());
+    let first = if has_share { format!("{SOLVED} (higher is better), then by ") } else { String::new() };
+    Some(format!(
+        "Episodes are ranked by {first}{figure} ({better} is better) relative to the best algorithm in the same \
+         environment, then by {figure} itself."
+    ))
 }
 
 struct Ranked {
@@ -132,6 +151,7 @@ mod tests {
         assert_eq!(found, [of_a, of_b].concat());
         assert_eq!(picks[1].why, "SoC 20, ISR 1, 2.00 × that of B");
         assert_eq!(picks[0].why, "SoC 5, ISR 0.5");
+        assert_eq!([picks[0].by.as_str(), picks[1].by.as_str()], ["ISR", "SoC"]);
         assert_eq!((picks[4].row, picks[5].row), (7, 6));
     }
 

@@ -1,7 +1,10 @@
 //! Axes with ticks at the data. The plotting library cannot place ticks freely.
 
-use kuva::render::layout::{ComputedLayout, Layout};
+use std::sync::LazyLock;
+
+use kuva::render::layout::Layout;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
+use ttf_parser::Face;
 
 use super::compose::plain_layout;
 
@@ -17,8 +20,8 @@ const LEAST: f64 = -33.0;
 /// Length of a tick. Units: points.
 const TICK: f64 = 3.0;
 
-/// Mean width of a letter, relative to the font size.
-const LETTER: f64 = 0.62;
+/// Angle of slanted labels. Units: degrees.
+const SLANT: f64 = 40.0;
 
 /// One axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,16 +66,25 @@ impl Axis {
         let range = (first - 0.5, first + names.len() as f64 - 0.5);
         Self { title: title.to_owned(), is_log: false, range, ticks }
     }
+
+    /// Returns the place of a value as a share of the axis.
+    fn share(&self, value: f64) -> f64 {
+        let place = |value: f64| if self.is_log { value.log10() } else { value };
+        let (low, high) = (place(self.range.0), place(self.range.1));
+        (place(value) - low) / (high - low)
+    }
 }
 
-/// Formats a number for a tick.
+/// Formats a number for a tick, with a comma between thousands.
 fn number(value: f64) -> String {
     let is_small = value != 0.0 && value.abs() < 1e-3;
     if is_small || value.abs() >= 1e7 {
-        format!("{value:e}")
-    } else {
-        ((value * 1e9).round() / 1e9).to_string()
+        return format!("{value:e}");
     }
+    let text = ((value * 1e9).round() / 1e9).to_string();
+    let start = usize::from(value < 0.0);
+    let end = text.find('.').unwrap_or(text.len());
+    if end - start < 4 { text } else { format!("{},{}", &text[..end - 3], &text[end - 3..]) }
 }
 
 /// Returns about five round numbers within a range, with their labels.
@@ -85,28 +97,34 @@ fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
 }
 
-/// Returns powers of two within a range above zero, with their labels.
+/// Returns powers of ten within a range above zero, with their labels.
 ///
-/// If there were too many or some below one half, returns powers of ten; if those are too few, also their multiples by
-/// 2 and 5.
+/// If those are too few, also their multiples by 2 and 5; in a narrow range, round numbers.
 fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
-    let of = |base: i32, factors: &[f64]| -> Vec<(f64, String)> {
-        let power = |value: f64| value.ln() / f64::from(base).ln();
-        let counts = power(low).floor() as i32..=power(high).ceil() as i32;
-        let all =
-            counts.flat_map(|count| factors.iter().map(move |factor| factor * f64::from(base).powi(count)));
+    let of = |factors: &[f64]| -> Vec<(f64, String)> {
+        let counts = low.log10().floor() as i32..=high.log10().ceil() as i32;
+        let all = counts.flat_map(|count| factors.iter().map(move |factor| factor * 10f64.powi(count)));
         all.filter(|tick| (low..=high).contains(tick)).map(|tick| (tick, number(tick))).collect()
     };
-    if low >= 0.5 && high / low < 1024.0 {
-        return of(2, &[1.0]);
+    let (decades, more) = (of(&[1.0]), of(&[1.0, 2.0, 5.0]));
+    match (decades.len(), more.len()) {
+        (3.., _) => decades,
+        (_, 3..) => more,
+        _ => round_numbers((low, high)),
     }
-    let decades = of(10, &[1.0]);
-    if decades.len() > 2 { decades } else { of(10, &[1.0, 2.0, 5.0]) }
 }
 
-/// Returns the approximate width of a text.
+/// Returns the width of a text in the font of plots.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {
-    text.chars().count() as f64 * f64::from(size) * LETTER
+    static FACE: LazyLock<Option<Face<'static>>> =
+        LazyLock::new(|| Face::parse(dejavu::sans::regular(), 0).ok());
+    let advance = |letter: char| {
+        let face = FACE.as_ref()?;
+        let advance = face.glyph_hor_advance(face.glyph_index(letter)?)?;
+        Some(f64::from(advance) / f64::from(face.units_per_em()))
+    };
+    // Characters of other fonts, such as Chinese ones, are at most about as wide as high.
+    text.chars().map(|letter| advance(letter).unwrap_or(1.0)).sum::<f64>() * f64::from(size)
 }
 
 /// The frame of one plot: its size, title and axes.
@@ -116,23 +134,59 @@ pub(super) struct Frame {
     pub height: f64,
     pub font_size: u32,
     pub title: Option<String>,
+    /// Whether both axes have the same length.
+    pub is_square: bool,
     pub x: Axis,
     pub y: Axis,
 }
 
 impl Frame {
+    fn width_of(&self, text: &str) -> f64 {
+        text_width(text, self.font_size)
+    }
+
+    fn widest(&self, axis: &Axis) -> f64 {
+        within(axis).map(|(_, text)| self.width_of(text)).fold(0.0, f64::max)
+    }
+
+    /// Returns the left, upper, right and lower end of the axes.
+    pub fn inner(&self) -> [f64; 4] {
+        let size = f64::from(self.font_size);
+        let labels = if self.is_slanted() { self.widest(&self.x) * SLANT.to_radians().sin() } else { 0.0 };
+        let top = self.title.as_ref().map_or(size * 0.6, |_| size * 2.0);
+        let bottom = (self.height - (TICK + size * 2.9 + labels)).max(top + size);
+        let (left, right) = self.sides();
+        let spare = if self.is_square { ((right - left) - (bottom - top)).max(0.0) / 2.0 } else { 0.0 };
+        [left + spare, top, right - spare, bottom]
+    }
+
+    fn sides(&self) -> (f64, f64) {
+        let size = f64::from(self.font_size);
+        let left = (size * 2.0 + self.widest(&self.y) + TICK).min(self.width * 0.45);
+        let last = self.x.ticks.last().map_or(0.0, |(_, text)| self.width_of(text) / 2.0);
+        (left, self.width - (size * 0.6 + last.min(size * 1.5)))
+    }
+
+    /// Returns whether the labels of the horizontal axis are too wide to stand side by side.
+    fn is_slanted(&self) -> bool {
+        let (left, right) = self.sides();
+        let place = |tick: f64| left + (right - left) * self.x.share(tick);
+        let spans: Vec<(f64, f64)> = within(&self.x)
+            .map(|(tick, text)| (place(tick), self.width_of(text) / 2.0))
+            .map(|(x, half)| (x - half, x + half))
+            .collect();
+        spans
+            .iter()
+            .zip(spans.iter().skip(1))
+            .any(|(one, next)| one.1 + f64::from(self.font_size) * 0.25 > next.0)
+    }
+
     /// Returns the layout for the plotting library, with only the lines of the axes.
     pub fn layout(&self) -> Layout {
-        let size = f64::from(self.font_size);
-        let widest = |axis: &Axis| {
-            axis.ticks.iter().map(|(_, text)| text_width(text, self.font_size)).fold(0.0, f64::max)
-        };
-        let left = size * 2.0 + widest(&self.y) + TICK + 2.0;
-        let right = 5.0 + self.x.ticks.last().map_or(0.0, |(_, text)| text_width(text, self.font_size) / 2.0);
-        let top = self.title.as_ref().map_or(5.0, |_| size * 2.0);
+        let [left, top, right, bottom] = self.inner();
         let mut layout = plain_layout((self.width, self.height), self.x.range, self.y.range)
-            .with_force_margins(left.min(self.width * 0.45), right.min(self.width * 0.25))
-            .with_force_margins_y(top, TICK + size * 3.1)
+            .with_force_margins(left, self.width - right)
+            .with_force_margins_y(top, self.height - bottom)
             .with_axis_line_width(0.6);
         (layout.log_x, layout.log_y) = (self.x.is_log, self.y.is_log);
         layout
@@ -140,43 +194,34 @@ impl Frame {
 
     /// Draws grid lines behind the plot, and ticks and texts around it.
     pub fn draw(&self, scene: &mut Scene) {
-        let place = ComputedLayout::from_layout(&self.layout());
-        let (left, right) = (place.margin_left, place.width - place.margin_right);
-        let (top, bottom) = (place.margin_top, place.height - place.margin_bottom);
+        let [left, top, right, bottom] = self.inner();
         let size = f64::from(self.font_size);
         let mut behind = Vec::new();
-        let mut free_from = f64::NEG_INFINITY;
+        let is_slanted = self.is_slanted();
         for (tick, text) in within(&self.x) {
-            let (x, half) = (place.map_x(tick), text_width(text, self.font_size) / 2.0);
+            let x = left + (right - left) * self.x.share(tick);
             behind.push(line((x, top), (x, bottom), GRID));
             scene.add(line((x, bottom), (x, bottom + TICK), "black"));
-            if x - half > free_from {
-                free_from = x + half + size * 0.5;
-                scene.add(self::text(text, (x, bottom + TICK + size), self.font_size));
-            }
+            let label = if is_slanted {
+                let place = (x + size * 0.3, bottom + TICK + size * 0.8);
+                anchored(text, place, self.font_size, TextAnchor::End, Some(-SLANT))
+            } else {
+                self::text(text, (x, bottom + TICK + size), self.font_size)
+            };
+            scene.add(label);
         }
         for (tick, text) in within(&self.y) {
-            let y = place.map_y(tick);
+            let y = bottom - (bottom - top) * self.y.share(tick);
             behind.push(line((left, y), (right, y), GRID));
             scene.add(line((left - TICK, y), (left, y), "black"));
-            scene.add(anchored(
-                text,
-                (left - TICK - 2.0, y + size * 0.35),
-                self.font_size,
-                TextAnchor::End,
-                None,
-            ));
+            let place = (left - TICK - 2.0, y + size * 0.35);
+            scene.add(anchored(text, place, self.font_size, TextAnchor::End, None));
         }
         scene.elements.splice(0..0, behind);
         let (middle_x, middle_y) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
-        scene.add(text(&self.x.title, (middle_x, bottom + TICK + size * 2.5), self.font_size));
-        scene.add(anchored(
-            &self.y.title,
-            (size * 1.2, middle_y),
-            self.font_size,
-            TextAnchor::Middle,
-            Some(-90.0),
-        ));
+        scene.add(text(&self.x.title, (middle_x, self.height - size * 0.5), self.font_size));
+        let beside = (left - TICK - 2.0 - self.widest(&self.y) - size * 0.6, middle_y);
+        scene.add(anchored(&self.y.title, beside, self.font_size, TextAnchor::Middle, Some(-90.0)));
         if let Some(title) = &self.title {
             scene.add(text(title, (middle_x, top - size * 0.6), self.font_size));
         }
@@ -217,11 +262,20 @@ mod tests {
     fn ticks_are_round_and_within_the_range() {
         let texts = |axis: Axis| axis.ticks.into_iter().map(|(_, text)| text).collect::<Vec<_>>();
         assert_eq!(texts(Axis::of_numbers("", &[0.0, 1.0], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);
-        assert_eq!(texts(Axis::of_numbers("", &[3.0, 1210.0], false, None)), ["0", "500", "1000"]);
-        assert_eq!(texts(Axis::of_numbers("", &[8.0, 64.0], true, None)), ["8", "16", "32", "64"]);
+        assert_eq!(texts(Axis::of_numbers("", &[3.0, 1210.0], false, None)), ["0", "500", "1,000"]);
+        assert_eq!(texts(Axis::of_numbers("", &[8.0, 64.0], true, None)), ["10", "20", "50"]);
+        assert_eq!(
+            texts(Axis::of_numbers("", &[130.0, 8100.0], true, None)),
+            ["200", "500", "1,000", "2,000", "5,000"]
+        );
+        assert_eq!(texts(Axis::of_numbers("", &[610.0, 680.0], true, None)), ["620", "640", "660", "680"]);
+        assert_eq!(
+            texts(Axis::of_numbers("", &[-2e4, 2e4], false, None)),
+            ["-20,000", "-10,000", "0", "10,000", "20,000"]
+        );
         assert_eq!(
             texts(Axis::of_numbers("", &[0.01, 900.0], true, None)),
-            ["0.01", "0.1", "1", "10", "100", "1000"]
+            ["0.01", "0.1", "1", "10", "100", "1,000"]
         );
         assert_eq!(
             texts(Axis::of_numbers("", &[6e-5, 0.003], true, None)),

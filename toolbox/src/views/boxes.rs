@@ -8,10 +8,10 @@ use serde_json::Value;
 
 use super::axes::Axis;
 use super::options::{Common, Options};
-use super::panel::framed;
+use super::page::framed;
 use super::picture::Picture;
 use super::series::{at, distinct, placeless};
-use super::style::Style;
+use super::style::{COLUMN, Style};
 use super::{Shown, known_column};
 use crate::bootstrap::percentile;
 use crate::frame::{lacking, values};
@@ -35,7 +35,7 @@ impl BoxView {
         let options = Options::new(name, node, &Style::keys(&[]))?;
         Ok(Self {
             common: Common::read(&options)?,
-            style: Style::read(&options, (3.6, 2.6))?,
+            style: Style::read(&options, COLUMN)?,
             x: options.text("x")?.unwrap_or_else(|| ALGORITHM.to_owned()),
             y: options.required("y")?,
         })
@@ -69,12 +69,11 @@ impl BoxView {
         let all: Vec<f64> = groups.iter().flat_map(|(_, values)| values).copied().collect();
         let is_log = self.style.log_y && all.iter().all(|&value| value > 0.0);
         let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
-        let colours = (0..groups.len()).rev().map(|number| self.style.colour(number));
         let mut dots: Vec<(f64, f64)> = Vec::new();
         for (number, (_, values)) in groups.iter().enumerate() {
             dots.extend(outliers(values).into_iter().map(|x| (x, number as f64 + 1.0)));
         }
-        let mut boxes = BoxPlot::new().with_horizontal(true).with_width(0.6).with_group_colors(colours);
+        let mut boxes = BoxPlot::new().with_horizontal(true).with_width(0.6).with_color(self.style.colour(0));
         for (name, values) in groups {
             boxes = boxes.with_group(name, values);
         }

@@ -1,16 +1,17 @@
 //! Cactus plots: the number of instances that each algorithm solves within a time.
 
 use kuva::plot::line::{LinePlot, LineStyle};
+use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
 use super::axes::Axis;
 use super::legend::Legend;
 use super::options::{Common, Options};
-use super::panel::{framed, place_legend};
+use super::page::{framed, single};
 use super::picture::Picture;
 use super::series::{Series, signs};
-use super::style::Style;
+use super::style::{COLUMN, Style};
 use super::{Shown, known_column};
 use crate::frame::lacking;
 use crate::results::{RUNTIME, Results, SOLVED};
@@ -32,7 +33,7 @@ impl CactusView {
         let log_x = options.flag("use_log_scale_x")?.unwrap_or(true);
         Ok(Self {
             common: Common::read(&options)?,
-            style: Style { log_x, has_markers: false, ..Style::read(&options, (3.6, 2.6))? },
+            style: Style { log_x, ..Style::read(&options, COLUMN)? },
             x: options.text("x")?.unwrap_or_else(|| RUNTIME.to_owned()),
         })
     }
@@ -67,28 +68,34 @@ impl CactusView {
         let is_log = self.style.log_x && all.iter().all(|&time| time > 0.0);
         let end = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let most = lines.iter().map(|(_, times)| times.len()).max().unwrap_or(0) as f64;
-        let (mut plots, mut entries, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut plots, mut entries) = (Vec::new(), Vec::new());
         for (number, (name, times)) in lines.iter().enumerate().filter(|(_, (_, times))| !times.is_empty()) {
             let mut points: Vec<(f64, f64)> =
                 times.iter().enumerate().map(|(count, &time)| (time, count as f64 + 1.0)).collect();
             points.push((end, times.len() as f64));
-            let (colour, _, dashes) = signs(number, &self.style);
+            let (colour, marker, dashes) = signs(number, &self.style);
             let line = LinePlot::new()
-                .with_data(points.clone())
+                .with_data(points)
                 .with_step()
                 .with_color(colour)
                 .with_stroke_width(self.style.line_width)
                 .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
             plots.push(Plot::Line(line));
+            if self.style.has_markers {
+                // A marker at the end names the line in grey, too.
+                let dot = ScatterPlot::new().with_data([(end, times.len() as f64)]).with_color(colour);
+                plots.push(Plot::Scatter(dot.with_size(self.style.line_width * 1.6).with_marker(marker)));
+            }
             entries.push(Series::entry(number, self.common.algorithm(name), &self.style));
-            drawn.push(points);
         }
         let x = Axis::of_numbers(&self.common.title(&self.x), &all, is_log, self.style.ticks.as_deref());
         let y = Axis::of_numbers("Solved Instances", &[0.0, most], false, None);
-        let frame = self.style.frame(x, y);
-        let legend = Legend { title: None, entries, columns: 1, font_size: self.style.legend_font_size };
-        let scene = framed(plots, &frame);
-        let scene = place_legend(scene, &frame, legend, self.style.legend_place, &drawn);
+        let columns = self.style.legend_columns;
+        let legend = Legend { title: None, entries, columns, font_size: self.style.legend_font_size };
+        let scene = single(&self.style, legend, |style| {
+            let frame = style.frame(x, y);
+            (framed(plots, &frame), Some(frame))
+        });
         Picture::new(scene, &self.style)
     }
 }

@@ -5,13 +5,13 @@ use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
-use super::axes::Axis;
+use super::axes::{Axis, Frame};
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
+use super::page::framed;
 use super::pairing::Pairing;
-use super::panel::framed;
 use super::picture::Picture;
-use super::style::Style;
+use super::style::{COLUMN, Style};
 use super::{Shown, known_column, named};
 use crate::frame::lacking;
 use crate::results::{Results, Row};
@@ -57,7 +57,7 @@ impl CompareView {
         };
         Ok(Self {
             common: Common::read(&options)?,
-            style: Style::read(&options, (2.8, 2.8))?,
+            style: Style::read(&options, COLUMN)?,
             metric,
             first: options.text("first")?,
             second: options.text("second")?,
@@ -165,6 +165,7 @@ impl CompareView {
         let dots = ScatterPlot::new().with_data(both.to_vec()).with_color(self.style.colour(0));
         let dots = dots.with_size(1.6).with_marker_opacity(0.5);
         let plots = vec![Plot::Line(diagonal.with_stroke_width(0.7)), Plot::Scatter(dots)];
-        Picture::new(framed(plots, &self.style.frame(x, y)), &self.style)
+        let frame = Frame { is_square: true, ..self.style.frame(x, y) };
+        Picture::new(framed(plots, &frame), &self.style)
     }
 }

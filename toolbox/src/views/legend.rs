@@ -10,7 +10,7 @@ use super::compose::{bare, insert, plain_layout};
 const LINE: f64 = 1.5;
 
 /// Width of a line's sign and the space next to it. Units: points.
-const SIGN: f64 = 26.0;
+const SIGN: f64 = 30.0;
 
 /// One line of a legend.
 pub(super) struct Entry {
@@ -35,6 +35,13 @@ impl Legend {
     fn column_width(&self) -> f64 {
         let labels = self.entries.iter().map(|entry| text_width(&entry.label, self.font_size));
         SIGN + labels.fold(0.0, f64::max) + f64::from(self.font_size)
+    }
+
+    /// Reduces the columns until the legend is at most as wide as the page, and fills its lines evenly.
+    pub fn fit(&mut self, width: f64) {
+        let most = ((width - 4.0) / self.column_width()).floor().max(1.0) as usize;
+        let count = self.entries.len().max(1);
+        self.columns = count.div_ceil(count.div_ceil(self.columns.clamp(1, most)));
     }
 
     fn num_columns(&self) -> usize {

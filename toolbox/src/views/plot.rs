@@ -5,13 +5,12 @@ use pogema_core::Error;
 use serde_json::Value;
 
 use super::axes::{Axis, Frame};
-use super::compose::insert;
 use super::legend::Legend;
 use super::options::{Common, Options};
-use super::panel::{framed, place_legend};
+use super::page::{framed, grid, single};
 use super::picture::Picture;
 use super::series::{Places, Series, at, distinct, means, placeless};
-use super::style::Style;
+use super::style::{COLUMN, Style};
 use super::{Shown, known_column};
 use crate::bootstrap::{RESAMPLES, Spread};
 use crate::frame::{lacking, shown};
@@ -34,6 +33,9 @@ pub struct PlotView {
     spread: Spread,
     panels: Option<Panels>,
 }
+
+/// Default size of a panel; three of them span a page. Units: inches.
+const PANEL: (f64, f64) = (2.33, 2.1);
 
 /// The options of a plot with several panels.
 #[derive(Clone, Debug)]
@@ -59,7 +61,7 @@ impl PlotView {
         let panels = is_multiple.then(|| Panels::read(&options)).transpose()?;
         Ok(Self {
             common: Common::read(&options)?,
-            style: Style::read(&options, if is_multiple { (2.0, 2.0) } else { (2.6, 2.8) })?,
+            style: Style::read(&options, if is_multiple { PANEL } else { COLUMN })?,
             x: options.required("x")?,
             y: options.required("y")?,
             by: options.text("by")?.unwrap_or_else(|| ALGORITHM.to_owned()),
@@ -129,10 +131,16 @@ impl PlotView {
         };
         let content = |value: Value| {
             let rows = results.rows.iter().filter(|row| at(row, &panels.over).as_ref() == Some(&value));
-            let title = panels.have_titles.then(|| self.common.shown(&panels.over, &value));
+            let title = panels.have_titles.then(|| self.panel_title(&panels.over, &value));
             Content { rows: rows.collect(), title, series: Vec::new() }
         };
         distinct(&results.rows, &panels.over).into_iter().map(content).collect()
+    }
+
+    /// Returns the value of a panel, with the title of its column if the value alone says nothing.
+    fn panel_title(&self, column: &str, value: &Value) -> String {
+        let text = self.common.shown(column, value);
+        if value.is_string() { text } else { format!("{}: {text}", self.common.title(column)) }
     }
 
     fn frame(&self, content: &Content<'_>, all: &[Content<'_>], places: &Places) -> Frame {
@@ -166,60 +174,28 @@ impl PlotView {
     }
 
     fn draw(&self, contents: &[Content<'_>], names: &[Value], places: &Places) -> Scene {
-        let legend = |columns| {
-            let used = names.iter().enumerate().filter(|(number, _)| {
-                contents.iter().flat_map(|content| &content.series).any(|series| series.number == *number)
-            });
-            let entries = used
-                .map(|(number, name)| Series::entry(number, self.common.shown(&self.by, name), &self.style));
-            let title = self.style.has_legend_title.then(|| self.common.title(&self.by));
-            Legend { title, entries: entries.collect(), columns, font_size: self.style.legend_font_size }
+        let used = names.iter().enumerate().filter(|(number, _)| {
+            contents.iter().flat_map(|content| &content.series).any(|series| series.number == *number)
+        });
+        let entries =
+            used.map(|(number, name)| Series::entry(number, self.common.shown(&self.by, name), &self.style));
+        let legend = Legend {
+            title: self.style.has_legend_title.then(|| self.common.title(&self.by)),
+            entries: entries.collect(),
+            columns: self.style.legend_columns,
+            font_size: self.style.legend_font_size,
         };
-        let draw = |content: &Content<'_>| {
-            let frame = self.frame(content, contents, places);
+        let draw = |content: &Content<'_>, height: f64| {
+            let frame = Frame { height, ..self.frame(content, contents, places) };
             let plots = content.series.iter().flat_map(|series| series.plots(&self.style)).collect();
-            (framed(plots, &frame), frame)
+            (framed(plots, &frame), Some(frame))
         };
         if let Some(panels) = &self.panels {
-            let parts = contents.iter().map(|content| draw(content).0).collect();
-            self.grid(parts, panels.columns, legend(self.style.legend_columns))
+            let parts = contents.iter().map(|content| draw(content, self.style.height).0).collect();
+            grid(&self.style, parts, panels.columns, legend)
         } else {
-            let (scene, frame) = draw(&contents[0]);
-            let line = |series: &Series| series.points.iter().map(|(x, found)| (*x, found.mean)).collect();
-            let lines: Vec<Vec<(f64, f64)>> = contents[0].series.iter().map(line).collect();
-            place_legend(scene, &frame, legend(1), self.style.legend_place, &lines)
+            single(&self.style, legend, |style| draw(&contents[0], style.height))
         }
-    }
-
-    /// Arranges panels in a grid, with the legend below, or above if `legend_loc` is at the top.
-    fn grid(&self, parts: Vec<Scene>, columns: usize, mut legend: Legend) -> Scene {
-        let columns = columns.min(parts.len()).max(1);
-        let total = self.style.width * columns as f64;
-        while legend.columns > 1 && legend.size().0 > total {
-            legend.columns -= 1;
-        }
-        let (width, height) = legend.size();
-        let is_above = self.style.legend_place.is_some_and(|place| place.starts_with("upper"));
-        let heading = self.style.title().map_or(0.0, |_| f64::from(self.style.font_size) * 2.0);
-        let first = heading + if is_above { height } else { 0.0 };
-        let panels = self.style.height * parts.len().div_ceil(columns) as f64;
-        let total = total.max(width);
-        let mut scene = Scene::new(total, heading + panels + height + 4.0);
-        for (number, part) in parts.into_iter().enumerate() {
-            let (row, column) = (number / columns, number % columns);
-            insert(
-                &mut scene,
-                part,
-                (column as f64 * self.style.width, first + row as f64 * self.style.height),
-            );
-        }
-        if let Some(title) = self.style.title() {
-            let (x, y, size) = (total / 2.0, heading * 0.7, self.style.font_size + 1);
-            scene.add(super::axes::text(title, (x, y), size));
-        }
-        let top = if is_above { heading } else { first + panels };
-        legend.draw(&mut scene, ((total - width) / 2.0, top), false);
-        scene
     }
 
     /// Returns notes that explain the plot.
@@ -249,7 +225,7 @@ impl Panels {
             columns: options.whole("num_cols", 100)?.unwrap_or(3).max(1),
             share_x: options.flag("share_x")?.unwrap_or(false),
             share_y: options.flag("share_y")?.unwrap_or(false),
-            have_titles: !options.flag("remove_individual_titles")?.unwrap_or(true),
+            have_titles: !options.flag("remove_individual_titles")?.unwrap_or(false),
         })
     }
 }

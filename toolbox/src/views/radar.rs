@@ -1,21 +1,29 @@
 //! The six metrics of each algorithm, as a table and as a radar plot.
 
-use kuva::plot::radar::RadarPlot;
-use kuva::render::layout::Layout;
+use std::f64::consts::TAU;
+
+use kuva::plot::line::LinePlot;
 use kuva::render::plots::Plot;
+use kuva::render::render::{Scene, TextAnchor};
 use pogema_core::{Error, Words};
 
-use super::compose::bare;
+use super::Shown;
+use super::axes::{anchored, text, text_width};
+use super::compose::{bare, insert, plain_layout};
 use super::grid::{Cell, Table};
 use super::legend::Legend;
 use super::options::{Common, Options};
+use super::page::single;
 use super::picture::Picture;
 use super::series::Series;
-use super::style::Style;
-use super::{Shown, axes};
+use super::style::{COLUMN, Style};
+use crate::bootstrap::Estimate;
 use crate::results::{ALGORITHM, Results};
 use crate::six::{Definition, Metric, Six, six};
 use crate::tree::Node;
+
+/// The values at which there is a ring.
+const RINGS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// `type: radar`: the six metrics. They need the folders of a whole evaluation.
 ///
@@ -32,7 +40,7 @@ impl RadarView {
         let options = Options::new(name, node, &Style::keys(&["definition"]))?;
         Ok(Self {
             common: Common::read(&options)?,
-            style: Style::read(&options, (4.2, 3.2))?,
+            style: Style::read(&options, COLUMN)?,
             definition: options.word("definition")?.unwrap_or_default(),
         })
     }
@@ -90,43 +98,94 @@ impl RadarView {
     }
 
     fn draw(&self, all: &[Six], known: &[usize]) -> Picture {
-        let names = known.iter().map(|&at| self.common.title(Metric::NAMES[at]));
-        let mut radar = RadarPlot::new(names)
-            .with_range(0.0, 1.0)
-            .with_grid_lines(4)
-            .with_dot_size(self.style.line_width * 1.2)
-            .with_stroke_width(self.style.line_width);
-        for (number, six) in all.iter().enumerate() {
-            let values: Vec<f64> = known.iter().map(|&at| six.values[at].unwrap_or(0.0).min(1.0)).collect();
-            let colour = self.style.colour(number);
-            radar = radar.with_series_color(values, self.common.algorithm(&six.algorithm), colour);
-        }
-        let size = f64::from(self.style.font_size);
-        let mut layout = Layout::new((0.0, 1.0), (0.0, 1.0))
-            .with_width(self.style.width)
-            .with_height(self.style.height)
-            .with_tick_size(self.style.font_size)
-            .with_body_size(self.style.font_size)
-            .with_label_size(self.style.font_size)
-            .with_force_margins(0.0, 0.0)
-            .with_force_margins_y(self.style.title().map_or(0.0, |_| size * 2.0), 0.0);
-        layout.show_legend = false;
-        let mut scene = bare(vec![Plot::Radar(radar)], layout);
-        if let Some(title) = self.style.title() {
-            scene.add(axes::text(title, (self.style.width / 2.0, size * 1.4), self.style.font_size));
-        }
-        // The library draws these lines without dashes in some formats.
-        let plain = Style { has_markers: false, has_line_types: false, ..self.style.clone() };
-        let entry = |(number, six): (usize, &Six)| {
-            Series::entry(number, self.common.algorithm(&six.algorithm), &plain)
+        let names: Vec<String> = known.iter().map(|&at| self.common.title(Metric::NAMES[at])).collect();
+        let line = |(number, six): (usize, &Six)| {
+            let values = known.iter().map(|&at| six.values[at].unwrap_or(0.0).min(1.0));
+            let points = values.enumerate().map(|(at, value)| polar(at, known.len(), value));
+            let estimate = |(x, mean)| (x, Estimate { mean, interval: None, count: 1 });
+            Series { number, points: closed(points.collect()).into_iter().map(estimate).collect() }
         };
-        let entries = all.iter().enumerate().map(entry).collect();
-        let legend = Legend { title: None, entries, columns: 1, font_size: self.style.legend_font_size };
-        let (width, height) = legend.size();
-        let top = (self.style.height - height).max(0.0) / 2.0;
-        scene.width += width;
-        scene.height = scene.height.max(height);
-        legend.draw(&mut scene, (self.style.width, top), false);
+        let lines: Vec<Series> = all.iter().enumerate().map(line).collect();
+        let entries = lines.iter().zip(all).map(|(line, six)| {
+            Series::entry(line.number, self.common.algorithm(&six.algorithm), &self.style)
+        });
+        let legend = Legend {
+            title: None,
+            entries: entries.collect(),
+            columns: self.style.legend_columns,
+            font_size: self.style.legend_font_size,
+        };
+        // A legend within the plot would cover a metric.
+        let style = Style { legend_place: None, ..self.style.clone() };
+        let scene = single(&style, legend, |style| (web(style, &names, &lines), None));
         Picture::new(scene, &self.style)
+    }
+}
+
+/// Returns the place of a value on one of several spokes; the first points up, the others follow clockwise.
+fn polar(spoke: usize, spokes: usize, value: f64) -> (f64, f64) {
+    let angle = TAU * spoke as f64 / spokes as f64;
+    (value * angle.sin(), value * angle.cos())
+}
+
+fn closed(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.extend(points.first().copied());
+    points
+}
+
+/// Draws the lines on rings and spokes, with names around them.
+fn web(style: &Style, names: &[String], lines: &[Series]) -> Scene {
+    let (size, small, count) = (f64::from(style.font_size), style.legend_font_size, names.len());
+    let heading = style.title().map_or(0.0, |_| size * 1.6);
+    let labels: Vec<Vec<&str>> = names.iter().map(|name| in_two(name)).collect();
+    let widest = labels.iter().flatten().map(|text| text_width(text, style.font_size)).fold(0.0, f64::max);
+    let radius =
+        ((style.height - heading) / 2.0 - size * 1.9).min(style.width / 2.0 - widest - size).max(size);
+    let (x, y) = (style.width / 2.0, heading + (style.height - heading) / 2.0);
+    let grid = |points: Vec<(f64, f64)>| {
+        Plot::Line(LinePlot::new().with_data(points).with_color("#CCCCCC").with_stroke_width(0.5))
+    };
+    let ring = |value: f64| grid(closed((0..count).map(|spoke| polar(spoke, count, value)).collect()));
+    let mut plots: Vec<Plot> = RINGS.map(ring).into();
+    plots.extend((0..count).map(|spoke| grid(vec![(0.0, 0.0), polar(spoke, count, 1.0)])));
+    plots.extend(lines.iter().flat_map(|line| line.plots(style)));
+    let reach = 1.0 + size * 0.5 / radius;
+    let layout = plain_layout((2.0 * radius * reach, 2.0 * radius * reach), (-reach, reach), (-reach, reach));
+    let mut scene = Scene::new(style.width, style.height);
+    insert(&mut scene, bare(plots, layout), (x - radius * reach, y - radius * reach));
+    for (spoke, lines) in labels.iter().enumerate() {
+        let (across, up) = polar(spoke, count, 1.0);
+        let anchor = match across {
+            east if east > 0.1 => TextAnchor::Start,
+            west if west < -0.1 => TextAnchor::End,
+            _ => TextAnchor::Middle,
+        };
+        let left = x + across * (radius + size * 0.7);
+        let above = y - up * (radius + size * 0.9) + size * (0.35 - (lines.len() - 1) as f64 / 2.0 * 1.1);
+        for (number, line) in lines.iter().enumerate() {
+            scene.add(anchored(
+                line,
+                (left, above + number as f64 * size * 1.1),
+                style.font_size,
+                anchor,
+                None,
+            ));
+        }
+    }
+    for value in RINGS {
+        let place = (x + 2.0, y - value * radius + f64::from(small) * 0.9);
+        scene.add(anchored(&value.to_string(), place, small, TextAnchor::Start, None));
+    }
+    if let Some(title) = style.title() {
+        scene.add(text(title, (style.width / 2.0, size * 1.2), style.font_size));
+    }
+    scene
+}
+
+/// Breaks a long name after its last hyphen or space.
+fn in_two(name: &str) -> Vec<&str> {
+    match name.rfind(['-', ' ']).filter(|_| name.chars().count() > 12) {
+        Some(end) => vec![&name[..=end], &name[end + 1..]],
+        None => vec![name],
     }
 }

@@ -13,7 +13,7 @@ use crate::frame::{compare, values};
 use crate::results::{Row, figure};
 
 /// Dash patterns of lines; the first is solid.
-const DASHES: [&str; 6] = ["", "5 2", "1.5 1.5", "5 2 1.5 2", "8 2 2 2", "3 1"];
+const DASHES: [&str; 7] = ["", "5 2", "1.5 1.5", "5 2 1.5 2", "7 3", "3 1", "1.5 4"];
 
 /// Markers that are easy to distinguish even when small.
 const MARKERS: [MarkerShape; 8] = [
@@ -159,4 +159,26 @@ pub(super) fn signs(number: usize, style: &Style) -> (&str, MarkerShape, Option<
     let dashes = DASHES[number % DASHES.len()];
     let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());
     (style.colour(number), MARKERS[number % MARKERS.len()], dashes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::tree::Node;
+    use crate::views::options::Options;
+
+    #[test]
+    fn lines_differ_without_colours() {
+        let node = Node::parse("type: plot").unwrap();
+        let style = Style::read(&Options::new("Plot1", &node, &[]).unwrap(), (1.0, 1.0)).unwrap();
+        let sign = |number| {
+            let (_, marker, dashes) = signs(number, &style);
+            (format!("{marker:?}"), dashes)
+        };
+        // Markers and dash patterns have periods without a common divisor.
+        let count = DASHES.len() * MARKERS.len();
+        assert_eq!((0..count).map(sign).collect::<HashSet<_>>().len(), count);
+    }
 }

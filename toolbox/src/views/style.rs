@@ -10,6 +10,9 @@ use super::options::Options;
 /// Number of points per inch; pictures are measured in points.
 pub(super) const INCH: f64 = 72.0;
 
+/// Default size of a plot: the width of a column in a two-column paper, and a height for the same page. Units: inches.
+pub(super) const COLUMN: (f64, f64) = (3.4, 2.6);
+
 /// Colours that are safe for most forms of colour blindness.
 ///
 /// Source: Okabe and Ito (2008), "Color Universal Design"; yellow, which is faint on white, is last
@@ -106,7 +109,7 @@ impl Style {
     /// Returns the frame of a plot with a single panel.
     pub fn frame(&self, x: Axis, y: Axis) -> Frame {
         let Self { width, height, font_size, .. } = *self;
-        Frame { width, height, font_size, title: self.title().map(str::to_owned), x, y }
+        Frame { width, height, font_size, title: self.title().map(str::to_owned), is_square: false, x, y }
     }
 }
 

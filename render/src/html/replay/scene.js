@@ -29,11 +29,13 @@ class Scene {
     this.place(step, time - step);
     const isCoarse = this.view.scale < COARSE;
     if (agent !== null) this.drawWindow(context, agent);
+    const hasNumbers = options.numbers && this.view.scale >= LABELS_FROM;
     if (options.goals) this.drawGoals(context, step, isCoarse);
+    if (options.goals && hasNumbers) this.drawGoalNumbers(context, step);
     if (agent !== null) this.drawPath(context, step, agent);
     this.drawAgents(context, isCoarse);
-    if (options.numbers && this.view.scale >= LABELS_FROM) this.drawNumbers(context);
-    if (agent !== null) this.drawChosen(context, step, agent);
+    if (hasNumbers) this.drawNumbers(context);
+    if (agent !== null) this.drawChosen(context, step, agent, options.goals && hasNumbers);
   }
 
   // Computes the position and the size of every agent; the size of invisible and finished agents is 0.
@@ -76,35 +78,53 @@ class Scene {
   }
 
   drawGoals(context, step, isCoarse) {
-    const { film, view } = this;
-    const [top, bottom, left, right] = view.seen();
+    const { view } = this;
     context.lineWidth = isCoarse ? Math.max(LINE, 0.6 / view.scale) : LINE;
     if (isCoarse) context.globalAlpha = 0.5;
     this.teams.forEach((team, color) => {
       context.strokeStyle = PALETTE[color];
       context.beginPath();
-      for (const agent of team) {
-        const index = step * film.goalStride + agent;
-        const [row, col] = [film.goalRows[index], film.goalCols[index]];
-        if (!(film.flags[step * film.numAgents + agent] & ACTIVE)) continue;
-        if (row < top || row > bottom || col < left || col > right) continue;
-        addDisc(context, col + 0.5, row + 0.5, RADIUS, isCoarse);
-      }
+      this.eachGoal(step, team, (_, row, col) => addDisc(context, col + 0.5, row + 0.5, RADIUS, isCoarse));
       context.stroke();
     });
     context.globalAlpha = 1;
   }
 
+  // Calls `draw(agent, row, col)` for the visible goals of the active agents of a team.
+  eachGoal(step, team, draw) {
+    const { film } = this;
+    const [top, bottom, left, right] = this.view.seen();
+    for (const agent of team) {
+      const index = step * film.goalStride + agent;
+      const [row, col] = [film.goalRows[index], film.goalCols[index]];
+      if (!(film.flags[step * film.numAgents + agent] & ACTIVE)) continue;
+      if (row < top || row > bottom || col < left || col > right) continue;
+      draw(agent, row, col);
+    }
+  }
+
   drawNumbers(context) {
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    const digits = String(this.film.numAgents - 1).length;
-    context.font = `600 ${digits < 3 ? 0.4 : 0.9 / digits}px system-ui, sans-serif`;
+    this.beginNumbers(context, 600);
     for (let agent = 0; agent < this.film.numAgents; agent += 1) {
       if (this.sizes[agent] < RADIUS / 2) continue;
       context.fillStyle = INK[agent % PALETTE.length];
       context.fillText(String(agent), this.xs[agent], this.ys[agent] + 0.03);
     }
+  }
+
+  // Writes the number of its agent into each goal. Agents are drawn later, so an agent on a goal hides the number.
+  drawGoalNumbers(context, step) {
+    this.beginNumbers(context, 400);
+    context.fillStyle = theme.text;
+    const write = (agent, row, col) => context.fillText(String(agent), col + 0.5, row + 0.53);
+    for (const team of this.teams) this.eachGoal(step, team, write);
+  }
+
+  beginNumbers(context, weight) {
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    const digits = String(this.film.numAgents - 1).length;
+    context.font = `${weight} ${digits < 3 ? 0.4 : 0.9 / digits}px system-ui, sans-serif`;
   }
 
   drawWindow(context, agent) {
@@ -146,7 +166,8 @@ class Scene {
     context.globalAlpha = 1;
   }
 
-  drawChosen(context, step, agent) {
+  // A goal without a number gets a dot.
+  drawChosen(context, step, agent, hasNumber) {
     const { film, view } = this;
     const state = film.agent(step, agent);
     const ring = (x, y, color, radius, dash) => {
@@ -161,7 +182,8 @@ class Scene {
     if (state.isActive) {
       context.fillStyle = colorOf(agent);
       context.beginPath();
-      context.arc(state.goal[1] + 0.5, state.goal[0] + 0.5, Math.max(0.14, 2.5 / view.scale), 0, 2 * Math.PI);
+      const dot = hasNumber ? 0 : Math.max(0.14, 2.5 / view.scale);
+      context.arc(state.goal[1] + 0.5, state.goal[0] + 0.5, dot, 0, 2 * Math.PI);
       context.fill();
       ring(state.goal[1] + 0.5, state.goal[0] + 0.5, colorOf(agent), RADIUS, []);
     }

@@ -23,6 +23,7 @@ class LongList {
   set(length, chosen) {
     this.length = length;
     this.spacer.style.height = this.box.style.maxHeight = `${length * this.rowHeight}px`;
+    this.box.parentElement.style.setProperty("--rows", this.spacer.style.height);
     this.pick(chosen);
   }
 

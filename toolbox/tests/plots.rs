@@ -1,0 +1,170 @@
+//! Properties of drawn plots: sizes for a two-column paper, complete and legible texts, and lines that differ in grey.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::HashSet;
+
+use pogema_toolbox::views::{ImageFormat, View};
+use pogema_toolbox::{Node, Results, Row};
+
+/// The width of a column and the greatest height of a plot, in points.
+const COLUMN: (f64, f64) = (244.8, 187.2);
+
+const ALGORITHMS: [&str; 8] =
+    ["DCC", "IQL", "LaCAM", "MAMBA", "QMIX", "QPLEX", "SCRIMP", "A long name of a policy"];
+
+/// Returns rows of eight algorithms in all sets of the paper.
+fn results() -> Results {
+    let sets = ["01-random", "02-mazes", "03-warehouse", "04-movingai", "05-puzzles", "06-pathfinding"];
+    let mut rows = Vec::new();
+    for (at, algorithm) in ALGORITHMS.into_iter().enumerate() {
+        for set in sets {
+            for (number, agents) in [8, 16, 24, 32, 48, 64].into_iter().enumerate() {
+                let cost = agents * (15 + 12 * at) + 3 * number;
+                let text = format!(
+                    r#"{{"metrics": {{"CSR": 1, "SoC": {cost}, "makespan": {cost}, "ep_length": {cost}, "runtime": {}}},
+                        "env_grid_search": {{"num_agents": {agents}, "map_name": "{set}"}}, "algorithm": "{algorithm}"}}"#,
+                    0.01 * cost as f64,
+                );
+                let row: Row = serde_json::from_str(&text).unwrap();
+                rows.push(Row { set: set.to_owned(), ..row });
+            }
+        }
+    }
+    Results { rows, notes: Vec::new() }
+}
+
+fn drawn(fields: &str, kind: ImageFormat) -> Vec<u8> {
+    let view = View::read("View1", &Node::parse(fields).unwrap()).unwrap();
+    view.show("View1", &results(), None).unwrap().pictures[0].bytes(kind).unwrap()
+}
+
+fn svg(fields: &str) -> String {
+    String::from_utf8(drawn(fields, ImageFormat::Svg)).unwrap()
+}
+
+/// A text, the left, upper, right and lower end of its box, and whether it is rotated.
+type Label = (String, [f64; 4], bool);
+
+/// Returns the texts that are not in a moved group, such as a panel.
+fn labels(page: &roxmltree::Document<'_>, panel: usize) -> Vec<Label> {
+    let groups = page.root_element().children().filter(|node| node.has_tag_name("g"));
+    let panels: Vec<_> =
+        groups.filter(|group| group.children().any(|node| node.has_tag_name("text"))).collect();
+    let parent = panels.get(panel).copied().unwrap_or(page.root_element());
+    let texts = parent.children().filter(|node| node.has_tag_name("text"));
+    texts
+        .map(|node| {
+            let number = |name| node.attribute(name).unwrap().parse::<f64>().unwrap();
+            let (x, y, size) = (number("x"), number("y"), number("font-size"));
+            let text = node.text().unwrap().to_owned();
+            // Digits of DejaVu Sans are 0.64 of the font size wide.
+            let width = text.chars().count() as f64 * size * 0.62;
+            let left = match node.attribute("text-anchor") {
+                Some("middle") => x - width / 2.0,
+                Some("end") => x - width,
+                _ => x,
+            };
+            (text, [left, y - 0.75 * size, left + width, y], node.has_attribute("transform"))
+        })
+        .collect()
+}
+
+fn assert_apart(labels: &[Label]) {
+    let level: Vec<&Label> = labels.iter().filter(|(_, _, is_rotated)| !is_rotated).collect();
+    for (at, (one, a, _)) in level.iter().enumerate() {
+        for (other, b, _) in &level[at + 1..] {
+            let is_apart = a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1];
+            assert!(is_apart, "`{one}` {a:?} covers `{other}` {b:?}");
+        }
+    }
+}
+
+#[test]
+fn plots_of_all_types_fill_a_column_and_have_legible_texts() {
+    for fields in [
+        "{type: plot, x: num_agents, y: SoC, name: Random}",
+        "{type: plot, x: num_agents, y: SoC, use_log_scale_x: True, use_log_scale_y: True}",
+        "{type: plot, x: num_agents, y: SoC, legend_loc: upper left}",
+        "{type: plot, x: map_name, y: SoC}",
+        "{type: box, y: SoC}",
+        "{type: cactus}",
+        "{type: compare, first: DCC, second: IQL}",
+        "{type: radar}",
+    ] {
+        let text = svg(fields);
+        let page = roxmltree::Document::parse(&text).unwrap();
+        let root = page.root_element();
+        assert_eq!(root.attribute("width"), Some(format!("{}pt", COLUMN.0).as_str()), "{fields}");
+        assert_eq!(root.attribute("height"), Some(format!("{}pt", COLUMN.1).as_str()), "{fields}");
+        assert_eq!(root.attribute("viewBox"), Some(format!("0 0 {} {}", COLUMN.0, COLUMN.1).as_str()));
+        for node in page.descendants().filter(|node| node.has_tag_name("text")) {
+            let size: f64 = node.attribute("font-size").unwrap().parse().unwrap();
+            assert!((7.0..=9.0).contains(&size), "{fields}: {size}");
+        }
+        assert_apart(&labels(&page, 0));
+    }
+}
+
+#[test]
+fn panels_have_titles_and_all_tick_labels() {
+    let text = svg("{type: multi-plot, x: num_agents, y: SoC, over: map_name}");
+    let page = roxmltree::Document::parse(&text).unwrap();
+    for (panel, title) in ["01-random", "02-mazes", "03-warehouse", "04-movingai"].into_iter().enumerate() {
+        let labels = labels(&page, panel);
+        for text in [title, "8", "16", "24", "32", "48", "64"] {
+            assert!(
+                labels.iter().any(|(label, ..)| label == text),
+                "no `{text}` in panel {panel}: {labels:?}"
+            );
+        }
+        assert_apart(&labels);
+    }
+    // A number alone says nothing.
+    let text = svg("{type: multi-plot, x: map_name, y: SoC, over: num_agents}");
+    assert!(text.contains(">Number of Agents: 8<"), "{text}");
+    let text =
+        svg("{type: multi-plot, x: num_agents, y: SoC, over: map_name, remove_individual_titles: True}");
+    assert!(!text.contains(">01-random<"), "{text}");
+}
+
+#[test]
+fn labels_without_room_are_slanted_and_complete() {
+    let text = svg("{type: plot, x: map_name, y: SoC, width: 2}");
+    let page = roxmltree::Document::parse(&text).unwrap();
+    let labels = labels(&page, 0);
+    for name in ["01-random", "02-mazes", "03-warehouse", "04-movingai", "05-puzzles", "06-pathfinding"] {
+        assert!(labels.iter().any(|(label, _, is_rotated)| label == name && *is_rotated), "{labels:?}");
+    }
+}
+
+#[test]
+fn logarithmic_axes_have_decimal_ticks() {
+    let text = svg("{type: plot, x: num_agents, y: SoC, use_log_scale_x: True, use_log_scale_y: True}");
+    for power in ["128", "256", "512", "1024", "1,024", "2048"] {
+        assert!(!text.contains(&format!(">{power}<")), "{power}: {text}");
+    }
+    // The horizontal axis marks the data.
+    assert!(text.contains(">1,000<") && text.contains(">48<"), "{text}");
+}
+
+#[test]
+fn lines_differ_in_dashes_or_markers() {
+    for fields in ["{type: plot, x: num_agents, y: SoC}", "{type: cactus}", "{type: radar}"] {
+        let text = svg(fields);
+        let page = roxmltree::Document::parse(&text).unwrap();
+        let dashes: HashSet<_> =
+            page.descendants().filter_map(|node| node.attribute("stroke-dasharray")).collect();
+        assert_eq!(dashes.len(), 6, "{fields}: {dashes:?}");
+    }
+}
+
+#[test]
+fn pixels_are_as_many_as_the_resolution_says() {
+    let bytes = drawn("{type: plot, x: num_agents, y: SoC, figure_dpi: 150}", ImageFormat::Png);
+    let info = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap().info().clone();
+    assert_eq!((info.width, info.height), (510, 390));
+    // 150 dots per inch.
+    assert_eq!(info.pixel_dims.unwrap().xppu, 5906);
+    assert!(drawn("{type: radar}", ImageFormat::Pdf).starts_with(b"%PDF"));
+}
