@@ -1,13 +1,16 @@
-//! Windows as strings of hexadecimal digits.
+//! Windows and bytes as strings of hexadecimal digits.
+
+/// Writes bytes as hexadecimal digits.
+pub(crate) fn digits_of(bytes: impl IntoIterator<Item = u8>) -> String {
+    let digits = bytes.into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    digits.filter_map(|digit| char::from_digit(digit.into(), 16)).collect()
+}
 
 /// Packs eight cells into a byte, the first into its highest bit, and writes the bytes as hexadecimal digits.
 pub(crate) fn pack<T>(window: &[T], is_set: impl Fn(&T) -> bool) -> String {
-    let digits = window.chunks(8).flat_map(|cells| {
-        let byte =
-            cells.iter().zip((0..8).rev()).fold(0, |byte, (cell, bit)| byte | u32::from(is_set(cell)) << bit);
-        [byte >> 4, byte & 15]
-    });
-    digits.filter_map(|digit| char::from_digit(digit, 16)).collect()
+    digits_of(window.chunks(8).map(|cells| {
+        cells.iter().zip((0..8).rev()).fold(0, |byte, (cell, bit)| byte | u8::from(is_set(cell)) << bit)
+    }))
 }
 
 /// Returns the cells that [`pack`] packed, followed by the zeros that pad the last byte.

@@ -133,7 +133,7 @@ fn survey(reports: &[PortReport]) -> String {
         let _ = writeln!(text, "| `{rule}` | {} |", marks.join(" | "));
     }
     let _ = writeln!(text, "\n## Smallest counterexamples");
-    let mut groups: BTreeMap<(&str, &str, &str), Vec<(&str, &Cause)>> = BTreeMap::new();
+    let mut groups: BTreeMap<_, Vec<(&str, &Cause)>> = BTreeMap::new();
     for (report, name) in reports.iter().zip(&names) {
         for cause in &report.causes {
             let key = (cause.rule.as_deref().unwrap_or("protocol"), cause.what.as_str(), cause.when.as_str());

@@ -4,7 +4,7 @@ use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, P
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::digits::{pack, unpack};
+use crate::digits::{digits_of, pack, unpack};
 
 /// Reads observations from an answer. An error describes what is wrong with their form.
 ///
@@ -94,11 +94,7 @@ fn resolve(expected: &[String], answer: &mut [String], num_values: usize) {
 fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
     let bytes: Vec<u8> = values.map(u8::from).collect();
     match algorithm {
-        "sha256" => {
-            let digits = Sha256::digest(&bytes).into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
-            let digits = digits.filter_map(|digit| char::from_digit(digit.into(), 16));
-            Some(format!("sha256:{}", digits.collect::<String>()))
-        }
+        "sha256" => Some(format!("sha256:{}", digits_of(Sha256::digest(&bytes)))),
         "fnv1a64" => Some(format!("fnv1a64:{:016x}", fnv1a64(&bytes))),
         _ => None,
     }

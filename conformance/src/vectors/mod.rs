@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use crate::digits::digits_of;
 use crate::port::{Profile, profile_of};
 use crate::rules;
 
@@ -93,7 +94,7 @@ pub fn write(folder: &Path) -> Result<Written, Error> {
         let text = text_of(rule, vectors)?;
         let path = format!("{rule}.json");
         write_file(folder, &path, text.as_bytes())?;
-        let sha256 = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+        let sha256 = digits_of(Sha256::digest(&text));
         listed.push(Listed { rule: rule.clone(), path, num_vectors: vectors.len(), sha256 });
     }
     write_file(folder, SCHEMA, &pretty(&schema())?)?;
