@@ -10,7 +10,7 @@ import time
 import numpy as np
 from pogema import GridConfig, pogema_v0
 
-STRETCHES = 5
+INTERVALS = 5
 SECONDS = 0.3
 ACTIONS = 64
 
@@ -18,7 +18,7 @@ ACTIONS = 64
 def fastest(work, seconds=SECONDS):
     """Return the calls of `work` per second, in the fastest interval."""
     best = 0.0
-    for _ in range(STRETCHES):
+    for _ in range(INTERVALS):
         calls, start = 0, time.perf_counter()
         while (spent := time.perf_counter() - start) < seconds or calls == 0:
             work()
