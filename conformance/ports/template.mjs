@@ -1,12 +1,12 @@
 // A complete port to copy: a small environment, and the adapter that connects it to the checks. Replace `Environment`
-// by your own environment, and list its abilities in `CLAIMS`. docs/PORTING.md explains the questions and answers.
+// with your own environment, and list its abilities in `CLAIMS`. docs/PORTING.md explains the questions and answers.
 //
 // Needs Node 18 or newer and nothing else:   node template.mjs
 
 import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 
-// ------------------------------------ The environment. Replace it by yours. ---------------------------------------
+// ------------------------------------ The environment. Replace it with yours. ---------------------------------------
 
 const MOVES = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]; // stay, up, down, left, right
 const isSame = (one, other) => one[0] === other[0] && one[1] === other[1];

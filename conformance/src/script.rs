@@ -51,7 +51,7 @@ pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Req
 
 fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, response: &mut Response) {
     let script = draw_script(dice, player);
-    // No step between the resets, because in POGEMA an abandoned episode leaves its counters to the next one.
+    // No step between the resets, because POGEMA adds the counters of an abandoned episode to the next one.
     for _ in 0..if dice.chance(0.15) { 3 } else { 1 } {
         let seed = dice.chance(0.2).then(|| dice.below(1000) as u64);
         if !perform(player, Op::Reset(seed), request, response) {

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <fstream>
 
-// These keys are compared if the port tells them.
+// These keys are compared if the claims list them under `tells`.
 const vector<const char*> OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"};
 
 bool has(const json& list, const json& word) { return std::find(list.begin(), list.end(), word) != list.end(); }

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 DEFAULTS = {"occupancy": ["as_released"], "reward": ["own"]}
-OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}  # compared if the port tells them
+# These keys are compared if the claims list them under `tells`.
+OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}
 
 
 def can_play(claims: dict[str, Any], needs: dict[str, Any]) -> bool:

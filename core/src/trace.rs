@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
 
-/// The format of a header. The files of earlier versions have the same, and no last line.
+/// The format of a header. Files of earlier versions have the same header format, but no last line.
 const FORMAT: &str = "pogema-trace/1";
 /// The version of the spec whose rules this workspace follows.
 pub const SPEC: &str = "pogema-1.4.0/1";

@@ -42,7 +42,7 @@ pub(crate) struct Painter<'a> {
     scene: &'a Scene<'a>,
     transform: Transform,
     background: Pixmap,
-    /// The obstacles that become seen after the first frame: that frame and the shape.
+    /// The obstacles that the viewing agent first sees after the first frame: the frame and the shape.
     fading: Vec<(usize, Path)>,
     agents: Vec<usize>,
     goals: Vec<usize>,

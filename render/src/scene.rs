@@ -41,7 +41,7 @@ pub struct Look {
     pub opacity: f64,
 }
 
-/// Obstacles that become seen at the same frame.
+/// Obstacles that the viewing agent first sees at the same frame.
 pub struct Obstacles {
     /// The frame at which the viewing agent first sees them; none for never.
     pub seen: Option<usize>,

@@ -20,9 +20,9 @@ const IGNORED: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
 /// A built-in algorithm with its settings.
 #[derive(Clone, Debug)]
 pub struct BuiltIn {
-    /// Its name among the policies.
+    /// The name of its policy.
     pub name: String,
-    /// The settings of its policies.
+    /// The settings of its policy.
     pub settings: PolicySettings,
 }
 

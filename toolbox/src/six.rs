@@ -13,15 +13,15 @@ words! {
     /// Definition of the metrics.
     #[derive(Default)]
     pub enum Definition {
-        /// The definition behind the published numbers, all of which follow from the published files.
+        /// The definition that reproduces all published numbers from the published files.
         ///
-        /// - Instances that no algorithm solved are left out. "Best" is the best of the compared algorithms.
+        /// - Instances that no algorithm solved are omitted. "Best" is the best of the compared algorithms.
         /// - Scalability uses seconds per step, over all pairs of numbers of agents, and is at most 1.
-        /// - Pathfinding counts a path that was not found as a path of the length of the episode. In lifelong suites, it
-        ///   counts 0 for every algorithm if any algorithm has an episode of length 0.
-        /// - Coordination counts makespan − 1 steps per episode. In the published files, this equals `ep_length`
-        ///   wherever they count collisions. In POGEMA 1.4.0, and therefore in our results, `ep_length` is larger by
-        ///   one. Makespan is the same in both, so files of both kinds can be compared.
+        /// - If no path was found, Pathfinding uses the length of the episode as the length of the path. In lifelong
+        ///   suites, an instance counts as 0 for every algorithm if any algorithm has an episode of length 0.
+        /// - Coordination counts makespan − 1 steps per episode. In the published files that count collisions, this
+        ///   number equals `ep_length`. In POGEMA 1.4.0, and therefore in our results, `ep_length` is larger by one.
+        ///   Makespan is the same in both, so files of both kinds can be compared.
         ///
         /// Source: `build_web_plot.py` of the public repository pogema-benchmark, commit 7b86d776
         #[default]
@@ -57,7 +57,7 @@ words! {
 }
 
 impl Metric {
-    /// Returns the parts of names that identify the required folders.
+    /// Returns parts of folder names. The metric requires the folders whose names contain one of them.
     fn sets(self) -> &'static [&'static str] {
         match self {
             Self::Performance | Self::Coordination => &["random", "mazes"],
@@ -163,9 +163,7 @@ impl<'a> Joined<'a> {
         }
     }
 
-    /// Returns the mean of a value over all instances; `None` if the value is unknown for any instance.
-    ///
-    /// Instances that do not count are left out.
+    /// Returns the mean of a value over all instances that count; `None` if the value is unknown for any instance.
     fn mean(&self, figure: impl Fn(&HashMap<&str, &Row>) -> Option<Counted>) -> Option<f64> {
         let found: Option<Vec<Counted>> = self.instances.iter().map(figure).collect();
         mean_of(&found?.into_iter().flatten().collect::<Vec<f64>>())

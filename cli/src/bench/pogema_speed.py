@@ -1,6 +1,6 @@
 """Times POGEMA 1.4.0: reads a JSON list of configs from stdin, prints observations and resets per second of each.
 
-Actions are sampled beforehand, so that only steps are timed; the fastest of several stretches counts.
+Actions are sampled beforehand, so that only steps are timed; the fastest of several intervals counts.
 """
 
 import json
@@ -10,15 +10,15 @@ import time
 import numpy as np
 from pogema import GridConfig, pogema_v0
 
-STRETCHES = 5
+INTERVALS = 5
 SECONDS = 0.3
 ACTIONS = 64
 
 
 def fastest(work, seconds=SECONDS):
-    """Return the calls of `work` per second, in the fastest stretch."""
+    """Return the calls of `work` per second, in the fastest interval."""
     best = 0.0
-    for _ in range(STRETCHES):
+    for _ in range(INTERVALS):
         calls, start = 0, time.perf_counter()
         while (spent := time.perf_counter() - start) < seconds or calls == 0:
             work()

@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-/// The number of time stretches, of which the fastest counts: other load on the machine can only slow a stretch down.
-const STRETCHES: u32 = 5;
+/// The number of intervals. The fastest one counts, because other load on the machine can only slow an interval down.
+const INTERVALS: u32 = 5;
 
-/// Returns the calls of `work` per second, in the fastest stretch.
+/// Returns the calls of `work` per second, in the fastest interval.
 pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
     work();
-    let stretch = budget / STRETCHES;
+    let interval = budget / INTERVALS;
     let mut best = 0f64;
-    for _ in 0..STRETCHES {
+    for _ in 0..INTERVALS {
         let (mut num_calls, mut batch) = (0u32, 1u32);
         let start = Instant::now();
         loop {
@@ -23,7 +23,7 @@ pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
             }
             num_calls += batch;
             let spent = start.elapsed();
-            if spent >= stretch {
+            if spent >= interval {
                 best = best.max(f64::from(num_calls) / spent.as_secs_f64());
                 break;
             }

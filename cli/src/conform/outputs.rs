@@ -32,10 +32,11 @@ pub struct Outputs {
     /// `port: name` to limit an entry to one port. Copy `rule` and `what` from the line `FAIL collide/soft: cell
     /// differs` of the report; for a line `ERROR what` the rule is `protocol`. If the report shows several causes of one
     /// rule and field, give each its own entry, with `when` copied from the report. Listed causes are reported separately
-    /// and do not change the exit status. If no port shows an entry any longer, the exit status is 1, so that the list
-    /// stays up to date. This applies only if the run compared the rule of the entry: never with `--case` or `--part`,
-    /// nor if `--rules`, `--profile` or the port's claims leave the rule out, nor if a port broke the protocol so
-    /// often that the run was cut short. For the rule `protocol`, it applies only without `--rules` and `--profile`.
+    /// and do not change the exit status. If the deviation of an entry no longer occurs in any port, the exit status is
+    /// 1, so that the list stays up to date. Only entries whose rule was compared are checked in this way. No entry is
+    /// checked with `--case` or `--part`, or if protocol errors of a port cut the run short. Entries for rules that
+    /// `--rules`, `--profile` or the port's claims leave out are not checked. Entries for the rule `protocol` are
+    /// checked only without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }

@@ -211,7 +211,9 @@ pub fn verdict(report: &PortReport) -> String {
 pub fn times(cause: &Cause) -> String {
     let times = if cause.times == 1 { "once".into() } else { format!("{} times", cause.times) };
     match cause.share {
-        Some(Share { alike, shrunk }) => format!("{times}, {alike} of {shrunk} shrunk ones for this cause"),
+        Some(Share { alike, shrunk }) => {
+            format!("{times}; {alike} of {shrunk} shrunk examples have this cause")
+        }
         None => times,
     }
 }

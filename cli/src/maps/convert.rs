@@ -151,7 +151,7 @@ fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
 fn config(text: &MapText, scenario: Option<&Scenario>) -> String {
     let mut lines = vec!["map: |-".to_owned()];
     let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
-    // Without starts and goals no letter can be missing, and pools always have characters.
+    // Only starts and goals can run out of letters, and there are none; pools have fixed characters.
     let rows = plain.rows().unwrap_or_else(|_| plain.map.rows());
     lines.extend(rows.iter().map(|row| format!("  {row}")));
     let own = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };

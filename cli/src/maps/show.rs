@@ -150,8 +150,8 @@ fn picture(text: &MapText, max_width: usize) -> String {
     }
 }
 
-/// Draws a map in braille characters. Each has two columns and four rows of dots, each dot covers a square of cells
-/// and is set if at least half of them are obstacles.
+/// Draws a map in braille characters. Each character has two columns and four rows of dots. Each dot covers a square of
+/// cells and is set if at least half of them are obstacles.
 fn braille(map: &Map, max_width: usize) -> String {
     const DOTS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
     let scale = map.width().div_ceil(2 * max_width).max(1);

@@ -31,7 +31,7 @@ pub struct Stats {
     /// Place agents as POGEMA does with this seed; requires `--num-agents`
     #[arg(long, value_name = "S", requires = "num_agents")]
     seed: Option<u64>,
-    /// Effect of reaching a goal: agents leave the map, or have to be on their goals at the same time
+    /// Effect of reaching a goal, as the bounds and proofs assume it
     #[arg(long, default_value_t = OnGoal::Nothing, value_parser = word_of(&OnGoal::WORDS[..2]))]
     on_target: OnGoal,
     /// Print everything as JSON

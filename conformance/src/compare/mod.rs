@@ -72,7 +72,7 @@ pub fn compare_in(
     let (op, found, states_differ) = (0, Vec::new(), false);
     let families = families_of(&config);
     let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
-    // Instances give the goals, so only in config mode is a wrong goal attributed to the drawing of goals.
+    // Instances give the goals, so a wrong goal is attributed to the drawing of goals only in config mode.
     let draws_goals =
         scope.drawn && !scope.is_whole() && config.on_target == OnGoal::Restart && !has_sequences;
     let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, states_differ };

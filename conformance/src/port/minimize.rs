@@ -20,11 +20,11 @@ use crate::runner::Progress;
 
 /// Maximum number of occurrences of one group that are shrunk.
 const MAX_SHRUNK: usize = 8;
-/// The same for misbehaviours, each repetition of which costs a new process.
+/// The same for misbehaviours. Each repetition of a misbehaviour costs a new process.
 const MAX_SHRUNK_FAULTS: usize = 2;
 
-/// Shrinks several occurrences of each cause, keeps the smallest as a case, and splits causes that shrink to different
-/// ones. Calls `progress` after each cause.
+/// Shrinks several occurrences of each group, keeps the smallest as a case, and splits groups whose occurrences shrink
+/// to different causes. Calls `progress` after each group.
 ///
 /// # Errors
 /// If a case cannot be written.

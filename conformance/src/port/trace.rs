@@ -75,7 +75,7 @@ fn metric_names(trace: &Trace) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Returns the comparisons that apply to a trace: of everything that it records throughout.
+/// Returns the comparisons that apply to a trace. Observations are compared only if every frame has them.
 fn scope_of(trace: &Trace) -> Scope {
     let is_seen =
         trace.start.observations.is_some() && trace.steps.iter().all(|step| step.observations.is_some());

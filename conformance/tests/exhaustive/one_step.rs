@@ -88,8 +88,9 @@ impl Both {
         self.expected.len() as u64
     }
 
-    /// Returns the state that the reference reaches. The actions of finished agents do not count (rule: move/inactive),
-    /// so the reference plays only the joint action in which they wait; that one has the lowest number of its class.
+    /// Returns the state that the reference reaches. The actions of finished agents have no effect (rule:
+    /// move/inactive), so joint actions that differ only in those form a class. The reference plays only one of them,
+    /// in which the finished agents wait; it has the lowest number of its class.
     fn expected(&mut self, number: usize, actions: &[Action]) -> &Snapshot {
         let digit = |agent: usize| 5usize.pow(agent as u32);
         let gone = (0..actions.len()).filter(|&agent| self.is_gone(agent));
@@ -103,8 +104,8 @@ impl Both {
     }
 }
 
-/// Returns a goal that the agent cannot reach in one step, if the map has one, else any cell other than the start, if
-/// the map has one.
+/// Returns a goal that the agent cannot reach in one step. If the map has none, returns any cell other than the start;
+/// if there is no other cell, returns the start.
 fn far_from(map: &Map, start: Cell) -> Cell {
     let distance = |cell: &Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col);
     let is_far = |cell: &Cell| *cell != start && (map.is_obstacle(*cell) || distance(cell) > 1);

@@ -86,7 +86,7 @@ impl Both {
         let num_actions = 5usize.pow(num_agents as u32);
         let (mut first, mut second) = (vec![Action::Stay; num_agents], vec![Action::Stay; num_agents]);
         self.reference.reset(instance).unwrap();
-        // Different first steps may reach the same state: its second steps are played once.
+        // Different first steps may reach the same state, whose second steps are played only once.
         let mut played: Vec<(Snapshot, Vec<Outputs>)> = Vec::new();
         for number in 0..num_actions {
             write_actions(number, &mut first);

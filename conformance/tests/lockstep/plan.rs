@@ -204,7 +204,7 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
 
 /// Returns a strategy for plans that vary every input of the engines.
 pub fn plans() -> impl Strategy<Value = Plan> {
-    // `quarters` makes crowds: it is the share of cells with an agent, in quarters; 0 means `few` agents.
+    // `quarters` sets the size of the crowd: the share of cells with an agent, in quarters. 0 means `few` agents.
     (configs(), vec(grounds(), 2), any::<bool>(), 0..=4usize, 0..MAX_AGENTS, ops()).prop_map(
         |(config, mut grounds, same_size, quarters, few, mut ops)| {
             if same_size {

@@ -1,4 +1,4 @@
-//! Checks that we reject all configs that a live POGEMA 1.4.0 rejects, and further ones only for a decided reason.
+//! Checks that we reject all configs that a live POGEMA 1.4.0 rejects, and reject others only for a known reason.
 //!
 //! `POGEMA_ORACLE_PYTHON=python cargo test -p pogema-conformance --test rejects_live`
 

@@ -40,8 +40,8 @@ words! {
         Toolbox = "toolbox",
         /// As in the published warehouse.
         ///
-        /// The first and last row have no starts. Starts are in columns 1, 2, 4 and 5 and the mirrored four,
-        /// in the rows of each shelf and the rows next to it.
+        /// Starts are in columns 1, 2, 4 and 5 and the four columns that mirror them, in the rows of each shelf and the
+        /// rows next to it. The first and last row have no starts.
         Published = "published",
     }
 }
@@ -132,7 +132,7 @@ impl Warehouse {
         }
         let height = self.vertical_gap * (self.walls_rows + 1) + self.wall_height * self.walls_rows;
         let walls = 2 * self.bottom_gap + self.wall_width * self.walls_in_row;
-        // Without walls there is no gap, rather than one gap less than none.
+        // Without walls, the number of gaps would be −1, so the subtraction must not go below 0.
         let width = (walls + self.horizontal_gap * self.walls_in_row).saturating_sub(self.horizontal_gap);
         super::check_sides(width as i64, height as i64)?;
         Ok((height, width))

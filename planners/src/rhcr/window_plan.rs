@@ -1,4 +1,4 @@
-//! The plan for the steps of the planning window, which PIBT extends and which is always free of conflicts.
+//! The plan for the steps of the planning window. It is always free of conflicts; PIBT extends it.
 //!
 //! Source: Jiang et al., "Scaling Lifelong Multi-Agent Path Finding to More Realistic Settings: Research Challenges and
 //! Opportunities", Symposium on Combinatorial Search 2024: windows that start from PIBT
@@ -22,7 +22,7 @@ pub(crate) struct WindowPlan {
     pub(super) num_steps: usize,
     /// Shape: `[agents, steps + 1]`
     pub(super) paths: Vec<Vec<Vertex>>,
-    /// The cost of each path, with the costs to go beyond the window.
+    /// The cost of each path, including the costs to go after the window.
     pub(super) costs: Vec<u32>,
     pub(super) reserved: Reservations,
     step: PibtStep,
@@ -92,7 +92,7 @@ impl WindowPlan {
                 Target::Here(_) => UNREACHABLE,
             };
             order.sort_by_key(|&agent| distance(agent));
-            // No agent stays at its goal, so no dead end counts as closed.
+            // Agents do not stay at their goals, so an agent on its goal does not block a dead end.
             let goals = vec![Vertex::MAX; now.len()];
             let input =
                 StepInput { graph: &self.graph, now: &now, goals: &goals, costs: &costs, order: &order };
@@ -144,7 +144,7 @@ fn phase_at(vertex: Vertex, phase: usize, legs: &[Leg]) -> usize {
     phase + legs[phase..].iter().take_while(|leg| leg.to_go[vertex as usize] == 0).count()
 }
 
-/// Returns the steps until a path reaches its last goal, with the costs to go beyond its end.
+/// Returns the number of steps until a path reaches its last goal; if it does not, all its steps plus the costs to go.
 fn cost(path: &[Vertex], legs: &[Leg]) -> u32 {
     let mut phase = 0;
     for (step, &vertex) in path.iter().enumerate() {

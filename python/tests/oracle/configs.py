@@ -25,7 +25,7 @@ class Draw:
         self.registered: tuple[str, str] | None = None
 
     def chance(self, probability: float) -> bool:
-        """Returns True with a probability."""
+        """Returns True with the given probability."""
         return bool(self.generator.random() < probability)
 
     def number(self, low: int, high: int) -> int:
@@ -41,7 +41,7 @@ class Draw:
         self.kinds.add(kind)
 
     def config(self) -> Fields:
-        """Returns the fields of a config that is intended to be playable."""
+        """Returns the fields of a config that should be playable."""
         fields: Fields = {"on_target": self.one(ON_TARGET), "obs_radius": self.number(1, 6)}
         for name, choices in (("collision_system", COLLISIONS), ("observation_type", OBSERVATIONS)):
             fields[name] = self.one(choices)
