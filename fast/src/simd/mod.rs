@@ -16,6 +16,9 @@ mod avx512_layout;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512_windows;
+#[cfg(test)]
+#[allow(unsafe_code, reason = "slices next to pages without access")]
+mod guard_pages;
 #[cfg(target_arch = "x86_64")]
 mod positions;
 mod scalar;

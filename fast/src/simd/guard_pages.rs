@@ -1,0 +1,94 @@
+//! Tests that no path reads or writes beyond its slices: values beside them stay as they are, and pages around them end
+//! the process when touched.
+//!
+//! A sanitizer does not see the stores that bypass the cache, because they are assembly.
+
+use region::{Allocation, Protection};
+
+use super::sealed::Spread;
+use super::{SimdPath, Value, lead_of};
+
+/// Memory between two pages without access.
+struct Guarded {
+    memory: Allocation,
+    num_bytes: usize,
+}
+
+/// Where a slice touches a guard page.
+#[derive(Clone, Copy, Debug)]
+enum Side {
+    Start,
+    End,
+}
+
+impl Guarded {
+    fn new(num_pages: usize) -> Self {
+        let page = region::page::size();
+        let num_bytes = num_pages * page;
+        let mut memory = region::alloc(num_bytes + 2 * page, Protection::READ_WRITE).unwrap();
+        for guard in [0, page + num_bytes] {
+            // SAFETY: both pages lie inside the allocation, and no slice contains any of their bytes.
+            unsafe { region::protect(memory.as_mut_ptr::<u8>().add(guard), page, Protection::NONE).unwrap() };
+        }
+        Self { memory, num_bytes }
+    }
+
+    fn slice<T: Copy>(&mut self, side: Side, len: usize, value: T) -> &mut [T] {
+        assert!(len * size_of::<T>() <= self.num_bytes);
+        let skipped = match side {
+            Side::Start => 0,
+            Side::End => self.num_bytes - len * size_of::<T>(),
+        };
+        // SAFETY: the bytes lie between the guard pages, belong to this slice alone, and hold numbers, for which every
+        // bit pattern is valid. Pages are aligned for every number, and so is each multiple of its size before them.
+        let slice = unsafe {
+            let first = self.memory.as_mut_ptr::<u8>().add(region::page::size() + skipped);
+            std::slice::from_raw_parts_mut(first.cast::<T>(), len)
+        };
+        slice.fill(value);
+        slice
+    }
+}
+
+/// Values between a slice and its guard page. A store of a whole cache line touches them, but no guard page.
+const DISTANCES: [usize; 9] = [0, 1, 2, 5, 8, 15, 16, 33, 63];
+
+fn check<V: Value + Spread>(path: SimdPath, canary: V) {
+    let (mut bits, mut values) = (Guarded::new(1), Guarded::new(2));
+    for len in (1..300).chain([511, 512, 513, 1000]) {
+        for (side, distance) in
+            [Side::Start, Side::End].into_iter().flat_map(|side| DISTANCES.map(|at| (side, at)))
+        {
+            let all = values.slice(side, len + distance, canary);
+            let (first, last) = match side {
+                Side::Start => (distance, distance + len),
+                Side::End => (0, len),
+            };
+            let lead = lead_of(&all[first..]);
+            for words_side in [Side::Start, Side::End] {
+                let words = bits.slice(words_side, (lead + len).div_ceil(64), 0_u64);
+                for (index, word) in words.iter_mut().enumerate() {
+                    *word = 0x9e37_79b9_7f4a_7c15_u64.rotate_left(index as u32 * 7);
+                }
+                let mut expected = vec![canary; all.len()];
+                V::spread(SimdPath::Scalar, words, lead, &mut expected[first..last], false);
+                for beyond_cache in [false, true] {
+                    all.fill(canary);
+                    V::spread(path, words, lead, &mut all[first..last], beyond_cache);
+                    assert_eq!(
+                        all, expected,
+                        "{path}, {len} values at a distance of {distance} to the {side:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn spread_stays_inside_its_slices() {
+    for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
+        check::<f32>(path, 7.0);
+        check::<u8>(path, 7);
+    }
+}
