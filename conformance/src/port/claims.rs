@@ -267,13 +267,16 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     if !hello.profiles.contains(&profile) {
         return Some(Unclaimed::new(format!("profile {profile}"), "config"));
     }
+    let missing = keys_needed_by(rule).find(|(key, _)| !hello.tells.contains(key));
+    missing.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
+}
+
+/// Returns the optional keys without which a rule cannot be tested, each with the rule or the prefix of rules about it.
+pub fn keys_needed_by(rule: &str) -> impl Iterator<Item = (Told, &'static str)> {
     let needed = [
         (Told::ActionsAfter, "collide/soft/rewrite"),
         (Told::Derived, "config/size"),
         (Told::Foretold, "goal/restart/foretold"),
     ];
-    let missing = needed
-        .into_iter()
-        .find(|(key, of)| !hello.tells.contains(key) && Unclaimed::new("", of).covers(rule));
-    missing.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
+    needed.into_iter().filter(move |(_, of)| Unclaimed::new("", of).covers(rule))
 }

@@ -31,7 +31,7 @@ mod subject;
 mod test_episode;
 mod trace;
 
-pub use claims::{Mode, Scope, Unclaimed, adapt, needed_by, profile_of};
+pub use claims::{Mode, Scope, Unclaimed, adapt, keys_needed_by, needed_by, profile_of};
 pub use group::{Cause, Example, Share};
 pub use judge::{Judged, judge};
 pub use keep::text_of;

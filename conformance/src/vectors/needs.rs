@@ -4,7 +4,7 @@ use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward, Words as _}
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
-use crate::port::{Mode, Profile, Told, profile_of};
+use crate::port::{Mode, Profile, Told, keys_needed_by, profile_of};
 use crate::request::{Op, Record, Request, Response};
 
 /// What an implementation must claim to hold a conversation, under the keys of an answer to `hello`.
@@ -46,21 +46,9 @@ impl Needs {
         metrics.extend(request.collisions.then_some(["a_collisions", "o_collisions"]).into_iter().flatten());
         profiles.extend((!metrics.is_empty()).then_some(Profile::Metrics));
         let profiles = Profile::all().filter(|profile| profiles.contains(profile)).collect();
-        let tells = Told::all().filter(|key| is_needed(*key, rule)).collect();
+        let tells = keys_needed_by(rule).map(|(key, _)| key).collect();
         let config = GridConfig::from_value(&request.config).ok();
         Self { profiles, rules: config.map(|config| Rules::of(&config, played)), metrics, tells }
-    }
-}
-
-/// Returns whether a rule can only be tested on an optional key.
-fn is_needed(key: Told, rule: &str) -> bool {
-    let is_of =
-        |prefix: &str| rule.strip_prefix(prefix).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
-    match key {
-        Told::ActionsAfter => is_of("collide/soft/rewrite"),
-        Told::Derived => is_of("config/size"),
-        Told::Foretold => is_of("goal/restart/foretold"),
-        Told::OnGoal | Told::Occupied | Told::Padded => false,
     }
 }
 
