@@ -88,12 +88,7 @@ fn run() -> Result<ExitCode, Error> {
         Command::Views(views) => views.run(),
         Command::Replay(replay) => replay.run().map(done),
         Command::Render(render) => render.run().map(done),
-        Command::Conform(conform) => {
-            interrupt::exit_on_ctrl_c(|| {
-                "the cases that were kept so far stay, and no report is written".into()
-            })?;
-            conform.run()
-        }
+        Command::Conform(conform) => conform.run(),
         Command::Port(port) => port.run().map(done),
         Command::Bench(bench) => bench.run().map(done),
     }

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
@@ -81,20 +82,60 @@ fn an_interrupted_plan_ends_with_one_line() {
 }
 
 #[test]
-fn benchmarks_and_comparisons_end() {
+fn benchmarks_end_with_one_line() {
     let folder = tempfile::tempdir().unwrap();
-    for arguments in [
-        &["bench", "--rows", "64 agents, 32 x 32", "--seconds", "1000"][..],
-        &["conform", "--cases", "1000000000"],
-    ] {
-        let mut process = start(folder.path(), arguments);
-        wait_until(&mut process, handles_ctrl_c);
-        let (status, text, error) = interrupt(process);
-        assert_eq!(
-            (status, text.as_str(), error.lines().count()),
-            (Some(130), "", 1),
-            "{arguments:?}: {error}"
-        );
-        assert!(error.starts_with("interrupted: "), "{arguments:?}: {error}");
+    let mut process = start(folder.path(), &["bench", "--rows", "64 agents, 32 x 32", "--seconds", "1000"]);
+    wait_until(&mut process, handles_ctrl_c);
+    let (status, text, error) = interrupt(process);
+    assert_eq!((status, text.as_str(), error.lines().count()), (Some(130), "", 1), "{error}");
+    assert!(error.starts_with("interrupted: "), "{error}");
+}
+
+#[test]
+fn an_interrupted_comparison_reports_what_it_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.json");
+    let mut process = start(folder.path(), &["conform", "--cases", "1000000000", "--json", "report.json"]);
+    wait_until(&mut process, handles_ctrl_c);
+    let (status, text, error) = interrupt(process);
+    assert_eq!((status, error.as_str()), (Some(130), ""), "{text}");
+    assert!(
+        text.ends_with("all agree: 0 divergences\ninterrupted: only the cases above were checked\n"),
+        "{text}"
+    );
+    assert!(fs::read_to_string(report).unwrap().contains("\"fresh\""));
+}
+
+/// A port that answers `hello` and nothing more, and makes a file at the first question that it leaves open.
+const MUTE_PORT: &str = r#"
+import json, sys
+for line in sys.stdin:
+    if json.loads(line)["type"] == "hello":
+        print(json.dumps({"name": "mute", "version": "1", "profiles": ["core"]}), flush=True)
+    else:
+        open("asked", "a").write("x")
+"#;
+
+/// Ctrl-C in a terminal reaches the port, too. Its end must not count as a crash.
+#[test]
+fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("port.py"), MUTE_PORT).unwrap();
+    let arguments =
+        ["conform", "--port", "python3 port.py", "--json", "report.json", "--html", "report.html"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.args(arguments).current_dir(at).process_group(0);
+    let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_until(&mut process, |id| handles_ctrl_c(id) && at.join("asked").exists());
+    let group = format!("-{}", process.id());
+    assert!(Command::new("kill").args(["-INT", "--", &group]).status().unwrap().success());
+    let output = process.wait_with_output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("cases were not reached"), "{text}");
+    assert!(text.contains("interrupted, no new cause so far: 0 cases, 0 steps"), "{text}");
+    for file in ["report.json", "report.html"] {
+        assert!(at.join(file).exists(), "{file}");
     }
 }

@@ -50,7 +50,7 @@ pub use play::{NamedEngine, play, play_on};
 pub use request::{
     Back, Derived, Failure, History, Op, Record, Registered, Request, ResetRecord, Response, StepRecord, When,
 };
-pub use runner::{Fault, Progress, Report, RunPart};
+pub use runner::{Fault, Report, RunPart, Watch};
 pub use script::{Script, play_script};
 pub use tally::{Tally, families_of};
 

@@ -1,6 +1,7 @@
 //! Runs of all checks of the engines.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use pogema_core::Error;
@@ -63,8 +64,28 @@ pub struct Fault {
     pub kept: Option<PathBuf>,
 }
 
-/// A function that a run calls after each case.
-pub type Progress<'a> = &'a (dyn Fn() + Sync);
+/// How the caller follows a run, and ends it early.
+#[derive(Clone, Copy)]
+pub struct Watch<'a> {
+    /// Called after each case.
+    pub progress: &'a (dyn Fn() + Sync),
+    /// Another thread sets this to end the run soon. The report then covers the cases that were checked before.
+    pub stop: &'a AtomicBool,
+}
+
+impl Default for Watch<'_> {
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { progress: &|| (), stop: &NEVER }
+    }
+}
+
+impl Watch<'_> {
+    /// Returns whether the run must end.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
 
 /// The result of one case.
 #[derive(Default)]
@@ -167,7 +188,7 @@ impl Report {
         num_cases: u64,
         seed: u64,
         keep: &Path,
-        progress: Progress<'_>,
+        watch: Watch<'_>,
     ) -> Result<(), Error> {
         let Some((&first, others)) = engines.split_first() else { return Ok(()) };
         let check = |(): &mut (), case| {
@@ -184,10 +205,9 @@ impl Report {
                 checked.compare("fresh", &name, engine, (&request, &expected), &got);
             }
             keep_fault(&mut checked, keep, &request, &expected);
-            progress();
             Ok(checked)
         };
-        self.add("fresh", on_workers(None, num_cases, || Ok(()), check)?);
+        self.add("fresh", on_workers(None, num_cases, watch, || Ok(()), check)?);
         Ok(())
     }
 
@@ -202,7 +222,7 @@ impl Report {
         num_cases: u64,
         seed: u64,
         keep: &Path,
-        progress: Progress<'_>,
+        watch: Watch<'_>,
     ) -> Result<(), Error> {
         let check = |oracle: &mut Oracle, case| {
             let request = play_script(NamedEngine::REFERENCE, draw_request(seed, case), seed).0;
@@ -216,10 +236,9 @@ impl Report {
                 checked.compare("oracle", &name, *engine, (&request, &expected), got);
             }
             keep_fault(&mut checked, keep, &request, &expected);
-            progress();
             Ok(checked)
         };
-        self.add("oracle", on_workers(None, num_cases, || Oracle::start(python), check)?);
+        self.add("oracle", on_workers(None, num_cases, watch, || Oracle::start(python), check)?);
         Ok(())
     }
 
@@ -285,12 +304,14 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
     }
 }
 
-/// Runs cases on the given number of workers [default: one per core] and returns the results in case order.
+/// Runs cases on the given number of workers [default: one per core] and returns the results in case order. After
+/// `watch.stop`, the other cases are left out.
 ///
 /// A worker may be a process that is slow to start, so each thread has one and reuses it.
 pub(crate) fn on_workers<W: Send, T: Send>(
     num_workers: Option<usize>,
     num_cases: u64,
+    watch: Watch<'_>,
     make_worker: impl Fn() -> Result<W, Error> + Sync,
     run: impl Fn(&mut W, u64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
@@ -299,11 +320,19 @@ pub(crate) fn on_workers<W: Send, T: Send>(
     let idle = Mutex::new(Vec::new());
     let locked = || idle.lock().unwrap_or_else(PoisonError::into_inner);
     let run_case = |case| {
+        if watch.is_stopped() {
+            return None;
+        }
         let taken = locked().pop();
-        let mut worker = taken.map_or_else(&make_worker, Ok)?;
+        let mut worker = match taken.map_or_else(&make_worker, Ok) {
+            Ok(worker) => worker,
+            Err(error) => return Some(Err(error)),
+        };
         let result = run(&mut worker, case);
         locked().push(worker);
-        result
+        (watch.progress)();
+        // The key that stops the run also reaches the processes of the workers, which may then fail.
+        (!watch.is_stopped()).then_some(result)
     };
-    pool.install(|| (0..num_cases).into_par_iter().map(run_case).collect())
+    pool.install(|| (0..num_cases).into_par_iter().filter_map(run_case).collect())
 }

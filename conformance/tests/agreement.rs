@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_conformance::{NamedEngine, Report, golden};
+use pogema_conformance::{NamedEngine, Report, Watch, golden};
 use pogema_core::{Action, Collision, Config, Environment, Error, OnGoal, Reward};
 use pogema_core::{Instance, Occupancy, Snapshot, State, StepOut};
 use pogema_reference::Reference;
@@ -22,7 +22,7 @@ fn engines_agree_with_the_recordings() {
 fn fresh(engines: &[NamedEngine], num_cases: u64) -> Report {
     let keep = tempfile::tempdir().unwrap();
     let mut report = Report::default();
-    report.check_fresh(engines, num_cases, 77, keep.path(), &|| ()).unwrap();
+    report.check_fresh(engines, num_cases, 77, keep.path(), Watch::default()).unwrap();
     report
 }
 

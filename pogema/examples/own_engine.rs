@@ -3,7 +3,7 @@
 
 use pogema::reference::Reference;
 use pogema::{Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepOut};
-use pogema_conformance::{NamedEngine, Report};
+use pogema_conformance::{NamedEngine, Report, Watch};
 
 /// Your engine. This one delegates to the reference. If `is_wrong` is set, it has a bug: the first agent never moves
 /// up.
@@ -55,7 +55,7 @@ impl Environment for Mine {
 fn check(engine: NamedEngine) -> Result<Report, Error> {
     let mut report = Report::default();
     let folder = std::env::temp_dir().join(format!("pogema-found-{}", std::process::id()));
-    report.check_fresh(&[NamedEngine::REFERENCE, engine], 200, 1, &folder, &|| ())?;
+    report.check_fresh(&[NamedEngine::REFERENCE, engine], 200, 1, &folder, Watch::default())?;
     Ok(report)
 }
 

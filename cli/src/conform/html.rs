@@ -55,6 +55,7 @@ fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
         "passed": score.passed,
         "claimed": score.claimed,
         "num_not_run": report.num_not_run,
+        "num_interrupted": report.num_interrupted,
         "new": shown(false),
         "known": shown(true),
     })

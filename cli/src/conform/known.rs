@@ -154,7 +154,9 @@ impl Deviation {
     /// Returns whether the run would have shown the deviation if it still existed. It would not if only single cases or
     /// parts were played, if the run was cut short, or if the rule was left out or is not claimed.
     fn was_played(&self, report: &PortReport, plan: &Plan) -> bool {
-        let is_whole = plan.files.is_empty() && plan.parts.is_empty() && report.num_not_run == 0;
+        let is_whole = plan.files.is_empty()
+            && plan.parts.is_empty()
+            && report.num_not_run + report.num_interrupted == 0;
         is_whole
             && match &self.rule {
                 Some(rule) => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),

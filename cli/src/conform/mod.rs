@@ -18,10 +18,11 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::vectors::{self, Written};
-use pogema_conformance::{NamedEngine, Report, cases, find_oracle_python, golden};
+use pogema_conformance::{NamedEngine, Report, Watch, cases, find_oracle_python, golden};
 use pogema_core::Error;
 use pogema_fast::SimdPath;
 
+use crate::interrupt::Interrupt;
 use crate::output::{check_writable, lined_table, print_line, progress_bar, write_json};
 
 /// The number of divergences that are printed in full.
@@ -71,6 +72,8 @@ impl Conform {
             print_line(&format!("wrote {num_vectors} vectors of {num_rules} rules to {folder}"))?;
             return Ok(ExitCode::SUCCESS);
         }
+        let interrupt = Interrupt::watch()?;
+        let stop = interrupt.flag();
         if self.ports.is_requested() {
             let bar = self.bar("cases");
             let shared = ports::Shared {
@@ -79,8 +82,10 @@ impl Conform {
                 json: self.json.as_ref(),
                 keep: &self.keep,
                 bar: &bar,
+                stop: &stop,
             };
-            return self.ports.run(&shared);
+            let status = self.ports.run(&shared)?;
+            return Ok(interrupt.status().unwrap_or(status));
         }
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let mut report = Report::default();
@@ -91,20 +96,27 @@ impl Conform {
             report.check_cases(&name("cases"), &cases::folder(), engine)?;
         }
         let bar = self.bar("fresh cases");
-        report.check_fresh(&ENGINES, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
+        let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
+        report.check_fresh(&ENGINES, self.cases, self.seed, &self.keep, watch)?;
         bar.finish_and_clear();
-        if self.oracle {
+        if self.oracle && !watch.is_stopped() {
             let python = find_oracle_python(&self.oracle_folder)?;
             report.check_cases_with_oracle(&cases::folder(), &python)?;
             let bar = self.bar("POGEMA 1.4.0");
-            report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, &|| bar.inc(1))?;
+            let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
+            report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, watch)?;
             bar.finish_and_clear();
         }
         if let Some(path) = &self.json {
             write_json(path, &report)?;
         }
-        print_line(&report_text(&report))?;
-        Ok(if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        let mut text = report_text(&report);
+        if watch.is_stopped() {
+            let _ = write!(text, "\ninterrupted: only the cases above were checked");
+        }
+        print_line(&text)?;
+        let status = if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        Ok(interrupt.status().unwrap_or(status))
     }
 
     fn bar(&self, what: &'static str) -> ProgressBar {

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
 use indicatif::ProgressBar;
+use pogema_conformance::Watch;
 use pogema_conformance::port::{
     Command, Link, Part, Plan, PortReport, Process, Profile, Subject, check_ports, check_traces,
     shrink_causes,
@@ -75,6 +77,8 @@ pub struct Shared<'a> {
     pub json: Option<&'a PathBuf>,
     pub keep: &'a PathBuf,
     pub bar: &'a ProgressBar,
+    /// Ctrl-C sets this.
+    pub stop: &'a AtomicBool,
 }
 
 impl Ports {
@@ -103,8 +107,8 @@ impl Ports {
             self.commands.iter().map(|text| Command::new(text, timeout)).collect::<Result<Vec<_>, _>>()?;
         let subjects: Vec<Subject<'_>> = commands.iter().map(|command| self.subject(command)).collect();
         let plan = self.plan(shared);
-        let mut reports =
-            check_ports(&subjects, &plan, |total| shared.bar.set_length(total), &|| shared.bar.inc(1))?;
+        let watch = Watch { progress: &|| shared.bar.inc(1), stop: shared.stop };
+        let mut reports = check_ports(&subjects, &plan, |total| shared.bar.set_length(total), watch)?;
         let num_causes: usize = reports.iter().map(|report| report.causes.len()).sum();
         shared.bar.reset();
         shared.bar.set_message("shrinking counterexamples");
@@ -116,7 +120,7 @@ impl Ports {
             } else {
                 shared.keep.join(format!("{}", index + 1))
             };
-            shrink_causes(subject, report, &plan, &folder, &|| shared.bar.inc(1))?;
+            shrink_causes(subject, report, &plan, &folder, watch)?;
         }
         shared.bar.finish_and_clear();
         known.mark(&mut reports);

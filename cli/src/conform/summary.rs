@@ -140,6 +140,8 @@ pub struct Score {
     pub misbehaving: usize,
     /// Whether too many faults, known or not, ended the run.
     pub is_cut_short: bool,
+    /// Whether the run was interrupted.
+    pub is_interrupted: bool,
 }
 
 /// Counts the outcomes and causes of a port.
@@ -155,6 +157,7 @@ pub fn score(report: &PortReport) -> Score {
         diverging: count(|cause| cause.rule.is_some() && cause.known.is_none()),
         misbehaving: count(|cause| cause.rule.is_none() && cause.known.is_none()),
         is_cut_short: report.num_not_run > 0 && count(|cause| cause.rule.is_none()) > 0,
+        is_interrupted: report.num_interrupted > 0,
     }
 }
 
@@ -169,7 +172,7 @@ words! {
         Diverges = "diverges",
         /// The port breaks the protocol, and possibly rules.
         Misbehaves = "misbehaves",
-        /// Nothing that the port claims was played.
+        /// Nothing that the port claims was played, or the run was interrupted before anything was found.
         Unchecked = "nothing",
     }
 }
@@ -181,7 +184,7 @@ impl Score {
             // Known faults do not excuse the cases that were not run because of them.
             Self { misbehaving: 1.., .. } | Self { is_cut_short: true, .. } => Verdict::Misbehaves,
             Self { diverging: 1.., .. } => Verdict::Diverges,
-            Self { claimed: 0, .. } => Verdict::Unchecked,
+            Self { claimed: 0, .. } | Self { is_interrupted: true, .. } => Verdict::Unchecked,
             Self { known: 1.., .. } => Verdict::Known,
             _ => Verdict::Conforms,
         }
@@ -199,6 +202,7 @@ pub fn verdict(report: &PortReport) -> String {
         (0, 0) if score.is_cut_short => {
             format!("misbehaves only in known ways, but too often to finish the run: {played}")
         }
+        (0, 0) if score.is_interrupted => format!("interrupted, no new cause so far: {played}"),
         (0, 0) if score.verdict() == Verdict::Unchecked => format!("nothing was checked: {played}"),
         (0, 0) => format!("conforms to all it claims{exception}: {played}"),
         (1.., 0) => format!("diverges: {} in {played}", causes(diverging)),

@@ -16,7 +16,7 @@ use super::report::PortReport;
 use super::run::judge_item;
 use super::shrink::{Budget, shrink};
 use super::subject::{Subject, Worker};
-use crate::runner::Progress;
+use crate::runner::Watch;
 
 /// Maximum number of occurrences of one group that are shrunk.
 const MAX_SHRUNK: usize = 8;
@@ -24,7 +24,7 @@ const MAX_SHRUNK: usize = 8;
 const MAX_SHRUNK_FAULTS: usize = 2;
 
 /// Shrinks several occurrences of each group, keeps the smallest as a case, and splits groups whose occurrences shrink
-/// to different causes. Calls `progress` after each group.
+/// to different causes. Once `watch.stop` is set, examples stay as large as they are.
 ///
 /// # Errors
 /// If a case cannot be written.
@@ -33,11 +33,11 @@ pub fn shrink_causes(
     report: &mut PortReport,
     plan: &Plan,
     folder: &Path,
-    progress: Progress<'_>,
+    watch: Watch<'_>,
 ) -> Result<(), Error> {
     let name = report.hello.as_ref().map_or_else(|| report.command.clone(), |hello| hello.name.clone());
-    let mut keeper =
-        Keeper { subject, plan, folder, name, worker: Worker::new(subject, plan), num_kept: BTreeMap::new() };
+    let worker = Worker::new(subject, plan);
+    let mut keeper = Keeper { subject, plan, folder, name, worker, watch, num_kept: BTreeMap::new() };
     let mut causes = Vec::new();
     for cause in std::mem::take(&mut report.causes) {
         // A port that does not start has played nothing.
@@ -46,7 +46,7 @@ pub fn shrink_causes(
         } else {
             causes.extend(keeper.shrink_and_split(cause)?);
         }
-        progress();
+        (watch.progress)();
     }
     report.causes = causes;
     Ok(())
@@ -60,6 +60,7 @@ struct Keeper<'a> {
     /// The name of the port.
     name: String,
     worker: Worker<'a>,
+    watch: Watch<'a>,
     /// The number of cases kept under each file name.
     num_kept: BTreeMap<String, usize>,
 }
@@ -104,10 +105,10 @@ impl Keeper<'_> {
         let mut budget = Budget::FULL;
         let mut shrunk = Vec::new();
         for index in 0..count {
-            let example =
-                shrink(&mut self.worker, &occurrences[index * occurrences.len() / count], &mut budget);
+            let occurrence = &occurrences[index * occurrences.len() / count];
+            let example = shrink(&mut self.worker, occurrence, &mut budget, self.watch);
             // An example that could not be shrunk to the end says nothing about its cause.
-            if shrunk.is_empty() || !budget.is_spent() {
+            if shrunk.is_empty() || !(budget.is_spent() || self.watch.is_stopped()) {
                 shrunk.push(example);
             }
         }
@@ -122,12 +123,15 @@ impl Keeper<'_> {
         let mut repeated = None;
         for example in examples.iter().take(MAX_ATTEMPTS - 1).chain(examples.last()) {
             keep(example, &self.name, &path)?;
+            if self.watch.is_stopped() {
+                break;
+            }
             repeated = self.repeat(&path, example)?;
             if repeated.is_some() {
                 break;
             }
         }
-        cause.is_repeated = Some(repeated.is_some());
+        cause.is_repeated = (!self.watch.is_stopped()).then_some(repeated.is_some());
         // The report shows what the replay shows. A misbehaviour that it does not show may depend on the time limit, so
         // the one of the run is kept.
         let smallest = examples.first().filter(|example| example.fault.is_none()).unwrap_or(&cause.example);

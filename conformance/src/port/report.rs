@@ -33,6 +33,8 @@ pub struct PortReport {
     pub num_steps: u64,
     /// Number of cases skipped after too many misbehaviours.
     pub num_not_run: u64,
+    /// Number of cases that the run did not reach before it was interrupted.
+    pub num_interrupted: u64,
 }
 
 /// Numbers of cases of a rule by verdict.

@@ -13,14 +13,14 @@ use super::protocol::{Hello, Profile};
 use super::report::{ItemResult, PortReport, add_result};
 use super::subject::{Subject, Worker};
 use crate::request::{Request, Response};
-use crate::runner::{Progress, on_workers};
+use crate::runner::{Watch, on_workers};
 
 /// Number of misbehaviours after which the other items of a port are skipped.
 const MAX_FAULTS: u64 = 20;
 /// Number of missing answers after which the other items are skipped, because each costs the time limit.
 const MAX_HANGS: u64 = 5;
 
-/// Checks ports in parallel. Calls `total` once with the number of checks, and `progress` after each check.
+/// Checks ports in parallel. Calls `total` once with the number of checks.
 ///
 /// # Errors
 /// If a case or recording cannot be read.
@@ -28,29 +28,34 @@ pub fn check_ports(
     subjects: &[Subject<'_>],
     plan: &Plan,
     total: impl FnOnce(u64),
-    progress: Progress<'_>,
+    watch: Watch<'_>,
 ) -> Result<Vec<PortReport>, Error> {
     let items = items(plan)?;
     let num_subjects = subjects.len() as u64;
-    total(items.len() as u64 * num_subjects);
+    let num_checks = items.len() as u64 * num_subjects;
+    total(num_checks);
     let faults: Vec<AtomicU64> = subjects.iter().map(|_| AtomicU64::new(0)).collect();
     let results = on_workers(
         plan.num_workers,
-        items.len() as u64 * num_subjects,
+        num_checks,
+        watch,
         || Ok(subjects.iter().map(|subject| Worker::new(subject, plan)).collect::<Vec<_>>()),
         |workers, number| {
             let (item, subject) =
                 (&items[(number / num_subjects) as usize], (number % num_subjects) as usize);
-            let result = check_item(&mut workers[subject], subject, &faults[subject], plan, item);
-            progress();
-            result
+            check_item(&mut workers[subject], subject, &faults[subject], plan, item)
         },
     )?;
     let blank =
         |subject: &Subject<'_>| PortReport { command: subject.command.clone(), ..PortReport::default() };
     let mut reports: Vec<PortReport> = subjects.iter().map(blank).collect();
+    let mut num_left = vec![items.len() as u64; subjects.len()];
     for result in results {
+        num_left[result.subject] -= 1;
         add_result(&mut reports[result.subject], result, plan);
+    }
+    for (report, num_left) in reports.iter_mut().zip(num_left) {
+        report.num_interrupted = num_left;
     }
     Ok(reports)
 }

@@ -9,6 +9,7 @@ use super::subject::Worker;
 use super::test_episode::TestEpisode;
 use crate::play::play;
 use crate::request::{Op, Request, Response};
+use crate::runner::Watch;
 
 /// The remaining plays for shrinking the occurrences of one group.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +32,10 @@ impl Budget {
     }
 }
 
-/// Shrinks an example as long as it shows the same cause. The result is the smallest only if the budget lasts.
-pub fn shrink(worker: &mut Worker<'_>, example: &Example, budget: &mut Budget) -> Example {
-    let mut shrinker = Shrinker { worker, best: example.clone(), budget };
+/// Shrinks an example as long as it shows the same cause. The result is the smallest only if the budget lasts and
+/// the run is not stopped.
+pub fn shrink(worker: &mut Worker<'_>, example: &Example, budget: &mut Budget, watch: Watch<'_>) -> Example {
+    let mut shrinker = Shrinker { worker, best: example.clone(), budget, watch };
     if let Some(op) = example.op() {
         shrinker.shrink_until(op);
     }
@@ -44,6 +46,7 @@ pub struct Shrinker<'a, 'w> {
     worker: &'a mut Worker<'w>,
     pub best: Example,
     budget: &'a mut Budget,
+    watch: Watch<'a>,
 }
 
 impl Shrinker<'_, '_> {
@@ -77,7 +80,7 @@ impl Shrinker<'_, '_> {
 
     /// Returns whether shrinking must end.
     pub fn is_done(&self) -> bool {
-        self.budget.is_spent()
+        self.budget.is_spent() || self.watch.is_stopped()
     }
 
     /// Makes a request the new best if it shows the same cause.

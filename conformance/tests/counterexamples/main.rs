@@ -7,10 +7,10 @@ mod unreliable;
 
 use std::path::Path;
 
-use pogema_conformance::cases;
 use pogema_conformance::port::{
     Cause, FaultKind, Misbehaviour, Part, Plan, PortReport, check_ports, shrink_causes,
 };
+use pogema_conformance::{Watch, cases};
 
 use unreliable::{Behaviour, Log, subject};
 
@@ -25,9 +25,9 @@ fn check(behaviour: Behaviour, folder: &Path) -> (PortReport, Log) {
         parts: vec![Part::Cases, Part::Drawn],
         ..Plan::default()
     };
-    let mut report = check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0);
+    let mut report = check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0);
     let subject = unreliable::subject(behaviour, &log);
-    shrink_causes(&subject, &mut report, &plan, folder, &|| ()).unwrap();
+    shrink_causes(&subject, &mut report, &plan, folder, Watch::default()).unwrap();
     (report, log)
 }
 

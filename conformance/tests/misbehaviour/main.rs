@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use pogema_conformance::Watch;
 use pogema_conformance::port::{Command, Link, Part, Plan, PortReport, Process, Subject, check_ports};
 
 const TIMEOUT: Duration = Duration::from_millis(1500);
@@ -28,7 +29,7 @@ fn check(way: &str, folder: &Path) -> PortReport {
         files: Vec::new(),
         parts: vec![Part::Cases],
     };
-    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
+    check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0)
 }
 
 fn headings(report: &PortReport) -> Vec<&str> {

@@ -12,6 +12,7 @@ mod views;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use pogema_conformance::Watch;
 use pogema_conformance::port::{Cause, Link, Part, Plan, PortReport, Subject, check_ports, shrink_causes};
 use pogema_core::Map;
 
@@ -39,7 +40,7 @@ fn subject(flaw: Flaw) -> Subject<'static> {
 }
 
 fn check(flaw: Flaw, plan: &Plan) -> PortReport {
-    check_ports(&[subject(flaw)], plan, |_| (), &|| ()).unwrap().remove(0)
+    check_ports(&[subject(flaw)], plan, |_| (), Watch::default()).unwrap().remove(0)
 }
 
 #[test]
@@ -82,7 +83,7 @@ fn each_bug_is_caught_by_the_cases_of_its_rule_and_shrinks() {
     for (flaw, description, rule) in PLANTED {
         let mut report = check(flaw, &plan());
         let folder = tempfile::tempdir().unwrap();
-        shrink_causes(&subject(flaw), &mut report, &plan(), folder.path(), &|| ()).unwrap();
+        shrink_causes(&subject(flaw), &mut report, &plan(), folder.path(), Watch::default()).unwrap();
         let is_of_rule = |case: &String| case == rule || case.starts_with(&format!("{rule}/"));
         let Some(cause) = report.causes.iter().find(|cause| cause.cases.keys().any(is_of_rule)) else {
             let seen: Vec<_> =

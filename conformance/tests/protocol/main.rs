@@ -10,7 +10,7 @@ use pogema_conformance::port::{
     Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
     check_ports, play_on_port,
 };
-use pogema_conformance::{NamedEngine, Op, Request};
+use pogema_conformance::{NamedEngine, Op, Request, Watch};
 use pogema_core::{Collision, Observation, OnGoal};
 use serde_json::json;
 
@@ -23,7 +23,7 @@ fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
         start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))),
     };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
-    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap().remove(0)
+    check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0)
 }
 
 fn cause_names(report: &PortReport) -> Vec<String> {

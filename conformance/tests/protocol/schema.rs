@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use jsonschema::Validator;
-use pogema_conformance::NamedEngine;
 use pogema_conformance::port::{
     Ask, Hello, Link, Misbehaviour, PROTOCOL, Part, Plan, Reply, Server, Subject, check_ports,
 };
+use pogema_conformance::{NamedEngine, Watch};
 use serde_json::{Value, json};
 
 /// A port that records all messages.
@@ -54,7 +54,7 @@ fn all_messages_fit_the_schema() {
     };
     let subject = Subject { command: "recording".into(), replay: Vec::new(), start: Box::new(start) };
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
-    check_ports(&[subject], &plan, |_| (), &|| ()).unwrap();
+    check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap();
     let schema = schema();
     let messages = messages.lock().unwrap();
     assert!(messages.len() > 1000, "only {} messages were recorded", messages.len());
