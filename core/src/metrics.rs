@@ -75,6 +75,10 @@ pub struct EpisodeMeter {
     arrived: Vec<u64>,
 }
 
+/// The largest number of steps that a meter or an engine counts to after a saved episode was restored. No episode is
+/// that long, and sums of such numbers do not overflow.
+pub const LARGEST_STEP: u64 = 1 << 40;
+
 /// A number larger than any step.
 const NEVER: u64 = u64::MAX;
 
@@ -93,6 +97,13 @@ impl EpisodeMeter {
     /// Returns the number of agents that are measured.
     pub fn num_agents(&self) -> usize {
         self.arrived.len()
+    }
+
+    /// Returns whether an episode can have these counts. Counts that were read from a file may be anything.
+    pub fn is_plausible(&self) -> bool {
+        let arrivals = self.arrived.iter().filter(|&&arrived| arrived != NEVER);
+        let counts = [&self.step, &self.num_reached].into_iter().chain(arrivals);
+        counts.copied().all(|count| count <= LARGEST_STEP)
     }
 
     /// Sets the length of an episode over which throughput is measured, without resetting the counters. Units: steps.

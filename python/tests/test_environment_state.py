@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import functools
 import hashlib
+import json
+import operator
 import pickle
 from pathlib import Path
 from typing import Any
@@ -155,6 +158,18 @@ def test_corrupt_bytes_are_rejected() -> None:
     wrong = saved.replace(b'"version":1', b'"version":2')
     with pytest.raises(ValueError, match="version 1"):
         _engine.restore_engine(wrong)
+
+
+@pytest.mark.parametrize("place", [("elapsed",), ("meter", "step"), ("meter", "num_reached"), ("episode", "step")])
+def test_impossible_counts_are_rejected(place: tuple[str, ...]) -> None:
+    """A saved environment whose next step would overflow a counter raises a ValueError."""
+    env = _make_pogema(GridConfig(**SMALL, seed=4))
+    env.reset()
+    state = json.loads(env._engine.__reduce__()[1][0])
+    holder = functools.reduce(operator.getitem, place[:-1], state)
+    holder[place[-1]] = 2**64 - 1
+    with pytest.raises(ValueError, match="more steps than any episode"):
+        _engine.restore_engine(json.dumps(state).encode())
 
 
 #: Environments that the first release saved after 7 steps, and the digest of its next 14 steps.

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use numpy::PyArray2;
 use pogema_core::{
-    Action, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, Metrics,
-    Observation, Occupancy, OnGoal, Outside, Trace,
+    Action, CollisionMeter, Config, DensityMeter, Environment, Episode, Error, Instance, LARGEST_STEP,
+    Metrics, Observation, Occupancy, OnGoal, Outside, Trace,
 };
 use pogema_maps::{GridConfig, InstanceSource, foretold_from};
 use pyo3::prelude::*;
@@ -144,7 +144,8 @@ impl Engine {
             return Ok(());
         }
         let state = self.episode.snapshot();
-        let restored = self.episode.engine_mut().restore(elapsed, &state);
+        // No episode is longer, and the count must not overflow.
+        let restored = self.episode.engine_mut().restore(elapsed.min(LARGEST_STEP), &state);
         restored.map_err(|error| errors::call(py, &error))
     }
 

@@ -1,7 +1,8 @@
 //! Serializes an environment, so that it can be pickled and copied in the middle of an episode.
 
 use pogema_core::{
-    CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, Map, Recording, Snapshot, StreamState,
+    CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, LARGEST_STEP, Map, Recording, Snapshot,
+    StreamState,
 };
 use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
 use pyo3::prelude::*;
@@ -131,6 +132,12 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
         && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent);
     if !fits {
         return Err(foreign("the number of agents differs from the config's"));
+    }
+    let steps = [Some(saved.elapsed), saved.episode.as_ref().map(|episode| episode.step)];
+    let collisions = saved.collisions.map(|meter| [meter.with_agents, meter.with_obstacles]);
+    let mut counts = steps.into_iter().flatten().chain(collisions.into_iter().flatten());
+    if !saved.meter.is_plausible() || counts.any(|count| count > LARGEST_STEP) {
+        return Err(foreign("it counts more steps than any episode has"));
     }
     engine.drawn = saved.drawn;
     (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);

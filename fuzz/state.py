@@ -1,0 +1,104 @@
+"""Fuzzes saved environments for some seconds: state.py [SECONDS]
+
+Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and flips bytes; the engine must reject
+the result with a ValueError, or play on.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import resource
+import signal
+import sys
+import time
+from typing import Any
+
+from pogema_rs import GridConfig, pogema_v0
+from pogema_rs._engine import Engine, restore_engine
+
+VALUES = [None, True, -1, 0, 1, 2**15, 2**16, 2**31, 2**32, 2**63 - 1, 2**64 - 1, -(2**63), 1e308, 0.5, "", "soft", [], {}]
+LIMIT_OF_BYTES = 4 << 30
+LIMIT_OF_SECONDS = 10
+
+
+def saved_states() -> list[bytes]:
+    states = []
+    for on_target in ("finish", "nothing", "restart"):
+        for is_persistent in (False, True):
+            config = GridConfig(
+                num_agents=3, size=6, seed=1, on_target=on_target, persistent=is_persistent, collision_system="soft"
+            )
+            env = pogema_v0(config)
+            env.reset()
+            for step in range(4):
+                env.step([step % 5, 1, 2])
+            engine = next(value for value in vars(env.unwrapped).values() if isinstance(value, Engine))
+            states.append(engine.__reduce__()[1][0])
+    return states
+
+
+def places(value: Any) -> list[tuple[Any, Any]]:
+    """Returns all places inside a JSON value: the container and its key or index."""
+    found = []
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        found.append((value, key))
+        found.extend(places(inner))
+    return found
+
+
+def changed(saved: bytes, rng: random.Random) -> bytes:
+    if rng.random() < 0.2:
+        place = rng.randrange(len(saved))
+        return saved[:place] + bytes([rng.randrange(256)]) + saved[place + rng.randrange(3) :]
+    state = json.loads(saved)
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        holder, key = rng.choice(places(state))
+        old = holder[key]
+        kind = rng.randrange(5)
+        if kind == 0 and isinstance(holder, list):
+            holder.insert(key, old)
+        elif kind == 1:
+            del holder[key]
+        elif kind == 2 and isinstance(old, int):
+            holder[key] = old + rng.choice((-1, 1))
+        elif kind == 3:
+            other, other_key = rng.choice(places(state))
+            holder[key] = json.loads(json.dumps(other[other_key]))
+        else:
+            holder[key] = rng.choice(VALUES)
+    return json.dumps(state).encode()
+
+
+def play(engine: Engine) -> None:
+    engine.__reduce__()
+    for action in (1, 4, 0):
+        engine.step([action] * len(engine.active))
+
+
+def main() -> None:
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
+    resource.setrlimit(resource.RLIMIT_AS, (LIMIT_OF_BYTES, LIMIT_OF_BYTES))
+    states = saved_states()
+    seed = random.SystemRandom().randrange(2**32)
+    rng = random.Random(seed)
+    tried = restored = 0
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        state = changed(rng.choice(states), rng)
+        signal.alarm(LIMIT_OF_SECONDS)
+        try:
+            play(restore_engine(state))
+            restored += 1
+        except (ValueError, TypeError, MemoryError):
+            pass
+        except BaseException:
+            print(f"state: seed {seed}, attempt {tried}: {state!r}", file=sys.stderr)
+            raise
+        signal.alarm(0)
+        tried += 1
+    print(f"Done {tried} states, {restored} of them restored")
+
+
+main()
