@@ -16,7 +16,7 @@ use crate::store::{EPISODES, FAILED, LINES, RESULTS, entries};
 pub const ALGORITHM: &str = "algorithm";
 
 /// The share of instances that were solved: 1 or 0 in one row.
-pub(crate) const SOLVED: &str = "CSR";
+pub const SOLVED: &str = "CSR";
 
 /// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
@@ -101,7 +101,7 @@ impl Row {
     }
 
     /// Returns whether the instance was solved. Rows without `CSR`, for example lifelong ones, count as solved.
-    pub(crate) fn is_solved(&self) -> bool {
+    pub fn is_solved(&self) -> bool {
         self.metric(SOLVED).is_none_or(|share| share > 0.0)
     }
 
@@ -192,7 +192,7 @@ impl Results {
     }
 
     /// Returns the rows of each folder, by its name.
-    pub(crate) fn by_folder(&self) -> BTreeMap<&str, Vec<&Row>> {
+    pub fn by_folder(&self) -> BTreeMap<&str, Vec<&Row>> {
         let mut folders: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
         for row in &self.rows {
             folders.entry(&row.set).or_default().push(row);
