@@ -23,10 +23,20 @@ impl Engine {
             return Err(Error::ForeignState);
         }
         self.reset(instance)?;
-        self.streams = streams;
+        self.set_streams(streams)?;
         self.on_goal.clone_from(&state.on_goal);
         self.num_on_goal = self.on_goal.iter().filter(|&&on_goal| on_goal).count();
         self.return_to(step, state)
+    }
+
+    /// Replaces the goal stream of each agent; the current goals stay.
+    ///
+    /// # Errors
+    /// For a number of streams other than that of agents.
+    pub fn set_streams(&mut self, streams: Vec<GoalStream>) -> Result<(), Error> {
+        Error::check_length("streams", self.streams.len(), streams.len())?;
+        self.streams = streams;
+        Ok(())
     }
 
     /// Restores cells, goals, active agents, occupancy and time, but not the goal streams.

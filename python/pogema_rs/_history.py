@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
 from pogema_rs import _engine
-from pogema_rs.errors import ElapsedStepsError, NotKeptError
+from pogema_rs.errors import ElapsedStepsError, NoHistoryError, NotKeptError
 
+if TYPE_CHECKING:
+    from pogema_rs.grid import Grid
+    from pogema_rs.grid_config import GridConfig
+    from pogema_rs.semantics import Semantics
+
+# The largest number that the engine reads; it counts fewer steps.
+_LARGEST = 2**64 - 1
 # A goal drawn since the reset consists of NumPy integers, as in POGEMA.
 _Whole = Union[int, np.int64]
 
@@ -99,9 +106,61 @@ def decompressed(history: History) -> History:
     return [at_every_step(changes, num_steps) for changes in history]
 
 
-def check_elapsed_steps(is_persistent: object, elapsed_steps: int) -> None:
-    """Raises an error if the elapsed steps cannot be set to a number."""
-    if not is_persistent:
+def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) -> None:
+    """Raises an error if the elapsed steps of an environment cannot be set to a number."""
+    if env.semantics.elapsed_needs_persistent and not is_persistent:
         raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
     if elapsed_steps < 0:
         raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
+
+
+class Kept:
+    """The methods of an environment that keeps its steps if the config is persistent."""
+
+    grid_config: GridConfig
+    grid: Optional[Grid]
+    semantics: Semantics
+    _engine: _engine.Engine
+    _fixed: dict[str, Any]
+
+    def step_back(self) -> bool:
+        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
+
+        Rule: history/step-back
+        """
+        self._check_kept()
+        return self._engine.step_back()
+
+    def _check_kept(self) -> None:
+        if not self._fixed["persistent"]:
+            raise NotKeptError("steps are kept only with persistent=True in the config")
+        if self.grid is None:
+            raise NoHistoryError("the environment was not reset yet")
+
+    def set_elapsed_steps(self, elapsed_steps: int) -> None:
+        """Sets how many steps count towards the time limit so far; a reset sets the number to 0.
+
+        With the semantics "1.4.0" [default] it needs `persistent` in the config.
+
+        Errors: `ValueError` for a config that is not persistent, and for a number below 0.
+        """
+        check_elapsed_steps(self, self._fixed["persistent"], elapsed_steps)
+        self._engine.elapsed = min(elapsed_steps, _LARGEST)
+
+    def get_history(self) -> list:
+        """Returns for each agent its `AgentState` after the reset and after each later step that changed it.
+
+        Needs `persistent` in the config.
+
+        Rule: history/changes
+        """
+        self._check_kept()
+        return kept(self._engine, self.grid_config.obs_radius)
+
+    def get_full_history(self) -> list:
+        """Returns for each agent its `AgentState` at every step so far, including the reset."""
+        num_steps = self._engine.num_steps
+        return [at_every_step(changes, num_steps) for changes in self.get_history()]
+
+    agent_state_to_full_list = staticmethod(at_every_step)
+    decompress_history = staticmethod(decompressed)

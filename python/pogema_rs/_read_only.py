@@ -1,8 +1,8 @@
-"""Lists and dictionaries that show the state of an environment, and cannot be written into."""
+"""Values that show the state of an environment, and cannot be written into."""
 
 from __future__ import annotations
 
-from typing import Any, NoReturn, TypeVar
+from typing import Any, ClassVar, NoReturn, TypeVar
 
 from pogema_rs.errors import StateError
 
@@ -38,3 +38,15 @@ class ReadOnlyDict(dict[Key, Item]):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         return dict, (dict(self),)
+
+
+class FixedAttributes:
+    """An object with attributes that only the package sets, through `__dict__`."""
+
+    # What a user does instead of setting an attribute, by its name.
+    _FIXED: ClassVar[dict[str, str]] = {}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self._FIXED:
+            raise StateError(f"`{name}` of {type(self).__name__} cannot be set; {self._FIXED[name]}")
+        super().__setattr__(name, value)

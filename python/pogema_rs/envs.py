@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Literal, Optional, Union, cast, overload
+from typing import Any, Literal, Optional, Union, overload
 
 import gymnasium
 import numpy as np
 
-from pogema_rs import _engine, _history, grid_registry
+from pogema_rs import _engine
+from pogema_rs._base import ActionsSampler, PogemaBase
 from pogema_rs._forward import forwarded
-from pogema_rs._overrides import Overridable
-from pogema_rs._read_only import ReadOnlyList
-from pogema_rs.errors import NoHistoryError, NotKeptError, NotResetError, StateError
+from pogema_rs._goal_generators import GoalGenerators
+from pogema_rs._history import Kept
+from pogema_rs._read_only import FixedAttributes, ReadOnlyList
+from pogema_rs._resets import Resettable
+from pogema_rs.errors import NotResetError, StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.install import is_installed
@@ -45,86 +48,8 @@ __getattr__, __dir__ = forwarded(
     },
 )
 
-_PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
-
-def _differ(one: Any, other: Any) -> bool:
-    """Returns whether two values of a field differ; arrays, which NumPy compares by element, count as different."""
-    try:
-        return bool(one != other)
-    except ValueError:
-        return True
-
-
-class ActionsSampler:
-    """A source of random actions with its own generator.
-
-    Rule: seed/streams
-    """
-
-    def __init__(self, num_actions: int, seed: Optional[int] = 42) -> None:
-        self._num_actions = num_actions
-        self.update_seed(seed)
-
-    def update_seed(self, seed: Optional[int] = None) -> None:
-        """Restarts the generator from a seed."""
-        self._rnd = np.random.default_rng(seed)
-
-    def sample_actions(self, dim: int = 1) -> np.ndarray:
-        """Returns `dim` random actions.
-
-        Shape: `(dim,)`, int64
-        """
-        return self._rnd.integers(self._num_actions, size=dim)
-
-
-class PogemaBase(Overridable, gymnasium.Env):
-    """The base class of POGEMA's environments, without a step and a reset."""
-
-    metadata = {"render_modes": ["ansi"]}
-
-    def __init__(self, grid_config: Optional[GridConfig] = None) -> None:
-        self.grid_config = GridConfig() if grid_config is None else grid_config
-        self.grid: Optional[Grid] = None
-        self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
-        self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
-
-    def step(self, action: Any) -> Any:
-        """Plays one step; a subclass defines it."""
-        raise NotImplementedError
-
-    def reset(
-        self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None
-    ) -> Any:
-        """Begins an episode; a subclass defines it."""
-        raise NotImplementedError
-
-    def check_reset(self) -> None:
-        """Raises `NotResetError` if the environment was not reset yet."""
-        if self.grid is None:
-            raise NotResetError("the environment was not reset yet")
-
-    def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
-        return self._started().render(mode=mode)
-
-    def sample_actions(self) -> np.ndarray:
-        """Returns a random action for each agent, from a generator seeded with the config's seed.
-
-        Shape: `(agents,)`, int64
-        """
-        return self._sampler.sample_actions(dim=self.grid_config.num_agents)
-
-    def get_num_agents(self) -> int:
-        """Returns the number of agents."""
-        return self.grid_config.num_agents
-
-    def _started(self) -> Grid:
-        self.check_reset()
-        return cast(Grid, self.grid)
-
-
-class Pogema(Filmed, PogemaBase):
+class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
     """An environment; `pogema_v0` makes one with a time limit and metrics.
 
     A subclass may override `_obs`, `_get_agents_obs`, `_pomapf_obs` and `_get_infos`, which compute what `reset` and
@@ -141,13 +66,20 @@ class Pogema(Filmed, PogemaBase):
     Source: POGEMA 1.4.0, `envs.py`
     """
 
+    _FIXED = {
+        "grid": "reset with `agents_xy` and `targets_xy` to place agents",
+        "semantics": "make a new environment with `pogema_v0(config, semantics=...)`",
+    }
     _grid_class = Grid
+    semantics: Semantics
     # Whether the environment neither truncates episodes nor measures metrics.
     _is_bare = False
     # Whether a step under `soft` writes into the caller's actions.
     _rewrites_actions = False
     # How many goals of its sequence each agent has reached, if the config gives sequences.
     _num_reached: Optional[list[int]] = None
+    # The generators of `random_generators`, if a user asked for them since the reset.
+    _generators: Optional[GoalGenerators] = None
 
     def __init__(
         self,
@@ -157,7 +89,7 @@ class Pogema(Filmed, PogemaBase):
     ) -> None:
         self._check_overrides()
         super().__init__(GridConfig(num_agents=2) if grid_config is None else grid_config)
-        self.semantics = Semantics(semantics)
+        self.__dict__["semantics"] = Semantics(semantics)
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
         # As in POGEMA, the time limit and the class follow from the config that the environment was made with.
@@ -171,41 +103,6 @@ class Pogema(Filmed, PogemaBase):
             self.semantics.occupancy_is_exact,
         )
         self.observation_space = _observation_space(self.grid_config)
-
-    # POGEMA's users change or replace the config between two resets. The values of the last reset are kept, so that an
-    # unchanged config is not read again.
-
-    def _remember_config(self) -> None:
-        fields = self.grid_config.__dict__
-        self._last_config = self.grid_config
-        self._last_fields = {name: fields[name] for name in GridConfig.model_fields}
-        self._last_places = {name: [*fields[name]] for name in _PLACES if fields[name] is not None}
-
-    def _registered(self) -> Optional[str]:
-        return grid_registry.map_text(self.grid_config.map_name)
-
-    def _begin_episode(self) -> None:
-        fields, last = self.grid_config.__dict__, self._last_fields
-        is_same = self.grid_config is self._last_config
-        changed = [name for name in last if fields[name] is not last[name] and _differ(fields[name], last[name])]
-        changed += [name for name, places in self._last_places.items() if _differ(fields[name], places)]
-        if is_same and all(name == "seed" for name in changed):
-            if changed:
-                self._engine.reseed({"seed": self.grid_config.seed})
-            messages = self._engine.reset()
-        else:
-            fixed: dict[str, Any] = dict(self._fixed)
-            pools = self._engine.pools()
-            if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
-                fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
-            messages = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
-        if changed or not is_same:
-            self._remember_config()
-        if self._num_reached is not None:
-            self._num_reached = [0] * self.grid_config.num_agents
-        for text in messages:
-            warnings.warn(text, UserWarning, stacklevel=3)
-        self.grid = self._grid_class._of(self._engine, self.grid_config)
 
     # Gymnasium's types describe one agent; here each value is a list with an entry for every agent.
 
@@ -233,7 +130,13 @@ class Pogema(Filmed, PogemaBase):
             gymnasium.Env.reset(self, seed=seed)
             self.grid_config.seed = seed
             self._sampler.update_seed(seed)
-        self._begin_episode()
+        messages = self._reset_engine()
+        self.__dict__["grid"] = self._grid_class._of(self._engine, self.grid_config)
+        if self._num_reached is not None:
+            self._num_reached = [0] * self.grid_config.num_agents
+        self._generators = None
+        for text in messages:
+            warnings.warn(text, UserWarning, stacklevel=2)
         if self.semantics.reset_clears_metrics:
             self._engine.clear_metrics()
         observations = self._obs()
@@ -244,20 +147,21 @@ class Pogema(Filmed, PogemaBase):
     ) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
-        In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged.
-        After `install_as_pogema()`, they become the actions as carried out if `collision_system` is `soft`, as in
-        POGEMA.
+        In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
+        `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions become
+        the actions as carried out if `collision_system` is `soft`, as in POGEMA.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 
         Rule: move/actions, end/terminated, end/truncated
         """
-        if self._rewrites_actions and self.grid_config.collision_system == "soft":
-            before = self._engine.active, self._engine.cells(0)
+        if self._generators is None:
             result = self._engine.step(action, self._has_metrics)
-            self._rewrite(action, *before)
         else:
-            result = self._engine.step(action, self._has_metrics)
+            with self._generators:
+                result = self._engine.step(action, self._has_metrics)
+        if self._rewrites_actions and self.grid_config.collision_system == "soft":
+            self._rewrite(action)
         if self._num_reached is not None:
             for agent, on_goal in enumerate(self._engine.on_goal):
                 self._num_reached[agent] += on_goal
@@ -265,15 +169,24 @@ class Pogema(Filmed, PogemaBase):
             result = (*result[:3], [False] * len(result[3]), result[4])
         return self._completed(result) if self._overridden else result
 
-    def _rewrite(self, actions: Any, active: list[bool], cells: list[tuple[int, int]]) -> None:
+    def _rewrite(self, actions: Any) -> None:
         """Writes the action to stay over each move that was not carried out; a tuple stays unchanged.
 
         Rule: collide/soft/rewrite
         """
         if not isinstance(actions, tuple):
-            for agent, cell in enumerate(self._engine.cells(0)):
-                if active[agent] and cell == cells[agent] and actions[agent] % 5 != 0:  # 0 and -5 stay
+            for agent, done in enumerate(self._engine.executed):
+                if done == 0 and actions[agent] % 5 != 0:  # 0 and -5 stay
                     actions[agent] = 0
+
+    @property
+    def executed_actions(self) -> Optional[list[int]]:
+        """What each agent did in the last step: its action if it moved, otherwise 0.
+
+        Before the first step of an episode, and after a step back, it is `None`.
+        """
+        executed = self._engine.executed
+        return ReadOnlyList(action or 0 for action in executed) if executed else None
 
     @property
     def was_on_goal(self) -> Optional[list[bool]]:
@@ -304,52 +217,35 @@ class Pogema(Filmed, PogemaBase):
         """See `Grid.get_state`."""
         return self._started().get_state(ignore_borders=ignore_borders, as_dict=as_dict)
 
-    def step_back(self) -> bool:
-        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
-
-        Rule: history/step-back
-        """
-        self._check_kept()
-        return self._engine.step_back()
-
-    def _check_kept(self) -> None:
-        if not self._fixed["persistent"]:
-            raise NotKeptError("steps are kept only with persistent=True in the config")
-        if self.grid is None:
-            raise NoHistoryError("the environment was not reset yet")
-
-    def set_elapsed_steps(self, elapsed_steps: int) -> None:
-        """Sets how many steps count towards the time limit so far; needs `persistent` in the config.
-
-        Errors: `ValueError` for a config that is not persistent, and for a number below 0.
-        """
-        _history.check_elapsed_steps(self._fixed["persistent"], elapsed_steps)
-        self._engine.elapsed = elapsed_steps
-
-    def get_history(self) -> list:
-        """Returns for each agent its `AgentState` after the reset and after each later step that changed it.
-
-        Needs `persistent` in the config.
-
-        Rule: history/changes
-        """
-        self._check_kept()
-        return _history.kept(self._engine, self.grid_config.obs_radius)
-
-    def get_full_history(self) -> list:
-        """Returns for each agent its `AgentState` at every step so far, including the reset."""
-        num_steps = self._engine.num_steps
-        return [_history.at_every_step(changes, num_steps) for changes in self.get_history()]
-
-    agent_state_to_full_list = staticmethod(_history.at_every_step)
-    decompress_history = staticmethod(_history.decompressed)
-
 
 class PogemaLifeLong(Pogema):
     """An environment with `on_target="restart"`."""
 
     _grid_class = GridLifeLong
     _step_gets_infos = False
+
+    @property
+    def random_generators(self) -> list[np.random.Generator]:
+        """The generator from which the goals of each agent are drawn, new with each reset.
+
+        Drawing from a generator, or replacing it by another one on PCG64, changes the later goals.
+
+        Errors: `NotResetError`, an `AttributeError`, before the first reset. A step raises `TypeError` or `ValueError`
+        if an entry is not a generator of its own on PCG64.
+
+        Rule: seed/goals
+        """
+        return self._goal_generators().generators
+
+    @random_generators.setter
+    def random_generators(self, generators: list[np.random.Generator]) -> None:
+        self._goal_generators().generators = generators
+
+    def _goal_generators(self) -> GoalGenerators:
+        if self._generators is None:
+            grid = self._started()
+            self._generators = GoalGenerators(self._engine, grid._seed, len(self._engine.active))
+        return self._generators
 
     @property
     def has_custom_sequences(self) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs._forward import forwarded
-from pogema_rs._read_only import ReadOnlyDict, ReadOnlyList
+from pogema_rs._read_only import FixedAttributes, ReadOnlyDict, ReadOnlyList
 from pogema_rs.errors import StateError
 from pogema_rs.generator import get_components
 from pogema_rs.grid_config import GridConfig, engine_fields
@@ -40,7 +40,7 @@ __getattr__, __dir__ = forwarded(
 Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
 
-class Grid:
+class Grid(FixedAttributes):
     """The map and its agents.
 
     A grid of an environment shows that environment's current state; a grid made from a config shows the state after a
@@ -52,6 +52,8 @@ class Grid:
     Source: POGEMA 1.4.0, `grid.py`, `Grid`
     """
 
+    _FIXED = {"config": "set `grid_config` of the environment before its reset"}
+    config: GridConfig
     _seed: Optional[int] = None
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
@@ -72,7 +74,7 @@ class Grid:
 
     def _show(self, engine: _engine.Engine, grid_config: GridConfig) -> None:
         self._engine = engine
-        self.config = grid_config
+        self.__dict__["config"] = grid_config
         self._seed = grid_config.seed
         self._obstacles: Optional[np.ndarray] = None
 
@@ -285,7 +287,8 @@ class GridLifeLong(Grid):
 
     @cached_property
     def _components(self) -> tuple[dict, dict]:
-        return get_components(self.config, self.obstacles)
+        points, labels = get_components(self.config, self.obstacles)
+        return ReadOnlyDict({label: ReadOnlyList(cells) for label, cells in points.items()}), ReadOnlyDict(labels)
 
     @property
     def component_to_points(self) -> dict[int, list[tuple[int, int]]]:

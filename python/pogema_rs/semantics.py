@@ -30,3 +30,13 @@ class Semantics(str, Enum):
     def reset_clears_metrics(self) -> bool:
         """Whether a reset clears the counters of an episode that did not end."""
         return self is Semantics.DEVELOPED
+
+    @property
+    def elapsed_needs_persistent(self) -> bool:
+        """Whether the elapsed steps can be set only with `persistent` in the config."""
+        return self is Semantics.RELEASED
+
+    @property
+    def deprecates_monitor(self) -> bool:
+        """Whether `AnimationMonitor` is deprecated, because every environment has its methods."""
+        return self is Semantics.DEVELOPED

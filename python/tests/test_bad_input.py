@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 import warnings
 from typing import Any, get_args
@@ -180,6 +181,41 @@ def test_concurrent_threads_get_an_error() -> None:
     assert all(isinstance(error, RuntimeError) for error in errors_raised)
     assert env._engine.num_steps == sum(num_steps)
     env.step(np.zeros(4000, dtype=int))
+
+
+def test_reading_during_a_step_is_a_state_error() -> None:
+    """Every method that only reads gives the same error as a step; the actions call them while a step has the lock."""
+    env = started(on_target="restart")
+    engine = env._engine
+    calls: dict[str, Any] = {
+        **{name: getattr(engine, name) for name in ("infos", "observe", "occupied", "obstacles", "foretold_goals")},
+        **{name: getattr(engine, name) for name in ("pools", "goal_generators", "history", "pack_film", "draw_svg")},
+        **{name: functools.partial(getattr(engine, name), 0) for name in ("cells", "starts", "goals")},
+        **{name: getattr(engine, name) for name in ("step_back", "clear_metrics", "measure", "__reduce__")},
+        **{
+            name: functools.partial(getattr, engine, name)
+            for name in dir(engine)
+            if not name.startswith("_") and not callable(getattr(engine, name, None)) and name != "elapsed"
+        },
+    }
+    said = {}
+
+    class Reads:
+        def __len__(self) -> int:
+            return 3
+
+        def __getitem__(self, agent: int) -> int:
+            for name, call in calls.items():
+                try:
+                    call()
+                except RuntimeError as error:
+                    said[name] = f"{type(error).__name__}: {error}"
+            return 0
+
+    env.step(Reads())
+    text = "StateError: another thread is using this environment, expected one thread at a time"
+    assert said == {name: text for name in calls}
+    assert {"active", "executed", "is_filmed", "size"} <= calls.keys()
 
 
 def test_step_completes_if_its_warning_is_an_error() -> None:

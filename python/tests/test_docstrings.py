@@ -16,15 +16,17 @@ MODULES = {
 }
 
 
-def is_overload(node):
-    return any(isinstance(mark, ast.Name) and mark.id == "overload" for mark in node.decorator_list)
+def is_repeated(node):
+    """Returns whether another definition of the name has the docstring: an overload, or the setter of a property."""
+    marks = [getattr(mark, "attr", getattr(mark, "id", None)) for mark in node.decorator_list]
+    return "overload" in marks or "setter" in marks
 
 
 def public_names(body):
     """Returns the public names that a module or class defines, including public aliases of private functions."""
     names = {}
     for node in body:
-        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not is_overload(node):
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not is_repeated(node):
             names[node.name] = node
         elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Name) and node.value.id in names:
             names.update({target.id: names[node.value.id] for target in node.targets if isinstance(target, ast.Name)})

@@ -33,9 +33,11 @@ class MultiTimeLimit(Wrapper, TimeLimit):
         return observations, rewards, terminated, truncated, infos
 
     def set_elapsed_steps(self, elapsed_steps: int) -> None:
-        """Sets how many steps count towards the limit so far; needs `persistent` in the config.
+        """Sets how many steps count towards the limit so far; a reset sets the number to 0.
+
+        With the semantics "1.4.0" [default] it needs `persistent` in the config.
 
         Errors: `ValueError` for a config that is not persistent, and for a number below 0.
         """
-        check_elapsed_steps(self.unwrapped.grid_config.persistent, elapsed_steps)
+        check_elapsed_steps(self.unwrapped, self.unwrapped.grid_config.persistent, elapsed_steps)
         self._elapsed_steps = elapsed_steps

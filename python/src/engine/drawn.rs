@@ -8,7 +8,7 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::Engine;
+use super::Inner;
 
 /// Flags of the goals drawn since the reset: the current goals, and those at each change kept in persistent mode.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -73,9 +73,9 @@ fn has_changed(past: &[Snapshot], agent: usize) -> bool {
     state(before) != state(after)
 }
 
-impl Engine {
+impl Inner {
     /// Records which goals are new. In POGEMA drawn goals are NumPy integers and given goals are not.
-    pub(crate) fn note_goals(&mut self) {
+    pub(super) fn note_goals(&mut self) {
         let config = self.source.config();
         let is_lifelong = config.on_target == OnGoal::Restart;
         let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
@@ -92,7 +92,7 @@ impl Engine {
     /// The step is complete even if Python turns a warning into an error.
     ///
     /// Rule: goal/restart/sequence
-    pub(crate) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
         if self.source.config().on_target != OnGoal::Restart {
             return Ok(());
         }

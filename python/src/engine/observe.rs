@@ -1,17 +1,27 @@
 //! Observations as the arrays, tuples and dictionaries that POGEMA returns.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pogema_core::{Environment, Instance, from_border, from_starts};
+use pogema_core::{Environment, Instance, Observation, from_border, from_starts};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use super::Engine;
+use super::Inner;
 use crate::errors;
 use crate::lists::{Pairs, tuples};
 use crate::memory::zeros;
 
-impl Engine {
-    pub(crate) fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+impl Inner {
+    /// Returns the observations of all agents, in the type that the config names.
+    pub(super) fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.check_started(py)?;
+        match self.episode.config().observation {
+            Observation::Default => self.observe_default(py),
+            Observation::Pomapf => self.observe_apart(py, false),
+            Observation::Mapf => self.observe_apart(py, true),
+        }
+    }
+
+    fn observe_default<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
         let array = zeros::<f32, _>(py, [num_agents, 3, side, side])?;
@@ -23,11 +33,7 @@ impl Engine {
         split(py, array.as_any(), num_agents)
     }
 
-    pub(crate) fn observe_apart<'py>(
-        &self,
-        py: Python<'py>,
-        is_global: bool,
-    ) -> PyResult<Bound<'py, PyList>> {
+    fn observe_apart<'py>(&self, py: Python<'py>, is_global: bool) -> PyResult<Bound<'py, PyList>> {
         let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
         let obstacles = zeros::<f32, _>(py, [num_agents, side, side])?;
@@ -74,7 +80,7 @@ impl Engine {
     }
 
     /// Returns the map with its border, and the cells and goals of all agents in its coordinates.
-    pub(crate) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
+    pub(super) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
         self.check_started(py)?;
         let config = self.episode.config();
         let (height, width) = self.episode.engine().size();

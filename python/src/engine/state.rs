@@ -1,8 +1,8 @@
 //! Serializes an environment, so that it can be pickled and copied in the middle of an episode.
 
 use pogema_core::{
-    CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, LARGEST_STEP, Map, Recording, Snapshot,
-    StreamState,
+    Action, CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, LARGEST_STEP, Map, Recording,
+    Snapshot, StreamState,
 };
 use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
 use pyo3::prelude::*;
@@ -10,8 +10,8 @@ use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::Engine;
 use super::drawn::Drawn;
+use super::{Engine, Inner};
 use crate::guard::guarded;
 use crate::{errors, interrupt};
 
@@ -40,6 +40,8 @@ struct Saved {
     density: Option<DensityMeter>,
     #[serde(default)]
     collisions: Option<CollisionMeter>,
+    #[serde(default)]
+    executed: Vec<Option<Action>>,
 }
 
 /// An episode that has begun.
@@ -54,7 +56,7 @@ struct SavedEpisode {
 }
 
 guarded! {
-/// Restores the environment that [`save`] turned into these bytes.
+/// Restores the environment that `Engine.__reduce__` turned into these bytes.
 ///
 /// # Errors
 /// `ValueError` for any other bytes.
@@ -66,17 +68,17 @@ pub fn restore_engine(py: Python<'_>, saved: &[u8]) -> PyResult<Engine> {
         let saved = saved.to_vec();
         interrupt::detach(py, move || restored(&saved))?
     };
-    restored.map_err(|error| errors::call(py, &error))
+    restored.map(Engine::of).map_err(|error| errors::call(py, &error))
 }
 }
 
-/// Returns the complete state as versioned JSON.
-pub fn save<'py>(engine: &Engine, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-    let saved = engine.saved().map_err(|error| errors::call(py, &error))?;
-    Ok(PyBytes::new(py, saved.as_bytes()))
-}
+impl Inner {
+    /// Returns the complete state as versioned JSON.
+    pub(super) fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let saved = self.saved().map_err(|error| errors::call(py, &error))?;
+        Ok(PyBytes::new(py, saved.as_bytes()))
+    }
 
-impl Engine {
     fn saved(&self) -> Result<String, Error> {
         let mut config = self.source.config().to_value();
         // Pools keep the order to which resets have shuffled them.
@@ -110,6 +112,7 @@ impl Engine {
             is_measured: self.is_measured,
             density: episode.meters().density.clone(),
             collisions: episode.meters().collisions,
+            executed: self.executed.clone(),
         };
         serde_json::to_string(&saved).map_err(|error| foreign(&error.to_string()))
     }
@@ -119,17 +122,18 @@ fn foreign(reason: &str) -> Error {
     Error::Corrupt { what: "these bytes are not a saved environment".into(), reason: reason.to_owned() }
 }
 
-fn restored(saved: &[u8]) -> Result<Engine, Error> {
+fn restored(saved: &[u8]) -> Result<Inner, Error> {
     let saved: Value = serde_json::from_slice(saved).map_err(|error| foreign(&error.to_string()))?;
     if saved["format"] != FORMAT || saved["version"] != VERSION {
         return Err(foreign(&format!("expected the format `{FORMAT}`, version {VERSION}")));
     }
     let saved: Saved = serde_json::from_value(saved).map_err(|error| foreign(&error.to_string()))?;
     let source = InstanceSource::new(GridConfig::from_value(&saved.config)?, saved.registered)?;
-    let mut engine = Engine::of(source, saved.exact, saved.time_limit)?;
+    let mut engine = Inner::new(source, saved.exact, saved.time_limit)?;
     let rules = *engine.episode.config();
     let fits = saved.meter.num_agents() == rules.num_agents
-        && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent);
+        && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent)
+        && (saved.executed.is_empty() || saved.executed.len() == rules.num_agents);
     if !fits {
         return Err(foreign("the number of agents differs from the config's"));
     }
@@ -139,7 +143,7 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
     if !saved.meter.is_plausible() || counts.any(|count| count > LARGEST_STEP) {
         return Err(foreign("it counts more steps than any episode has"));
     }
-    engine.drawn = saved.drawn;
+    (engine.drawn, engine.executed) = (saved.drawn, saved.executed);
     (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);
     let meters = engine.episode.meters_mut();
     meters.episode = saved.meter;
@@ -151,7 +155,7 @@ fn restored(saved: &[u8]) -> Result<Engine, Error> {
 }
 
 fn resume(
-    engine: &mut Engine,
+    engine: &mut Inner,
     episode: SavedEpisode,
     elapsed: u64,
     recording: Option<Recording>,

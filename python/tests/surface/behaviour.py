@@ -5,6 +5,7 @@ Each scenario uses names of POGEMA that random cases (`tests/oracle`) do not rea
 
 from __future__ import annotations
 
+import copy
 import importlib
 import pickle
 import sys
@@ -51,6 +52,13 @@ def bare(**fields: Any) -> Any:
     made = config(**fields)
     classes = {"finish": envs.Pogema, "nothing": envs.PogemaCoopFinish, "restart": envs.PogemaLifeLong}
     return classes[made.on_target](made)
+
+
+def pogema_made(**fields: Any) -> Any:
+    """Returns an environment with a time limit and metrics."""
+    from pogema import pogema_v0
+
+    return pogema_v0(config(**fields))
 
 
 def greedy(env: Any) -> list[int]:
@@ -255,6 +263,84 @@ def generator_of_a_grid() -> Any:
         env.reset()
         seen.append(described(env.grid.rnd.integers(1000, size=5)))
     return seen
+
+
+def generator_states(env: Any) -> Any:
+    """Returns the states of the generators of goals; a half that was used is of no effect."""
+    states = [generator.bit_generator.state for generator in env.random_generators]
+    return [(state["state"], state["has_uint32"] and state["uinteger"]) for state in states]
+
+
+LIFELONG: tuple[dict[str, Any], ...] = (
+    {},
+    {"collision_system": "soft", "observation_type": "MAPF", "empty_outside": False},
+    {"map": "@.$@\n.$@.\n$..@", "num_agents": 3},
+    {"persistent": True},
+)
+
+
+@scenario
+def generators_of_goals() -> Any:
+    """Drawing from them between steps changes later goals, and a reset makes new ones."""
+    seen: list[Any] = [outcome(lambda: bare(on_target="restart").random_generators)]
+    for fields in LIFELONG:
+        env = pogema_made(on_target="restart", max_episode_steps=64, **fields)
+        for episode in range(2):
+            seen += [described(env.reset()), generator_states(env)]
+            kept = env.random_generators
+            for step in range(40):
+                if step % 5 == 1:
+                    owner = kept[step % len(kept)]
+                    seen.append(described([owner.integers(10, size=step % 3), owner.random(), owner.integers(7)]))
+                if step == 20 and episode:
+                    env.random_generators[1] = np.random.default_rng(11)
+                if step == 30 and episode:
+                    env.random_generators = [np.random.default_rng(number) for number in range(len(kept))]
+                if step % 11 == 10 and fields.get("persistent"):
+                    seen.append(env.step_back())
+                seen += [described(env.step(greedy(env))), generator_states(env), described(env.get_targets_xy())]
+            seen += [kept is env.random_generators, described(env.get_lifelong_targets_xy())]
+    return seen
+
+
+@scenario
+def generators_beside_sequences() -> Any:
+    """They exist, and nothing draws from them."""
+    env = bare(
+        map="....", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 0]]], on_target="restart", num_agents=1, seed=6
+    )
+    env.reset()
+    seen = [generator_states(env), described(env.random_generators[0].random(3))]
+    for _ in range(5):
+        seen += [described(env.step(greedy(env))), generator_states(env)]
+    return seen
+
+
+@scenario
+def copies_of_generators() -> Any:
+    """A copy of an environment has its own generators."""
+    env = bare(on_target="restart")
+    env.reset()
+    foretold = copy.deepcopy(env.random_generators)
+    env.random_generators[0].random()
+    copies = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    copies[0].random_generators[1].integers(9)
+    seen = [described([generator.random() for generator in foretold])]
+    for one in (env, *copies):
+        seen += [[described(one.step(greedy(one))), generator_states(one)] for _ in range(25)]
+    return seen
+
+
+@scenario
+def elapsed_steps() -> Any:
+    """A reset sets them to 0, also if they were set before the first reset."""
+    env = pogema_made(persistent=True, max_episode_steps=6)
+    seen = [outcome(env.set_elapsed_steps, 4), described(env.reset())]
+    seen += [described(env.step([0] * 4)) for _ in range(7)]
+    env.reset()
+    for number in (5, 2**70, 0, -1, 3):
+        seen += [outcome(env.set_elapsed_steps, number), described(env.step([0] * 4)[2:4])]
+    return [*seen, outcome(pogema_made().set_elapsed_steps, 1)]
 
 
 @scenario

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from behaviour import SCENARIOS
@@ -117,5 +118,30 @@ def test_actions_of_the_caller_stay_unchanged() -> None:
     env = pogema_v0(GridConfig(map="ab\nBA", collision_system="soft"))
     env.reset()
     actions = [4, 3]
+    assert env.executed_actions is None
     env.step(actions)
     assert actions == [4, 3]
+    assert env.executed_actions == [0, 0]
+
+
+@pytest.mark.parametrize("system", ["soft", "priority", "block_both"])
+def test_executed_actions_are_the_moves(system: str) -> None:
+    """They are 0 for agents that stayed or had finished, in copies too, and unknown after a step back."""
+    config = GridConfig(size=5, num_agents=5, density=0.1, seed=2, collision_system=system, persistent=True)
+    env, generator = pogema_v0(config), np.random.default_rng(1)
+    moves, seen = np.array(config.MOVES), set()
+    env.reset()
+    for _ in range(300):
+        before, active = np.array(env.get_agents_xy()), env.grid.is_active
+        actions = generator.integers(-5, 5, size=5)
+        env.step(actions)
+        executed = env.executed_actions
+        assert (before + moves[executed] == np.array(env.get_agents_xy())).all()
+        assert all(done in (0, action % 5) for done, action in zip(executed, actions))
+        assert pickle.loads(pickle.dumps(env)).executed_actions == executed
+        seen |= {(done == action % 5, active[agent]) for agent, (done, action) in enumerate(zip(executed, actions))}
+    assert seen == {(True, True), (False, True), (True, False), (False, False)}
+    env.step_back()
+    assert env.executed_actions is None
+    env.reset()
+    assert env.executed_actions is None

@@ -32,9 +32,9 @@ BEHAVIOUR = {
         "surface/test_behaviour.py",
         "def test_overridden_method_that_is_never_called_is_an_error",
     ),
-    "`grid.positions_xy`, `finishes_xy`, `starts_xy`, `is_active`": (
-        "surface/test_behaviour.py",
-        "def test_grid_cannot_be_written_into",
+    "`grid.positions_xy`, `finishes_xy`, `starts_xy`, `is_active` and all other state": (
+        "surface/test_writing.py",
+        "def test_attribute_cannot_be_set_or_changed",
     ),
     "`grid.move`, `hide_agent` and the other methods that change a grid": (
         "oracle/surprises.py",

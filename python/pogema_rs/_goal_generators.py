@@ -1,0 +1,77 @@
+"""The generators of goals as NumPy generators."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs._engine import Engine
+
+# What NumPy calls the states of the one bit generator that POGEMA uses.
+_NAME = "PCG64"
+
+
+class GoalGenerators:
+    """NumPy generators that an engine draws from.
+
+    The engine has its own copies. Within `with`, it plays a step: before, its copies take the states of the NumPy
+    generators, and afterwards these take its states, also if a warning about the step is an error.
+
+    Rule: seed/goals
+    """
+
+    def __init__(self, engine: Engine, seed: Optional[int], num_agents: int) -> None:
+        self._engine = engine
+        # Without a state, the goals are given in the config, and nothing draws from the generators.
+        self._is_drawn = engine.goal_generators() is not None
+        seeds = np.random.default_rng(seed).integers(np.iinfo(np.int32).max, size=num_agents)
+        self.generators = [np.random.default_rng(seed) for seed in seeds]
+        self._read()
+
+    def __enter__(self) -> None:
+        """Writes the states into the engine.
+
+        Errors: `TypeError` for a value that is not a generator on PCG64, `ValueError` for a wrong number of
+        generators and for one that two agents share.
+        """
+        if self._is_drawn:
+            self._engine.set_goal_generators([_saved(state) for state in self._states()])
+
+    def __exit__(self, *_: object) -> None:
+        self._read()
+
+    def _read(self) -> None:
+        for generator, saved in zip(self.generators, self._engine.goal_generators() or []):
+            generator.bit_generator.state = _numpy(saved)
+
+    def _states(self) -> list[dict[str, Any]]:
+        num_agents = len(self._engine.active)
+        if not isinstance(self.generators, list):
+            raise TypeError(f"`random_generators` is `{self.generators!r}`, expected a list of NumPy generators")
+        if len(self.generators) != num_agents:
+            text = f"`random_generators` has {len(self.generators)} entries, expected one for each of {num_agents} agents"
+            raise ValueError(text)
+        owners: dict[int, int] = {}
+        for agent, generator in enumerate(self.generators):
+            if not (isinstance(generator, np.random.Generator) and isinstance(generator.bit_generator, np.random.PCG64)):
+                text = f"`random_generators[{agent}]` is `{generator!r}`, expected a NumPy generator on {_NAME}"
+                raise TypeError(text)
+            owner = owners.setdefault(id(generator.bit_generator), agent)
+            if owner != agent:
+                text = f"`random_generators[{agent}]` is also `random_generators[{owner}]`, expected one for each agent"
+                raise ValueError(text)
+        return [dict(generator.bit_generator.state) for generator in self.generators]
+
+
+def _saved(state: dict[str, Any]) -> str:
+    numbers = {"state": state["state"]["state"], "increment": state["state"]["inc"]}
+    return json.dumps({"pcg": numbers, "upper_half": state["uinteger"] if state["has_uint32"] else None})
+
+
+def _numpy(saved: str) -> dict[str, Any]:
+    state = json.loads(saved)
+    numbers = {"state": state["pcg"]["state"], "inc": state["pcg"]["increment"]}
+    half = state["upper_half"]
+    return {"bit_generator": _NAME, "state": numbers, "has_uint32": int(half is not None), "uinteger": half or 0}

@@ -1,0 +1,63 @@
+"""Resets of an environment whose config may have changed since the last one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional
+
+from pogema_rs import grid_registry
+from pogema_rs.grid_config import GridConfig, engine_fields
+
+if TYPE_CHECKING:
+    from pogema_rs._engine import Engine
+
+_PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
+
+
+def _differ(one: Any, other: Any) -> bool:
+    """Returns whether two values of a field differ; arrays, which NumPy compares by element, count as different."""
+    try:
+        return bool(one != other)
+    except ValueError:
+        return True
+
+
+class Resettable:
+    """An environment that begins episodes with the current values of its config.
+
+    POGEMA's users change or replace the config between two resets. The values of the last reset are kept, so that an
+    unchanged config is not read again.
+    """
+
+    grid_config: GridConfig
+    _engine: Engine
+    # The fields that follow from the config with which the environment was made.
+    _fixed: dict[str, Any]
+
+    def _remember_config(self) -> None:
+        fields = self.grid_config.__dict__
+        self._last_config = self.grid_config
+        self._last_fields = {name: fields[name] for name in GridConfig.model_fields}
+        self._last_places = {name: [*fields[name]] for name in _PLACES if fields[name] is not None}
+
+    def _registered(self) -> Optional[str]:
+        return grid_registry.map_text(self.grid_config.map_name)
+
+    def _reset_engine(self) -> list[str]:
+        """Resets the engine, with a new config if the fields changed, and returns its warnings."""
+        fields, last = self.grid_config.__dict__, self._last_fields
+        is_same = self.grid_config is self._last_config
+        changed = [name for name in last if fields[name] is not last[name] and _differ(fields[name], last[name])]
+        changed += [name for name, places in self._last_places.items() if _differ(fields[name], places)]
+        if is_same and all(name == "seed" for name in changed):
+            if changed:
+                self._engine.reseed({"seed": self.grid_config.seed})
+            messages = self._engine.reset()
+        else:
+            fixed: dict[str, Any] = dict(self._fixed)
+            pools = self._engine.pools()
+            if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
+                fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
+            messages = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
+        if changed or not is_same:
+            self._remember_config()
+        return messages

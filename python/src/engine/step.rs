@@ -1,0 +1,87 @@
+//! A step of an episode, and its results.
+
+use pogema_core::{Action, Cell, Error, Metrics, OnGoal};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use super::Inner;
+use crate::errors;
+use crate::lists::{infos, read_actions};
+
+/// Observations, rewards, terminated, truncated and infos of a step.
+pub type Stepped<'py> = (Bound<'py, PyList>, Vec<f64>, Vec<bool>, Vec<bool>, Bound<'py, PyList>);
+
+impl Inner {
+    /// Plays one step.
+    pub(super) fn play<'py>(
+        &mut self,
+        py: Python<'py>,
+        actions: &Bound<'py, PyAny>,
+        has_metrics: bool,
+    ) -> PyResult<Stepped<'py>> {
+        let (num_agents, got) = (self.episode.config().num_agents, actions.len()?);
+        let fits = Error::check_length("actions", num_agents, got);
+        fits.map_err(|error| errors::call(py, &error))?;
+        self.check_started(py)?;
+        let active = self.episode.state().active;
+        if let Some((agent, number)) = read_actions(actions, active, &mut self.actions)? {
+            let error = Error::Action { agent: Some(agent), number };
+            return Err(errors::call(py, &error));
+        }
+        let (was_active, before) = (active.to_vec(), self.episode.state().cells.to_vec());
+        let (episode, actions) = (&mut self.episode, &self.actions);
+        py.detach(|| episode.step(actions)).map_err(|error| errors::call(py, &error))?;
+        self.note_goals();
+        self.note_executed(&was_active, &before);
+        let infos = infos(py, self.episode.state().active)?;
+        if let Some(metrics) = self.metrics(has_metrics) {
+            infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
+        }
+        let rewards = self.episode.rewards().iter().map(|&reward| f64::from(reward)).collect();
+        self.warn_of_turns(py)?;
+        let (terminated, truncated) = (self.episode.terminated().to_vec(), self.episode.truncated().to_vec());
+        Ok((self.observe(py)?, rewards, terminated, truncated, infos))
+    }
+
+    /// Records what each agent did in the last step.
+    ///
+    /// Rule: collide/soft/rewrite
+    fn note_executed(&mut self, was_active: &[bool], before: &[Cell]) {
+        let cells = self.episode.state().cells.iter().zip(before);
+        let done = |((&action, &is_active), (now, before)): ((&Action, &bool), (&Cell, &Cell))| {
+            is_active.then_some(if now == before { Action::Stay } else { action })
+        };
+        self.executed.clear();
+        self.executed.extend(self.actions.iter().zip(was_active).zip(cells).map(done));
+    }
+
+    pub(super) fn check_started(&self, py: Python<'_>) -> PyResult<()> {
+        self.episode.instance().map(|_| ()).map_err(|error| errors::call(py, &error))
+    }
+
+    /// Returns the metrics if the last step ended the episode; without `has_metrics` only density and collisions.
+    fn metrics(&self, has_metrics: bool) -> Option<Metrics> {
+        let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
+        if has_metrics {
+            return Some(metrics);
+        }
+        let Metrics { avg_agents_density, a_collisions, o_collisions, .. } = metrics;
+        let measured = Metrics { avg_agents_density, a_collisions, o_collisions, ..Metrics::default() };
+        (measured != Metrics::default()).then_some(measured)
+    }
+
+    /// Returns metrics under POGEMA's names, as integers where POGEMA's are integers.
+    fn named<'py>(&self, py: Python<'py>, metrics: &Metrics) -> PyResult<Bound<'py, PyDict>> {
+        let named = PyDict::new(py);
+        let is_nothing = self.episode.config().on_goal == OnGoal::Nothing;
+        for (name, value) in metrics.named() {
+            let is_count = matches!(name, "a_collisions" | "o_collisions");
+            if is_count || is_nothing && matches!(name, "ep_length" | "SoC" | "makespan") {
+                named.set_item(name, value as u64)?;
+            } else {
+                named.set_item(name, value)?;
+            }
+        }
+        Ok(named)
+    }
+}

@@ -1,0 +1,122 @@
+"""Tests that writing into an environment takes effect or raises an error, attribute by attribute."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from pogema_rs import GridConfig, envs
+from pogema_rs.errors import StateError
+from pogema_rs.grid import Grid
+
+MODES = {"finish": envs.Pogema, "nothing": envs.PogemaCoopFinish, "restart": envs.PogemaLifeLong}
+REFUSED = (AttributeError, StateError, TypeError, ValueError)
+
+# The attributes that a user may set or change, with the reason.
+FREE = {
+    "grid_config": "the next reset reads it",
+    "action_space": "as in POGEMA, only wrappers read it",
+    "observation_space": "as in POGEMA, only wrappers read it",
+    "random_generators": "the next goals are drawn from it",
+    "rnd": "as in POGEMA, nothing draws from it",
+    "metadata": "Gymnasium's",
+    "is_multiagent": "as in POGEMA, only frameworks read it",
+    "render_mode": "Gymnasium's",
+    "spec": "Gymnasium's",
+    "np_random": "Gymnasium's; as in POGEMA, nothing draws from it",
+    "np_random_seed": "Gymnasium's",
+    "reward_range": "Gymnasium's",
+}
+
+
+def made(on_target: str) -> Any:
+    """Returns an environment after a step."""
+    fields = {"size": 6, "num_agents": 3, "density": 0.2, "seed": 4, "on_target": on_target}
+    env = MODES[on_target](GridConfig(**fields))
+    env.reset()
+    env.step([1, 2, 3])
+    return env
+
+
+def attributes(value: Any) -> Iterator[tuple[str, Any]]:
+    """Yields the public attributes of an object that are not methods."""
+    for name in dir(value):
+        if not name.startswith("_") and name not in FREE and name != "unwrapped":
+            found = getattr(value, name)
+            if not callable(found):
+                yield name, found
+
+
+def changes(value: Any) -> Iterator[Callable[[], Any]]:
+    """Yields calls that change a container."""
+    if isinstance(value, (list, np.ndarray)):
+        yield lambda: value.__setitem__(0, value[0])
+    if isinstance(value, list):
+        yield from (lambda: value.append(None), value.clear)
+        yield from changes(value[0])
+    if isinstance(value, dict):
+        key = next(iter(value))
+        yield from (lambda: value.__setitem__(key, value[key]), lambda: value.pop(key))
+        yield from changes(value[key])
+
+
+@pytest.mark.parametrize("on_target", MODES)
+@pytest.mark.parametrize("of", ["environment", "grid"])
+def test_attribute_cannot_be_set_or_changed(of: str, on_target: str) -> None:
+    env = made(on_target)
+    owner, seen = (env if of == "environment" else env.grid), []
+    for name, value in attributes(owner):
+        with pytest.raises(REFUSED):
+            setattr(owner, name, copy.copy(value))
+            pytest.fail(f"`{name}` can be set")
+        for change in changes(value):
+            with pytest.raises(REFUSED):
+                change()
+                pytest.fail(f"a value in `{name}` can be changed")
+        seen.append(name)
+    expected = {"environment": {"grid", "was_on_goal", "executed_actions"}, "grid": {"positions_xy", "config"}}
+    assert expected[of] <= set(seen)
+
+
+def test_attributes_that_may_be_set_exist() -> None:
+    names = {name for mode in MODES for owner in (made(mode), made(mode).grid) for name in dir(owner)}
+    # Releases of Gymnasium differ in their own attributes.
+    assert {name for name in FREE if name not in names and not hasattr(gymnasium.Env, name)} <= {"reward_range"}
+
+
+@pytest.mark.parametrize("name", ["grid", "semantics"])
+def test_error_says_what_to_do_instead(name: str) -> None:
+    with pytest.raises(StateError, match=f"^`{name}` of PogemaLifeLong cannot be set; (reset|make)"):
+        setattr(made("restart"), name, None)
+
+
+def test_environment_of_ones_own_sets_its_grid() -> None:
+    env = envs.PogemaBase(GridConfig(size=4))
+    env.grid = Grid(env.grid_config)
+    assert env.render(mode="ansi")
+
+
+@pytest.mark.parametrize(
+    ("generators", "text"),
+    [
+        ([np.random.default_rng(0)], "has 1 entries, expected one for each of 3 agents"),
+        ([1, 2, 3], r"\[0\]` is `1`, expected a NumPy generator on PCG64"),
+        ([np.random.Generator(np.random.MT19937(1))] * 3, "expected a NumPy generator on PCG64"),
+        ([np.random.default_rng(0)] * 3, r"\[1\]` is also `random_generators\[0\]`"),
+        (3, "is `3`, expected a list of NumPy generators"),
+    ],
+)
+def test_wrong_generators_stop_the_step(generators: Any, text: str) -> None:
+    env, other = made("restart"), made("restart")
+    kept = env.random_generators
+    env.random_generators = generators
+    with pytest.raises((TypeError, ValueError), match=text):
+        env.step([1, 1, 1])
+    env.random_generators = kept
+    assert env.step([1, 1, 1])[1:] == other.step([1, 1, 1])[1:]
+    assert env.get_targets_xy() == other.get_targets_xy()
