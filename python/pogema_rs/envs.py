@@ -148,8 +148,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
         In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
-        `executed_actions` holds the actions as carried out. After `install_as_pogema()`, they become the actions as carried out if `collision_system` is `soft`, as in
-        POGEMA.
+        `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions become
+        those that POGEMA leaves there: if `collision_system` is `soft`, 0 replaces each reverted move.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 

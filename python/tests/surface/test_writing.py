@@ -105,10 +105,10 @@ def test_environment_of_ones_own_sets_its_grid() -> None:
     ("generators", "text"),
     [
         ([np.random.default_rng(0)], "has 1 entries, expected one for each of 3 agents"),
-        ([1, 2, 3], r"\[0\]` is `1`, expected a NumPy generator on PCG64"),
-        ([np.random.Generator(np.random.MT19937(1))] * 3, "expected a NumPy generator on PCG64"),
+        ([1, 2, 3], r"^`random_generators\[0\]` is of type `int`, expected a generator on `PCG64`$"),
+        ([np.random.Generator(np.random.MT19937(1))] * 3, r"\[0\]` is of type `MT19937`, expected"),
         ([np.random.default_rng(0)] * 3, r"\[1\]` is also `random_generators\[0\]`"),
-        (3, "is `3`, expected a list of NumPy generators"),
+        (3, "is of type `int`, expected a list of NumPy generators"),
     ],
 )
 def test_wrong_generators_stop_the_step(generators: Any, text: str) -> None:
