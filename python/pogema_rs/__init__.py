@@ -8,8 +8,9 @@ Each name is imported at its first use. Importing the package imports only gymna
 
 Modules with POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogema_rs.generator`, `pogema_rs.grid`,
 `pogema_rs.grid_config`, `pogema_rs.grid_registry`, `pogema_rs.utils`, `pogema_rs.svg_animation` with
-`pogema_rs.svg_animation.animation_drawer` and `pogema_rs.svg_animation.animation_wrapper`, and `pogema_rs.wrappers`
-with `pogema_rs.wrappers.metrics`, `pogema_rs.wrappers.multi_time_limit` and `pogema_rs.wrappers.persistence`.
+`pogema_rs.svg_animation.animation_drawer`, `pogema_rs.svg_animation.animation_wrapper` and
+`pogema_rs.svg_animation.svg_objects`, and `pogema_rs.wrappers` with `pogema_rs.wrappers.metrics`,
+`pogema_rs.wrappers.multi_time_limit` and `pogema_rs.wrappers.persistence`.
 
 Additional modules: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
 `pogema_rs.errors`, `pogema_rs.install`, `pogema_rs.svg_animation.filmed` and `pogema_rs.wrappers.forwarding`.

@@ -47,22 +47,26 @@ class GoalGenerators:
             generator.bit_generator.state = _numpy(saved)
 
     def _states(self) -> list[dict[str, Any]]:
-        num_agents = len(self._engine.active)
         if not isinstance(self.generators, list):
-            raise TypeError(f"`random_generators` is `{self.generators!r}`, expected a list of NumPy generators")
-        if len(self.generators) != num_agents:
-            text = f"`random_generators` has {len(self.generators)} entries, expected one for each of {num_agents} agents"
-            raise ValueError(text)
+            raise TypeError(f"`random_generators` is of type `{_kind(self.generators)}`, expected a list of NumPy generators")
+        got, num_agents = len(self.generators), len(self._engine.active)
+        if got != num_agents:
+            raise ValueError(f"`random_generators` has {got} entries, expected one for each of {num_agents} agents")
         owners: dict[int, int] = {}
         for agent, generator in enumerate(self.generators):
-            if not (isinstance(generator, np.random.Generator) and isinstance(generator.bit_generator, np.random.PCG64)):
-                text = f"`random_generators[{agent}]` is `{generator!r}`, expected a NumPy generator on {_NAME}"
-                raise TypeError(text)
-            owner = owners.setdefault(id(generator.bit_generator), agent)
+            source = generator.bit_generator if isinstance(generator, np.random.Generator) else None
+            if not isinstance(source, np.random.PCG64):
+                kind = _kind(generator if source is None else source)
+                raise TypeError(f"`random_generators[{agent}]` is of type `{kind}`, expected a generator on `{_NAME}`")
+            owner = owners.setdefault(id(source), agent)
             if owner != agent:
                 text = f"`random_generators[{agent}]` is also `random_generators[{owner}]`, expected one for each agent"
                 raise ValueError(text)
         return [dict(generator.bit_generator.state) for generator in self.generators]
+
+
+def _kind(value: object) -> str:
+    return type(value).__name__
 
 
 def _saved(state: dict[str, Any]) -> str:

@@ -149,7 +149,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
 
         In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
         `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions become
-        the actions as carried out if `collision_system` is `soft`, as in POGEMA.
+        those that POGEMA leaves there: if `collision_system` is `soft`, 0 replaces each reverted move.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
 

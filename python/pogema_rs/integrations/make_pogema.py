@@ -77,8 +77,8 @@ def make_pogema(
 ) -> Any:
     """Makes an environment from a config, for the framework that its `integration` names.
 
-    `semantics` is "1.4.0" [default] or "2.0", in which every agent is seen, `reset(seed=...)` chooses the episode, and
-    each reset clears the metrics.
+    `semantics` is "1.4.0" [default] or "2.0", in which every agent is seen, `reset(seed=...)` chooses the episode,
+    each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.
 
     Errors: `KeyError` for `auto_reset` without Sample Factory, and for an unknown integration; `NotImplementedError`
     for `rllib`, as in POGEMA.

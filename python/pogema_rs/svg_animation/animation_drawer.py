@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import base64
+import math
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Optional, Union
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 from pogema_rs._forward import forwarded
 
 if TYPE_CHECKING:
     from pogema_rs import _engine
+    from pogema_rs.svg_animation.svg_objects import SvgObject
 
-__all__ = ["AnimationConfig", "SvgAnimation"]
+__all__ = ["AnimationConfig", "Drawing", "GridHolder", "SvgAnimation", "SvgSettings"]
 
-# POGEMA's module offers this name too.
-__getattr__, __dir__ = forwarded(__name__, {"GridConfig": "grid_config"})
+# POGEMA's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "Animation": "svg_animation.svg_objects",
+        "AnimationDrawer": "svg_animation._drawer",
+        "Circle": "svg_animation.svg_objects",
+        "GridConfig": "grid_config",
+        "Line": "svg_animation.svg_objects",
+        "Rectangle": "svg_animation.svg_objects",
+        "RectangleHref": "svg_animation.svg_objects",
+    },
+)
 
 
 @dataclass
@@ -42,6 +56,93 @@ class AnimationConfig:
         return (self.frame_idx or 0) if self.static else None
 
 
+@dataclass
+class SvgSettings:
+    """The sizes and colours of an `AnimationDrawer`.
+
+    Units: hundredths of a cell, unless `scale_size` is changed; `time_scale` is in seconds per step.
+    """
+
+    r: int = 35
+    stroke_width: int = 10
+    scale_size: int = 100
+    time_scale: float = 0.25
+    draw_start: int = 100
+    rx: int = 15
+    obstacle_color: str = "#84A1AE"
+    ego_color: str = "#c1433c"
+    ego_other_color: str = "#6e81af"
+    shaded_opacity: float = 0.2
+    egocentric_shaded: bool = True
+    stroke_dasharray: int = 25
+    colors: tuple = ("#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72D5C8", "#0ea08c", "#8F7B66")
+
+
+@dataclass
+class GridHolder:
+    """An episode for an `AnimationDrawer`.
+
+    `width` is the number of rows of `obstacles` and `height` the number of columns, as in POGEMA. `history` holds the
+    `AgentState` of each agent at every step, in the coordinates of `obstacles`, and `colors` a colour for each agent.
+    """
+
+    obstacles: Any = None
+    episode_length: Any = None
+    height: Any = None
+    width: Any = None
+    colors: Any = None
+    history: Any = None
+    obs_radius: Any = None
+    grid_config: Any = None
+    on_target: Any = None
+    config: Any = None
+    svg_settings: Any = None
+
+
+class Drawing:
+    """An SVG made of elements; the y axis points up from the lower left corner.
+
+    POGEMA always defines obstacles with its default sizes and colours; here they follow `svg_settings`.
+
+    Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `Drawing`
+    """
+
+    def __init__(self, height: int, width: int, svg_settings: SvgSettings) -> None:
+        self.height = height
+        self.width = width
+        self.origin = (0, 0)
+        self.elements: list[SvgObject] = []
+        self.svg_settings = svg_settings
+
+    def add_element(self, element: SvgObject) -> None:
+        """Adds an element above all others."""
+        self.elements.append(element)
+
+    def render(self) -> str:
+        """Returns the text of the SVG, whose longer side is 512 pixels."""
+        settings, scale = self.svg_settings, max(self.height, self.width) / 512
+        width, height = (math.ceil(side / scale) for side in (self.width, self.height))
+        left, bottom = self.origin
+        side = 2 * settings.r
+        lines = [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+            f'width="{width}" height="{height}" viewBox="{left} {bottom - self.height} {self.width} {self.height}">',
+            "<defs>",
+            f'<rect id="obstacle" width="{side}" height="{side}" fill="{settings.obstacle_color}" rx="{settings.rx}"/>',
+            "<style>",
+            f".line {{stroke: {settings.obstacle_color}; stroke-width: {settings.stroke_width};}}",
+            f".agent {{r: {settings.r};}}",
+            f".target {{fill: none; stroke-width: {settings.stroke_width}; r: {settings.r};}}",
+            "</style>",
+            "</defs>",
+        ]
+        return "\n".join([*lines, *(element.render() for element in self.elements), "</svg>"])
+
+    def __str__(self) -> str:
+        return self.render()
+
+
 class SvgAnimation:
     """A drawing that notebooks display."""
 
@@ -52,15 +153,24 @@ class SvgAnimation:
         """Returns the text of the SVG."""
         return self._text
 
+    def __str__(self) -> str:
+        return self._text
+
     def save(self, name: Union[str, PathLike]) -> None:
-        """Writes the SVG to a file."""
-        with open(name, "w", encoding="utf-8") as file:
-            file.write(self._text)
+        """Writes the SVG to a file, and makes the folders above it."""
+        write(name, self._text)
 
     def _repr_html_(self) -> str:
         # An <img> isolates the ids of the drawing from those of other drawings on the page.
         data = base64.b64encode(self._text.encode()).decode()
         return f'<img src="data:image/svg+xml;base64,{data}" alt="animation of an episode">'
+
+
+def write(name: Union[str, PathLike], text: str) -> None:
+    """Writes a text to a file, and makes the folders above it."""
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
 
 
 def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:

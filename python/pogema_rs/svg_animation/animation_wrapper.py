@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import warnings
+from itertools import cycle
 from os import PathLike
 from typing import Any, Optional, Union
 
 from pogema_rs._forward import forwarded
+from pogema_rs._history import History, decompressed, kept
 from pogema_rs.grid_config import GridConfig
-from pogema_rs.svg_animation.animation_drawer import AnimationConfig
+from pogema_rs.svg_animation._drawer import AnimationDrawer
+from pogema_rs.svg_animation.animation_drawer import AnimationConfig, GridHolder, SvgSettings, write
 from pogema_rs.wrappers.forwarding import Wrapper
 
-__all__ = ["AnimationConfig", "AnimationMonitor"]
+__all__ = ["AnimationConfig", "AnimationDrawer", "AnimationMonitor", "GridHolder", "SvgSettings"]
 
 # POGEMA's module offers these names too.
 __getattr__, __dir__ = forwarded(
@@ -29,11 +33,18 @@ class AnimationMonitor(Wrapper):
     As in POGEMA, the k-th episode begun is saved unless k + 1 is a multiple of `save_every_idx_episode`. If that field
     is 1, every episode is saved.
 
+    The engine draws the episodes. If `svg_settings` were changed, an `AnimationDrawer` draws them with these settings.
+    In POGEMA's 2.0 line every environment has these methods, and this class is deprecated.
+
     Source: POGEMA 1.4.0, `svg_animation/animation_wrapper.py`, `AnimationMonitor`
     """
 
     def __init__(self, env: Any, animation_config: Optional[AnimationConfig] = None) -> None:
         super().__init__(env)
+        if self.unwrapped.semantics.deprecates_monitor:
+            text = "AnimationMonitor is deprecated: call `enable_animation` and `save_animation` of the environment"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+        self.svg_settings = SvgSettings()
         self.animation_config = animation_config or AnimationConfig()
         self._episode_idx = 0
         env.unwrapped.enable_animation()
@@ -51,7 +62,6 @@ class AnimationMonitor(Wrapper):
         if _all(terminated) or _all(truncated):
             every = self.animation_config.save_every_idx_episode
             if every and ((self._episode_idx + 1) % every or every == 1):
-                os.makedirs(self.animation_config.directory, exist_ok=True)
                 name = self.pick_name(self.unwrapped.grid_config, self._episode_idx)
                 self.save_animation(os.path.join(self.animation_config.directory, name))
         return result
@@ -72,8 +82,46 @@ class AnimationMonitor(Wrapper):
     def save_animation(
         self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
     ) -> None:
-        """Writes the animation of the episode so far to a file."""
-        self.unwrapped.save_animation(name, animation_config)
+        """Writes the animation of the episode so far to a file, and makes the folders above it."""
+        if self.svg_settings == SvgSettings():
+            self.unwrapped.save_animation(name, animation_config)
+        else:
+            holder = self._holder(animation_config or AnimationConfig())
+            write(name, AnimationDrawer().create_animation(holder).render())
+
+    @property
+    def history(self) -> Optional[History]:
+        """The `AgentState` of each agent after the reset and after each later step that changed it.
+
+        The coordinates are those of the drawing: the map with a border of one cell. Before the first reset it is
+        `None`.
+
+        Rule: history/changes
+        """
+        if self._episode_idx == 0:
+            return None
+        return kept(self.unwrapped._engine, 1)
+
+    def _holder(self, config: AnimationConfig) -> GridHolder:
+        """Returns the episode so far for an `AnimationDrawer`, cut as in POGEMA."""
+        env, history = self.unwrapped, [[*states, states[-1]] for states in decompressed(self.history or [])]
+        grid_config, trim = env.grid_config, env.grid_config.obs_radius - 1
+        obstacles = env.get_obstacles()[trim : -trim or None, trim : -trim or None]
+        if config.egocentric_idx is not None and grid_config.on_target == "finish":
+            length = history[config.egocentric_idx][-1].step + 1
+            history = [states[:length] for states in history]
+        return GridHolder(
+            obstacles=obstacles,
+            episode_length=len(history[0]),
+            height=obstacles.shape[1],
+            width=obstacles.shape[0],
+            colors=dict(zip(range(len(history)), cycle(self.svg_settings.colors))),
+            history=history,
+            obs_radius=grid_config.obs_radius,
+            on_target=grid_config.on_target,
+            config=config,
+            svg_settings=self.svg_settings,
+        )
 
 
 def _all(ends: Any) -> bool:

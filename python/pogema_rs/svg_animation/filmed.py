@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Optional, Union
 
-from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw
+from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw, write
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Engine
@@ -22,6 +22,11 @@ class Filmed:
         """Records the episodes from the next reset on."""
         self._engine.film(True)
 
+    @property
+    def animation_is_active(self) -> bool:
+        """Whether the episodes from the next reset on are recorded."""
+        return self._engine.is_filmed
+
     def render_animation(self, animation_config: Optional[AnimationConfig] = None) -> SvgAnimation:
         """Returns the episode so far as an animation that notebooks display.
 
@@ -32,11 +37,9 @@ class Filmed:
     def save_animation(
         self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
     ) -> None:
-        """Writes the animation of the episode so far to a file."""
+        """Writes the animation of the episode so far to a file, and makes the folders above it."""
         self.render_animation(animation_config).save(name)
 
     def save_replay(self, name: Union[str, PathLike] = "replay.html", title: str = "POGEMA episode") -> None:
-        """Writes the episode so far as a page that replays it in any browser."""
-        page = self._engine.draw_html(title)
-        with open(name, "w", encoding="utf-8") as file:
-            file.write(page)
+        """Writes the episode so far as a page that replays it in any browser, and makes the folders above it."""
+        write(name, self._engine.draw_html(title))

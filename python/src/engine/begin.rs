@@ -26,6 +26,7 @@ impl Inner {
             drawn: Drawn::default(),
             actions: Vec::with_capacity(rules.num_agents),
             executed: Vec::new(),
+            before: Vec::new(),
         })
     }
 

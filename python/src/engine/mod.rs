@@ -11,7 +11,7 @@ mod step;
 
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
-use pogema_core::{Action, Episode};
+use pogema_core::{Action, Cell, Episode};
 use pogema_maps::InstanceSource;
 use pyo3::prelude::*;
 
@@ -41,6 +41,8 @@ pub struct Inner {
     actions: Vec<Action>,
     /// What each agent did in the last step: nothing if it was not active, and `Stay` if its move was reverted.
     executed: Vec<Option<Action>>,
+    /// The cells before the last step.
+    before: Vec<Cell>,
 }
 
 impl Engine {

@@ -1,6 +1,6 @@
 //! A step of an episode, and its results.
 
-use pogema_core::{Action, Cell, Error, Metrics, OnGoal};
+use pogema_core::{Action, Error, Metrics, OnGoal, State};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -28,11 +28,12 @@ impl Inner {
             let error = Error::Action { agent: Some(agent), number };
             return Err(errors::call(py, &error));
         }
-        let (was_active, before) = (active.to_vec(), self.episode.state().cells.to_vec());
+        self.note_intended();
+        // INVARIANT: the checks above leave the step no reason to fail, so the notes are those of this step.
         let (episode, actions) = (&mut self.episode, &self.actions);
         py.detach(|| episode.step(actions)).map_err(|error| errors::call(py, &error))?;
         self.note_goals();
-        self.note_executed(&was_active, &before);
+        self.note_reverted();
         let infos = infos(py, self.episode.state().active)?;
         if let Some(metrics) = self.metrics(has_metrics) {
             infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
@@ -43,16 +44,27 @@ impl Inner {
         Ok((self.observe(py)?, rewards, terminated, truncated, infos))
     }
 
-    /// Records what each agent did in the last step.
+    /// Records what each active agent is going to do, and from where.
+    fn note_intended(&mut self) {
+        let State { cells, active, .. } = self.episode.state();
+        self.before.clear();
+        self.before.extend_from_slice(cells);
+        self.executed.clear();
+        let intended =
+            self.actions.iter().zip(active).map(|(&action, is_active)| is_active.then_some(action));
+        self.executed.extend(intended);
+    }
+
+    /// Records which agents did not move.
     ///
     /// Rule: collide/soft/rewrite
-    fn note_executed(&mut self, was_active: &[bool], before: &[Cell]) {
-        let cells = self.episode.state().cells.iter().zip(before);
-        let done = |((&action, &is_active), (now, before)): ((&Action, &bool), (&Cell, &Cell))| {
-            is_active.then_some(if now == before { Action::Stay } else { action })
-        };
-        self.executed.clear();
-        self.executed.extend(self.actions.iter().zip(was_active).zip(cells).map(done));
+    fn note_reverted(&mut self) {
+        let cells = self.episode.state().cells.iter().zip(&self.before);
+        for (done, (now, before)) in self.executed.iter_mut().zip(cells) {
+            if now == before {
+                *done = done.map(|_| Action::Stay);
+            }
+        }
     }
 
     pub(super) fn check_started(&self, py: Python<'_>) -> PyResult<()> {

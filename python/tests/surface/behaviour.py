@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -378,6 +379,86 @@ def actions_of_the_caller() -> Any:
                     actions = container(plan)
                     env.step(actions)
                     seen.append([int(action) for action in actions])
+    return described(seen)
+
+
+def elements(text: str) -> Any:
+    """Returns the elements of an SVG without its style, whose form is free."""
+    found = ElementTree.fromstring(text.encode()).iter()
+    return [(one.tag, sorted(one.items())) for one in found if not one.tag.endswith("style")]
+
+
+@scenario
+def svg_elements() -> Any:
+    """Elements with attributes and animations, and a drawing of them."""
+    from pogema.svg_animation import animation_drawer as drawer
+    from pogema.svg_animation import svg_objects as objects
+
+    made = [
+        objects.Circle(cx=1, cy=2, r=3, stroke_width=4, **{"class": "agent"}),
+        objects.Line(x1=0, y1=1.5, x2=2, y2=-3),
+        objects.Rectangle(x=1, y=2, width=3, height=4, fill="none"),
+        objects.RectangleHref(x=1, y=2, height=4, opacity=0.5),
+    ]
+    made[0].add_animation(objects.Animation(attributeName="cx", values="1;2", dur="1s"))
+    drawing = drawer.Drawing(300, 500, drawer.SvgSettings())
+    for element in made:
+        drawing.add_element(element)
+    attributes = [sorted(element.attributes.items()) for element in made]
+    text = objects.SvgObject.render_attributes({"b_c": 1, "a": "x"})
+    return described([attributes, text, elements(drawing.render())])
+
+
+@scenario
+def drawings_of_episodes() -> Any:
+    """The elements of an animation and of a frame, egocentric or not, with a subclass and other settings."""
+    from pogema import AnimationConfig, AnimationMonitor
+    from pogema.svg_animation import animation_drawer as drawer
+
+    class Green(drawer.AnimationDrawer):
+        def create_agents(self, grid_holder: Any) -> Any:
+            agents = super().create_agents(grid_holder)
+            for agent in agents:
+                agent.attributes["fill"] = "green"
+            return agents
+
+    seen: list[Any] = []
+    for mode in MODES:
+        made = pogema_made(on_target=mode, obs_radius=1 + len(seen) % 3)
+        env = AnimationMonitor(made, AnimationConfig(save_every_idx_episode=None))
+        seen += [env.history, vars(env.svg_settings)]
+        list(played(env, 14))
+        seen.append(described(env.decompress_history(env.history)) if mode != "restart" else len(env.history))
+        for options in (
+            *({}, {"egocentric_idx": 0}, {"static": True, "frame_idx": 3}, {"show_agents": False}),
+            *({"egocentric_idx": 0, "static": True, "frame_idx": 2}, {"show_grid_lines": False}),
+        ):
+            for kind, settings in ((drawer.AnimationDrawer, {}), (Green, {"time_scale": 0.5, "ego_color": "red"})):
+                trim = env.grid_config.obs_radius - 1
+                obstacles = env.get_obstacles()[trim : -trim or None, trim : -trim or None]
+                history = env.decompress_history(env.history)
+                holder = drawer.GridHolder(
+                    width=len(obstacles), height=len(obstacles[0]), obstacles=obstacles, history=history,
+                    episode_length=len(history[0]), obs_radius=env.grid_config.obs_radius, on_target=mode,
+                    colors=dict(enumerate(drawer.SvgSettings().colors)), config=AnimationConfig(**options),
+                    svg_settings=drawer.SvgSettings(**settings),
+                )  # fmt: skip
+                seen.append(elements(kind().create_animation(holder).render()))
+    return described(seen)
+
+
+@scenario
+def parts_of_a_drawer() -> Any:
+    """The helpers that subclasses call."""
+    from pogema.svg_animation.animation_drawer import AnimationDrawer as Drawer
+
+    tokens: list[str] = ["a"]
+    times: list[int] = [2]
+    for count in (1, 2, 5):
+        Drawer.wisely_add("b", count, tokens, times)
+    seen = [tokens, times, *(Drawer.compress_tokens(list(text)) for text in ("", "a", "aab", "abbbbca"))]
+    seen += [elements(Drawer.compressed_anim("cx", list(text), 0.25).render()) for text in ("aab", "abbbbca")]
+    seen += [Drawer.fix_point(1, 2, 5), [Drawer.check_in_radius(2, 2, row, 4, 2) for row in range(7)]]
     return described(seen)
 
 

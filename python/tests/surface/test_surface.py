@@ -41,6 +41,10 @@ BEHAVIOUR = {
         '"write-protected grid"',
     ),
     "`env.step(actions)`": ("surface/test_behaviour.py", "def test_actions_of_the_caller_stay_unchanged"),
+    "`save_animation` and `render_animation`": (
+        "test_animations.py",
+        "def test_settings_of_a_monitor_take_effect",
+    ),
     "`possible_agents_xy`, `possible_targets_xy`": (
         "test_environment.py",
         "def test_lists_of_the_caller_are_unchanged",
@@ -55,12 +59,17 @@ BEHAVIOUR = {
 }
 
 
-def first_cells() -> list[str]:
-    """Returns the first cell of each row of the table."""
+def rows() -> list[list[str]]:
+    """Returns the cells of each row of the table."""
     found = TABLE.search(PAGE.read_text(encoding="utf-8"))
     assert found, f"{PAGE} has no table between the comments"
     lines = [line for line in found[1].splitlines() if line.startswith("|")][2:]
-    return [line.split("|")[1].strip() for line in lines]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def first_cells() -> list[str]:
+    """Returns the first cell of each row of the table."""
+    return [row[0] for row in rows()]
 
 
 def patterns() -> list[str]:
@@ -140,6 +149,7 @@ def test_table_is_short_and_its_rows_are_tested() -> None:
     assert len(cells) <= MAX_ROWS and set(BEHAVIOUR) <= set(cells)
     for file, test in BEHAVIOUR.values():
         assert test in (HERE.parent / file).read_text(encoding="utf-8"), f"{file} has no {test}"
+    assert all(len(row) == 3 and all(row) for row in rows()), "each row says what differs and what a user does"
     assert all("`" in cell for cell in cells if cell not in BEHAVIOUR)
 
 

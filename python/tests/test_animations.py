@@ -1,0 +1,105 @@
+"""Tests the animations of environments: what POGEMA's 2.0 line adds, and settings for drawings."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from pogema_rs import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
+from pogema_rs.wrappers.multi_time_limit import MultiTimeLimit
+from pogema_rs.wrappers.persistence import PersistentWrapper
+
+SMALL: dict[str, Any] = {"size": 5, "num_agents": 3, "density": 0.2, "seed": 2, "max_episode_steps": 4}
+
+
+def recorded(semantics: str = "1.4.0", **fields: Any) -> Any:
+    """Returns an environment after an episode that it recorded."""
+    env = pogema_v0(GridConfig(**{**SMALL, **fields}), semantics=semantics)
+    env.enable_animation()
+    env.reset()
+    for _ in range(4):
+        env.step(env.sample_actions())
+    return env
+
+
+def test_text_of_an_animation_is_its_svg(tmp_path: Path) -> None:
+    animation = recorded().render_animation()
+    assert str(animation) == animation.render()
+    assert ElementTree.fromstring(str(animation)).tag.endswith("svg")
+
+
+def test_saving_makes_folders(tmp_path: Path) -> None:
+    env = recorded()
+    ways = {"a.svg": env.save_animation, "b.html": env.save_replay, "c.svg": env.render_animation().save}
+    for name, save in ways.items():
+        for folder in (tmp_path / name / "new" / "folder", tmp_path):
+            save(folder / f"saved-{name}")
+            assert (folder / f"saved-{name}").read_text(encoding="utf-8").strip().endswith(">")
+    with pytest.raises(OSError, match="a.svg"):
+        env.save_animation(tmp_path / "saved-a.svg" / "below a file")
+
+
+def test_environment_tells_whether_it_records() -> None:
+    env = pogema_v0(GridConfig(**SMALL))
+    assert env.animation_is_active is False
+    env.enable_animation()
+    assert env.animation_is_active is True
+    monitor = AnimationMonitor(pogema_v0(GridConfig(**SMALL)))
+    assert monitor.animation_is_active is True
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+def test_elapsed_steps_of_the_2_0_line_need_no_persistence(persistent: bool) -> None:
+    env = pogema_v0(GridConfig(**SMALL, persistent=persistent), semantics="2.0")
+    env.set_elapsed_steps(3)
+    env.reset()
+    assert env.step([0] * 3)[3] == [False] * 3
+    env.set_elapsed_steps(3)
+    assert env.step([0] * 3)[3] == [True] * 3
+    with pytest.raises(ValueError, match="elapsed_steps is -1, expected 0 or more"):
+        env.set_elapsed_steps(-1)
+    limited = MultiTimeLimit(env, 5)
+    limited.reset()
+    limited.set_elapsed_steps(4)
+    assert limited.step([0] * 3)[3] == [True] * 3
+    with pytest.raises(ValueError, match="only with persistent=True"):
+        pogema_v0(GridConfig(**SMALL)).set_elapsed_steps(1)
+
+
+def test_history_wraps_any_environment() -> None:
+    env = PersistentWrapper(pogema_v0(GridConfig(**SMALL), semantics="2.0"))
+    env.reset()
+    env.step([1, 2, 3])
+    assert [len(states) for states in env.get_full_history()] == [2, 2, 2]
+
+
+@pytest.mark.parametrize(("semantics", "number"), [("1.4.0", 0), ("2.0", 1)])
+def test_monitor_is_deprecated_in_the_2_0_line(semantics: str, number: int) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        AnimationMonitor(pogema_v0(GridConfig(**SMALL), semantics=semantics))
+    assert [one.category for one in caught] == [DeprecationWarning] * number
+    assert all(one.filename == __file__ and "`enable_animation`" in str(one.message) for one in caught)
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"egocentric_idx": 1}, {"static": True, "frame_idx": 2}, {"static_frame_idx": 1}]
+)
+@pytest.mark.parametrize("on_target", ["finish", "restart"])
+def test_settings_of_a_monitor_take_effect(tmp_path: Path, options: dict[str, Any], on_target: str) -> None:
+    monitor = AnimationMonitor(
+        pogema_v0(GridConfig(**SMALL, on_target=on_target)), AnimationConfig(save_every_idx_episode=None)
+    )
+    assert monitor.history is None
+    monitor.reset()
+    for _ in range(4):
+        monitor.step(monitor.sample_actions())
+    monitor.svg_settings.obstacle_color = "#123456"
+    monitor.save_animation(tmp_path / "new" / "own.svg", AnimationConfig(**options))
+    text = (tmp_path / "new" / "own.svg").read_text(encoding="utf-8")
+    assert 'fill="#123456"' in text and ElementTree.fromstring(text.encode()) is not None
+    assert ("<animate" in text) == (not any("static" in name for name in options))
