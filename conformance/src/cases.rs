@@ -25,6 +25,7 @@ use pogema_core::{Error, Map};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::data;
 use crate::request::{Op, Record, Registered, Request, Response};
 
 pub use expect::{Expect, Sees};
@@ -94,9 +95,9 @@ impl ActionWord {
     }
 }
 
-/// Returns the folder of the cases in this crate.
+/// Returns the folder of the cases: in this crate or, in a release, next to the program.
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("cases")
+    data::folder("cases")
 }
 
 /// Reads one case.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 
+use crate::data;
 use crate::request::{Request, Response};
 
 /// A request and POGEMA's answer to it.
@@ -17,14 +18,14 @@ pub struct GoldenRecording {
     pub response: Response,
 }
 
-/// Returns the folder of the recordings in this crate.
+/// Returns the folder of the recordings: in this crate or, in a release, next to the program.
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/pogema-1.4.0")
+    data::folder("golden/pogema-1.4.0")
 }
 
 /// Returns the folder of all mismatches found so far, recorded in the same format with the right answers.
 pub fn found_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("found")
+    data::folder("found")
 }
 
 /// Returns the files under a folder whose names have an ending, sorted by path.

@@ -22,6 +22,7 @@
 
 pub mod cases;
 mod compare;
+mod data;
 mod dice;
 mod digits;
 mod draw;

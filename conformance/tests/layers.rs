@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
@@ -43,9 +43,13 @@ fn crates_use_lower_layers_only() {
     assert_eq!(metadata.packages.len(), LAYERS.len());
 }
 
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
 /// Returns the features with which a set of packages builds each external dependency.
 fn features(selection: &[&str]) -> BTreeMap<String, String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = root();
     let mut command = std::process::Command::new(env!("CARGO"));
     command.args(["tree", "--offline", "--prefix", "none", "--format", "{p}|{f}"]).args(selection);
     let output = command.current_dir(root).output().unwrap();
@@ -69,5 +73,36 @@ fn the_program_and_the_wheel_use_the_features_of_the_tests() {
             let of_tests = tests.get(&package).unwrap_or(&features);
             assert_eq!(&features, of_tests, "{package} of the {what}: add its features to workspace-hack");
         }
+    }
+}
+
+/// The licences of all dependencies must accompany the compiled wheel and program.
+#[test]
+fn the_notices_list_the_dependencies_of_the_wheel_and_the_program() {
+    let settings = std::fs::read_to_string(root().join("about.toml")).unwrap();
+    let list = settings.split("targets = [").nth(1).unwrap().split(']').next().unwrap();
+    let targets: Vec<&str> =
+        list.split('"').skip(1).step_by(2).flat_map(|target| ["--target", target]).collect();
+    for (package, folder) in [("pogema-python", "python"), ("pogema-cli", "cli")] {
+        let selection = [&["--package", package, "--edges", "normal"], &*targets].concat();
+        let used = features(&selection).into_keys();
+        let used: BTreeSet<String> =
+            used.map(|package| package.replace(" (proc-macro)", "").replace(" v", " ")).collect();
+        let path = root().join(folder).join("THIRD-PARTY.txt");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (above, below) = ("=".repeat(80), "-".repeat(80));
+        let lists = text.split(&above).skip(1).map(|section| section.split(&below).next().unwrap());
+        let listed: BTreeSet<String> = lists
+            .flat_map(|list| list.lines().filter_map(|line| line.strip_prefix("    ")))
+            .filter(|package| package.contains(' '))
+            .map(String::from)
+            .collect();
+        let missing: Vec<&String> = used.difference(&listed).collect();
+        let surplus: Vec<&String> = listed.difference(&used).collect();
+        assert!(
+            missing.is_empty() && surplus.is_empty(),
+            "{}: {missing:?} are missing, {surplus:?} are not used; run `BLESS=1 ./check notices`",
+            path.display()
+        );
     }
 }

@@ -1,4 +1,4 @@
-"""Makes sure that the tests run against the installed wheel, not the source folder."""
+"""Makes sure that the tests run against the installed wheel, and marks those that need POGEMA."""
 
 from pathlib import Path
 
@@ -8,6 +8,14 @@ _SOURCE = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure(config):
+    config.addinivalue_line("markers", "oracle: the module reads POGEMA_ORACLE_PYTHON, the interpreter with POGEMA 1.4.0")
     where = Path(pogema_rs.__file__).resolve()
     if where.is_relative_to(_SOURCE):
         raise SystemExit(f"the package under test is {where}, expected an installed wheel")
+
+
+def pytest_collection_modifyitems(items):
+    need_pogema = {path for path in {item.path for item in items} if "POGEMA_ORACLE_PYTHON" in path.read_text(encoding="utf-8")}
+    for item in items:
+        if item.path in need_pogema:
+            item.add_marker("oracle")
