@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import io
+import re
 import urllib.request
 import zipfile
-from typing import BinaryIO
+from typing import IO
 
 from pogema_rs.toolbox.generators.generator_utils import maps_dict_to_yaml
 
 __all__ = ["download_moving_ai_maps", "map_to_grid", "maps_dict_to_yaml"]
 
 _OBSTACLES = "@OT"
+# The first lines of a file: what they match, and what an error says.
+_HEADER = (
+    (r"type .*", "`type` and a word"),
+    (r"height \d+", "`height` and a number"),
+    (r"width \d+", "`width` and a number"),
+    (r"map", "`map`"),
+)
 
 
 def download_moving_ai_maps(url: str) -> dict[str, str]:
@@ -28,7 +36,7 @@ def download_moving_ai_maps(url: str) -> dict[str, str]:
         return {name.replace(".map", ""): map_to_grid(archive.open(name)) for name in names}
 
 
-def map_to_grid(file_in_zip: BinaryIO, remove_border: bool = True) -> str:
+def map_to_grid(file_in_zip: IO[bytes], remove_border: bool = True) -> str:
     """Returns the text of a map in MovingAI's format, and closes its file; `@`, `O` and `T` are obstacles.
 
     Errors: `ValueError` for a wrong file, with its line.
@@ -37,13 +45,11 @@ def map_to_grid(file_in_zip: BinaryIO, remove_border: bool = True) -> str:
     """
     with file_in_zip:
         lines = [line.decode("utf-8").rstrip() for line in file_in_zip]
-    header = [line.split(" ") for line in lines[:4]]
-    expected = ("type", "height", "width", "map")
-    for number, name in enumerate(expected):
-        words = header[number] if number < len(header) else [""]
-        if words[0] != name or (name in ("height", "width") and not (len(words) == 2 and words[1].isdecimal())):
-            raise ValueError(f"line {number + 1} is `{' '.join(words)}`, expected `{name}`" + " and a number" * (0 < number < 3))
-    height = int(header[1][1])
+    for number, (pattern, expected) in enumerate(_HEADER):
+        line = lines[number] if number < len(lines) else ""
+        if not re.fullmatch(pattern, line):
+            raise ValueError(f"line {number + 1} is `{line}`, expected {expected}")
+    height = int(lines[1].split()[1])
     if len(lines) < 4 + height:
         raise ValueError(f"the map has {len(lines) - 4} rows, expected {height}")
     border = 1 if remove_border else 0

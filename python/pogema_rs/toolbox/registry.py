@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Optional
 
+from pogema_rs.install import is_installed
+from pogema_rs.toolbox._toolbox_maps import toolbox_maps
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.run_episode import run_episode
 
@@ -24,6 +26,8 @@ class ToolboxRegistry:
     """
 
     _maps: dict[str, Any] = {}
+    # Whether `_maps` includes those of pogema-toolbox.
+    _has_toolbox_maps = False
     _algorithms: dict[str, tuple[_Make, Optional[_Make], Optional[_Make]]] = {}
     _envs: dict[str, tuple[_Make, Optional[_Make]]] = {}
     _run_episode_funcs: dict[str, Callable[[Any, Any], dict[str, Any]]] = {"default": run_episode}
@@ -67,7 +71,7 @@ class ToolboxRegistry:
     def get_state(cls) -> dict[str, Any]:
         """Returns everything registered, for another process."""
         return {
-            "maps": cls._maps,
+            "maps": cls.get_maps(),
             "algorithms": cls._algorithms,
             "envs": cls._envs,
             "run_episode": cls._run_episode_funcs,
@@ -76,7 +80,7 @@ class ToolboxRegistry:
     @classmethod
     def recreate_from_state(cls, state: Mapping[str, Any]) -> None:
         """Replaces the registry with that of another process."""
-        cls._maps = dict(state.get("maps", {}))
+        cls._maps, cls._has_toolbox_maps = dict(state.get("maps", {})), True
         cls._algorithms = dict(state.get("algorithms", {}))
         cls._envs = dict(state.get("envs", {}))
         cls._run_episode_funcs = dict(state.get("run_episode", {"default": run_episode}))
@@ -139,16 +143,22 @@ class ToolboxRegistry:
 
     @classmethod
     def get_maps(cls) -> dict[str, Any]:
-        """Returns the registered maps, by name."""
+        """Returns the registered maps, by name.
+
+        After `install_as_pogema(toolbox=True)` they include the maps of pogema-toolbox, if that is installed.
+        """
+        if is_installed("pogema_toolbox") and not cls._has_toolbox_maps:
+            cls._maps, cls._has_toolbox_maps = {**toolbox_maps(), **cls._maps}, True
         return cls._maps
 
     @classmethod
     def register_maps(cls, maps: Mapping[str, Any]) -> None:
         """Registers maps, each as text or as a list of rows."""
+        known = cls.get_maps()
         for name, grid in maps.items():
-            if cls._maps.get(name, grid) != grid:
+            if known.get(name, grid) != grid:
                 cls.warning(f"a second map named {name} replaces the first one")
-            cls._maps[name] = grid
+            known[name] = grid
 
     @classmethod
     def register_run_func(cls, name: str, run_func: Callable[[Any, Any], dict[str, Any]]) -> None:

@@ -19,7 +19,7 @@ def maps_dict_to_yaml(filename: Union[str, os.PathLike[str]], maps: Mapping[str,
     """
     yaml = required("yaml", "`maps_dict_to_yaml`")
 
-    class Blocks(yaml.Dumper):  # type: ignore[misc, name-defined]
+    class Blocks(yaml.Dumper):  # type: ignore[name-defined]
         """Writes every text as a block."""
 
     Blocks.add_representer(str, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|"))

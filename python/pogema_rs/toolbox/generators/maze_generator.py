@@ -114,8 +114,8 @@ class MazeGenerator:
         rng = np.random.default_rng(seed)
         num_walls = int(grid.shape[0] * grid.shape[1] * obstacle_density // wall_components) if wall_components else 0
         for _ in range(num_walls):
-            x = rng.integers(0, grid.shape[1] // 2) * 2
-            y = rng.integers(0, grid.shape[0] // 2) * 2
+            x = int(rng.integers(0, grid.shape[1] // 2)) * 2
+            y = int(rng.integers(0, grid.shape[0] // 2)) * 2
             grid[y, x] = 1
             direction = (0, 0)
             for _ in range(wall_components):

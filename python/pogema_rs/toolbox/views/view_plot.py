@@ -10,10 +10,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
+from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
 
-__all__ = ["PlotView", "View", "draw", "drop_na", "eval_logs_to_pandas", "prepare_plot_fields", "process_plot_view"]
+__all__ = [
+    "PlotView",
+    "ToolboxRegistry",
+    "View",
+    "draw",
+    "drop_na",
+    "eval_logs_to_pandas",
+    "prepare_plot_fields",
+    "process_plot_view",
+]
 
 
 class PlotView(View):
@@ -88,7 +98,9 @@ def draw(
         raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "results.json").write_text(json.dumps(list(results)), encoding="utf-8")
+        for algorithm in dict.fromkeys(row["algorithm"] for row in results):
+            rows = [row for row in results if row["algorithm"] == algorithm]
+            (folder / f"{algorithm}.json").write_text(json.dumps(rows), encoding="utf-8")
         # JSON is YAML.
         views = folder / "views.yaml"
         views.write_text(json.dumps({"results_views": {target.stem: dict(fields)}}), encoding="utf-8")
