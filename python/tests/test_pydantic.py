@@ -142,7 +142,7 @@ def test_settings_of_algorithms(written):
     assert isinstance(settings, AlgoBase) and settings.parallel_backend == "balanced_multiprocessing"
 
 
-LEFT = """
+SUPPORTED = """
 import warnings
 warnings.simplefilter("ignore")
 from pydantic import Field, root_validator, validator
@@ -165,16 +165,20 @@ except ValueError as error:
     assert "too large" in str(error)
 
 
-class Constant(GridConfig):
-    kind: str = Field("a", const=True)
+class Left(GridConfig):
 """
+LEFT = {
+    '    kind: str = Field("a", const=True)': "`const` is removed, use `Literal` instead",
+    '    kind: str = Field("a", regex="a+")': "`regex` is removed. use `pattern` instead",
+    "    check = root_validator(lambda cls, values: values)": "you MUST specify `skip_on_failure=True`",
+}
 
 
 @pytest.mark.skipif(IS_PYDANTIC_1, reason="pydantic 1 supports it")
-def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(tmp_path):
-    script = tmp_path / "constant.py"
-    script.write_text(LEFT)
+@pytest.mark.parametrize("line", LEFT)
+def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
+    script = tmp_path / "left.py"
+    script.write_text(f"{SUPPORTED}{line}\n")
     done = subprocess.run([sys.executable, "-B", str(script)], capture_output=True, text=True, check=False)
-    line = LEFT.splitlines().index('    kind: str = Field("a", const=True)') + 1
-    assert f"line {line}, in Constant" in done.stderr, done.stderr
-    assert "`const` is removed, use `Literal` instead" in done.stderr
+    assert f"line {SUPPORTED.count(chr(10)) + 1}, in Left" in done.stderr, done.stderr
+    assert LEFT[line] in done.stderr
