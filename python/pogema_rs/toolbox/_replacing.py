@@ -29,7 +29,15 @@ _BACKENDS: dict[str, Callable[..., list[dict[str, Any]]]] = {
 
 
 def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) -> _Rows:
-    """Plays all episodes in memory, and writes `<algorithm>.json` and plots into the folder, if one is given."""
+    """Plays all episodes in memory, and writes `<algorithm>.json` and plots into the folder, if one is given.
+
+    Errors: `FileExistsError` if the folder has results that were stored episode by episode, whose other files would no
+    longer fit.
+    """
+    if eval_dir is not None and Path(eval_dir, "about.json").exists():
+        raise FileExistsError(
+            f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, or `begin` `anew`"
+        )
     _check_views(evaluation_config)
     variants = list(generate_variants(evaluation_config["environment"]))
     changes, environments = [variant[0] for variant in variants], [variant[1] for variant in variants]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Optional
@@ -17,6 +18,23 @@ __all__ = ["ToolboxRegistry"]
 _Make = Callable[..., Any]
 _LOGGER = logging.getLogger("pogema_rs.toolbox")
 _FORMAT = "%(asctime)s | Toolbox %(levelname)s | %(message)s"
+
+
+class _Calls(logging.Handler):
+    """A handler that calls a function with each line."""
+
+    def __init__(self, function: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._function = function
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._function(self.format(record) + "\n")
+
+
+def _handler(sink: Any) -> logging.Handler:
+    if isinstance(sink, (str, os.PathLike)):
+        return logging.FileHandler(sink)
+    return logging.StreamHandler(sink) if hasattr(sink, "write") else _Calls(sink)
 
 
 class ToolboxRegistry:
@@ -34,13 +52,13 @@ class ToolboxRegistry:
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:
-        """Sends messages of at least a level to a stream or a file [default: stderr]."""
-        is_file = isinstance(sink, str) or hasattr(sink, "__fspath__")
-        handler = logging.FileHandler(sink) if is_file else logging.StreamHandler(sink or sys.stderr)
+        """Sends messages of at least a level to a stream, a file, a function or a handler [default: stderr]."""
+        handler = sink if isinstance(sink, logging.Handler) else _handler(sink or sys.stderr)
         handler.setFormatter(logging.Formatter(_FORMAT))
         _LOGGER.handlers = [handler]
         _LOGGER.propagate = False
-        _LOGGER.setLevel(level if level != "SUCCESS" else "INFO")
+        # The other levels of loguru, which pogema-toolbox uses.
+        _LOGGER.setLevel({"TRACE": "DEBUG", "SUCCESS": "INFO"}.get(level, level))
 
     @classmethod
     def debug(cls, message: str) -> None:

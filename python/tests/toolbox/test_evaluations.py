@@ -1,12 +1,15 @@
 """Tests of evaluations that replace earlier results, and of wrong input to the functions of pogema-toolbox."""
 
+import copy
 import io
 import json
+import logging
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pogema_rs import BatchAStarAgent
@@ -58,9 +61,13 @@ class Broken(Still):
 
 @pytest.fixture(autouse=True)
 def empty_registry():
-    """Restores the registry after each test."""
-    state = {name: dict(value) for name, value in ToolboxRegistry.get_state().items()}
+    """Restores the registry and its logger after each test."""
+    state = {name: copy.copy(value) for name, value in ToolboxRegistry.get_state().items()}
+    logger = logging.getLogger("pogema_rs.toolbox")
+    kept = logger.handlers, logger.propagate, logger.level
     yield
+    logger.handlers, logger.propagate = kept[:2]
+    logger.setLevel(kept[2])
     ToolboxRegistry.recreate_from_state(state)
 
 
@@ -82,6 +89,8 @@ def test_own_import_keeps_earlier_results(tmp_path, backend):
         assert metrics(evaluation(suite, tmp_path / "set", begin="replace")) == metrics(stored)
         assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["Policy.json", "maps.yaml"]
     assert metrics(evaluation(SUITE)) == metrics(stored)
+    with pytest.raises(FileExistsError, match="has `about.json` of a run that can be resumed"):
+        evaluation(SUITE, tmp_path / "stored", begin="replace")
 
 
 def test_error_of_a_policy_ends_the_run(tmp_path):
@@ -96,6 +105,8 @@ def test_error_of_a_policy_ends_the_run(tmp_path):
 @pytest.mark.parametrize("begin", ["anew", "replace"])
 @pytest.mark.parametrize("backend", ["sequential", "multiprocessing"])
 def test_policy_that_replaces_another_one_is_played(tmp_path, begin, backend):
+    if begin == "replace":
+        (tmp_path / "suite.yaml").touch()
     suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend}}}
     seen = []
     for policy in (Still, BatchAStarAgent):
@@ -217,6 +228,74 @@ def test_views_of_the_engine_are_drawn_too(tmp_path, caplog):
     run_views(rows, {"results_views": views}, eval_dir=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["Boxes.pdf"]
     assert (tmp_path / "Boxes.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_views_accept_what_results_may_contain(tmp_path):
+    rows = [
+        {"metrics": {"SoC": value, "gap": float("nan")}, "env_grid_search": {"seed": seed}, "algorithm": "A/B"}
+        for seed, value in enumerate([np.int64(3), np.float32(2.5), 4, 5.0])
+    ]
+    process_plot_view(rows, PlotView(x="seed", y="SoC"), tmp_path / "plot.svg")
+    assert "A_B" in (tmp_path / "plot.svg").read_text()
+
+
+def test_messages_go_to_any_sink(tmp_path):
+    lines = []
+    handler = logging.StreamHandler(io.StringIO())
+    for sink in (lines.append, handler, tmp_path / "log.txt", str(tmp_path / "log.txt")):
+        ToolboxRegistry.setup_logger("SUCCESS", sink)
+        ToolboxRegistry.success("done")
+        ToolboxRegistry.debug("hidden")
+    assert len(lines) == 1 and lines[0].endswith("| done\n")
+    assert handler.stream.getvalue().endswith("| done\n")
+    assert (tmp_path / "log.txt").read_text().count("done") == 2
+    assert "hidden" not in (tmp_path / "log.txt").read_text()
+
+
+POLICIES = """
+from pogema import GridConfig
+from pogema_toolbox.algorithm_config import AlgoBase
+
+
+class Right:
+    def reset_states(self):
+        pass
+
+    def act(self, observations):
+        return [len(GridConfig().MOVES) - 1] * len(observations)
+"""
+MAIN = """
+import json
+import pogema_rs
+pogema_rs.install_as_pogema(toolbox=True)
+from pogema_toolbox.create_env import Environment, create_env_base
+from pogema_toolbox.evaluator import evaluation
+from pogema_toolbox.registry import ToolboxRegistry
+from policies import Right
+
+if __name__ == "__main__":
+    ToolboxRegistry.setup_logger("ERROR")
+    ToolboxRegistry.register_env("Environment", create_env_base, Environment)
+    ToolboxRegistry.register_algorithm("Right", Right)
+    environment = {"name": "Environment", "num_agents": 3, "seed": {"grid_search": [1, 2, 3]}, "with_animation": True}
+    names = ("sequential", "balanced_multiprocessing", "balanced_dask", "dask")
+    algorithms = {name: {"name": "Right", "num_process": 2, "parallel_backend": name} for name in names}
+    print(json.dumps(evaluation({"environment": environment, "algorithms": algorithms})))
+"""
+
+
+def test_line_in_a_script_redirects_imports_in_all_its_processes(tmp_path):
+    (tmp_path / "policies.py").write_text(POLICIES)
+    (tmp_path / "main.py").write_text(MAIN)
+    # Dask spawns its workers, which read the script again.
+    command = [sys.executable, "-B", "main.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert len(rows) == 12 and set(rows[0]["metrics"]) == {"ISR", "CSR", "ep_length"}
+    assert all(row["metrics"] == rows[number % 3]["metrics"] for number, row in enumerate(rows))
+    drawn = sorted(str(path.relative_to(tmp_path)) for path in (tmp_path / "renders").rglob("*.svg"))
+    assert drawn[:3] == [f"renders/balanced_dask/pogema-seed{seed}.svg" for seed in (1, 2, 3)] and len(drawn) == 12
 
 
 def test_own_results_can_be_loaded(tmp_path):

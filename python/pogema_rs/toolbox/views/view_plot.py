@@ -7,9 +7,11 @@ import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
+from pogema_rs.toolbox._work import plain
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
@@ -96,11 +98,12 @@ def draw(
     extension = target.suffix.removeprefix(".")
     if extension not in ("pdf", "png", "svg"):
         raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         for algorithm in dict.fromkeys(row["algorithm"] for row in results):
-            rows = [row for row in results if row["algorithm"] == algorithm]
-            (folder / f"{algorithm}.json").write_text(json.dumps(rows), encoding="utf-8")
+            name = algorithm.replace("/", "_")  # also the name of a file
+            rows = [_shown(row, name) for row in results if row["algorithm"] == algorithm]
+            (folder / f"{name}.json").write_text(json.dumps(rows, default=plain), encoding="utf-8")
         # JSON is YAML.
         views = folder / "views.yaml"
         views.write_text(json.dumps({"results_views": {target.stem: dict(fields)}}), encoding="utf-8")
@@ -108,3 +111,9 @@ def draw(
         for file in (file for view in shown for file in view.files):
             shutil.move(file, target)
     return [table for view in shown for table in view.tables]
+
+
+def _shown(row: Mapping[str, Any], algorithm: str) -> dict[str, Any]:
+    """Returns a row for the engine, without the numbers that JSON lacks."""
+    metrics = {key: value for key, value in row["metrics"].items() if not (isinstance(value, float) and isnan(value))}
+    return {**row, "metrics": metrics, "algorithm": algorithm}
