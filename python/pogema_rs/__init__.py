@@ -17,8 +17,13 @@ Additional modules: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitat
 
 Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a command line (`python -m`):
 `pogema_rs.toolbox.evaluator`, `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`,
-`pogema_rs.toolbox.algorithm_config`, `pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder` and
-`pogema_rs.toolbox.views`.
+`pogema_rs.toolbox.algorithm_config`, `pogema_rs.toolbox.run_episode`, `pogema_rs.toolbox.results_holder`,
+`pogema_rs.toolbox.config_variant_generator`, `pogema_rs.toolbox.eval_utils`, `pogema_rs.toolbox.moving_ai_ingestion`,
+`pogema_rs.toolbox.fix_num_threads_issue`, `pogema_rs.toolbox.views` with `pogema_rs.toolbox.views.view_utils`,
+`pogema_rs.toolbox.views.view_tabular`, `pogema_rs.toolbox.views.view_plot` and
+`pogema_rs.toolbox.views.view_multi_plot`, and `pogema_rs.toolbox.generators` with
+`pogema_rs.toolbox.generators.generator_utils`, `pogema_rs.toolbox.generators.maze_generator`,
+`pogema_rs.toolbox.generators.random_generator` and `pogema_rs.toolbox.generators.warehouse_generator`.
 
 Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,
 `pogema_rs.integrations.pettingzoo`, `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`,

@@ -20,6 +20,7 @@ __all__ = [
     "JumpedError",
     "MapShapeError",
     "MapTextError",
+    "MissingSuiteError",
     "NoCellError",
     "NoHistoryError",
     "NotKeptError",
@@ -123,6 +124,10 @@ class AutoResetError(_Quiet, ValueError):
 
 class OverrideError(StateError, TypeError):
     """A method of an environment that a subclass overrides, although it is never called."""
+
+
+class MissingSuiteError(FileNotFoundError, AssertionError):
+    """A folder of results without the suite that was played."""
 
 
 class UnknownIntegrationError(_Quiet, ValueError):

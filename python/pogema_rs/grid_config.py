@@ -6,11 +6,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, Optional, Union
 
-from pydantic import ConfigDict, ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError
-
 from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
+from pogema_rs._models import validation_error
 from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
 from pogema_rs.utils import CommonSettings
 
@@ -31,8 +29,6 @@ class GridConfig(CommonSettings):
 
     Source: POGEMA 1.4.0, `grid_config.py`, `GridConfig`
     """
-
-    model_config = ConfigDict(extra="ignore", arbitrary_types_allowed=True, protected_namespaces=())
 
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
@@ -61,28 +57,45 @@ class GridConfig(CommonSettings):
 
     def __init__(self, **fields: Any) -> None:
         known = type(self).model_fields
-        _warn_of_unknown(fields, known)
+        ignores_unknown = self._extra() == "ignore"
+        if ignores_unknown:
+            _warn_of_unknown(fields, known)
         own = {name: value for name, value in fields.items() if name in GridConfig.model_fields}
+        own = {**self._changed_defaults(), **own}
         try:
             own = _derived(coerced(own))
         except RefusedConfigError as refused:
-            raise _validation_error(type(self).__name__, refused, fields) from None
-        super().__init__(**{**{name: fields[name] for name in fields if name in known}, **own})
+            field = refused.field if refused.field in GridConfig.model_fields else None
+            raise validation_error(type(self), refused.reason, field, fields) from None
+        kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
+        super().__init__(**{**kept, **own})
+
+    @classmethod
+    def _changed_defaults(cls) -> Mapping[str, Any]:
+        """Returns the defaults of a subclass that differ from those of this class."""
+        if cls is GridConfig:
+            return {}
+        ours, theirs = GridConfig._defaults(), cls._defaults()
+        return {name: theirs[name] for name in ours if name in theirs and theirs[name] != ours[name]}
 
     def update_config(self, **fields: Any) -> None:
         """Sets some fields and derives the others again; after an error the config is unchanged.
 
         A new `size` discards width and height, and a new width or height discards the size.
         """
-        merged = self.dict()
+        ours, theirs = GridConfig.model_fields, type(self).model_fields
+        merged = {name: getattr(self, name) for name in ours}
         if "size" in fields:
             merged.pop("width", None)
             merged.pop("height", None)
         elif "width" in fields or "height" in fields:
             merged.pop("size", None)
-        updated = GridConfig(**{**merged, **fields})
-        for name in GridConfig.model_fields:
+        of_subclass = {name: value for name, value in fields.items() if name in theirs and name not in ours}
+        updated = GridConfig(**{**merged, **{name: fields[name] for name in fields if name not in of_subclass}})
+        for name in ours:
             setattr(self, name, getattr(updated, name))
+        for name, value in of_subclass.items():
+            setattr(self, name, value)
 
     @staticmethod
     def str_map_to_list(
@@ -118,18 +131,6 @@ class GridConfig(CommonSettings):
                 raise ValueError(f"the position is {cell!r}, expected a pair (row, col) of whole numbers")
             if not (0 <= cell[0] < height and 0 <= cell[1] < width):
                 raise OutsideMapError(f"the position is {cell!r}, expected a cell of {height} rows and {width} columns")
-
-    def dict(self, **kwargs: Any) -> dict[str, Any]:  # noqa: A003 - the name in POGEMA
-        """Returns all fields by name, like `model_dump`."""
-        return self.model_dump(**kwargs)
-
-    def json(self, **kwargs: Any) -> str:
-        """Returns all fields as JSON, like `model_dump_json`."""
-        return self.model_dump_json(**kwargs)
-
-    def copy(self, **kwargs: Any) -> GridConfig:
-        """Returns a copy, like `model_copy`."""
-        return self.model_copy(**kwargs)
 
 
 # The engine plays the same episode in every framework.
@@ -190,11 +191,3 @@ def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
         raise MapTextError("config: `map` has both letters and `@`, `$` or `!`, expected one or the other")
     if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:
         raise MapTextError("config: `map` has letters alongside agents_xy and targets_xy, expected one or the other")
-
-
-def _validation_error(title: str, refused: RefusedConfigError, fields: Mapping[str, Any]) -> ValidationError:
-    name = refused.field if refused.field in GridConfig.model_fields else None
-    error = PydanticCustomError("pogema", "{text}", {"text": refused.reason})
-    place: tuple[str, ...] = (name,) if name else ()
-    details = InitErrorDetails(type=error, loc=place, input=fields.get(name) if name else fields)
-    return ValidationError.from_exception_data(title, [details])

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Optional, Union
 
 from gymnasium.utils import colorize
-from pydantic import BaseModel
 
+from pogema_rs._models import Model
 from pogema_rs.errors import BlockedCellError, InstanceError
 
 __all__ = ["AgentsTargetsSizeError", "CommonSettings", "check_grid", "grid_to_str", "render_grid"]
@@ -16,7 +16,7 @@ __all__ = ["AgentsTargetsSizeError", "CommonSettings", "check_grid", "grid_to_st
 _NAMES = string.digits + string.ascii_letters + string.punctuation
 
 
-class CommonSettings(BaseModel):
+class CommonSettings(Model):
     """The fields that all configs have."""
 
     MOVES: list = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]

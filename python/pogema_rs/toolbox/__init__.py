@@ -10,3 +10,6 @@ formats of suites and results.
 from __future__ import annotations
 
 __all__: list[str] = []
+
+#: The release of pogema-toolbox whose interface this package has.
+__version__ = "0.1.1"

@@ -14,7 +14,8 @@ from itertools import islice
 from multiprocessing.connection import Connection
 from typing import Any, Optional
 
-from pogema_rs.toolbox._work import Outcome, Task, play, play_with
+from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox._work import Outcome, Task, forget, play, play_with
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 #: Episodes submitted per process, so that no process is idle.
@@ -35,7 +36,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
     while waiting:
         under_way: dict[Future[Outcome], Task] = {}
         try:
-            with _pool(num_processes) as pool:
+            with process_pool(num_processes) as pool:
                 while waiting or under_way:
                     while waiting and len(under_way) < _AHEAD * num_processes:
                         task = waiting.pop()
@@ -58,14 +59,9 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
 
 def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> Iterator[Outcome]:
     """Plays episodes on the workers of a scheduler [default: a local cluster]; Dask replays those of a dead worker."""
-    from distributed import Client, LocalCluster, as_completed
+    from distributed import as_completed
 
-    if address is None:
-        cluster = LocalCluster(n_workers=num_processes, threads_per_worker=1, dashboard_address=None)
-        client = Client(cluster, timeout="120s")
-    else:
-        cluster, client = None, Client(address, timeout="120s")
-    try:
+    with dask_client(num_processes, address) as client:
         state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
         rest = iter(tasks)
         num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
@@ -86,6 +82,22 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
                 yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
             for task in islice(rest, 1):
                 under_way.add(send(task))
+
+
+@contextmanager
+def dask_client(num_processes: int, address: Optional[str]) -> Iterator[Any]:
+    """Yields a client of a scheduler [default: a local cluster, which ends with the client].
+
+    Errors: `ImportError` without Dask.
+    """
+    distributed = required("distributed", "a Dask backend")
+    if address is None:
+        cluster = distributed.LocalCluster(n_workers=num_processes, threads_per_worker=1, dashboard_address=None)
+        client = distributed.Client(cluster, timeout="120s")
+    else:
+        cluster, client = None, distributed.Client(address, timeout="120s")
+    try:
+        yield client
     except BaseException:
         # Closing a worker waits for seconds until its episode ends.
         for worker in cluster.workers.values() if cluster is not None else ():
@@ -100,7 +112,7 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
 
 
 @contextmanager
-def _pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
+def process_pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
     """Yields a process pool whose workers end with this process, and immediately after an exception."""
     # Only this process keeps the writer open. The workers wait for its end, which also comes if this process is killed.
     reader, writer = multiprocessing.Pipe(duplex=False)
@@ -121,6 +133,7 @@ def _initialize(state: dict[str, Any], reader: Connection, writer: Connection) -
     # Otherwise NumPy uses all cores in every process.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     ToolboxRegistry.recreate_from_state(state)
+    forget()  # a forked process has the algorithm of its parent
 
 
 def _end_with_parent(reader: Connection) -> None:

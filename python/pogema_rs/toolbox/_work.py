@@ -56,10 +56,21 @@ def play(task: Task, is_filmed: bool = False) -> Outcome:
         return Outcome(task.index, error=reason, traceback=traceback.format_exc())
 
 
+def forget() -> None:
+    """Drops the algorithm that this process played last, because another one may be registered under its name."""
+    _ready.clear()
+
+
+#: The state from which this process made its registry.
+_state: list[dict[str, Any]] = []
+
+
 def play_with(state: dict[str, Any], task: Task) -> Outcome:
-    """Plays an episode in a process in which nothing is registered yet."""
-    if not _ready:
+    """Plays an episode with the registry of another process, which all tasks of a run share."""
+    if not (_state and _state[0] is state):
         ToolboxRegistry.recreate_from_state(state)
+        _state[:] = [state]
+        forget()
     return play(task)
 
 
@@ -81,8 +92,8 @@ def _play(task: Task, is_filmed: bool) -> Outcome:
     if task.environment.get("with_animation"):
         _draw(env, task)
     film = env.unwrapped._engine.pack_film() if is_filmed else ""
-    plain = {name: _plain(value) for name, value in metrics.items()}
-    return Outcome(task.index, plain, float(runtime), machine(), film=film)
+    shown = {name: plain(value) for name, value in metrics.items()}
+    return Outcome(task.index, shown, float(runtime), machine(), film=film)
 
 
 def _algorithm(task: Task) -> tuple[Any, Any]:
@@ -102,6 +113,6 @@ def _draw(env: Any, task: Task) -> None:
     env.unwrapped.save_animation(str(folder / f"episode-{task.index:05}.svg"))
 
 
-def _plain(value: Any) -> Any:
-    """Converts a NumPy number to a Python number."""
+def plain(value: Any) -> Any:
+    """Returns a NumPy number as a Python number, and any other value unchanged."""
     return value.item() if hasattr(value, "item") else value

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Literal, Optional
 
-from pydantic import BaseModel
+from pogema_rs._models import Model
 
 __all__ = ["AlgoBase"]
 
 
-class AlgoBase(BaseModel):
+class AlgoBase(Model):
     """The settings of an algorithm; extend this class to add settings.
 
     Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase`

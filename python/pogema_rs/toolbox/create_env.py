@@ -7,9 +7,13 @@ from typing import Any, Optional
 
 import numpy as np
 
+from pogema_rs._engine import nearest_name
+from pogema_rs.errors import MapTextError
 from pogema_rs.grid_config import GridConfig
+from pogema_rs.install import is_installed
 from pogema_rs.integrations.make_pogema import pogema_v0
 from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
+from pogema_rs.toolbox._toolbox_maps import LOGO
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.wrappers import Wrapper
 from pogema_rs.wrappers.metrics import RuntimeMetricWrapper
@@ -59,11 +63,14 @@ class MultiMapWrapper(Wrapper):
         if pattern:
             maps = ToolboxRegistry.get_maps()
             is_meant = re.compile(f"^{pattern}$").match
-            self._names = [pattern] if pattern in maps else sorted(name for name in maps if is_meant(name))
+            self._names = sorted(name for name in maps if is_meant(name))
+            # In pogema-toolbox, the name of a map is a pattern too: `a.b` also matches `a-b`.
+            if pattern in maps and not (self._names and is_installed("pogema_toolbox")):
+                self._names = [pattern]
             if not self._names:
-                raise KeyError(f"No map matching: {pattern}")
+                raise MapTextError(_unmatched(pattern, is_meant(LOGO) is not None, list(maps)))
 
-    def reset(self, *, seed: Optional[int] = None, **kwargs: Any) -> tuple[Any, Any]:
+    def reset(self, seed: Optional[int] = None, **kwargs: Any) -> tuple[Any, Any]:
         """Begins an episode; the default seed is that of the config."""
         config = self.env.unwrapped.grid_config
         seed = config.seed if seed is None else seed
@@ -75,15 +82,27 @@ class MultiMapWrapper(Wrapper):
         return self.env.reset(seed=seed, **kwargs)
 
 
+def _unmatched(pattern: str, is_logo: bool, names: list[str]) -> str:
+    if is_logo:
+        return f"no map matches `{pattern}`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
+    hint = f"; did you mean `{nearest_name(pattern, names)}`?" if names else ", and no map is registered"
+    return f"no map matches `{pattern}`{hint}"
+
+
 def create_env_base(config: Environment) -> Any:
     """Makes the environment of a suite, which measures all metrics of the results.
+
+    After `install_as_pogema(toolbox=True)` it measures only those of pogema-toolbox: run times, density and blocked
+    moves are left out.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `create_env_base`
     """
     env: Wrapper = ProvideGlobalObstacles(pogema_v0(grid_config=config))
-    env.unwrapped._engine.measure()
     if config.use_maps:
         env = MultiMapWrapper(env)
     if config.with_animation:
-        env = AnimationMonitor(env, AnimationConfig(save_every_idx_episode=None))
+        env = AnimationMonitor(env, AnimationConfig(directory="experiments/renders", save_every_idx_episode=None))
+    if is_installed("pogema_toolbox"):
+        return env
+    env.unwrapped._engine.measure()
     return RuntimeMetricWrapper(env)

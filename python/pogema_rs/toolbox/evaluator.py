@@ -15,13 +15,57 @@ from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
 from pogema_rs._engine import Evaluation, num_cores
-from pogema_rs.toolbox import _backends
-from pogema_rs.toolbox._work import Outcome, Task, play
+from pogema_rs._forward import forwarded
+from pogema_rs.install import is_installed
+from pogema_rs.toolbox import _backends, _replacing
+from pogema_rs.toolbox._chunks import (
+    balanced_dask_backend,
+    balanced_multiprocess_backend,
+    dask_backend,
+    get_balanced_buckets_indexes,
+    get_env_config_cost,
+    get_num_of_available_cpus,
+    multiprocess_backend,
+    sequential_backend,
+    split_on_chunks,
+)
+from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox._replacing import join_metrics_and_configs, run_views
+from pogema_rs.toolbox._work import Outcome, Task, forget, play
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
 
-__all__ = ["EvaluationError", "evaluation"]
+__all__ = [
+    "EvaluationError",
+    "balanced_dask_backend",
+    "balanced_multiprocess_backend",
+    "dask_backend",
+    "evaluation",
+    "get_balanced_buckets_indexes",
+    "get_env_config_cost",
+    "get_num_of_available_cpus",
+    "join_metrics_and_configs",
+    "multiprocess_backend",
+    "run_views",
+    "sequential_backend",
+    "split_on_chunks",
+]
+
+# pogema-toolbox's module offers these names too.
+__getattr__, __dir__ = forwarded(
+    __name__,
+    {
+        "Environment": "toolbox.create_env",
+        "MultiPlotView": "toolbox.views.view_multi_plot",
+        "PlotView": "toolbox.views.view_plot",
+        "TabularView": "toolbox.views.view_tabular",
+        "generate_variants": "toolbox.config_variant_generator",
+        "process_multi_plot_view": "toolbox.views.view_multi_plot",
+        "process_plot_view": "toolbox.views.view_plot",
+        "process_table_view": "toolbox.views.view_tabular",
+    },
+)
 
 _Path = Union[str, os.PathLike[str]]
 
@@ -45,9 +89,9 @@ class EvaluationError(RuntimeError):
 
 def evaluation(
     evaluation_config: Union[_Path, Mapping[str, Any]],
-    eval_dir: _Path,
+    eval_dir: Optional[_Path] = None,
     *,
-    begin: Literal["new", "resume", "anew"] = "new",
+    begin: Optional[Literal["new", "resume", "anew", "replace"]] = None,
     maps: Sequence[_Path] = (),
     dask: Optional[str] = None,
     html: Optional[_Path] = None,
@@ -55,12 +99,17 @@ def evaluation(
     """Plays the missing episodes of a suite and returns all results in the layout of pogema-toolbox.
 
     `evaluation_config` is a YAML file or its content. `begin` says how to treat earlier results in the folder
-    `eval_dir`: `new` rejects them, `resume` continues an interrupted run of the same suite, `anew` deletes them
-    [default: `new`]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
+    `eval_dir`: `new` rejects them, `resume` continues an interrupted run of the same suite, `anew` deletes them,
+    `replace` does what pogema-toolbox does [default: `new`; `replace` after `install_as_pogema(toolbox=True)` and
+    without a folder]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
     of a scheduler for algorithms with a Dask `parallel_backend` [default: the one in the suite, otherwise a cluster of
     processes on this machine]. At the end the tables of `results_views` are printed, and plots are written to `views`
     in the folder. `html` is the file for a page with both, and with replays of the worst and best episodes, which are
     played again for it.
+
+    With `replace`, any folder will do, for example that of the suite. Only `<algorithm>.json` and plots are written, at
+    the end of each algorithm, and tables are logged. The first error of a policy ends the run. Algorithms must be
+    registered, and the options that follow `begin` are not available.
 
     If an algorithm is not registered, its name selects a built-in planner or policy. Threads play it, or Dask if that
     is its `parallel_backend` and an address is given.
@@ -70,6 +119,15 @@ def evaluation(
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
     """
+    if begin is None:
+        begin = "replace" if eval_dir is None or is_installed("pogema_toolbox") else "new"
+    if begin == "replace":
+        given = {"maps": maps, "dask": dask, "html": html}
+        for name in (name for name, value in given.items() if value):
+            raise ValueError(f"`{name}` is given and `begin` is `replace`, expected `new`, `resume` or `anew`")
+        return _replacing.evaluate(_content(evaluation_config), eval_dir)
+    if eval_dir is None:
+        raise ValueError(f"`eval_dir` is `None` and `begin` is `{begin}`, expected a folder")
     if isinstance(evaluation_config, Mapping):
         path, text = Path("suite.yaml"), json.dumps(evaluation_config)
     else:
@@ -93,6 +151,12 @@ def evaluation(
     if num_failed:
         raise EvaluationError(f"{num_failed} episodes could not be played; see {Path(eval_dir)}/*.failed.jsonl")
     return results
+
+
+def _content(evaluation_config: Union[_Path, Mapping[str, Any]]) -> Mapping[str, Any]:
+    if isinstance(evaluation_config, Mapping):
+        return evaluation_config
+    return required("yaml", "a suite in a file with `begin` `replace`").safe_load(Path(evaluation_config).read_text())
 
 
 def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:
@@ -137,6 +201,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
     to_do = suite.begin(key)
     if to_do is None:
         return 0
+    forget()
     progress.begin(len(to_do))
     num_failed = 0
     tasks = (_task(suite, index, key, settings, is_built_in) for index in to_do)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Optional
 
+from pogema_rs.install import is_installed
+from pogema_rs.toolbox._toolbox_maps import toolbox_maps
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.run_episode import run_episode
 
@@ -17,6 +20,23 @@ _LOGGER = logging.getLogger("pogema_rs.toolbox")
 _FORMAT = "%(asctime)s | Toolbox %(levelname)s | %(message)s"
 
 
+class _Calls(logging.Handler):
+    """A handler that calls a function with each line."""
+
+    def __init__(self, function: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._function = function
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._function(self.format(record) + "\n")
+
+
+def _handler(sink: Any) -> logging.Handler:
+    if isinstance(sink, (str, os.PathLike)):
+        return logging.FileHandler(sink)
+    return logging.StreamHandler(sink) if hasattr(sink, "write") else _Calls(sink)
+
+
 class ToolboxRegistry:
     """Algorithms, environments, maps and episode runners, keyed by their names in suites.
 
@@ -24,19 +44,21 @@ class ToolboxRegistry:
     """
 
     _maps: dict[str, Any] = {}
+    # Whether `_maps` includes those of pogema-toolbox.
+    _has_toolbox_maps = False
     _algorithms: dict[str, tuple[_Make, Optional[_Make], Optional[_Make]]] = {}
     _envs: dict[str, tuple[_Make, Optional[_Make]]] = {}
     _run_episode_funcs: dict[str, Callable[[Any, Any], dict[str, Any]]] = {"default": run_episode}
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:
-        """Sends messages of at least a level to a stream or a file [default: stderr]."""
-        is_file = isinstance(sink, str) or hasattr(sink, "__fspath__")
-        handler = logging.FileHandler(sink) if is_file else logging.StreamHandler(sink or sys.stderr)
+        """Sends messages of at least a level to a stream, a file, a function or a handler [default: stderr]."""
+        handler = sink if isinstance(sink, logging.Handler) else _handler(sink or sys.stderr)
         handler.setFormatter(logging.Formatter(_FORMAT))
         _LOGGER.handlers = [handler]
         _LOGGER.propagate = False
-        _LOGGER.setLevel(level if level != "SUCCESS" else "INFO")
+        # The other levels of loguru, which pogema-toolbox uses.
+        _LOGGER.setLevel({"TRACE": "DEBUG", "SUCCESS": "INFO"}.get(level, level))
 
     @classmethod
     def debug(cls, message: str) -> None:
@@ -67,7 +89,7 @@ class ToolboxRegistry:
     def get_state(cls) -> dict[str, Any]:
         """Returns everything registered, for another process."""
         return {
-            "maps": cls._maps,
+            "maps": cls.get_maps(),
             "algorithms": cls._algorithms,
             "envs": cls._envs,
             "run_episode": cls._run_episode_funcs,
@@ -76,7 +98,7 @@ class ToolboxRegistry:
     @classmethod
     def recreate_from_state(cls, state: Mapping[str, Any]) -> None:
         """Replaces the registry with that of another process."""
-        cls._maps = dict(state.get("maps", {}))
+        cls._maps, cls._has_toolbox_maps = dict(state.get("maps", {})), True
         cls._algorithms = dict(state.get("algorithms", {}))
         cls._envs = dict(state.get("envs", {}))
         cls._run_episode_funcs = dict(state.get("run_episode", {"default": run_episode}))
@@ -139,16 +161,22 @@ class ToolboxRegistry:
 
     @classmethod
     def get_maps(cls) -> dict[str, Any]:
-        """Returns the registered maps, by name."""
+        """Returns the registered maps, by name.
+
+        After `install_as_pogema(toolbox=True)` they include the maps of pogema-toolbox, if that is installed.
+        """
+        if is_installed("pogema_toolbox") and not cls._has_toolbox_maps:
+            cls._maps, cls._has_toolbox_maps = {**toolbox_maps(), **cls._maps}, True
         return cls._maps
 
     @classmethod
     def register_maps(cls, maps: Mapping[str, Any]) -> None:
         """Registers maps, each as text or as a list of rows."""
+        known = cls.get_maps()
         for name, grid in maps.items():
-            if cls._maps.get(name, grid) != grid:
+            if known.get(name, grid) != grid:
                 cls.warning(f"a second map named {name} replaces the first one")
-            cls._maps[name] = grid
+            known[name] = grid
 
     @classmethod
     def register_run_func(cls, name: str, run_func: Callable[[Any, Any], dict[str, Any]]) -> None:

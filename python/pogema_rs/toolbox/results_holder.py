@@ -21,3 +21,6 @@ class ResultsHolder:
     def get_final(self) -> dict[str, Any]:
         """Returns the metrics by name."""
         return self.results
+
+    def __repr__(self) -> str:
+        return str(self.results)

@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 HERE = Path(__file__).resolve().parent
+STAND_INS = HERE.parent / "toolbox" / "stand_ins"
 PAGE = HERE.parent.parent.parent / "docs" / "guide" / "moving.md"
 TABLE = re.compile(r"<!-- surface -->\n(.*?)<!-- end of surface -->", re.DOTALL)
 MAX_ROWS = 25
@@ -50,6 +51,14 @@ BEHAVIOUR = {
         "def test_lists_of_the_caller_are_unchanged",
     ),
     "`get_agents_xy(only_active=True)`": ("oracle/surprises.py", '"only active agents"'),
+    "`evaluation(suite, folder)` of pogema-toolbox": (
+        "toolbox/test_evaluations.py",
+        "def test_own_import_keeps_earlier_results",
+    ),
+    "the maps `pogema-logo` and `four-rooms` of pogema-toolbox": (
+        "toolbox/test_evaluations.py",
+        "def test_maps_of_the_toolbox_are_read_from_its_installation",
+    ),
     "`MOVES`": ("oracle/surprises.py", '"other moves"'),
     "`GridConfig` with an unknown field": (
         "test_environment.py",
@@ -84,7 +93,7 @@ def surfaces() -> tuple[Surface, Surface]:
     command = [str(HERE / "walk.py")]
     runs = [
         subprocess.run(
-            [python, "-B", *command, package, os.environ["POGEMA_TOOLBOX_FOLDER"]],
+            [python, "-B", *command, package, os.environ["POGEMA_TOOLBOX_FOLDER"], str(STAND_INS)],
             capture_output=True,
             text=True,
             timeout=300,

@@ -1,8 +1,9 @@
-"""Prints the surface of POGEMA, or of pogema_rs under its name, as JSON: walk.py PACKAGE FOLDER_OF_THE_TOOLBOX
+"""Prints the surface of POGEMA and pogema-toolbox, or of pogema_rs under their names, as JSON: walk.py PACKAGE FOLDER...
+
+PACKAGE is `pogema` or `pogema_rs`, and the folders hold pogema-toolbox and what it imports.
 
 The result maps a path, such as `pogema.grid.Grid.move`, to its kind: a list of parameters for a function. A path that
-begins with `<` is an attribute of an instance, for example of an environment before its first reset. The surface
-includes pogema-toolbox, which imports POGEMA.
+begins with `<` is an attribute of an instance, for example of an environment before its first reset.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from typing import Any
 
 PACKAGES = ("pogema", "pogema_toolbox")
 OURS = "pogema_rs"
+# Our packages and theirs; the first one that fits counts.
+NAMES = {"pogema_rs.toolbox": "pogema_toolbox", "pogema_rs": "pogema"}
 MODES = ("finish", "nothing", "restart")
 
 # Private methods that users override, and the private factory that they call.
@@ -28,12 +31,12 @@ HOOKS = (
 )
 
 
-def main(package: str, toolbox: str) -> None:
+def main(package: str, *folders: str) -> None:
     """Walks the modules and the instances of a package."""
-    sys.path.append(toolbox)
+    sys.path += folders
     warnings.simplefilter("ignore")
     if package == OURS:
-        importlib.import_module(package).install_as_pogema()
+        importlib.import_module(package).install_as_pogema(toolbox=True)
     found = [entry for name in PACKAGES for entry in of_package(name)]
     json.dump(dict(sorted([*found, *of_instances()])), sys.stdout, indent=1)
 
@@ -64,8 +67,9 @@ def is_own(value: Any) -> bool:
 def is_at_home(value: Any, module: str) -> bool:
     """Returns whether a module defines a class or function, and does not only import it."""
     home = str(getattr(value, "__module__", module))
+    theirs = next((home.replace(our, name, 1) for our, name in NAMES.items() if home.startswith(our)), home)
     # Ours may define in a private module what POGEMA's module of the name offers.
-    return home.replace(OURS, PACKAGES[0], 1) == module or home.rpartition(".")[2].startswith("_")
+    return theirs == module or home.rpartition(".")[2].startswith("_")
 
 
 def public(names: list[str]) -> list[str]:
@@ -176,12 +180,36 @@ def instances() -> Iterator[tuple[str, Any]]:
     yield "AnimationConfig", pogema.AnimationConfig()
     yield "AStarAgent", pogema.AStarAgent()
     yield "BatchAStarAgent", pogema.BatchAStarAgent()
+    yield from of_toolbox(fields)
     yield "registered grid", importlib.import_module("pogema.grid_registry").RegisteredGrid("walked", "a.\n.A")
     yield "actions sampler", envs.ActionsSampler(5)
     for integration in ("SampleFactory", "PyMARL", "gymnasium", "PettingZoo"):
         made = pogema.pogema_v0(pogema.GridConfig(num_agents=2, size=6, seed=1, integration=integration))
         made.reset()
         yield integration, made
+
+
+def of_toolbox(fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yields labelled instances of pogema-toolbox."""
+    classes = {
+        "create_env": ("Environment",),
+        "algorithm_config": ("AlgoBase",),
+        "results_holder": ("ResultsHolder",),
+        "views.view_utils": ("View",),
+        "views.view_tabular": ("TabularView", "Aggregator"),
+        "views.view_plot": ("PlotView",),
+        "views.view_multi_plot": ("MultiPlotView",),
+        "generators.maze_generator": ("MazeRangeSettings", "MazeGenerator"),
+        "generators.random_generator": ("MapRangeSettings",),
+        "generators.warehouse_generator": ("WarehouseConfig",),
+    }
+    for module, names in classes.items():
+        for name in names:
+            yield name, getattr(importlib.import_module(f"pogema_toolbox.{module}"), name)()
+    create_env = importlib.import_module("pogema_toolbox.create_env")
+    env = create_env.create_env_base(create_env.Environment(**fields))
+    env.reset()
+    yield "env of a suite", env
 
 
 if __name__ == "__main__":

@@ -1,29 +1,107 @@
-"""Tests that the unmodified pogema-toolbox gets the same results from POGEMA 1.4.0 and from pogema_rs."""
+"""Tests that scripts get the same results from pogema-toolbox on POGEMA 1.4.0 and from pogema_rs under their names."""
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).parent / "evaluate.py"
+import pytest
+
+import pogema_rs
+
+HERE = Path(__file__).resolve().parent
+FOLDERS = os.pathsep.join([os.environ["POGEMA_TOOLBOX_FOLDER"], str(HERE / "stand_ins")])
+# The last one runs beside POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
+THEIRS, OURS, OURS_ON_OLD_STACK = "pogema", "pogema_rs.toolbox", "pogema_rs.toolbox on an old stack"
 
 
-def results(python, package):
-    run = subprocess.run(
-        [python, "-B", str(SCRIPT), package, os.environ["POGEMA_TOOLBOX_FOLDER"]],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
+def run(package, script, folder, *arguments):
+    """Runs a script in a folder and returns its output."""
+    folder.mkdir(exist_ok=True)
+    python = sys.executable if package in ("pogema_rs", OURS) else os.environ["POGEMA_ORACLE_PYTHON"]
+    command = [python, "-B", str(HERE / "run_as.py"), package.split()[0], FOLDERS, str(HERE / script), *arguments]
+    environment = {**os.environ, "CALLS_OF_WANDB": str(folder / "calls.txt")}
+    if package == OURS_ON_OLD_STACK:
+        alone = folder.parent / "package"
+        alone.mkdir(exist_ok=True)
+        link = alone / "pogema_rs"
+        if not link.is_symlink():
+            link.symlink_to(Path(pogema_rs.__file__).parent)
+        environment["PYTHONPATH"] = str(alone)
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
     )
-    assert run.returncode == 0, run.stderr
-    return json.loads(run.stdout)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
-def test_astar_agent_has_equal_results():
-    theirs = results(os.environ["POGEMA_ORACLE_PYTHON"], "pogema")
-    ours = results(sys.executable, "pogema_rs")
-    assert len(theirs) == 120
+@pytest.fixture(scope="module")
+def evaluated(tmp_path_factory):
+    """The results of the A* agent and a random policy, for each package."""
+    folder = tmp_path_factory.mktemp("evaluated")
+    packages = (THEIRS, "pogema_rs", OURS)
+    return {package: json.loads(run(package, "evaluate.py", folder / package)) for package in packages}
+
+
+@pytest.mark.parametrize("package", ["pogema_rs", OURS])
+def test_evaluations_have_equal_results(evaluated, package):
+    (theirs, _), (ours, _) = evaluated[THEIRS], evaluated[package]
+    assert len(theirs) == 240
     assert len({json.dumps(result["metrics"]) for result in theirs}) > 60
     assert ours == theirs
+
+
+def test_results_beside_a_suite_are_the_same_files(evaluated):
+    theirs, ours = evaluated[THEIRS][1], evaluated[OURS][1]
+    assert sorted(ours) == sorted(theirs) and "restart/restart.yaml" in theirs and len(theirs) == 9
+    assert ours == theirs
+
+
+@pytest.fixture(scope="module")
+def scenarios(tmp_path_factory):
+    """What the functions of pogema-toolbox return, for each package."""
+    folder = tmp_path_factory.mktemp("scenarios")
+    packages = (THEIRS, OURS, OURS_ON_OLD_STACK)
+    return {package: json.loads(run(package, "scenarios.py", folder / package)) for package in packages}
+
+
+NAMES = """mazes neighbours random_maps warehouses files_of_maps variants moving_ai tables logged_tables plots folders
+    uploads shares_of_processes registry""".split()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_functions_return_the_same(scenarios, name):
+    assert list(scenarios[THEIRS]) == NAMES
+    assert scenarios[OURS][name] == scenarios[THEIRS][name]
+    assert scenarios[OURS_ON_OLD_STACK][name] == scenarios[THEIRS][name]
+
+
+def contents(folder):
+    """Returns the content of each file in a folder; of pictures and archives, only the name."""
+    names = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "log.txt"]
+    hidden = (".pdf", ".png", ".zip")
+    return {str(path.relative_to(folder)): "" if path.suffix in hidden else path.read_text() for path in names}
+
+
+def tables(folder):
+    """Returns the lines of the tables in a log."""
+    text = re.sub("\x1b\\[[0-9;]*m", "", (folder / "log.txt").read_text())
+    return [line for line in text.splitlines() if line[:1] in ("+", "|")]
+
+
+@pytest.mark.parametrize(
+    ("script", "num_files"), [("evaluate_sets.py", 9), ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
+)
+def test_unmodified_scripts_write_the_same_files(script, num_files, tmp_path):
+    found = []
+    for package in (THEIRS, OURS, OURS_ON_OLD_STACK):
+        folder = tmp_path / package
+        shutil.copytree(HERE / "scripts" / "experiments", folder / "experiments")
+        run(package, f"scripts/{script}", folder)
+        found.append((contents(folder), tables(folder)))
+    assert len(found[0][0]) >= num_files, found[0][0].keys()
+    assert found[1] == found[0]
+    assert found[2] == found[0]

@@ -1,0 +1,120 @@
+"""Evaluations that replace earlier results, and write the files of pogema-toolbox only."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Optional, Union
+
+from pogema_rs.toolbox import _chunks
+from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox.config_variant_generator import generate_variants
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views.view_multi_plot import MultiPlotView, process_multi_plot_view
+from pogema_rs.toolbox.views.view_plot import PlotView, draw, process_plot_view
+from pogema_rs.toolbox.views.view_tabular import TabularView, process_table_view
+
+_Path = Union[str, os.PathLike[str]]
+_Rows = list[dict[str, Any]]
+
+_BACKENDS: dict[str, Callable[..., list[dict[str, Any]]]] = {
+    "sequential": _chunks.sequential_backend,
+    "multiprocessing": _chunks.multiprocess_backend,
+    "dask": _chunks.dask_backend,
+    "balanced_multiprocessing": _chunks.balanced_multiprocess_backend,
+    "balanced_dask": _chunks.balanced_dask_backend,
+}
+
+
+def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) -> _Rows:
+    """Plays all episodes in memory, and writes `<algorithm>.json` and plots into the folder, if one is given.
+
+    Errors: `FileExistsError` if the folder has results that were stored episode by episode, whose other files would no
+    longer fit.
+    """
+    if eval_dir is not None and Path(eval_dir, "about.json").exists():
+        raise FileExistsError(
+            f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, or `begin` `anew`"
+        )
+    _check_views(evaluation_config)
+    variants = list(generate_variants(evaluation_config["environment"]))
+    changes, environments = [variant[0] for variant in variants], [variant[1] for variant in variants]
+    results: _Rows = []
+    for key, settings in evaluation_config["algorithms"].items():
+        config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
+        if config.parallel_backend not in _BACKENDS:
+            raise ValueError(
+                f"`parallel_backend` is `{config.parallel_backend}`, expected one of {', '.join(_BACKENDS)}"
+            )
+        metrics = _BACKENDS[config.parallel_backend](settings, environments, key)
+        rows = join_metrics_and_configs(metrics, environments, changes, settings, key)
+        if eval_dir is not None:
+            _write(Path(eval_dir, f"{key}.json"), json.dumps(rows))
+        results += rows
+        ToolboxRegistry.success(f"{key}: {len(rows)} episodes played")
+    run_views(results, evaluation_config, eval_dir=eval_dir)
+    return results
+
+
+def join_metrics_and_configs(
+    metrics: Sequence[Any],
+    evaluation_configs: Sequence[Mapping[str, Any]],
+    env_grid_search: Iterable[Mapping[tuple[str, ...], Any]],
+    algo_config: Mapping[str, Any],
+    algo_name: str,
+) -> _Rows:
+    """Returns a row for each episode: `metrics`, the varied fields as `env_grid_search`, and `algorithm`.
+
+    Source: pogema-toolbox 0.1.1, `evaluator.py`, `join_metrics_and_configs`
+    """
+    return [
+        {
+            "metrics": one,
+            "env_grid_search": {path[-1]: value for path, value in changes.items()},
+            "algorithm": algo_name,
+        }
+        for one, changes in zip(metrics, env_grid_search)
+    ]
+
+
+def run_views(
+    results: Sequence[Mapping[str, Any]], evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path] = None
+) -> None:
+    """Logs the tables of `results_views`, and writes each plot to `<name of the view>.pdf` in the folder.
+
+    `tabular` views are tables as in pogema-toolbox. All other types are drawn by the engine, those that pogema-toolbox
+    lacks included.
+
+    Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
+    """
+    folder = Path(eval_dir if eval_dir is not None else ".")
+    folder.mkdir(parents=True, exist_ok=True)
+    for key, fields in evaluation_config.get("results_views", {}).items():
+        target = folder / f"{key}.pdf"
+        if fields["type"] == "tabular":
+            process_table_view(results, TabularView(**fields))
+        elif fields["type"] == "plot":
+            process_plot_view(results, PlotView(**fields), target)
+        elif fields["type"] == "multi-plot":
+            process_multi_plot_view(results, MultiPlotView(**fields), target)
+        else:
+            for table in draw(results, fields, target):
+                ToolboxRegistry.info("\n" + table)
+
+
+def _check_views(evaluation_config: Mapping[str, Any]) -> None:
+    """Raises the error of a missing package before the first episode, not after the last one."""
+    views = evaluation_config.get("results_views", {}).values()
+    if any(view["type"] == "tabular" and view.get("print_results") for view in views):
+        for package in ("pandas", "tabulate"):
+            required(package, "a view of type `tabular` with `print_results`")
+
+
+def _write(path: Path, text: str) -> None:
+    """Writes a whole file, or on failure leaves the existing one unchanged."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)

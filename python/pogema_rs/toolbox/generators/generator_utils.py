@@ -1,0 +1,47 @@
+"""Writes maps to files, and checks the settings of generators."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Union
+
+from pogema_rs.errors import MapShapeError
+from pogema_rs.toolbox._optional import required
+
+__all__ = ["check_sides", "generate_and_save", "maps_dict_to_yaml"]
+
+
+def maps_dict_to_yaml(filename: Union[str, os.PathLike[str]], maps: Mapping[str, str]) -> None:
+    """Writes maps to a YAML file, each as a block of lines below its name, sorted by name.
+
+    Source: pogema-toolbox 0.1.1, `generator_utils.py`, `maps_dict_to_yaml`
+    """
+    yaml = required("yaml", "`maps_dict_to_yaml`")
+
+    class Blocks(yaml.Dumper):  # type: ignore[name-defined]
+        """Writes every text as a block."""
+
+    Blocks.add_representer(str, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|"))
+    with open(filename, "w", encoding="utf-8") as file:
+        yaml.dump(dict(maps), file, Dumper=Blocks)
+
+
+def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Callable[[int], str]) -> None:
+    """Writes the maps of some seeds to `<name_prefix>.yaml`; their names have the seeds with equal numbers of digits.
+
+    Errors: `ValueError` if there is no seed.
+    """
+    seeds = list(seed_range)
+    if not seeds:
+        raise ValueError("`seed_range` is empty, expected at least one seed")
+    num_digits = len(str(max(seeds)))
+    maps = {f"{name_prefix}-seed-{str(seed).zfill(num_digits)}": generate(seed) for seed in seeds}
+    maps_dict_to_yaml(f"{name_prefix}.yaml", maps)
+
+
+def check_sides(width: Any, height: Any) -> None:
+    """Raises `MapShapeError`, an `AssertionError`, if a side of a map is not positive."""
+    for name, side in (("width", width), ("height", height)):
+        if side <= 0:
+            raise MapShapeError(f"`{name}` is `{side}`, expected a positive number")

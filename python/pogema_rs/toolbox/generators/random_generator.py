@@ -1,0 +1,63 @@
+"""Maps with obstacles at random cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs.toolbox.generators.generator_utils import check_sides, generate_and_save, maps_dict_to_yaml
+
+__all__ = ["MapRangeSettings", "generate_and_save_maps", "generate_map", "maps_dict_to_yaml"]
+
+
+@dataclass
+class MapRangeSettings:
+    """The ranges, both ends included, from which the settings of a map are drawn.
+
+    Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings`
+    """
+
+    width_min: int = 17
+    width_max: int = 21
+    height_min: int = 17
+    height_max: int = 21
+    obstacle_density_min: float = 0.1
+    obstacle_density_max: float = 0.3
+
+    def sample(self, seed: Optional[int] = None) -> dict[str, Any]:
+        """Draws the settings of one map."""
+        rng = np.random.default_rng(seed)
+        return {
+            "width": rng.integers(self.width_min, self.width_max + 1),
+            "height": rng.integers(self.height_min, self.height_max + 1),
+            "obstacle_density": rng.uniform(self.obstacle_density_min, self.obstacle_density_max),
+            "seed": seed,
+        }
+
+
+def generate_map(settings: Mapping[str, Any]) -> str:
+    """Returns the text of a map with the settings `width`, `height`, `obstacle_density` and `seed`.
+
+    Errors: `ValueError` for a density above 1, `AssertionError` for a side that is not positive.
+
+    Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
+    """
+    width, height, density = (settings[name] for name in ("width", "height", "obstacle_density"))
+    check_sides(width, height)
+    if not density <= 1:
+        raise ValueError(f"`obstacle_density` is `{density}`, expected at most 1")
+    rng = np.random.default_rng(settings["seed"])
+    obstacles: set[tuple[int, int]] = set()
+    # Draws each obstacle again until its cell is free.
+    while len(obstacles) < int(width * height * density):
+        col, row = int(rng.integers(0, width)), int(rng.integers(0, height))
+        obstacles.add((row, col))
+    return "\n".join("".join("#" if (row, col) in obstacles else "." for col in range(width)) for row in range(height))
+
+
+def generate_and_save_maps(name_prefix: str, seed_range: Iterable[int]) -> None:
+    """Writes a map for each seed to `<name_prefix>.yaml`."""
+    generate_and_save(name_prefix, seed_range, lambda seed: generate_map(MapRangeSettings().sample(seed)))

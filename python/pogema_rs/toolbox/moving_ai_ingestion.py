@@ -1,0 +1,57 @@
+"""Reads maps of the MovingAI benchmark, without the ring of cells at their border."""
+
+from __future__ import annotations
+
+import io
+import re
+import urllib.request
+import zipfile
+from typing import IO
+
+from pogema_rs.toolbox.generators.generator_utils import maps_dict_to_yaml
+
+__all__ = ["download_moving_ai_maps", "map_to_grid", "maps_dict_to_yaml"]
+
+_OBSTACLES = "@OT"
+# The first lines of a file: what they match, and what an error says.
+_HEADER = (
+    (r"type .*", "`type` and a word"),
+    (r"height \d+", "`height` and a number"),
+    (r"width \d+", "`width` and a number"),
+    (r"map", "`map`"),
+)
+
+
+def download_moving_ai_maps(url: str) -> dict[str, str]:
+    """Returns the maps of a zip archive as texts, by file name without `.map`.
+
+    Errors: `OSError` for an archive that cannot be downloaded, `zipfile.BadZipFile` or `ValueError` for a wrong file.
+
+    Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
+    """
+    with urllib.request.urlopen(url) as response:
+        archive = zipfile.ZipFile(io.BytesIO(response.read()))
+    with archive:
+        names = [name for name in archive.namelist() if name.endswith(".map")]
+        return {name.replace(".map", ""): map_to_grid(archive.open(name)) for name in names}
+
+
+def map_to_grid(file_in_zip: IO[bytes], remove_border: bool = True) -> str:
+    """Returns the text of a map in MovingAI's format, and closes its file; `@`, `O` and `T` are obstacles.
+
+    Errors: `ValueError` for a wrong file, with its line.
+
+    Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
+    """
+    with file_in_zip:
+        lines = [line.decode("utf-8").rstrip() for line in file_in_zip]
+    for number, (pattern, expected) in enumerate(_HEADER):
+        line = lines[number] if number < len(lines) else ""
+        if not re.fullmatch(pattern, line):
+            raise ValueError(f"line {number + 1} is `{line}`, expected {expected}")
+    height = int(lines[1].split()[1])
+    if len(lines) < 4 + height:
+        raise ValueError(f"the map has {len(lines) - 4} rows, expected {height}")
+    border = 1 if remove_border else 0
+    rows = [line[border : len(line) - border] for line in lines[4 + border : 4 + height - border]]
+    return "\n".join("".join("#" if sign in _OBSTACLES else "." for sign in row) for row in rows)

@@ -1,0 +1,119 @@
+"""Plots of means, drawn by the engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from math import isnan
+from pathlib import Path
+from typing import Any, Literal, Optional, Union
+
+from pogema_rs.toolbox._work import plain
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views import show
+from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
+
+__all__ = [
+    "PlotView",
+    "ToolboxRegistry",
+    "View",
+    "draw",
+    "drop_na",
+    "eval_logs_to_pandas",
+    "prepare_plot_fields",
+    "process_plot_view",
+]
+
+
+class PlotView(View):
+    """The options of a plot; `plt_style` and `tight_layout` have no effect.
+
+    Source: pogema-toolbox 0.1.1, `view_plot.py`, `PlotView`
+    """
+
+    type: Literal["plot"] = "plot"
+    name: Optional[str] = None
+    x: Optional[str] = None
+    y: Optional[str] = None
+    by: str = "algorithm"
+    width: float = 2.6
+    height: float = 2.8
+    remove_title: bool = False
+    line_width: float = 2.0
+    error_bar: tuple[str, int] = ("ci", 95)
+    plt_style: str = "seaborn-v0_8-colorblind"
+    figure_dpi: int = 300
+    font_size: int = 8
+    legend_font_size: int = 7
+    legend_loc: Literal[
+        "best", "upper right", "upper left", "lower left", "lower right", "right",
+        "center left", "center right", "lower center", "upper center", "center",
+    ] = "best"  # fmt: skip
+    figure_face_color: str = "#FFFFFF"
+    use_log_scale_x: bool = False
+    use_log_scale_y: bool = False
+    markers: bool = True
+    line_types: bool = True
+    extension: Literal["svg", "png", "pdf"] = "pdf"
+    #: Colours of the lines [default: those of the engine].
+    palette: Optional[list] = None
+    hue_order: Optional[list] = None
+    tight_layout: bool = True
+    ticks: Optional[list] = None
+    remove_legend_title: bool = True
+
+
+def process_plot_view(
+    results: Sequence[Mapping[str, Any]], view: PlotView, save_path: Union[str, os.PathLike[str], None] = None
+) -> None:
+    """Writes a plot to a file, whose ending is the format; logs a warning if the results lack a column.
+
+    Errors: `ValueError` for another ending than `.pdf`, `.png` and `.svg`, or a wrong option.
+
+    Source: pogema-toolbox 0.1.1, `view_plot.py`, `process_plot_view`
+    """
+    if save_path is not None:
+        draw(results, view.dict(), save_path)
+
+
+def prepare_plot_fields(view: PlotView) -> tuple[Optional[str], Optional[str], str]:
+    """Returns the displayed names of the columns `x`, `y` and `by`."""
+    names = view.rename_fields
+    return names.get(view.x, view.x), names.get(view.y, view.y), names.get(view.by, view.by)
+
+
+def draw(
+    results: Sequence[Mapping[str, Any]], fields: Mapping[str, Any], save_path: Union[str, os.PathLike[str]]
+) -> list[str]:
+    """Draws a view of any type that `pogema views` knows, and returns its tables as text.
+
+    `save_path` is the file of its plot, whose ending is the format: `.pdf`, `.png` or `.svg`.
+
+    Errors: `ValueError` for another ending or a wrong option.
+    """
+    target = Path(save_path)
+    extension = target.suffix.removeprefix(".")
+    if extension not in ("pdf", "png", "svg"):
+        raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        for algorithm in dict.fromkeys(row["algorithm"] for row in results):
+            name = algorithm.replace("/", "_")  # also the name of a file
+            rows = [_shown(row, name) for row in results if row["algorithm"] == algorithm]
+            (folder / f"{name}.json").write_text(json.dumps(rows, default=plain), encoding="utf-8")
+        # JSON is YAML.
+        views = folder / "views.yaml"
+        views.write_text(json.dumps({"results_views": {target.stem: dict(fields)}}), encoding="utf-8")
+        shown = show(folder, config=views, plot_format=extension, out=folder / "plots")  # type: ignore[arg-type]
+        for file in (file for view in shown for file in view.files):
+            shutil.move(file, target)
+    return [table for view in shown for table in view.tables]
+
+
+def _shown(row: Mapping[str, Any], algorithm: str) -> dict[str, Any]:
+    """Returns a row for the engine, without the numbers that JSON lacks."""
+    metrics = {key: value for key, value in row["metrics"].items() if not (isinstance(value, float) and isnan(value))}
+    return {**row, "metrics": metrics, "algorithm": algorithm}

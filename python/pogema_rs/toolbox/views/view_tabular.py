@@ -1,0 +1,115 @@
+"""Tables of means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, Union
+
+import numpy as np
+
+from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
+
+__all__ = ["Aggregator", "TabularView", "View", "preprocess_table", "process_table_view"]
+
+
+class TabularView(View):
+    """The options of a table.
+
+    Source: pogema-toolbox 0.1.1, `view_tabular.py`, `TabularView`
+    """
+
+    print_results: bool = False
+    type: Literal["tabular"] = "tabular"
+    table_format: str = "psql"
+    show_std: bool = True
+    skip_zero_std: bool = True
+
+
+class Aggregator:
+    """Formats the mean of some numbers with half the width of its interval.
+
+    `estimator` is a function of the numbers, or a name that pandas knows. `error_method` is `ci`, the percentiles of
+    means of samples drawn with NumPy's global generator, `sd`, a multiple of the standard deviation, or `None`.
+    `error_level` is the percentage of `ci`, or the factor of `sd`.
+
+    Source: pogema-toolbox 0.1.1, `view_tabular.py`, `Aggregator`
+    """
+
+    def __init__(
+        self,
+        estimator: Union[Callable[..., Any], str] = np.mean,
+        error_method: str | None = "ci",
+        error_level: float = 1.96,
+        round_digits: int = 2,
+    ) -> None:
+        self.estimator = estimator
+        self.error_method = error_method
+        self.error_level = error_level
+        self.round_digits = round_digits
+
+    def __call__(self, vals: Any) -> str:
+        """Returns the text, for example `3.50 ± 0.25`; a single number has no interval.
+
+        Errors: `KeyError` for an unknown `error_method`.
+        """
+        estimate = self.estimator(vals) if callable(self.estimator) else vals.agg(self.estimator)
+        text = f"{estimate:.{self.round_digits}f}"
+        if self.error_method is None or len(vals) <= 1:
+            return text
+        return f"{text} ± {self._half_interval(vals):.{self.round_digits}f}"
+
+    def _half_interval(self, vals: Any) -> float:
+        if self.error_method == "sd":
+            return vals.std() * self.error_level
+        if self.error_method == "ci":
+            tails = (100 - self.error_level) / 2
+            low, high = np.percentile(self.bootstrap(vals, func=self.estimator), [tails, 100 - tails])
+            return (high - low) / 2
+        raise KeyError(f"`error_method` is `{self.error_method}`, expected `ci`, `sd` or None")
+
+    @staticmethod
+    def bootstrap(data: Any, n_boot: int = 1000, func: Any = np.mean) -> np.ndarray:
+        """Returns a value of `func` for each of some samples, drawn with replacement by NumPy's global generator.
+
+        Shape: `(n_boot,)`
+        """
+        samples = np.random.choice(data, size=(n_boot, len(data)), replace=True)
+        return np.apply_along_axis(func, 1, samples)
+
+
+def preprocess_table(eval_configs: Sequence[Mapping[str, Any]], view: View) -> Any:
+    """Returns the frame of a table: a row for each combination of the varied fields that are not dropped.
+
+    Errors: `ImportError` without pandas.
+
+    Source: pogema-toolbox 0.1.1, `view_tabular.py`, `preprocess_table`
+    """
+    df = eval_logs_to_pandas(eval_configs)
+    drop_na(df)  # for its warnings: a table keeps these columns
+    metrics = [name for name in eval_configs[0].get("metrics", ()) if name in df.columns]
+    groups = [name for name in df.columns if name not in metrics and name not in view.drop_keys]
+    aggregator = Aggregator(
+        error_method=getattr(view, "error_method", "ci"),
+        error_level=getattr(view, "error_level", 95),
+        round_digits=view.round_digits,
+    )
+    table = df.groupby(by=groups, as_index=False).agg({name: aggregator for name in metrics})
+    table = table.drop(columns=view.drop_keys, errors="ignore")
+    if view.sort_by:
+        table = table.sort_values(by=view.sort_by)
+    return table.rename(columns=view.rename_fields)
+
+
+def process_table_view(results: Sequence[Mapping[str, Any]], view: TabularView) -> None:
+    """Logs a table if `view.print_results` is set.
+
+    Errors: `ImportError` without pandas or tabulate.
+
+    Source: pogema-toolbox 0.1.1, `view_tabular.py`, `process_table_view`
+    """
+    if view.print_results:
+        tabulate = required("tabulate", "a view of type `tabular`").tabulate
+        table = preprocess_table(results, view)
+        ToolboxRegistry.info("\n" + tabulate(table, headers="keys", tablefmt=view.table_format))

@@ -1,0 +1,309 @@
+"""Tests of evaluations that replace earlier results, and of wrong input to the functions of pogema-toolbox."""
+
+import copy
+import io
+import json
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pogema_rs import BatchAStarAgent
+from pogema_rs.toolbox import eval_utils
+from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox.config_variant_generator import generate_variants
+from pogema_rs.toolbox.create_env import Environment, create_env_base
+from pogema_rs.toolbox.evaluator import evaluation, run_views
+from pogema_rs.toolbox.generators.maze_generator import generate_and_save_mazes
+from pogema_rs.toolbox.generators.random_generator import generate_map
+from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
+from pogema_rs.toolbox.moving_ai_ingestion import map_to_grid
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views.view_plot import PlotView, process_plot_view
+from pogema_rs.toolbox.views.view_utils import load_from_folder
+
+SUITE = {
+    "environment": {
+        "name": "Environment",
+        "on_target": "nothing",
+        "num_agents": {"grid_search": [2, 3]},
+        "seed": {"grid_search": [0, 1]},
+        "max_episode_steps": 8,
+    },
+    "algorithms": {"Policy": {"name": "Policy", "parallel_backend": "sequential"}},
+}
+
+
+class Still:
+    """A policy that stays."""
+
+    def reset_states(self):
+        """Does nothing."""
+
+    def act(self, observations):
+        """Returns the action to stay for each agent."""
+        return [0] * len(observations)
+
+
+class Broken(Still):
+    """A policy that fails with three agents."""
+
+    def act(self, observations):
+        """Raises an error if there are three agents."""
+        if len(observations) == 3:
+            raise ArithmeticError("three are too many")
+        return super().act(observations)
+
+
+@pytest.fixture(autouse=True)
+def empty_registry():
+    """Restores the registry and its logger after each test."""
+    state = {name: copy.copy(value) for name, value in ToolboxRegistry.get_state().items()}
+    logger = logging.getLogger("pogema_rs.toolbox")
+    kept = logger.handlers, logger.propagate, logger.level
+    yield
+    logger.handlers, logger.propagate = kept[:2]
+    logger.setLevel(kept[2])
+    ToolboxRegistry.recreate_from_state(state)
+
+
+def metrics(rows):
+    return [{name: value for name, value in row["metrics"].items() if name != "runtime"} for row in rows]
+
+
+@pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing", "balanced_dask"])
+def test_own_import_keeps_earlier_results(tmp_path, backend):
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    stored = evaluation(SUITE, tmp_path / "stored")
+    with pytest.raises(OSError, match="has results already"):
+        evaluation(SUITE, tmp_path / "stored")
+    # A folder with the suite and other files is no obstacle.
+    suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend, "num_process": 2}}}
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "maps.yaml").write_text("{}")
+    for _ in range(2):
+        assert metrics(evaluation(suite, tmp_path / "set", begin="replace")) == metrics(stored)
+        assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["Policy.json", "maps.yaml"]
+    assert metrics(evaluation(SUITE)) == metrics(stored)
+    with pytest.raises(FileExistsError, match="has `about.json` of a run that can be resumed"):
+        evaluation(SUITE, tmp_path / "stored", begin="replace")
+
+
+def test_error_of_a_policy_ends_the_run(tmp_path):
+    ToolboxRegistry.register_algorithm("Policy", Broken)
+    for backend in ("sequential", "multiprocessing"):
+        suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend}}}
+        with pytest.raises(ArithmeticError, match="three are too many"):
+            evaluation(suite, tmp_path, begin="replace")
+        assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("begin", ["anew", "replace"])
+@pytest.mark.parametrize("backend", ["sequential", "multiprocessing"])
+def test_policy_that_replaces_another_one_is_played(tmp_path, begin, backend):
+    if begin == "replace":
+        (tmp_path / "suite.yaml").touch()
+    suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend}}}
+    seen = []
+    for policy in (Still, BatchAStarAgent):
+        ToolboxRegistry.register_algorithm("Policy", policy)
+        environment = {**SUITE["environment"], "observation_type": "POMAPF"}
+        seen.append(metrics(evaluation({**suite, "environment": environment}, tmp_path, begin=begin)))
+    assert seen[0] != seen[1]
+
+
+def test_maps_of_the_toolbox_are_read_from_its_installation():
+    code = """
+import sys
+import pogema_rs
+from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.create_env import Environment, create_env_base
+before = dict(ToolboxRegistry.get_maps())
+pogema_rs.install_as_pogema(toolbox=True)
+try:
+    create_env_base(Environment(map_name="pogema-.*"))
+except KeyError as error:
+    print(error)
+print(before, sorted(ToolboxRegistry.get_maps()))
+"""
+    outputs = []
+    for folder in ("", os.environ["POGEMA_TOOLBOX_FOLDER"]):
+        done = subprocess.run(
+            [sys.executable, "-B", "-c", code], env={**os.environ, "PYTHONPATH": folder}, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        outputs.append(done.stdout.splitlines())
+    missing = "no map matches `pogema-.*`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
+    assert outputs == [[missing, "{} []"], ["{} ['four-rooms', 'pogema-logo']"]]
+
+
+def test_toolbox_that_was_imported_before_is_reported():
+    code = "import pogema_toolbox, pogema_rs; pogema_rs.install_as_pogema(toolbox=True)"
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code],
+        env={**os.environ, "PYTHONPATH": os.environ["POGEMA_TOOLBOX_FOLDER"]},
+        capture_output=True,
+        text=True,
+    )
+    assert "RuntimeError: pogema_toolbox is already imported, expected a call of" in done.stderr, done.stderr
+
+
+def test_missing_packages_are_reported_before_the_first_episode(tmp_path, monkeypatch):
+    ToolboxRegistry.register_algorithm("Policy", Broken)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    views = {"Means": {"type": "tabular", "print_results": True}}
+    with pytest.raises(ImportError, match="`tabular` with `print_results` needs `pip install pandas`"):
+        evaluation({**SUITE, "results_views": views}, tmp_path, begin="replace")
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    (tmp_path / "suite.yaml").write_text("{}")
+    with pytest.raises(ImportError, match="`load_from_folder` needs `pip install PyYAML`"):
+        load_from_folder(tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="wrong_part"):
+        required("json.wrong_part", "this test")
+
+
+def test_wandb_is_needed_only_for_uploads(tmp_path):
+    folder = tmp_path / "set"
+    folder.mkdir()
+    eval_utils.initialize_wandb({}, folder, True, "Project")
+    eval_utils.save_evaluation_results(folder)
+    assert (tmp_path / "set.zip").exists()
+    with pytest.raises(ImportError, match="`initialize_wandb` needs `pip install wandb`"):
+        eval_utils.initialize_wandb({}, folder, False, "Project")
+    with pytest.raises(ImportError, match="`save_evaluation_results` needs `pip install wandb`"):
+        eval_utils.save_evaluation_results(folder)
+    with pytest.raises(ImportError, match="needs `pip install wandb`"):
+        eval_utils.create_and_push_summary_archive(["set"], tmp_path, "Project")
+
+
+def settings(**changes):
+    """Returns the settings of a random map."""
+    return {"width": 3, "height": 3, "obstacle_density": 0.1, "seed": 0, **changes}
+
+
+WRONG = [
+    (lambda: generate_map(settings(obstacle_density=1.5)), "`obstacle_density` is `1.5`, expected at most 1"),
+    (lambda: generate_map(settings(obstacle_density=float("nan"))), "`obstacle_density` is `nan`"),
+    (lambda: generate_map(settings(width=0)), "`width` is `0`, expected a positive number"),
+    (lambda: generate_warehouse(WarehouseConfig(walls_rows=-5)), "`height` is `-22`, expected a positive number"),
+    (lambda: generate_and_save_mazes("none", range(0)), "`seed_range` is empty, expected at least one seed"),
+    (lambda: list(generate_variants({"a": {"b": {"grid_search": 3}}})), "`a.b.grid_search` is `3`, expected a list"),
+    (lambda: list(generate_variants({"a": {"grid_search": "xy"}})), "`a.grid_search` is `'xy'`, expected a list"),
+    (lambda: map_to_grid(io.BytesIO(b"")), "line 1 is ``, expected `type` and a word"),
+    (lambda: map_to_grid(io.BytesIO(b"type octile\nheight x\n")), "line 2 is `height x`, expected `height` and a"),
+    (lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")), "the map has 1 rows, expected 2"),
+    (lambda: process_plot_view([], PlotView(x="a", y="b"), "plot.gif"), "expected a name that ends in `.pdf`"),
+    (lambda: evaluation(SUITE, begin="resume"), "`eval_dir` is `None` and `begin` is `resume`, expected a folder"),
+    (lambda: evaluation(SUITE, html="a.html"), "`html` is given and `begin` is `replace`, expected `new`"),
+    (lambda: evaluation({**SUITE, "algorithms": {"A": {"name": "None"}}}), "no algorithm is registered as `None`"),
+    (lambda: create_env_base(Environment(map_name="b")), "no map matches `b`, and no map is registered"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(WRONG)))
+def test_wrong_input_is_reported_in_one_line(number):
+    call, message = WRONG[number]
+    with pytest.raises((ValueError, TypeError, KeyError, AssertionError)) as raised:
+        call()
+    assert message in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_nearest_map_is_named():
+    ToolboxRegistry.register_maps({"hall": "..", "cellar": ".."})
+    with pytest.raises(KeyError, match="no map matches `hal`; did you mean `hall`?"):
+        create_env_base(Environment(map_name="hal"))
+
+
+def test_views_of_the_engine_are_drawn_too(tmp_path, caplog):
+    rows = [
+        {"metrics": {"CSR": 1.0, "SoC": 8 + seed}, "env_grid_search": {"seed": seed}, "algorithm": name}
+        for name in ("A", "B")
+        for seed in range(3)
+    ]
+    views = {"Boxes": {"type": "box", "y": "SoC"}, "Seeds": {"type": "seeds"}}
+    run_views(rows, {"results_views": views}, eval_dir=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["Boxes.pdf"]
+    assert (tmp_path / "Boxes.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_views_accept_what_results_may_contain(tmp_path):
+    rows = [
+        {"metrics": {"SoC": value, "gap": float("nan")}, "env_grid_search": {"seed": seed}, "algorithm": "A/B"}
+        for seed, value in enumerate([np.int64(3), np.float32(2.5), 4, 5.0])
+    ]
+    process_plot_view(rows, PlotView(x="seed", y="SoC"), tmp_path / "plot.svg")
+    assert "A_B" in (tmp_path / "plot.svg").read_text()
+
+
+def test_messages_go_to_any_sink(tmp_path):
+    lines = []
+    handler = logging.StreamHandler(io.StringIO())
+    for sink in (lines.append, handler, tmp_path / "log.txt", str(tmp_path / "log.txt")):
+        ToolboxRegistry.setup_logger("SUCCESS", sink)
+        ToolboxRegistry.success("done")
+        ToolboxRegistry.debug("hidden")
+    assert len(lines) == 1 and lines[0].endswith("| done\n")
+    assert handler.stream.getvalue().endswith("| done\n")
+    assert (tmp_path / "log.txt").read_text().count("done") == 2
+    assert "hidden" not in (tmp_path / "log.txt").read_text()
+
+
+POLICIES = """
+from pogema import GridConfig
+from pogema_toolbox.algorithm_config import AlgoBase
+
+
+class Right:
+    def reset_states(self):
+        pass
+
+    def act(self, observations):
+        return [len(GridConfig().MOVES) - 1] * len(observations)
+"""
+MAIN = """
+import json
+import pogema_rs
+pogema_rs.install_as_pogema(toolbox=True)
+from pogema_toolbox.create_env import Environment, create_env_base
+from pogema_toolbox.evaluator import evaluation
+from pogema_toolbox.registry import ToolboxRegistry
+from policies import Right
+
+if __name__ == "__main__":
+    ToolboxRegistry.setup_logger("ERROR")
+    ToolboxRegistry.register_env("Environment", create_env_base, Environment)
+    ToolboxRegistry.register_algorithm("Right", Right)
+    environment = {"name": "Environment", "num_agents": 3, "seed": {"grid_search": [1, 2, 3]}, "with_animation": True}
+    names = ("sequential", "balanced_multiprocessing", "balanced_dask", "dask")
+    algorithms = {name: {"name": "Right", "num_process": 2, "parallel_backend": name} for name in names}
+    print(json.dumps(evaluation({"environment": environment, "algorithms": algorithms})))
+"""
+
+
+def test_line_in_a_script_redirects_imports_in_all_its_processes(tmp_path):
+    (tmp_path / "policies.py").write_text(POLICIES)
+    (tmp_path / "main.py").write_text(MAIN)
+    # Dask spawns its workers, which read the script again.
+    command = [sys.executable, "-B", "main.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert len(rows) == 12 and set(rows[0]["metrics"]) == {"ISR", "CSR", "ep_length"}
+    assert all(row["metrics"] == rows[number % 3]["metrics"] for number, row in enumerate(rows))
+    drawn = sorted(str(path.relative_to(tmp_path)) for path in (tmp_path / "renders").rglob("*.svg"))
+    assert drawn[:3] == [f"renders/balanced_dask/pogema-seed{seed}.svg" for seed in (1, 2, 3)] and len(drawn) == 12
+
+
+def test_own_results_can_be_loaded(tmp_path):
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    played = evaluation(SUITE, tmp_path)
+    results, suite = load_from_folder(tmp_path)
+    assert metrics(results) == metrics(played) and suite["algorithms"] == SUITE["algorithms"]
+    (tmp_path / "suite.yaml").unlink()
+    with pytest.raises(FileNotFoundError, match="expected the suite of the results"):
+        load_from_folder(Path(tmp_path))
+    assert json.loads((tmp_path / "Policy.json").read_text()) == results
