@@ -90,6 +90,16 @@ pub fn action(py: Python<'_>, text: String) -> PyErr {
     of_class(py, "ActionError", text)
 }
 
+/// Converts an error from generating or reading a map.
+pub fn map(py: Python<'_>, error: &Error) -> PyErr {
+    match (error, error.field()) {
+        (Error::Memory { .. }, _) => memory(error),
+        // pogema-toolbox asserts the sides of maps.
+        (_, Some("width" | "height")) => of_class(py, "MapShapeError", error),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
 /// Converts an error in the arguments of a planner.
 pub fn plan(error: &Error) -> PyErr {
     PyValueError::new_err(error.to_string())

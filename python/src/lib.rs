@@ -9,6 +9,7 @@ mod fields;
 mod guard;
 mod interrupt;
 mod lists;
+mod maps;
 mod memory;
 mod planners;
 mod vec;
@@ -38,6 +39,11 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::maze, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::movingai_map, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::random_map, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::warehouse, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::warehouse_cells, module)?)?;
     module.add_function(wrap_pyfunction!(engine::state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

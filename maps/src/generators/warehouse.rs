@@ -83,19 +83,31 @@ impl Warehouse {
         if bays == Bays::None {
             return Ok(MapText::from(map));
         }
+        let (mut starts, goals) = self.cells(&map, bays)?;
+        // A cell that qualifies as both becomes a goal.
+        starts.retain(|start| goals.binary_search(start).is_err());
+        Ok(MapText { pools: Some((starts, goals)), ..MapText::from(map) })
+    }
+
+    /// Returns the possible starts and goals on a map, each in reading order. Of the settings, only the gaps are used.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a `vertical_gap` below 2.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_wfi_positions`
+    pub fn cells(&self, map: &Map, bays: Bays) -> Result<(Vec<Cell>, Vec<Cell>), Error> {
         if self.vertical_gap < 2 {
             return Err(Error::config("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
         }
-        let is_start = |cell: Cell| match bays {
-            Bays::Published => self.is_published_start(&map, cell),
-            Bays::None | Bays::Toolbox => self.is_toolbox_start(&map, cell),
+        let is_start = |cell: &Cell| match bays {
+            Bays::None => false,
+            Bays::Toolbox => self.is_toolbox_start(map, *cell),
+            Bays::Published => self.is_published_start(map, *cell),
         };
         let cells = (0..map.obstacles().len()).map(|index| map.cell_at(index));
-        let free = cells.filter(|&cell| !map.is_obstacle(cell));
-        let (goals, others): (Vec<Cell>, Vec<Cell>) = free.partition(|&cell| self.is_goal(&map, cell));
-        // A cell that qualifies as both becomes a goal.
-        let starts = others.into_iter().filter(|&cell| is_start(cell)).collect();
-        Ok(MapText { pools: Some((starts, goals)), ..MapText::from(map) })
+        let free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
+        let starts = free.iter().copied().filter(is_start).collect();
+        Ok((starts, free.into_iter().filter(|&cell| self.is_goal(map, cell)).collect()))
     }
 
     /// Returns the map without the first and last `num_cut` rows.

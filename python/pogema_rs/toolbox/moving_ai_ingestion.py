@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import io
-import re
 import urllib.request
 import zipfile
 from typing import IO
 
+from pogema_rs import _engine
 from pogema_rs.toolbox.generators.generator_utils import maps_dict_to_yaml
 
 __all__ = ["download_moving_ai_maps", "map_to_grid", "maps_dict_to_yaml"]
-
-_OBSTACLES = "@OT"
-# The first lines of a file: what they match, and what an error says.
-_HEADER = (
-    (r"type .*", "`type` and a word"),
-    (r"height \d+", "`height` and a number"),
-    (r"width \d+", "`width` and a number"),
-    (r"map", "`map`"),
-)
 
 
 def download_moving_ai_maps(url: str) -> dict[str, str]:
@@ -44,14 +35,4 @@ def map_to_grid(file_in_zip: IO[bytes], remove_border: bool = True) -> str:
     Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
     """
     with file_in_zip:
-        lines = [line.decode("utf-8").rstrip() for line in file_in_zip]
-    for number, (pattern, expected) in enumerate(_HEADER):
-        line = lines[number] if number < len(lines) else ""
-        if not re.fullmatch(pattern, line):
-            raise ValueError(f"line {number + 1} is `{line}`, expected {expected}")
-    height = int(lines[1].split()[1])
-    if len(lines) < 4 + height:
-        raise ValueError(f"the map has {len(lines) - 4} rows, expected {height}")
-    border = 1 if remove_border else 0
-    rows = [line[border : len(line) - border] for line in lines[4 + border : 4 + height - border]]
-    return "\n".join("".join("#" if sign in _OBSTACLES else "." for sign in row) for row in rows)
+        return _engine.movingai_map(file_in_zip.read().decode("utf-8"), not remove_border)

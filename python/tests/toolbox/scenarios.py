@@ -78,21 +78,6 @@ def mazes():
 
 
 @scenario
-def neighbours():
-    """The next ends of walls."""
-    seen = []
-    for number in range(200):
-        rng = np.random.default_rng(number)
-        shape = tuple(rng.integers(3, 9, 2).tolist())
-        x, y = (int(rng.integers(0, side)) for side in (shape[1], shape[0]))
-        last = [(0, 0), (0, 2), (0, -2), (2, 0), (-2, 0)][number % 5]
-        straight = [0.8, 0.5, 0.0][number % 3]
-        make = maze_generator.MazeGenerator
-        seen.append(make.select_random_neighbor(x, y, None, shape, rng, last, straight))
-    return seen
-
-
-@scenario
 def random_maps():
     """Settings and maps of drawn seeds."""
     settings = [random_generator.MapRangeSettings().sample(seed) for seed in numbers(0, 2**32, 60)]

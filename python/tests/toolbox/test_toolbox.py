@@ -68,7 +68,7 @@ def scenarios(tmp_path_factory):
     return {package: json.loads(run(package, "scenarios.py", folder / package)) for package in packages}
 
 
-NAMES = """mazes neighbours random_maps warehouses files_of_maps variants moving_ai tables logged_tables plots folders
+NAMES = """mazes random_maps warehouses files_of_maps variants moving_ai tables logged_tables plots folders
     uploads shares_of_processes registry""".split()
 
 

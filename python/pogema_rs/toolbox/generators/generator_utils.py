@@ -1,15 +1,15 @@
-"""Writes maps to files, and checks the settings of generators."""
+"""Writes maps to files, and draws seeds."""
 
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Union
+from typing import Optional, Union
 
-from pogema_rs.errors import MapShapeError
 from pogema_rs.toolbox._optional import required
 
-__all__ = ["check_sides", "generate_and_save", "maps_dict_to_yaml"]
+__all__ = ["drawn_seed", "generate_and_save", "maps_dict_to_yaml"]
 
 
 def maps_dict_to_yaml(filename: Union[str, os.PathLike[str]], maps: Mapping[str, str]) -> None:
@@ -40,8 +40,6 @@ def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Cal
     maps_dict_to_yaml(f"{name_prefix}.yaml", maps)
 
 
-def check_sides(width: Any, height: Any) -> None:
-    """Raises `MapShapeError`, an `AssertionError`, if a side of a map is not positive."""
-    for name, side in (("width", width), ("height", height)):
-        if side <= 0:
-            raise MapShapeError(f"`{name}` is `{side}`, expected a positive number")
+def drawn_seed(seed: Optional[int]) -> int:
+    """Returns a seed, a random one for None."""
+    return secrets.randbits(64) if seed is None else seed

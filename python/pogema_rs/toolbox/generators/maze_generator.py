@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Optional, Union
 
 import numpy as np
 
+from pogema_rs import _engine
 from pogema_rs.toolbox._optional import required
-from pogema_rs.toolbox.generators.generator_utils import check_sides, generate_and_save, maps_dict_to_yaml
+from pogema_rs.toolbox.generators.generator_utils import drawn_seed, generate_and_save, maps_dict_to_yaml
 
 __all__ = ["MazeGenerator", "MazeRangeSettings", "generate_and_save_mazes", "maps_dict_to_yaml"]
 
@@ -64,35 +65,6 @@ class MazeGenerator:
         """
         return np.array([[int(sign == "#") for sign in line] for line in string_maze.split("\n")])
 
-    @staticmethod
-    def select_random_neighbor(
-        x: int,
-        y: int,
-        maze_grid: Any,
-        maze_shape: Sequence[int],
-        rng: np.random.Generator,
-        last_direction: tuple[int, int],
-        go_straight: float,
-    ) -> tuple[Optional[int], Optional[int], tuple[int, int]]:
-        """Draws the next end of a wall, two cells away, and returns its column, its row and the direction (row, col).
-
-        The direction of the last piece has the weight `go_straight`, any other one `1 - go_straight`. If no direction
-        stays on the grid, returns `None` for the column and the row.
-        """
-        num_rows, num_cols = maze_shape
-        stays = {(0, -2): x > 1, (0, 2): x < num_cols - 2, (-2, 0): y > 1, (2, 0): y < num_rows - 2}
-        directions = [direction for direction, is_inside in stays.items() if is_inside]
-        if not directions:
-            return None, None, last_direction
-        weights = [go_straight if direction == last_direction else 1 - go_straight for direction in directions]
-        if all(weight == go_straight for weight in weights):
-            shares = [1 / len(weights)] * len(weights)
-        else:
-            total = sum(weights)
-            shares = [weight / total for weight in weights]
-        down, right = directions[rng.choice(range(len(directions)), p=shares)]
-        return x + right, y + down, (down, right)
-
     @classmethod
     def generate_maze(
         cls,
@@ -105,27 +77,10 @@ class MazeGenerator:
     ) -> str:
         """Returns the text of a maze; an even side is one cell longer in the maze.
 
-        Errors: `AssertionError` for a side that is not positive.
+        Errors: `AssertionError` for a side that is not positive, `ValueError` for another setting out of range.
         """
-        check_sides(width, height)
-        # Walls lie on even rows and columns; the ring around the grid is removed at the end.
-        grid = np.ones((height // 2 * 2 + 3, width // 2 * 2 + 3), dtype=int)
-        grid[1:-1, 1:-1] = 0
-        rng = np.random.default_rng(seed)
-        num_walls = int(grid.shape[0] * grid.shape[1] * obstacle_density // wall_components) if wall_components else 0
-        for _ in range(num_walls):
-            x = int(rng.integers(0, grid.shape[1] // 2)) * 2
-            y = int(rng.integers(0, grid.shape[0] // 2)) * 2
-            grid[y, x] = 1
-            direction = (0, 0)
-            for _ in range(wall_components):
-                next_x, next_y, direction = cls.select_random_neighbor(
-                    x, y, grid, grid.shape, rng, direction, go_straight
-                )
-                if next_x is not None and next_y is not None and grid[next_y, next_x] == 0:
-                    grid[next_y, next_x] = grid[(y + next_y) // 2, (x + next_x) // 2] = 1
-                    x, y = next_x, next_y
-        return cls.array_to_string(grid[1:-1, 1:-1])
+        sides = (width, height)
+        return _engine.maze(sides, obstacle_density, wall_components, go_straight, drawn_seed(seed))
 
     @classmethod
     def draw(cls, mazes: Union[str, Iterable[str]]) -> None:

@@ -8,7 +8,8 @@ from typing import Any, Optional
 
 import numpy as np
 
-from pogema_rs.toolbox.generators.generator_utils import check_sides, generate_and_save, maps_dict_to_yaml
+from pogema_rs import _engine
+from pogema_rs.toolbox.generators.generator_utils import drawn_seed, generate_and_save, maps_dict_to_yaml
 
 __all__ = ["MapRangeSettings", "generate_and_save_maps", "generate_map", "maps_dict_to_yaml"]
 
@@ -41,21 +42,12 @@ class MapRangeSettings:
 def generate_map(settings: Mapping[str, Any]) -> str:
     """Returns the text of a map with the settings `width`, `height`, `obstacle_density` and `seed`.
 
-    Errors: `ValueError` for a density above 1, `AssertionError` for a side that is not positive.
+    Errors: `ValueError` for a density that is not a share, `AssertionError` for a side that is not positive.
 
     Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
     """
-    width, height, density = (settings[name] for name in ("width", "height", "obstacle_density"))
-    check_sides(width, height)
-    if not density <= 1:
-        raise ValueError(f"`obstacle_density` is `{density}`, expected at most 1")
-    rng = np.random.default_rng(settings["seed"])
-    obstacles: set[tuple[int, int]] = set()
-    # Draws each obstacle again until its cell is free.
-    while len(obstacles) < int(width * height * density):
-        col, row = int(rng.integers(0, width)), int(rng.integers(0, height))
-        obstacles.add((row, col))
-    return "\n".join("".join("#" if (row, col) in obstacles else "." for col in range(width)) for row in range(height))
+    sides = (settings["width"], settings["height"])
+    return _engine.random_map(sides, settings["obstacle_density"], drawn_seed(settings["seed"]))
 
 
 def generate_and_save_maps(name_prefix: str, seed_range: Iterable[int]) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
-import numpy as np
-
-from pogema_rs.toolbox.generators.generator_utils import check_sides, maps_dict_to_yaml
+from pogema_rs import _engine
+from pogema_rs.toolbox.generators.generator_utils import maps_dict_to_yaml
 
 __all__ = [
     "WarehouseConfig",
@@ -41,19 +40,11 @@ class WarehouseConfig:
 def generate_warehouse(cfg: WarehouseConfig) -> str:
     """Returns the text of a warehouse, in which every free cell can be a start and a goal (`!`).
 
-    Errors: `AssertionError` for settings that leave no cell.
+    Errors: `AssertionError` for settings that leave no cell, `ValueError` for a negative one.
 
     Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse`
     """
-    period_rows, period_cols = cfg.wall_height + cfg.vertical_gap, cfg.wall_width + cfg.horizontal_gap
-    height = period_rows * cfg.walls_rows + cfg.vertical_gap
-    width = 2 * cfg.bottom_gap + period_cols * cfg.walls_in_row - cfg.horizontal_gap
-    check_sides(width, height)
-    shelves = np.zeros((height, width), dtype=bool)
-    for top in (cfg.vertical_gap + row * period_rows for row in range(cfg.walls_rows)):
-        for left in (cfg.bottom_gap + col * period_cols for col in range(cfg.walls_in_row)):
-            shelves[top : top + cfg.wall_height, left : left + cfg.wall_width] = True
-    return "\n".join("".join("#" if is_shelf else "!" for is_shelf in row) for row in shelves)
+    return _engine.warehouse(list(astuple(cfg))).replace(".", "!")
 
 
 def generate_wfi_positions(grid_str: str, bottom_gap: int, vertical_gap: int) -> tuple[_Cells, _Cells]:
@@ -61,26 +52,11 @@ def generate_wfi_positions(grid_str: str, bottom_gap: int, vertical_gap: int) ->
 
     With a `vertical_gap` of 2, goals are only below shelves, so that agents can pass.
 
-    Errors: `ValueError` for a `vertical_gap` of 1.
+    Errors: `ValueError` for a `vertical_gap` below 2.
 
     Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_wfi_positions`
     """
-    if vertical_gap == 1:
-        raise ValueError("`vertical_gap` is `1`, expected 2 or more: goals would block the way")
-    rows = grid_str.strip().split("\n")
-    height, width = len(rows), len(rows[0])
-    bays = [*range(bottom_gap - 1), *range(width - bottom_gap + 1, width)]
-    # Every third row stays free, so that agents can leave the bay.
-    lanes = [row for row in range(1, height - 1) if row % 3]
-    starts = [(row, col) for row in lanes for col in bays if rows[row][col] == "!"]
-    goals = []
-    for row in range(height):
-        above = rows[row - 1] if row > 0 else ""
-        below = rows[row + 1] if row < height - 1 and vertical_gap != 2 else ""
-        for col in range(width):
-            if rows[row][col] == "!" and "#" in (above[col : col + 1], below[col : col + 1]):
-                goals.append((row, col))
-    return starts, goals
+    return _engine.warehouse_cells(grid_str, bottom_gap, vertical_gap)
 
 
 def generate_wfi_warehouse(cfg: WarehouseConfig = WarehouseConfig()) -> str:
