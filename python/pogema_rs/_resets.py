@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, ClassVar, Optional
 
 from pogema_rs import grid_registry
+from pogema_rs.errors import StateError
 from pogema_rs.grid_config import GridConfig, engine_fields
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Engine
+    from pogema_rs.grid import Grid
 
 _PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
@@ -29,14 +32,30 @@ class Resettable:
     """
 
     grid_config: GridConfig
+    grid: Optional[Grid]
     _engine: Engine
     # The fields that follow from the config with which the environment was made.
     _fixed: dict[str, Any]
+    # The fields that POGEMA reads in every step. A new value would take effect in the middle of an episode there.
+    _LIVE: ClassVar[tuple[str, ...]] = (
+        *("collision_system", "obs_radius", "observation_type", "num_agents", "FREE", "OBSTACLE"),
+    )
+    _live = itemgetter(*_LIVE)
+
+    def _check_unchanged(self) -> None:
+        """Raises `StateError` if a field that POGEMA reads in every step changed since the last reset."""
+        fields = self.grid_config.__dict__
+        if not _differ(self._live(fields), self._live_values) or self.grid is None:
+            return
+        for name, value in zip(self._LIVE, self._live_values):
+            if _differ(fields[name], value):
+                raise StateError(f"`{name}` of the config changed from `{value}` to `{fields[name]}`; call `reset` first")
 
     def _remember_config(self) -> None:
         fields = self.grid_config.__dict__
         self._last_config = self.grid_config
         self._last_fields = {name: fields[name] for name in GridConfig.model_fields}
+        self._live_values = self._live(fields)
         self._last_places = {name: [*fields[name]] for name in _PLACES if fields[name] is not None}
 
     def _registered(self) -> Optional[str]:

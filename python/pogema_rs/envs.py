@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import Any, Literal, Optional, Union, overload
 
 import gymnasium
@@ -151,10 +152,12 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
         `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions become
         those that POGEMA leaves there: if `collision_system` is `soft`, 0 replaces each reverted move.
 
-        Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset.
+        Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset. `StateError`
+        if a field of the config changed since the reset that POGEMA reads in every step, such as `collision_system`.
 
         Rule: move/actions, end/terminated, end/truncated
         """
+        self._check_unchanged()
         if self._generators is None:
             result = self._engine.step(action, self._has_metrics)
         else:
@@ -223,6 +226,9 @@ class PogemaLifeLong(Pogema):
 
     _grid_class = GridLifeLong
     _step_gets_infos = False
+    # Later goals are drawn from the possible goals, and the throughput is a share of the length of an episode.
+    _LIVE = (*Pogema._LIVE, "possible_targets_xy", "max_episode_steps")
+    _live = itemgetter(*_LIVE)
 
     @property
     def random_generators(self) -> list[np.random.Generator]:

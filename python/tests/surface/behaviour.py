@@ -112,6 +112,42 @@ def metric_wrappers() -> Any:
     return seen
 
 
+CHANGES: dict[str, Any] = {
+    "on_target": ["finish", "nothing", "restart"],
+    "collision_system": ["soft", "priority", "block_both"],
+    "observation_type": ["POMAPF", "MAPF"],
+    "integration": ["gymnasium"],
+    **{name: [3] for name in ("seed", "obs_radius", "max_episode_steps", "FREE", "OBSTACLE")},
+    **{name: [7] for name in ("num_agents", "width", "height", "size")},
+    **{name: [[(0, 0), (1, 1), (2, 2), (3, 3), (4, 4)] * 2] for name in ("possible_agents_xy", "possible_targets_xy")},
+    **{"density": [0.0], "map": [[[0] * 5] * 5], "persistent": [True], "auto_reset": [False], "empty_outside": [False]},
+}
+"""New values of the fields of a config."""
+
+
+@scenario
+def changes_of_the_config() -> Any:
+    """Whether a change during an episode has an effect, or is refused, before the next reset; and the next episode."""
+    seen = []
+    for mode in MODES:
+        for name, values in CHANGES.items():
+            for value in values:
+                fields = {"on_target": mode, "num_agents": 10, "density": 0.0, "seed": 1, "size": 5}
+                unchanged, env = pogema_made(**fields), pogema_made(**fields)
+                generator = np.random.default_rng(2)
+                unchanged.reset(), env.reset()
+                setattr(env.unwrapped.grid_config, name, value)
+                is_noticed = False
+                for _ in range(12):
+                    actions = generator.integers(5, size=10).tolist()
+                    expected = described(unchanged.step([*actions]))
+                    is_noticed |= outcome(env.step, [*actions]) != expected
+                # Ours refuses other values of these two in any reset.
+                later = None if name in ("FREE", "OBSTACLE") else outcome(lambda env=env: list(played(env, 3)))
+                seen.append((mode, name, is_noticed, later))
+    return seen
+
+
 @scenario
 def own_metric() -> Any:
     """A subclass of `AbstractMetric` is called with the step, the agents on goals and the end."""
