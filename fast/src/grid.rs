@@ -122,6 +122,23 @@ impl Strips {
         }
     }
 
+    /// Reads the bits of a row from column `first` on as 0 and 1.
+    pub fn read_row(&self, row: usize, first: usize, out: &mut [u8]) {
+        let mut col = first;
+        let mut rest = out;
+        while !rest.is_empty() {
+            let (here, shift) = self.locate(row, col);
+            let number = rest.len().min(STRIDE - shift as usize);
+            let (now, later) = rest.split_at_mut(number);
+            let bits = self.words[here].load(Relaxed) >> shift;
+            for (bit, value) in now.iter_mut().enumerate() {
+                *value = (bits >> bit & 1) as u8;
+            }
+            col += number;
+            rest = later;
+        }
+    }
+
     /// Writes the obstacles of an instance with its border: first the outside, then the wall, then the map.
     ///
     /// Rule: border/ring, border/outside, border/noise

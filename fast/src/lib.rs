@@ -17,6 +17,7 @@
 //! | `observe` | observations |
 //! | `history` | the return to an earlier or saved state |
 //! | `masks` | action masks |
+//! | `buffers` | the buffers for observations and global states |
 //! | `batch` | many environments |
 //! | `simd` | conversion of windows to bits and of bits to values, without intrinsics or with AVX2 or AVX-512 |
 //!
@@ -41,6 +42,7 @@
 
 mod batch;
 mod bits;
+mod buffers;
 mod collide;
 mod goals;
 mod grid;
@@ -50,7 +52,8 @@ mod observe;
 mod simd;
 mod step;
 
-pub use batch::{Autoreset, Batch, Firsts, Instances, ObservationBuffers, Observations};
+pub use batch::{Autoreset, Batch, Firsts, Instances, suited_threads};
+pub use buffers::{ApartBuffers, GlobalBuffers, ObservationBuffers, Observations, Windows};
 pub use observe::words_per_agent;
 pub use simd::{SimdPath, Value};
 pub use step::Engine;

@@ -131,9 +131,15 @@ impl Engine {
         let num_values = num_agents * self.config.side() * self.config.side();
         Error::check_length("obstacles", num_values, obstacles.len())?;
         Error::check_length("agents", num_values, agents.len())?;
-        self.write_values(0..num_agents, Channels::Obstacles, obstacles, false);
-        self.write_values(0..num_agents, Channels::Agents, agents, false);
+        self.write_windows(obstacles, agents, false);
         Ok(())
+    }
+
+    /// Writes the windows of the `POMAPF` observation of all agents into parts of larger buffers.
+    pub(crate) fn write_windows<V: Value>(&self, obstacles: &mut [V], agents: &mut [V], beyond_cache: bool) {
+        let all = 0..self.config.num_agents;
+        self.write_values(all.clone(), Channels::Obstacles, obstacles, beyond_cache);
+        self.write_values(all, Channels::Agents, agents, beyond_cache);
     }
 
     /// Writes the map with its border.
@@ -144,9 +150,7 @@ impl Engine {
         let (height, width) = (self.height + border, self.width + border);
         Error::check_length("global obstacles", height * width, out.len())?;
         for (row, values) in out.chunks_mut(width).enumerate() {
-            for (col, value) in values.iter_mut().enumerate() {
-                *value = u8::from(self.obstacles.get(row, col));
-            }
+            self.obstacles.read_row(row, 0, values);
         }
         Ok(())
     }

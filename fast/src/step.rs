@@ -24,6 +24,7 @@ pub struct Engine {
     pub(crate) occupied: Strips,
     pub(crate) board: Board,
     pub(crate) streams: Vec<GoalStream>,
+    pub(crate) starts: Vec<Cell>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) goals: Vec<Cell>,
     pub(crate) active: Vec<bool>,
@@ -69,6 +70,7 @@ impl Engine {
             occupied: Strips::default(),
             board: Board::default(),
             streams: Vec::new(),
+            starts: Vec::new(),
             cells: Vec::new(),
             goals: Vec::new(),
             active: Vec::new(),
@@ -137,6 +139,7 @@ impl Engine {
             self.obstacles.num_bytes(),
             self.occupied.num_bytes(),
             self.board.num_bytes(),
+            num_bytes(&self.starts),
             num_bytes(&self.cells),
             num_bytes(&self.goals),
             num_bytes(&self.streams),
@@ -174,8 +177,10 @@ impl Engine {
         let num_agents = self.config.num_agents;
         self.obstacles.write_obstacles(instance, self.config.radius);
         self.board.write_obstacles(instance.map().obstacles());
-        self.cells.clear();
-        self.cells.extend_from_slice(instance.starts());
+        for list in [&mut self.starts, &mut self.cells] {
+            list.clear();
+            list.extend_from_slice(instance.starts());
+        }
         self.goals.clear();
         self.goals.extend(instance.goals().iter().map(GoalStream::first));
         self.active.clear();

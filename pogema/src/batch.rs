@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Error, Instance, MAX_THREADS, Map, Observation};
-use pogema_fast::{Batch, Instances};
+use pogema_core::{Error, Instance, Map};
+use pogema_fast::{Batch, Instances, suited_threads};
 use pogema_maps::{GridConfig, InstanceSource};
 
 use crate::seeds::Seed;
 
-/// Creates a batch of environments from a config, with one thread per core.
+/// Creates a batch of environments from a config, with as many threads as suit its size, at most one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
 /// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]).
@@ -18,8 +18,9 @@ use crate::seeds::Seed;
 pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, Error> {
     let source = EnvSource::new(vec![(config.clone(), None)], vec![0; num_envs])?;
     let source = source.with_seeds(vec![Seed::Shared(seed); num_envs])?;
-    let num_cores = std::thread::available_parallelism().map_or(1, usize::from);
-    Batch::new(config.rules(), num_envs, num_cores.min(MAX_THREADS), source)
+    let rules = config.rules();
+    let num_threads = suited_threads(num_envs, rules.num_agents, rules.num_observed() / rules.num_agents);
+    Batch::new(rules, num_envs, num_threads, source)
 }
 
 /// A config and the map that its `map_name` names.
@@ -76,6 +77,15 @@ impl EnvSource {
         &mut self.seeds
     }
 
+    /// Returns the numbers of rows and columns that hold the map of every environment.
+    pub fn largest_map(&self) -> (usize, usize) {
+        let sizes = self.configs.iter().map(|(config, registered)| match registered {
+            Some(map) if config.map_name.is_some() => (map.height(), map.width()),
+            _ => (config.height, config.width),
+        });
+        sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)))
+    }
+
     /// Returns the config of an environment.
     pub fn config(&self, env: usize) -> &GridConfig {
         &self.configs[self.of_env[env]].0
@@ -96,10 +106,6 @@ impl Instances for EnvSource {
 }
 
 fn check_playable(config: &GridConfig) -> Result<(), Error> {
-    if config.observation_type != Observation::Default {
-        let expected = "`default`, the only type that a batch supports";
-        return Err(Error::config("observation_type", config.observation_type, expected));
-    }
     if config.persistent {
         return Err(Error::config("persistent", true, "false, because a batch keeps no steps"));
     }
@@ -108,12 +114,13 @@ fn check_playable(config: &GridConfig) -> Result<(), Error> {
 
 /// Checks that a config has the same shapes and rules as that of the first environment.
 fn check_alike(env: usize, config: &GridConfig, first: &GridConfig) -> Result<(), Error> {
-    const SHARED: [&str; 7] = [
+    const SHARED: [&str; 8] = [
         "num_agents",
         "obs_radius",
         "collision_system",
         "on_target",
         "max_episode_steps",
+        "observation_type",
         "occupancy",
         "reward",
     ];

@@ -12,8 +12,9 @@ Modules with POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogem
 `pogema_rs.svg_animation.svg_objects`, and `pogema_rs.wrappers` with `pogema_rs.wrappers.metrics`,
 `pogema_rs.wrappers.multi_time_limit` and `pogema_rs.wrappers.persistence`.
 
-Additional modules: `pogema_rs.vec_env`, `pogema_rs.planners`, `pogema_rs.imitation`, `pogema_rs.semantics`,
-`pogema_rs.errors`, `pogema_rs.install`, `pogema_rs.svg_animation.filmed` and `pogema_rs.wrappers.forwarding`.
+Additional modules: `pogema_rs.vec_env`, `pogema_rs.packed`, `pogema_rs.planners`, `pogema_rs.imitation`,
+`pogema_rs.semantics`, `pogema_rs.errors`, `pogema_rs.install`, `pogema_rs.svg_animation.filmed` and
+`pogema_rs.wrappers.forwarding`.
 
 Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a command line (`python -m`):
 `pogema_rs.toolbox.evaluator`, `pogema_rs.toolbox.registry`, `pogema_rs.toolbox.create_env`,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from pogema_rs.grid_config import GridConfig
     from pogema_rs.install import install_as_pogema
     from pogema_rs.integrations.make_pogema import pogema_v0
+    from pogema_rs.packed import unpack
     from pogema_rs.semantics import Semantics
     from pogema_rs.svg_animation.animation_drawer import SvgAnimation
     from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
@@ -63,6 +65,7 @@ __all__ = [
     "__version__",
     "install_as_pogema",
     "pogema_v0",
+    "unpack",
 ]
 
 _HOMES = {
@@ -77,6 +80,7 @@ _HOMES = {
     "Wrapper": "wrappers.forwarding",
     "install_as_pogema": "install",
     "pogema_v0": "integrations.make_pogema",
+    "unpack": "packed",
 }
 # `import pogema` imports these modules too.
 _MODULES = (

@@ -1,7 +1,7 @@
 """The compiled part of the package; the other modules define the public names."""
 
 from collections.abc import Callable
-from typing import Any, Optional, final
+from typing import Any, Optional, Union, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ WORDS: dict[str, list[str]]
 __version__: str
 
 _Pairs = list[tuple[int, int]]
-_State = tuple[NDArray[Any], NDArray[np.bool_], Optional[NDArray[np.int8]]]
+_State = tuple[Union[NDArray[Any], dict[str, NDArray[Any]]], NDArray[np.bool_], Optional[NDArray[np.int8]]]
 
 @final
 class Engine:
@@ -106,7 +106,7 @@ class Batch:
         num_envs: int,
         autoreset: str,
         exact: bool,
-        num_threads: int,
+        threads: tuple[Optional[int], int],
     ) -> Batch: ...
     def reset(
         self,
@@ -124,10 +124,15 @@ class Batch:
         state: _State,
     ) -> list[int]: ...
     def ended(self, /, envs: list[int], state: _State) -> None: ...
+    def global_state(
+        self, /, arrays: dict[str, NDArray[Any]], active: NDArray[np.bool_], ended: Optional[list[int]]
+    ) -> None: ...
     def metrics(self, /, envs: list[int]) -> list[dict[str, float]]: ...
     def mask_actions(self, /, masks: NDArray[np.int8]) -> None: ...
     def episode_seeds(self, /) -> list[int]: ...
-    def sizes(self, /) -> tuple[int, int]: ...
+    def sizes(self, /) -> tuple[int, int, tuple[int, int]]: ...
+    def observation_type(self, /) -> str: ...
+    def num_threads(self, /) -> int: ...
     def close(self, /) -> None: ...
 
 @final

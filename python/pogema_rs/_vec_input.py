@@ -61,24 +61,6 @@ def _as_array(actions: Any) -> np.ndarray:
         raise ValueError(reason) from None
 
 
-def check_out(out: Any, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
-    """Returns a caller's buffer for observations after checking it.
-
-    Errors: TypeError for anything but an array of `dtype`, ValueError for a wrong shape, layout or write protection.
-    """
-    if not isinstance(out, np.ndarray):
-        raise TypeError(f"out is a {type(out).__name__}, expected a numpy array of {dtype} with shape {shape}")
-    if out.dtype != dtype:
-        raise TypeError(f"out has type {out.dtype}, expected {dtype}")
-    if out.shape != shape:
-        raise ValueError(f"out has shape {out.shape}, expected {shape}")
-    if not out.flags.c_contiguous or not out.flags.aligned:
-        raise ValueError("out is not contiguous in memory, expected a C-contiguous array")
-    if not out.flags.writeable:
-        raise ValueError("out is read-only, expected a writeable array")
-    return out
-
-
 def read_mask(options: Any, num_envs: int) -> Optional[list[bool]]:
     """Returns which environments to reset, or `None` for all."""
     if not options:

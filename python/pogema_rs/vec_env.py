@@ -2,58 +2,56 @@
 
 from __future__ import annotations
 
-import pickle
-import sys
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NoReturn, Optional, Union, cast
+from typing import TYPE_CHECKING, Any, Generic, NoReturn, Optional, Union, cast
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from pogema_rs import _engine, grid_registry
-from pogema_rs._vec_input import AutoresetMode, check_out, read_actions, read_autoreset, read_mask, read_seed
-from pogema_rs.grid_config import GridConfig, engine_fields
+from pogema_rs import _engine, _vec_spaces
+from pogema_rs._vec_configs import read_configs, read_threads
+from pogema_rs._vec_input import AutoresetMode, read_actions, read_autoreset, read_mask, read_seed
+from pogema_rs._vec_rewards import RewardFunction, changed_rewards, read_rewards
+from pogema_rs._vec_statistics import EpisodeStatistics
 from pogema_rs.semantics import Semantics
 
 __all__ = ["AutoresetMode", "VecEnv"]
 
 NUM_ACTIONS = 5
-_DTYPES: dict[str, np.dtype] = {"float32": np.dtype(np.float32), "uint8": np.dtype(np.uint8)}
+
+# The observations: an array, or a dictionary of arrays with the observation types `POMAPF` and `MAPF`.
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Observations = TypeVar("Observations", bound=_vec_spaces.Arrays, default=np.ndarray)
+else:
+    from typing import TypeVar
+
+    Observations = TypeVar("Observations")
 
 
-_Config = tuple[dict[str, Any], Optional[str]]
-
-
-def _engine_config(config: Any) -> _Config:
-    """Returns the fields that the engine reads, and the text of the map that the config names."""
-    if not isinstance(config, GridConfig):
-        config = GridConfig(**_fields(config))
-    if config.map_name is not None:
-        grid_registry.get_grid(config.map_name)  # an unknown name is an error, which a single environment ignores
-    return engine_fields(config), grid_registry.map_text(config.map_name)
-
-
-def _fields(config: Any) -> Mapping[str, Any]:
-    if isinstance(config, Mapping):
-        return config
-    dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
-    if dump is None:
-        kind = type(config).__name__
-        raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
-    return dump()
-
-
-class VecEnv(VectorEnv):
+class VecEnv(VectorEnv, Generic[Observations]):
     """A batch of `num_envs` environments with `agents` agents each, all stepped by one call.
 
     Every array has the axes `(num_envs, agents, ...)`: observations `(num_envs, agents, 3, side, side)`, rewards as
     float32, `terminated` and `truncated` as bool. An episode of an environment ends when all its agents terminated or
     all were truncated: `terminated.all(axis=1) | truncated.all(axis=1)`. Gymnasium's wrappers that count rewards or
     ends expect one number per environment; pass them this expression, or `rewards.sum(axis=1)`.
+
+    Observations: with `dtype="bits"`, uint32 of shape `(num_envs, agents, words)`, for `pogema_rs.unpack`. With the
+    config's `observation_type` `POMAPF` or `MAPF`, a dictionary of arrays: `obstacles` and `agents`
+    `(num_envs, agents, side, side)`, `xy` and `target_xy` `(num_envs, agents, 2)` as int64. `MAPF` adds
+    `global_obstacles` `(num_envs, rows, columns)` as uint8, one map per environment with its border, and `global_xy`
+    and `global_target_xy` `(num_envs, agents, 2)` as int64. Smaller maps are padded below and on the right with
+    obstacles. For type checkers, such an environment is a `VecEnv[dict[str, np.ndarray]]`.
+
+    Rewards: `rewards="own"` are POGEMA's. With `"shared"`, every agent gets the number of agents that are on their
+    goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is the
+    mean of the agents' own rewards. A function `(rewards, terminated, truncated, infos) -> rewards` gets and returns
+    arrays of shape `(num_envs, agents)`, float32.
 
     The next call of `reset` or `step` overwrites the array of observations. To keep it, copy it, pass `out=`, or set
     `double_buffer`, which preserves it until the call after the next. All other arrays are new with every call.
@@ -73,7 +71,10 @@ class VecEnv(VectorEnv):
 
     `infos` holds `is_active`, `(num_envs, agents)`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
     int8, 1 where no obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays
-    `(num_envs,)` that are NaN where `_metrics` is False.
+    `(num_envs,)` that are NaN where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode`
+    in the form of Gymnasium's `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of
+    the agents' returns, the length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the
+    global state at the end of each of these episodes, as `final_obs` holds the observations.
 
     Calls from two threads at the same time, and calls in a forked child, raise a RuntimeError. A config is read once;
     later changes to it have no effect. Warnings about single instances are not shown.
@@ -90,12 +91,15 @@ class VecEnv(VectorEnv):
         semantics: Union[str, Semantics] = Semantics.RELEASED,
         double_buffer: bool = False,
         masks: bool = False,
+        rewards: Union[str, RewardFunction] = "own",
+        statistics: bool = False,
     ) -> None:
         """Makes one environment for each config of a list, or `num_envs` of a single config.
 
         A config is a GridConfig or a dict. The configs of a list may have different maps, but must agree on agents,
         radius and rules. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
-        number of threads [default: one per core, at most one per environment].
+        largest number of threads [default: as many as suit the work of a step, at most one per core and environment].
+        A step uses fewer while measured times show that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.
@@ -105,26 +109,33 @@ class VecEnv(VectorEnv):
             expected = " or ".join(repr(known.value) for known in Semantics)
             raise ValueError(f"semantics is {semantics!r}, expected {expected}")
         self.semantics = Semantics(semantics)
-        self._dtype = _read_dtype(dtype)
+        dtype = _vec_spaces.read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
-        configs, of_env, self.num_envs = _read_configs(grid_config, num_envs)
-        self.num_threads = _read_threads(num_threads, self.num_envs)
+        reward, self._change_rewards = read_rewards(rewards)
+        configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
         self._batch = _engine.Batch(
             configs,
             of_env,
             self.num_envs,
             self.autoreset_mode.value,
             self.semantics.occupancy_is_exact,
-            self.num_threads,
+            (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
         )
-        self.num_agents, radius = self._batch.sizes()
-        side = 2 * radius + 1
+        self.num_threads = self._batch.num_threads()
+        self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
-        self.single_observation_space: spaces.Box = spaces.Box(0, 1, (self.num_agents, 3, side, side), self._dtype.type)
+        single_space = _vec_spaces.observation_space(
+            self._batch.observation_type(), dtype, self.num_agents, radius, size
+        )
+        # A Dict with `POMAPF` and `MAPF`; type checkers see the Box of all other environments.
+        self.single_observation_space = cast(spaces.Box, single_space)
+        self.single_state_space = _vec_spaces.state_space(self.num_agents, size)
         self.single_action_space = spaces.MultiDiscrete([NUM_ACTIONS] * self.num_agents)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._has_masks = bool(masks)
-        self._buffers = [self._new_observations(self.num_envs) for _ in range(2 if double_buffer else 1)]
+        self._statistics = EpisodeStatistics(self.num_envs, self.autoreset_mode) if statistics else None
+        num_buffers = 2 if double_buffer else 1
+        self._buffers = [_vec_spaces.zeros(single_space, self.num_envs) for _ in range(num_buffers)]
         self._next_buffer = 0
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
@@ -133,8 +144,16 @@ class VecEnv(VectorEnv):
     # Gymnasium defines an attribute.
     @cached_property
     def observation_space(self) -> spaces.Box:  # type: ignore[override]
-        """The space of all observations; made at first access, because it takes more memory than the observations."""
+        """The space of all observations, a Dict with `POMAPF` and `MAPF`.
+
+        It is made at first access, because it takes more memory than the observations.
+        """
         return cast(spaces.Box, batch_space(self.single_observation_space, self.num_envs))
+
+    @cached_property
+    def state_space(self) -> spaces.Dict:
+        """The space of `state()`; made at first access."""
+        return cast(spaces.Dict, batch_space(self.single_state_space, self.num_envs))
 
     @property
     def episode_seeds(self) -> np.ndarray:
@@ -146,8 +165,8 @@ class VecEnv(VectorEnv):
         *,
         seed: Union[int, Sequence[int], None] = None,
         options: Optional[dict[str, Any]] = None,
-        out: Optional[np.ndarray] = None,
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+        out: Optional[Observations] = None,
+    ) -> tuple[Observations, dict[str, Any]]:
         """Begins the first episodes of a seed or of one seed per environment; without a seed, the next episodes.
 
         `options={"reset_mask": mask}` skips the environments where the mask is False; the returned observations still
@@ -160,7 +179,9 @@ class VecEnv(VectorEnv):
         one, each = read_seed(seed, self.num_envs)
         observations = self._observations(out)
         active, masks = self._new_state(self.num_envs)
-        self._batch.reset((observations, active, masks), chosen, one, each)
+        self._batch.reset((_vec_spaces.for_engine(observations), active, masks), chosen, one, each)
+        if self._statistics is not None:
+            self._statistics.begin(chosen)
         if seed is not None:
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
@@ -168,8 +189,8 @@ class VecEnv(VectorEnv):
         return observations, self._state_infos(active, masks, self._all)
 
     def step(
-        self, actions: Any, *, out: Optional[np.ndarray] = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        self, actions: Any, *, out: Optional[Observations] = None
+    ) -> tuple[Observations, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Plays one step and returns observations, rewards, terminated, truncated and infos.
 
         `actions` are integers from 0 to 4 of shape `(num_envs, agents)`: an array, nested lists, or any object that
@@ -177,7 +198,7 @@ class VecEnv(VectorEnv):
         as indices from the end of a list, and wrong actions of inactive agents; this class rejects both.
 
         Errors: ValueError or TypeError for wrong actions, before anything is played; `InstanceError` if an environment
-        has no next episode.
+        has no next episode. TypeError or ValueError for wrong results of the function `rewards`, after the step.
         """
         numbers = read_actions(actions, (self.num_envs, self.num_agents))
         observations = self._observations(out)
@@ -185,11 +206,18 @@ class VecEnv(VectorEnv):
         rewards = np.empty(shape, dtype=np.float32)
         terminated, truncated = np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)
         active, masks = self._new_state(self.num_envs)
-        ended = self._batch.step(numbers, (rewards, terminated, truncated), (observations, active, masks))
+        state = (_vec_spaces.for_engine(observations), active, masks)
+        ended = self._batch.step(numbers, (rewards, terminated, truncated), state)
         self._swap_buffers(out)
         infos = self._state_infos(active, masks, self._all)
         if ended:
             self._add_ends(infos, ended)
+        if self._change_rewards is not None:
+            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
+        if self._statistics is not None:
+            self._statistics.count(rewards)
+            if ended:
+                infos["episode"], infos["_episode"] = self._statistics.end(ended)
         return observations, rewards, terminated, truncated, infos
 
     def action_masks(self) -> np.ndarray:
@@ -205,6 +233,19 @@ class VecEnv(VectorEnv):
         masks = np.empty((self.num_envs, self.num_agents, NUM_ACTIONS), dtype=np.int8)
         self._batch.mask_actions(masks)
         return masks
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Returns the global state of all environments, for example for a centralised critic.
+
+        `obstacles` `(num_envs, rows, columns)`, uint8, are the maps without a border, 1 for an obstacle. The size is
+        that of the largest map; smaller maps are padded below and on the right with obstacles. `positions` and `goals`
+        `(num_envs, agents, 2)`, int64, are the cells of the agents and their current goals, row first, counted from the
+        corner of the map. `active` `(num_envs, agents)`, bool, is False for agents that have finished; they stay where
+        they finished. The arrays are new with every call.
+
+        Errors: `NotResetError` before the first reset.
+        """
+        return self._global_state(self.num_envs, None)
 
     def sample_actions(self) -> np.ndarray:
         """Returns random actions from `np_random`, which `reset(seed=...)` seeds.
@@ -222,19 +263,22 @@ class VecEnv(VectorEnv):
     def __reduce_ex__(self, protocol: Any) -> NoReturn:
         raise TypeError("a VecEnv cannot be pickled or copied: make a new one of the same config, in each process")
 
-    def _new_observations(self, num_envs: int) -> np.ndarray:
-        return np.zeros((num_envs, *self.single_observation_space.shape), dtype=self._dtype)
+    def _global_state(self, num_envs: int, ended: Optional[list[int]]) -> dict[str, np.ndarray]:
+        """Returns the current states of all environments, or the final states of some."""
+        arrays: dict[str, np.ndarray] = _vec_spaces.zeros(self.single_state_space, num_envs)
+        self._batch.global_state(arrays, arrays["active"], ended)
+        return arrays
 
     def _new_state(self, num_envs: int) -> tuple[np.ndarray, Optional[np.ndarray]]:
         shape = (num_envs, self.num_agents)
         masks = np.empty((*shape, NUM_ACTIONS), dtype=np.int8) if self._has_masks else None
         return np.empty(shape, dtype=np.bool_), masks
 
-    def _observations(self, out: Optional[np.ndarray]) -> np.ndarray:
+    def _observations(self, out: Optional[Observations]) -> Any:
         buffer = self._buffers[self._next_buffer]
-        return buffer if out is None else check_out(out, buffer.shape, self._dtype)
+        return buffer if out is None else _vec_spaces.check_out(out, buffer)
 
-    def _swap_buffers(self, out: Optional[np.ndarray]) -> None:
+    def _swap_buffers(self, out: Optional[Observations]) -> None:
         if out is None:
             self._next_buffer = (self._next_buffer + 1) % len(self._buffers)
 
@@ -257,61 +301,17 @@ class VecEnv(VectorEnv):
         infos.update(metrics=metrics, _metrics=present)
         if self.autoreset_mode != AutoresetMode.SAME_STEP:
             return
-        observations = self._new_observations(len(ended))
+        observations = _vec_spaces.zeros(self.single_observation_space, len(ended))
         active, masks = self._new_state(len(ended))
-        self._batch.ended(ended, (observations, active, masks))
-        final = np.full(self.num_envs, None, dtype=object)
-        for env, observation in zip(ended, observations):
-            final[env] = observation
+        self._batch.ended(ended, (_vec_spaces.for_engine(observations), active, masks))
+        final = _vec_spaces.per_env(observations, ended, self.num_envs)
+        state = _vec_spaces.per_env(self._global_state(len(ended), ended), ended, self.num_envs)
         every_active, every_masks = self._spread(ended, active), None if masks is None else self._spread(ended, masks)
         info = {**self._state_infos(every_active, every_masks, present), "metrics": metrics, "_metrics": present}
         infos.update(final_obs=final, _final_obs=present, final_info=info, _final_info=present)
+        infos.update(final_state=state, _final_state=present)
 
     def _spread(self, envs: list[int], values: np.ndarray) -> np.ndarray:
         every = np.zeros((self.num_envs, *values.shape[1:]), dtype=values.dtype)
         every[envs] = values
         return every
-
-
-def _read_dtype(dtype: Any) -> np.dtype:
-    for name, known in _DTYPES.items():
-        if dtype == name or dtype == known:
-            return known
-    raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'uint8'")
-
-
-def _read_configs(grid_config: Any, num_envs: Optional[int]) -> tuple[list[_Config], Optional[list[int]], int]:
-    """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
-    if not isinstance(grid_config, (list, tuple)):
-        num_envs = 1 if num_envs is None else num_envs
-        _check_whole("num_envs", num_envs)
-        return [_engine_config(grid_config)], None, min(int(num_envs), sys.maxsize)
-    if num_envs not in (None, len(grid_config)):
-        raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-    configs = [_engine_config(config) for config in grid_config]
-    if not configs:
-        raise ValueError("num_envs is 0, expected at least 1")
-    # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
-    keys = [pickle.dumps(config) for config in configs]
-    places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
-    first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}
-    return [first[place] for place in range(len(places))], [places[key] for key in keys], len(configs)
-
-
-def _read_threads(num_threads: Optional[int], num_envs: int) -> int:
-    if num_threads is None:
-        return min(num_envs, _engine.num_cores(), _engine.MAX_THREADS)
-    _check_whole("num_threads", num_threads)
-    if num_threads > _engine.MAX_THREADS:
-        raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")
-    if num_threads > _engine.num_cores():
-        text = f"num_threads is {num_threads}, the machine has {_engine.num_cores()} cores"
-        warnings.warn(text, UserWarning, stacklevel=3)
-    return int(num_threads)
-
-
-def _check_whole(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name} is {value!r}, expected a whole number")
-    if value < 1:
-        raise ValueError(f"{name} is {value}, expected at least 1")

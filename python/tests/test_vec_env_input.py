@@ -153,7 +153,7 @@ BAD_VECTORS = [
     ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
     ({"num_threads": 1025}, ValueError, "num_threads is 1025, expected 1 to 1024"),
     ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
-    ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32' or 'uint8'"),
+    ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32', 'uint8' or 'bits'"),
     ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),
     ({"semantics": "3"}, ValueError, "semantics is '3', expected '1.4.0' or '2.0'"),
     ({"grid_config": 7}, TypeError, "grid_config holds a int, expected a GridConfig or a dict"),
@@ -162,7 +162,17 @@ BAD_VECTORS = [
     ({"grid_config": [CONFIG, {**CONFIG, "num_agents": 4}]}, ValueError, "`num_agents` is `4`, expected 5, because"),
     ({"grid_config": [CONFIG, {**CONFIG, "obs_radius": 3}]}, ValueError, "`obs_radius` is `3`, expected 2"),
     ({"grid_config": [CONFIG, {**CONFIG, "on_target": "nothing"}]}, ValueError, "environment 1 must share it"),
-    ({"grid_config": {**CONFIG, "observation_type": "MAPF"}}, ValueError, "expected `default`"),
+    (
+        {"grid_config": [CONFIG, {**CONFIG, "observation_type": "MAPF"}]},
+        ValueError,
+        "`observation_type` is `\"MAPF\"`, expected \"default\", because environment 1 must share it",
+    ),
+    (
+        {"grid_config": {**CONFIG, "observation_type": "MAPF"}, "dtype": "bits"},
+        ValueError,
+        "dtype is 'bits', expected 'float32' or 'uint8' with observation_type 'MAPF'",
+    ),
+    ({"rewards": "team"}, ValueError, "rewards is 'team', expected 'own', 'shared' or a function"),
     ({"grid_config": {**CONFIG, "persistent": True}}, ValueError, "expected false"),
     ({"grid_config": {**CONFIG, "obs_radius": 0}}, ValueError, "`obs_radius` is `0`, expected"),
 ]

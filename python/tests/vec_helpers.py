@@ -98,7 +98,7 @@ def check_ends(infos, shown, mode):
     ended = ["metrics" in one for one in shown]
     has_final = any(ended) and mode == AutoresetMode.SAME_STEP
     names = {"is_active", "action_masks"} | ({"metrics"} if any(ended) else set())
-    names |= {"final_obs", "final_info"} if has_final else set()
+    names |= {"final_obs", "final_info", "final_state"} if has_final else set()
     assert set(infos) == names | {f"_{name}" for name in names}
     if not any(ended):
         return

@@ -114,18 +114,12 @@ impl Work {
         failure?;
         let (bytes, actions) = (engine.num_bytes(), self.actions(1));
         let (mut ends, mut index) = (Ends::new(self.num_agents), 0);
-        let agents = || 0..self.num_agents;
         let act = |is_step: bool, observations: Observations<'_>| {
             if is_step {
                 index += 1;
                 engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())?;
             }
-            match observations {
-                Observations::None => Ok(()),
-                Observations::F32(floats) => engine.observe_agents(agents(), floats),
-                Observations::U8(bytes) => engine.observe_agents(agents(), bytes),
-                Observations::Bits(words) => engine.observe_bits(agents(), words),
-            }
+            engine.observe_into(observations)
         };
         Ok(Speed { reset, bytes, ..self.rates(budget, 1, pool.as_deref(), act)? })
     }

@@ -2,6 +2,7 @@
 
 mod jobs;
 mod lane;
+mod pace;
 mod prepare;
 mod team;
 
@@ -9,15 +10,17 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
+use crate::buffers::{ObservationBuffers, Observations};
 use crate::{Engine, SimdPath};
 
 use jobs::Jobs;
 use lane::Lane;
+use pace::Pace;
 use prepare::Preparer;
 use team::Team;
 
-pub use jobs::{ObservationBuffers, Observations};
 pub use prepare::Instances;
+pub use team::suited_threads;
 
 /// The time at which a lane begins its next episode after the end of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,12 +42,14 @@ pub enum Autoreset {
 /// lane then continues according to [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next
 /// episode ends.
 ///
-/// Results do not depend on the number of threads.
+/// Results do not depend on the number of threads. A step uses only the calling thread while measured times show that
+/// further threads do not make it faster.
 pub struct Batch {
     config: Config,
     autoreset: Autoreset,
     lanes: Vec<Lane>,
     team: Team,
+    pace: Pace,
     preparer: Preparer,
     is_started: bool,
 }
@@ -73,7 +78,8 @@ impl Batch {
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;
         let team = Team::new(num_threads)?;
         let preparer = Preparer::new(Box::new(source), num_lanes)?;
-        Ok(Self { config, autoreset: Autoreset::default(), lanes, team, preparer, is_started: false })
+        let (autoreset, pace) = (Autoreset::default(), Pace::default());
+        Ok(Self { config, autoreset, lanes, team, pace, preparer, is_started: false })
     }
 
     /// Sets the autoreset mode. Call this before the first reset.
@@ -86,6 +92,11 @@ impl Batch {
     /// Returns the rules and sizes of every lane.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// Returns the largest number of threads that play, the calling thread included.
+    pub fn num_threads(&self) -> usize {
+        self.team.num_threads()
     }
 
     /// Returns the number of lanes.
@@ -241,10 +252,12 @@ impl Batch {
         let beyond_cache = buffers.observations.is_beyond_cache();
         let steps = Some((actions, out));
         let jobs = Jobs { lanes: &mut self.lanes, steps, buffers, beyond_cache };
-        jobs.run(&self.team, &|lane, actions, out| lane.step(actions, out, autoreset, preparer))
+        jobs.run(&self.team, &mut self.pace, &|lane, actions, out| {
+            lane.step(actions, out, autoreset, preparer)
+        })
     }
 
-    /// Fills the buffers with the observations and action masks of every lane.
+    /// Fills the buffers with the observations, or global states, and action masks of every lane.
     ///
     /// # Errors
     /// Before the first reset, or for a buffer of the wrong length.
@@ -256,10 +269,10 @@ impl Batch {
         buffers.check(self.lanes.len(), &self.config)?;
         let beyond_cache = buffers.observations.is_beyond_cache();
         let jobs = Jobs { lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
-        jobs.run(&self.team, &|_, _, _| Ok(()))
+        jobs.run(&self.team, &mut self.pace, &|_, _, _| Ok(()))
     }
 
-    /// Writes the terminal observations of the last ended episodes of some lanes, in the given order.
+    /// Writes the terminal observations or global states of the last ended episodes of some lanes, in the given order.
     ///
     /// # Errors
     /// For a lane that does not exist or has no ended episode, or for a buffer of the wrong length.
@@ -269,21 +282,14 @@ impl Batch {
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
         observations.check(lanes.len(), &self.config)?;
         let beyond_cache = observations.is_beyond_cache();
-        let per_lane = observations.per_lane(&self.config);
-        match observations {
-            Observations::None => Ok(()),
-            Observations::F32(out) => self.in_parts(per_lane, out, |index, out| {
-                engines[index].observe_all(out, beyond_cache);
-                Ok(())
-            }),
-            Observations::U8(out) => self.in_parts(per_lane, out, |index, out| {
-                engines[index].observe_all(out, beyond_cache);
-                Ok(())
-            }),
-            Observations::Bits(out) => self.in_parts(per_lane, out, |index, out| {
-                engines[index].observe_bits(0..self.config.num_agents, out)
-            }),
-        }
+        let mut rest = observations;
+        let parts = engines.into_iter().map(|engine| {
+            let (first, others) = std::mem::replace(&mut rest, Observations::None).split_at(1, &self.config);
+            rest = others;
+            (engine, first)
+        });
+        let parts = parts.collect();
+        self.team.share(parts, |(engine, part)| part.write(engine, beyond_cache)).into_iter().collect()
     }
 
     /// Returns the environment of a lane.
@@ -336,17 +342,6 @@ impl Batch {
     fn check_lane(&self, lane: usize) -> Result<&Lane, Error> {
         let expected = || format!("below {}, the number of lanes", self.lanes.len());
         self.lanes.get(lane).ok_or_else(|| Error::config("lane", lane, expected()))
-    }
-
-    /// Writes a buffer in parts, on the threads of the team.
-    fn in_parts<T: Send>(
-        &self,
-        per_part: usize,
-        out: &mut [T],
-        write: impl Fn(usize, &mut [T]) -> Result<(), Error> + Sync,
-    ) -> Result<(), Error> {
-        let parts = out.chunks_mut(per_part).enumerate().collect();
-        self.team.share(parts, |(part, out)| write(part, out)).into_iter().collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::hint::spin_loop;
 use std::sync::atomic::{AtomicUsize, Ordering::Acquire, Ordering::Release};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use pogema_core::Error;
+use pogema_core::{Error, MAX_THREADS};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Number of spins before the caller sleeps while it waits for the helpers: tens of microseconds.
@@ -19,6 +19,23 @@ const FINAL_SPINS: usize = 5;
 #[derive(Debug)]
 pub struct Team {
     helpers: Option<ThreadPool>,
+}
+
+/// Nanoseconds of a step per agent, without observations.
+const AGENT_NANOS: usize = 16;
+/// Bytes of observations that are written in a nanosecond.
+const BYTES_PER_NANO: usize = 32;
+/// Nanoseconds of a step that occupy a thread long enough to repay waking it.
+const THREAD_NANOS: usize = 20_000;
+
+/// Returns a number of threads that suits the steps of a batch, at most one per core and lane.
+///
+/// `bytes_per_agent` is the size of an agent's observation.
+pub fn suited_threads(num_lanes: usize, num_agents: usize, bytes_per_agent: usize) -> usize {
+    let num_cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let per_agent = AGENT_NANOS + bytes_per_agent / BYTES_PER_NANO;
+    let nanos = num_lanes.saturating_mul(num_agents).saturating_mul(per_agent);
+    (nanos / THREAD_NANOS).clamp(1, num_cores.min(num_lanes).clamp(1, MAX_THREADS))
 }
 
 impl Team {
@@ -91,7 +108,19 @@ mod tests {
     use std::sync::Barrier;
     use std::thread;
 
-    use super::Team;
+    use super::{Team, suited_threads};
+
+    #[test]
+    fn small_batches_get_one_thread() {
+        assert_eq!(suited_threads(32, 8, 1452), 1);
+        assert_eq!(suited_threads(1, 10_000, 1452), 1);
+        assert!(suited_threads(64, 64, 1452) <= suited_threads(1000, 64, 1452));
+        let num_cores = thread::available_parallelism().map_or(1, usize::from);
+        assert_eq!(
+            suited_threads(usize::MAX, usize::MAX, usize::MAX),
+            num_cores.min(pogema_core::MAX_THREADS)
+        );
+    }
 
     #[test]
     fn results_are_in_order_and_each_part_is_done_once() {

@@ -52,8 +52,10 @@ class PogemaPuffer(PufferEnv):
             dtype=dtype,
             semantics=semantics,
         )
-        _, *shape = self.envs.single_observation_space.shape
-        self.single_observation_space = spaces.Box(0, 1, tuple(shape), self.envs.single_observation_space.dtype.type)
+        space = self.envs.single_observation_space
+        if not isinstance(space, spaces.Box):
+            raise ValueError("observation_type gives dictionaries, expected 'default'")
+        self.single_observation_space = spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)
         self.single_action_space = spaces.Discrete(NUM_ACTIONS)
         self.num_agents = self.envs.num_envs * self.envs.num_agents
         super().__init__(buf)

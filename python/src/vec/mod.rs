@@ -1,30 +1,34 @@
 //! The batch of environments behind `VecEnv`.
 
+mod buffers;
+mod inner;
+
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
-use numpy::{
-    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3,
-    PyReadwriteArrayDyn,
-};
-use pogema::{EnvSource, Seed};
-use pogema_core::{Action, Config, Error, Occupancy, StepOut};
-use pogema_fast::{Autoreset, Firsts, ObservationBuffers, Observations};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError};
+use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
+use pogema::Seed;
+use pogema_core::{Error, StepOut};
+use pogema_fast::{ObservationBuffers, Observations};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::fields::Fields;
 use crate::guard::guarded;
-use crate::{config, errors, interrupt, memory};
+use crate::{errors, interrupt};
+
+use buffers::{Buffer, Global, masks_mut, write_active, write_ended_masks};
+use inner::{Inner, read_autoreset};
 
 /// Output arrays of a step: rewards, terminated, truncated.
 ///
 /// Shape: `(envs, agents)` each
 type Ends<'py> = (PyReadwriteArray2<'py, f32>, PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
-/// Output arrays of a state: observations, flags of active agents, and optional action masks.
+/// Output arrays of a state: observations (an array, or a dictionary of arrays), flags of active agents, and optional
+/// action masks.
 ///
-/// Shape: `(envs, agents, 3, side, side)`, `(envs, agents)`, `(envs, agents, 5)`
+/// Shape: `(envs, agents, ...)`, `(envs, agents)`, `(envs, agents, 5)`
 type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyReadwriteArray3<'py, i8>>);
 
 /// A batch of environments that writes into buffers of the caller.
@@ -39,26 +43,14 @@ pub struct Batch {
     process: u32,
 }
 
-struct Inner {
-    batch: pogema_fast::Batch,
-    source: EnvSource,
-    actions: Vec<Action>,
-}
-
-/// The next episodes of some environments, before they begin.
-struct Next {
-    chosen: Vec<bool>,
-    /// The source with new seeds, if there are any, and its first instances.
-    seeded: Option<(EnvSource, Firsts)>,
-}
-
 guarded! {
 #[pymethods]
 impl Batch {
     /// Makes environments from configs.
     ///
     /// Each config comes with the text of the map that its `map_name` names. `of_env` holds the index of each
-    /// environment's config; without it, all have the first.
+    /// environment's config; without it, all have the first. `threads` are the number of threads and the bits of an
+    /// observed cell, which determine the default number.
     #[new]
     fn new(
         py: Python<'_>,
@@ -67,10 +59,10 @@ impl Batch {
         num_envs: usize,
         autoreset: &str,
         exact: bool,
-        num_threads: usize,
+        threads: (Option<usize>, usize),
     ) -> PyResult<Self> {
         let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
-        let make = move || Inner::new(&configs, of_env, num_envs, exact, num_threads);
+        let make = move || Inner::new(&configs, of_env, num_envs, exact, threads);
         let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
         Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process: std::process::id() })
@@ -95,9 +87,9 @@ impl Batch {
         let reset = fetched.and_then(|next| py.detach(|| inner.begin(next)));
         reset.map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
-        let mut buffer = Buffer::new(&observations)?;
+        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
         let view =
-            ObservationBuffers { observations: buffer.observations_mut()?, masks: masks_mut(&mut masks)? };
+            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
         let batch = &mut inner.batch;
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
         write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
@@ -124,9 +116,9 @@ impl Batch {
         })?;
         let (mut rewards, mut terminated, mut truncated) = ends;
         let (observations, active, mut masks) = state;
-        let mut buffer = Buffer::new(&observations)?;
+        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
         let view =
-            ObservationBuffers { observations: buffer.observations_mut()?, masks: masks_mut(&mut masks)? };
+            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
         if inner.ends_take_long() {
@@ -147,13 +139,33 @@ impl Batch {
         let mut guard = self.lock()?;
         let inner = Self::open(&mut guard)?;
         let (observations, active, mut masks) = state;
-        let mut buffer = Buffer::new(&observations)?;
-        let (batch, observed, masks) = (&inner.batch, buffer.observations_mut()?, masks_mut(&mut masks)?);
+        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
+        let (batch, observed, masks) = (&inner.batch, buffer.observations_mut(radius)?, masks_mut(&mut masks)?);
         let written = py.detach(|| {
             batch.observe_ended(&envs, observed)?;
             masks.map_or(Ok(()), |masks| write_ended_masks(batch, &envs, masks))
         });
         let written = written.and_then(|()| write_active(batch, Some(&envs), active));
+        written.map_err(|error| errors::batch(py, &error))
+    }
+
+    /// Writes the global states: now of all environments, or at the ends of the last episodes of some.
+    fn global_state(
+        &self,
+        py: Python<'_>,
+        arrays: Bound<'_, PyDict>,
+        active: PyReadwriteArray2<'_, bool>,
+        ended: Option<Vec<usize>>,
+    ) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let batch = &mut Self::open(&mut guard)?.batch;
+        let mut global = Global::new(&arrays, ["obstacles", "positions", "goals"])?;
+        let buffers = Observations::Global(global.buffers_mut(0)?);
+        let written = py.detach(|| match &ended {
+            Some(envs) => batch.observe_ended(envs, buffers),
+            None => batch.observe(buffers),
+        });
+        let written = written.and_then(|()| write_active(batch, ended.as_deref(), active));
         written.map_err(|error| errors::batch(py, &error))
     }
 
@@ -193,11 +205,24 @@ impl Batch {
         inner.source.seeds().iter().enumerate().map(seed).collect()
     }
 
-    /// Returns the number of agents of each environment, and their radius.
-    fn sizes(&self) -> PyResult<(usize, usize)> {
+    /// Returns the number of agents of each environment, their radius, and the size that holds every map.
+    fn sizes(&self) -> PyResult<(usize, usize, (usize, usize))> {
         let mut guard = self.lock()?;
-        let config = Self::open(&mut guard)?.batch.config();
-        Ok((config.num_agents, config.radius))
+        let inner = Self::open(&mut guard)?;
+        let config = inner.batch.config();
+        Ok((config.num_agents, config.radius, inner.source.largest_map()))
+    }
+
+    /// Returns the type of observations that the configs request.
+    fn observation_type(&self) -> PyResult<String> {
+        let mut guard = self.lock()?;
+        Ok(Self::open(&mut guard)?.batch.config().observation.to_string())
+    }
+
+    /// Returns the largest number of threads that play.
+    fn num_threads(&self) -> PyResult<usize> {
+        let mut guard = self.lock()?;
+        Ok(Self::open(&mut guard)?.batch.num_threads())
     }
 
     /// Frees the environments and their threads; does nothing in a forked child, since the parent owns both.
@@ -251,169 +276,10 @@ impl Drop for Batch {
     }
 }
 
-impl Inner {
-    fn new(
-        configs: &[(Fields, Option<String>)],
-        of_env: Option<Vec<usize>>,
-        num_envs: usize,
-        exact: bool,
-        num_threads: usize,
-    ) -> Result<Self, Error> {
-        let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
-        let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        // A batch of several configs holds a list of them, and is therefore small: the largest map counts for all.
-        let largest = configs.iter().max_by_key(|(config, _)| config.height.saturating_mul(config.width));
-        let bytes = largest.and_then(|(config, _)| memory::of_environments(config, num_envs));
-        memory::check("the batch", bytes)?;
-        let source = EnvSource::new(configs, of_env.unwrap_or_else(|| vec![0; num_envs]))?;
-        let rules = source.config(0).rules();
-        let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
-        let rules = Config { occupancy, ..rules };
-        let batch = pogema_fast::Batch::new(rules, num_envs, num_threads, source.clone())?;
-        Ok(Self { batch, source, actions: Vec::with_capacity(num_envs * rules.num_agents) })
-    }
-
-    /// Fetches the instances of a reset, and changes no episode.
-    fn fetch(
-        &mut self,
-        chosen: Option<Vec<bool>>,
-        seed: Option<u64>,
-        seeds: Option<Vec<u64>>,
-        stop: &AtomicBool,
-    ) -> Result<Next, Error> {
-        let num_envs = self.batch.num_lanes();
-        let chosen = chosen.unwrap_or_else(|| vec![true; num_envs]);
-        Error::check_length("chosen environments", num_envs, chosen.len())?;
-        let given: Vec<Seed> = match (seed, seeds) {
-            (Some(seed), _) => vec![Seed::Shared(seed); num_envs],
-            (None, Some(seeds)) => seeds.into_iter().map(Seed::Own).collect(),
-            (None, None) => {
-                self.batch.fetch(&chosen, stop)?;
-                return Ok(Next { chosen, seeded: None });
-            }
-        };
-        Error::check_length("seeds", num_envs, given.len())?;
-        let mut source = self.source.clone();
-        for ((seed, given), chosen) in source.seeds_mut().iter_mut().zip(given).zip(&chosen) {
-            *seed = if *chosen { given } else { *seed };
-        }
-        let firsts = self.batch.fetch_with(source.clone(), &chosen, stop)?;
-        Ok(Next { chosen, seeded: Some((source, firsts)) })
-    }
-
-    fn begin(&mut self, next: Next) -> Result<(), Error> {
-        let Some((source, firsts)) = next.seeded else { return self.batch.reset_lanes(&next.chosen) };
-        self.batch.begin_with(firsts)?;
-        self.source = source;
-        Ok(())
-    }
-
-    /// Returns whether the next step ends episodes whose next instances may take long.
-    fn ends_take_long(&self) -> bool {
-        let config = self.source.config(0);
-        let num_cells = config.height.saturating_mul(config.width);
-        let num_ends = || self.batch.num_truncated();
-        num_cells.saturating_mul(self.batch.num_lanes()) >= interrupt::LONG
-            && num_ends().saturating_mul(num_cells) >= interrupt::LONG
-    }
-
-    /// Stores actions, or returns the index and the number of the first invalid one.
-    fn read_actions(&mut self, numbers: &[i64]) -> Result<(), (usize, i64)> {
-        let is_action = |&number: &i64| (number as u64) < Action::ALL.len() as u64;
-        // No early exit, so that the loop is vectorized.
-        if !numbers.iter().fold(true, |all, number| all & is_action(number)) {
-            let wrong = numbers.iter().position(|number| !is_action(number)).unwrap_or_default();
-            return Err((wrong, numbers[wrong]));
-        }
-        self.actions.clear();
-        self.actions.extend(numbers.iter().map(|&number| Action::ALL[number as usize]));
-        Ok(())
-    }
-}
-
-/// A caller's buffer for observations.
-enum Buffer<'py> {
-    F32(PyReadwriteArrayDyn<'py, f32>),
-    U8(PyReadwriteArrayDyn<'py, u8>),
-}
-
-impl<'py> Buffer<'py> {
-    fn new(array: &Bound<'py, PyAny>) -> PyResult<Self> {
-        if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
-            return borrow(array).map(Self::F32);
-        }
-        let array = array.cast::<PyArrayDyn<u8>>();
-        let array = array.map_err(|_| {
-            PyTypeError::new_err("observations have the wrong type, expected float32 or uint8")
-        })?;
-        borrow(array).map(Self::U8)
-    }
-
-    fn observations_mut(&mut self) -> PyResult<Observations<'_>> {
-        match self {
-            Self::F32(array) => Ok(Observations::F32(array.as_slice_mut()?)),
-            Self::U8(array) => Ok(Observations::U8(array.as_slice_mut()?)),
-        }
-    }
-}
-
-fn borrow<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
-    array.try_readwrite().map_err(|error| {
-        PyRuntimeError::new_err(format!("the buffer for observations cannot be written: {error}"))
-    })
-}
-
-fn masks_mut<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResult<Option<&'a mut [i8]>> {
-    Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
-}
-
-/// Writes which agents are active: now in all environments, or at the end of the episode in some.
-fn write_active(
-    batch: &pogema_fast::Batch,
-    ended: Option<&[usize]>,
-    mut active: PyReadwriteArray2<'_, bool>,
-) -> Result<(), Error> {
-    let not_contiguous =
-        |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
-    let active = active.as_slice_mut().map_err(not_contiguous)?;
-    let num_agents = batch.config().num_agents;
-    let expected = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
-    Error::check_length("active", expected, active.len())?;
-    for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
-        let engine = match ended {
-            Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
-            None => Some(batch.lane(index)?),
-        };
-        // INVARIANT: `observe_ended` has rejected environments without an ended episode.
-        if let Some(engine) = engine {
-            part.copy_from_slice(engine.active());
-        }
-    }
-    Ok(())
-}
-
-fn write_ended_masks(batch: &pogema_fast::Batch, envs: &[usize], out: &mut [i8]) -> Result<(), Error> {
-    let per_env = batch.config().num_agents * Action::ALL.len();
-    Error::check_length("action masks", envs.len() * per_env, out.len())?;
-    envs.iter()
-        .zip(out.chunks_exact_mut(per_env))
-        .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
-}
-
 guarded! {
 /// Returns the number of threads that this process can run in parallel.
 #[pyfunction]
 pub fn num_cores() -> PyResult<usize> {
     Ok(std::thread::available_parallelism().map_or(1, usize::from))
 }
-}
-
-/// Reads Gymnasium's name of an autoreset mode.
-fn read_autoreset(name: &str) -> Result<Autoreset, Error> {
-    match name {
-        "SameStep" => Ok(Autoreset::SameStep),
-        "NextStep" => Ok(Autoreset::NextStep),
-        "Disabled" => Ok(Autoreset::Off),
-        _ => Err(Error::argument("autoreset_mode", name, "`SameStep`, `NextStep` or `Disabled`")),
-    }
 }

@@ -1,0 +1,103 @@
+//! The buffers for `POMAPF` and `MAPF` observations.
+
+use pogema_core::{Config, Error, from_starts};
+
+use crate::Engine;
+use crate::observe::is_beyond_cache;
+
+use super::global::{GlobalBuffers, write_pairs};
+
+/// The buffers for the windows of obstacles and agents.
+///
+/// Shape: both `[lanes, agents, side, side]`; every value 0 or 1.
+#[derive(Debug)]
+pub enum Windows<'a> {
+    /// Windows of obstacles, and of agents.
+    F32(&'a mut [f32], &'a mut [f32]),
+    /// Windows of obstacles, and of agents.
+    U8(&'a mut [u8], &'a mut [u8]),
+}
+
+impl Windows<'_> {
+    fn lengths(&self) -> (usize, usize) {
+        match self {
+            Self::F32(obstacles, agents) => (obstacles.len(), agents.len()),
+            Self::U8(obstacles, agents) => (obstacles.len(), agents.len()),
+        }
+    }
+
+    fn split_at(self, index: usize) -> (Self, Self) {
+        match self {
+            Self::F32(obstacles, agents) => {
+                let (obstacles, agents) = (obstacles.split_at_mut(index), agents.split_at_mut(index));
+                (Self::F32(obstacles.0, agents.0), Self::F32(obstacles.1, agents.1))
+            }
+            Self::U8(obstacles, agents) => {
+                let (obstacles, agents) = (obstacles.split_at_mut(index), agents.split_at_mut(index));
+                (Self::U8(obstacles.0, agents.0), Self::U8(obstacles.1, agents.1))
+            }
+        }
+    }
+
+    /// Returns whether the buffers should be written with stores that bypass the cache.
+    pub(super) fn is_beyond_cache(&self) -> bool {
+        is_beyond_cache(match self {
+            Self::F32(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
+            Self::U8(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
+        })
+    }
+}
+
+/// The buffers for `POMAPF` observations, and for `MAPF` observations if there are buffers for the global state.
+#[derive(Debug)]
+pub struct ApartBuffers<'a> {
+    /// The windows.
+    pub windows: Windows<'a>,
+    /// The cells of the agents, relative to their starts.
+    ///
+    /// Shape: `[lanes, agents, 2]`
+    pub xy: &'a mut [i64],
+    /// The goals of the agents, relative to their starts.
+    ///
+    /// Shape: `[lanes, agents, 2]`
+    pub target_xy: &'a mut [i64],
+    /// The map, cells and goals, with a border as wide as the radius.
+    pub global: Option<GlobalBuffers<'a>>,
+}
+
+impl ApartBuffers<'_> {
+    pub(super) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
+        let num_agents = num_lanes * config.num_agents;
+        let (obstacles, agents) = self.windows.lengths();
+        Error::check_length("obstacles", num_lanes * config.num_observed() / 3, obstacles)?;
+        Error::check_length("agents", num_lanes * config.num_observed() / 3, agents)?;
+        Error::check_length("xy", 2 * num_agents, self.xy.len())?;
+        Error::check_length("target_xy", 2 * num_agents, self.target_xy.len())?;
+        self.global.as_ref().map_or(Ok(()), |global| global.check(num_lanes, config))
+    }
+
+    pub(super) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
+        let num_agents = num_lanes * config.num_agents;
+        let windows = self.windows.split_at(num_lanes * config.num_observed() / 3);
+        let (xy, target_xy) =
+            (self.xy.split_at_mut(2 * num_agents), self.target_xy.split_at_mut(2 * num_agents));
+        let global = self.global.map(|global| global.split_at(num_lanes, config)).unzip();
+        (
+            Self { windows: windows.0, xy: xy.0, target_xy: target_xy.0, global: global.0 },
+            Self { windows: windows.1, xy: xy.1, target_xy: target_xy.1, global: global.1 },
+        )
+    }
+
+    /// Writes the observations of one lane.
+    ///
+    /// Rule: observe/pomapf, observe/pomapf/relative, observe/mapf
+    pub(super) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+        match self.windows {
+            Windows::F32(obstacles, agents) => engine.write_windows(obstacles, agents, beyond_cache),
+            Windows::U8(obstacles, agents) => engine.write_windows(obstacles, agents, beyond_cache),
+        }
+        write_pairs(from_starts(&engine.cells, &engine.starts), self.xy);
+        write_pairs(from_starts(&engine.goals, &engine.starts), self.target_xy);
+        self.global.map_or(Ok(()), |global| global.write(engine))
+    }
+}

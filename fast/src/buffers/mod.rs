@@ -1,0 +1,161 @@
+//! The buffers of a caller for observations, global states and action masks.
+
+mod apart;
+mod global;
+
+use pogema_core::{Action, Config, Error};
+
+use crate::Engine;
+use crate::observe::{is_beyond_cache, words_per_agent};
+
+pub use apart::{ApartBuffers, Windows};
+pub use global::GlobalBuffers;
+
+/// The buffer for the observations of some lanes, if they are requested.
+#[derive(Debug)]
+pub enum Observations<'a> {
+    /// No observations are requested.
+    None,
+    /// Shape: `[lanes, agents, 3, side, side]`
+    F32(&'a mut [f32]),
+    /// Shape: `[lanes, agents, 3, side, side]`
+    U8(&'a mut [u8]),
+    /// Shape: `[lanes, agents, words]` with [`words_per_agent`] words, in the format of
+    /// [`crate::Engine::observe_bits`].
+    Bits(&'a mut [u64]),
+    /// The `POMAPF` or `MAPF` observations.
+    Apart(ApartBuffers<'a>),
+    /// The global states.
+    Global(GlobalBuffers<'a>),
+}
+
+impl Observations<'_> {
+    /// Returns the number of entries per lane, if the observations are one array.
+    fn per_lane(&self, config: &Config) -> usize {
+        match self {
+            Self::None | Self::Apart(_) | Self::Global(_) => 0,
+            Self::F32(_) | Self::U8(_) => config.num_observed(),
+            Self::Bits(_) => config.num_agents * words_per_agent(config.radius),
+        }
+    }
+
+    /// Checks the lengths of all buffers.
+    pub(crate) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
+        let len = match self {
+            Self::None => 0,
+            Self::F32(out) => out.len(),
+            Self::U8(out) => out.len(),
+            Self::Bits(out) => out.len(),
+            Self::Apart(out) => return out.check(num_lanes, config),
+            Self::Global(out) => return out.check(num_lanes, config),
+        };
+        Error::check_length("observations", num_lanes * self.per_lane(config), len)
+    }
+
+    /// Splits the buffers after some lanes.
+    pub(crate) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
+        let index = num_lanes * self.per_lane(config);
+        match self {
+            Self::None => (Self::None, Self::None),
+            Self::F32(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::F32(left), Self::F32(right))
+            }
+            Self::U8(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::U8(left), Self::U8(right))
+            }
+            Self::Bits(out) => {
+                let (left, right) = out.split_at_mut(index);
+                (Self::Bits(left), Self::Bits(right))
+            }
+            Self::Apart(out) => {
+                let (left, right) = out.split_at(num_lanes, config);
+                (Self::Apart(left), Self::Apart(right))
+            }
+            Self::Global(out) => {
+                let (left, right) = out.split_at(num_lanes, config);
+                (Self::Global(left), Self::Global(right))
+            }
+        }
+    }
+
+    /// Returns whether a buffer for all lanes should be written with stores that bypass the cache.
+    pub(crate) fn is_beyond_cache(&self) -> bool {
+        match self {
+            Self::None | Self::Global(_) => false,
+            Self::F32(out) => is_beyond_cache(size_of_val(*out)),
+            Self::U8(out) => is_beyond_cache(size_of_val(*out)),
+            Self::Bits(out) => is_beyond_cache(size_of_val(*out)),
+            Self::Apart(out) => out.windows.is_beyond_cache(),
+        }
+    }
+
+    /// Writes the buffers of one lane.
+    pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+        match self {
+            Self::None => Ok(()),
+            Self::F32(out) => {
+                engine.observe_all(out, beyond_cache);
+                Ok(())
+            }
+            Self::U8(out) => {
+                engine.observe_all(out, beyond_cache);
+                Ok(())
+            }
+            Self::Bits(out) => engine.observe_bits(0..engine.config.num_agents, out),
+            Self::Apart(out) => out.write(engine, beyond_cache),
+            Self::Global(out) => out.write(engine),
+        }
+    }
+}
+
+impl Engine {
+    /// Writes the observations of all agents, in the form of the buffers for one lane.
+    ///
+    /// # Errors
+    /// Before the first reset, for a buffer of the wrong length, or for a map that is larger than its buffer.
+    pub fn observe_into(&self, observations: Observations<'_>) -> Result<(), Error> {
+        self.check_started()?;
+        observations.check(1, &self.config)?;
+        let beyond_cache = observations.is_beyond_cache();
+        observations.write(self, beyond_cache)
+    }
+}
+
+/// The buffers that a step or an observation of a batch fills. [`Observations`] alone convert into them.
+#[derive(Debug)]
+pub struct ObservationBuffers<'a> {
+    /// The buffer for observations.
+    pub observations: Observations<'a>,
+    /// The buffer for action masks, in the format of [`crate::Engine::mask_actions`], if they are requested.
+    ///
+    /// Shape: `[lanes, agents, 5]`
+    pub masks: Option<&'a mut [i8]>,
+}
+
+impl<'a> From<Observations<'a>> for ObservationBuffers<'a> {
+    fn from(observations: Observations<'a>) -> Self {
+        Self { observations, masks: None }
+    }
+}
+
+impl ObservationBuffers<'_> {
+    pub(crate) fn check(&self, num_lanes: usize, config: &Config) -> Result<(), Error> {
+        self.observations.check(num_lanes, config)?;
+        let expected = num_lanes * config.num_agents * Action::ALL.len();
+        self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", expected, masks.len()))
+    }
+
+    pub(crate) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
+        let (left, right) = self.observations.split_at(num_lanes, config);
+        let num_masks = num_lanes * config.num_agents * Action::ALL.len();
+        let (left_masks, right_masks) = self.masks.map(|masks| masks.split_at_mut(num_masks)).unzip();
+        (Self { observations: left, masks: left_masks }, Self { observations: right, masks: right_masks })
+    }
+
+    pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+        self.observations.write(engine, beyond_cache)?;
+        self.masks.map_or(Ok(()), |masks| engine.mask_actions(masks))
+    }
+}

@@ -1,0 +1,75 @@
+"""Reads the configs and the number of threads of a `VecEnv`."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+import warnings
+from collections.abc import Mapping
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs import _engine, grid_registry
+from pogema_rs.grid_config import GridConfig, engine_fields
+
+# The fields that the engine reads, and the text of a named map.
+Config = tuple[dict[str, Any], Optional[str]]
+
+
+def _engine_config(config: Any, reward: str) -> Config:
+    """Returns the fields that the engine reads, and the text of the map that the config names."""
+    if not isinstance(config, GridConfig):
+        config = GridConfig(**_fields(config))
+    if config.map_name is not None:
+        grid_registry.get_grid(config.map_name)  # an unknown name is an error, which a single environment ignores
+    return {**engine_fields(config), "reward": reward}, grid_registry.map_text(config.map_name)
+
+
+def _fields(config: Any) -> Mapping[str, Any]:
+    if isinstance(config, Mapping):
+        return config
+    dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
+    if dump is None:
+        kind = type(config).__name__
+        raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
+    return dump()
+
+
+def read_configs(
+    grid_config: Any, num_envs: Optional[int], reward: str
+) -> tuple[list[Config], Optional[list[int]], int]:
+    """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
+    if not isinstance(grid_config, (list, tuple)):
+        num_envs = 1 if num_envs is None else num_envs
+        _check_whole("num_envs", num_envs)
+        return [_engine_config(grid_config, reward)], None, min(int(num_envs), sys.maxsize)
+    if num_envs not in (None, len(grid_config)):
+        raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
+    configs = [_engine_config(config, reward) for config in grid_config]
+    if not configs:
+        raise ValueError("num_envs is 0, expected at least 1")
+    # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
+    keys = [pickle.dumps(config) for config in configs]
+    places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+    first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}
+    return [first[place] for place in range(len(places))], [places[key] for key in keys], len(configs)
+
+
+def read_threads(num_threads: Optional[int]) -> Optional[int]:
+    if num_threads is None:
+        return None
+    _check_whole("num_threads", num_threads)
+    if num_threads > _engine.MAX_THREADS:
+        raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")
+    if num_threads > _engine.num_cores():
+        text = f"num_threads is {num_threads}, the machine has {_engine.num_cores()} cores"
+        warnings.warn(text, UserWarning, stacklevel=3)
+    return int(num_threads)
+
+
+def _check_whole(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name} is {value!r}, expected a whole number")
+    if value < 1:
+        raise ValueError(f"{name} is {value}, expected at least 1")

@@ -1,0 +1,36 @@
+"""The rewards of a `VecEnv`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Optional
+
+import numpy as np
+
+RewardFunction = Callable[[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]], np.ndarray]
+
+_NAMES = ("own", "shared")
+
+
+def read_rewards(rewards: Any) -> tuple[str, Optional[RewardFunction]]:
+    """Returns the name of the engine's rewards, and the function that changes them if there is one."""
+    if callable(rewards):
+        return "own", rewards
+    if rewards not in _NAMES:
+        raise ValueError(f"rewards is {rewards!r}, expected 'own', 'shared' or a function")
+    return str(rewards), None
+
+
+def changed_rewards(change: RewardFunction, rewards: np.ndarray, *others: Any) -> np.ndarray:
+    """Returns the rewards of a step as a caller's function changes them.
+
+    Errors: TypeError for anything but an array of float32, ValueError for another shape.
+    """
+    changed = change(rewards, *others)
+    if not isinstance(changed, np.ndarray):
+        raise TypeError(f"the function `rewards` returned a {type(changed).__name__}, expected a numpy array")
+    if changed.dtype != np.float32:
+        raise TypeError(f"the function `rewards` returned an array of {changed.dtype}, expected float32")
+    if changed.shape != rewards.shape:
+        raise ValueError(f"the function `rewards` returned shape {changed.shape}, expected {rewards.shape}")
+    return changed

@@ -1,0 +1,127 @@
+"""The arrays of a `VecEnv`: their spaces, and buffers for them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any, Union
+
+import numpy as np
+from gymnasium import spaces
+
+from pogema_rs.packed import words_per_agent
+
+Arrays = Union[np.ndarray, dict[str, np.ndarray]]
+
+# The bits of an observed cell, for each type of observations; "bits" packs them into words.
+CELL_BITS = {"float32": 32, "uint8": 8, "bits": 1}
+
+
+def read_dtype(dtype: Any) -> str:
+    """Returns the name of a type of observations, given by name or as NumPy's type."""
+    for name in CELL_BITS:
+        if dtype == name or (name != "bits" and dtype == np.dtype(name)):
+            if name == "bits" and sys.byteorder != "little":
+                raise ValueError("dtype is 'bits', expected 'float32' or 'uint8' on a big-endian machine")
+            return name
+    raise ValueError(f"dtype is {dtype!r}, expected 'float32', 'uint8' or 'bits'")
+
+
+def observation_space(
+    kind: str, dtype: str, num_agents: int, radius: int, size: tuple[int, int]
+) -> Union[spaces.Box, spaces.Dict]:
+    """Returns the space of one environment's observations of a type: `default`, `POMAPF` or `MAPF`.
+
+    `size` holds the rows and columns of the largest map.
+
+    Errors: ValueError if the type has no packed form.
+    """
+    side = 2 * radius + 1
+    if kind == "default":
+        if dtype == "bits":
+            return spaces.Box(0, 2**32 - 1, (num_agents, words_per_agent(radius)), np.uint32)
+        return spaces.Box(0, 1, (num_agents, 3, side, side), np.dtype(dtype).type)
+    if dtype == "bits":
+        raise ValueError(f"dtype is 'bits', expected 'float32' or 'uint8' with observation_type {kind!r}")
+    window = spaces.Box(0, 1, (num_agents, side, side), np.dtype(dtype).type)
+    parts: dict[str, spaces.Space[Any]] = {
+        "obstacles": window,
+        "agents": window,
+        "xy": _cells(num_agents, 1 - max(size), max(size) - 1),
+        "target_xy": _cells(num_agents, 1 - max(size), max(size) - 1),
+    }
+    if kind == "MAPF":
+        rows, columns = (length + 2 * radius for length in size)
+        parts["global_obstacles"] = spaces.Box(0, 1, (rows, columns), np.uint8)
+        parts["global_xy"] = _cells(num_agents, radius, radius + max(size) - 1)
+        parts["global_target_xy"] = _cells(num_agents, radius, radius + max(size) - 1)
+    return spaces.Dict(parts)
+
+
+def state_space(num_agents: int, size: tuple[int, int]) -> spaces.Dict:
+    """Returns the space of one environment's global state."""
+    return spaces.Dict(
+        {
+            "obstacles": spaces.Box(0, 1, size, np.uint8),
+            "positions": _cells(num_agents, 0, max(size) - 1),
+            "goals": _cells(num_agents, 0, max(size) - 1),
+            "active": spaces.MultiBinary(num_agents),
+        }
+    )
+
+
+def _cells(num_agents: int, low: int, high: int) -> spaces.Box:
+    return spaces.Box(low, high, (num_agents, 2), np.int64)
+
+
+def zeros(space: spaces.Space[Any], num_envs: int) -> Any:
+    """Returns new arrays for some environments."""
+    if isinstance(space, spaces.Dict):
+        return {name: zeros(part, num_envs) for name, part in space.spaces.items()}
+    shape: Any = space.shape
+    return np.zeros((num_envs, *shape), np.bool_ if isinstance(space, spaces.MultiBinary) else space.dtype)
+
+
+def of_env(arrays: Any, index: int) -> Any:
+    """Returns the arrays of one environment."""
+    return {name: part[index] for name, part in arrays.items()} if isinstance(arrays, dict) else arrays[index]
+
+
+def per_env(rows: Any, envs: list[int], num_envs: int) -> np.ndarray:
+    """Returns a list that holds the rows of some environments, as Gymnasium has it for `final_obs`."""
+    every = np.full(num_envs, None, dtype=object)
+    for index, env in enumerate(envs):
+        every[env] = of_env(rows, index)
+    return every
+
+
+def for_engine(arrays: Any) -> Any:
+    """Returns the arrays as the engine writes them, with words of 64 bits."""
+    is_packed = isinstance(arrays, np.ndarray) and arrays.dtype == np.uint32
+    return arrays.view(np.uint64) if is_packed else arrays
+
+
+def check_out(out: Any, like: Any, name: str = "out") -> Any:
+    """Returns a caller's buffer for observations after checking that its arrays are like others.
+
+    Errors: TypeError for anything but arrays of the same types, ValueError for a wrong shape, layout or write
+    protection.
+    """
+    if isinstance(like, dict):
+        if not isinstance(out, dict) or set(out) != set(like):
+            given = sorted(map(str, out)) if isinstance(out, dict) else f"a {type(out).__name__}"
+            raise TypeError(f"{name} is {given}, expected a dict of arrays with the keys {sorted(like)}")
+        for key, part in like.items():
+            check_out(out[key], part, f"{name}[{key!r}]")
+        return out
+    dtype, shape = like.dtype, like.shape
+    if not isinstance(out, np.ndarray):
+        raise TypeError(f"{name} is a {type(out).__name__}, expected a numpy array of {dtype} with shape {shape}")
+    if out.dtype != dtype:
+        raise TypeError(f"{name} has type {out.dtype}, expected {dtype}")
+    if out.shape != shape:
+        raise ValueError(f"{name} has shape {out.shape}, expected {shape}")
+    if not out.flags.c_contiguous or not for_engine(out).flags.aligned:
+        raise ValueError(f"{name} is not contiguous in memory or not aligned, expected a C-contiguous array")
+    if not out.flags.writeable:
+        raise ValueError(f"{name} is read-only, expected a writeable array")
+    return out
