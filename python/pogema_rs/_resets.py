@@ -41,13 +41,16 @@ class Resettable:
         *("collision_system", "obs_radius", "observation_type", "num_agents", "FREE", "OBSTACLE"),
     )
     _live = itemgetter(*_LIVE)
+    _live_values: Optional[tuple[Any, ...]] = None
 
     def _check_unchanged(self) -> None:
         """Raises `StateError` if a field that POGEMA reads in every step changed since the last reset."""
         fields = self.grid_config.__dict__
-        if not _differ(self._live(fields), self._live_values) or self.grid is None:
+        last = self._live_values
+        # An environment that an earlier release saved holds none.
+        if last is None or self.grid is None or not _differ(self._live(fields), last):
             return
-        for name, value in zip(self._LIVE, self._live_values):
+        for name, value in zip(self._LIVE, last):
             if _differ(fields[name], value):
                 raise StateError(f"`{name}` of the config changed from `{value}` to `{fields[name]}`; call `reset` first")
 
@@ -77,6 +80,6 @@ class Resettable:
             if is_same and pools and not {"possible_agents_xy", "possible_targets_xy", "map"} & set(changed):
                 fixed.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
             messages = self._engine.reset(engine_fields(self.grid_config, **fixed), self._registered())
-        if changed or not is_same:
+        if changed or not is_same or self._live_values is None:
             self._remember_config()
         return messages
