@@ -211,6 +211,8 @@ CASES = {
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
+        # A shell starts a background process with SIGINT ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         CASES[sys.argv[1]]()
     else:
         print(*CASES)
