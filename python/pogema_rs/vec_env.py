@@ -80,6 +80,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
     later changes to it have no effect. Warnings about single instances are not shown.
     """
 
+    # Wrappers of Gymnasium before 1.0 ask for it, and its `VectorEnv.__init__` is not called.
+    is_vector_env = True
+
     def __init__(
         self,
         grid_config: Any,
