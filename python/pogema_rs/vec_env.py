@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, Optional, Union, cast
 
@@ -12,15 +13,20 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, _vec_spaces
-from pogema_rs._vec_configs import read_configs, read_threads
+from pogema_rs._vec_configs import read_changes, read_configs, read_room, read_threads
+from pogema_rs._vec_film import Film, start_film
 from pogema_rs._vec_input import AutoresetMode, read_actions, read_autoreset, read_mask, read_seed
 from pogema_rs._vec_rewards import RewardFunction, changed_rewards, read_rewards
 from pogema_rs._vec_statistics import EpisodeStatistics
 from pogema_rs.semantics import Semantics
 
-__all__ = ["AutoresetMode", "VecEnv"]
+__all__ = ["AutoresetMode", "Curriculum", "Film", "VecEnv"]
 
 NUM_ACTIONS = 5
+
+# Gets the index of an environment and the metrics of its episode that just ended. Returns the config of its further
+# episodes, or `None` to keep the config.
+Curriculum = Callable[[int, dict[str, float]], Any]
 
 # The observations: an array, or a dictionary of arrays with the observation types `POMAPF` and `MAPF`.
 if TYPE_CHECKING:
@@ -64,17 +70,31 @@ class VecEnv(VectorEnv, Generic[Observations]):
     config has none. No episode depends on the number of environments or threads. `episode_seeds` returns the seeds of
     the current episodes.
 
+    Padding: the configs of a list may differ in the number of agents, and `agents` is the largest of these numbers.
+    The rows after the agents of an environment are padding, with observations, rewards and positions of 0,
+    `terminated` and `truncated` True, `is_active` False, and action masks that only allow staying. Their actions must
+    be valid and have no effect. `infos["agent_mask"]`, `(num_envs, agents)`, is True for agents and False for padding.
+
     Autoreset, as in Gymnasium: with `SAME_STEP` the step that ends an episode also begins the next one, and
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `NEXT_STEP` the following step
     ignores the environment's actions and begins the next episode. With `DISABLED` the environment keeps its final
     state, with rewards of 0 and the last `terminated` and `truncated`, until `reset(options={"reset_mask": ...})`.
 
-    `infos` holds `is_active`, `(num_envs, agents)`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
+    `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations: with
+    `SAME_STEP`, a step that ends an episode returns rewards and ends of the old one, whose `agent_mask` is in
+    `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
     int8, 1 where no obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays
     `(num_envs,)` that are NaN where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode`
     in the form of Gymnasium's `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of
     the agents' returns, the length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the
     global state at the end of each of these episodes, as `final_obs` holds the observations.
+
+    Curriculum: `set_configs` changes configs from the next episode of each environment on. The function `curriculum`
+    does so automatically: each time an episode ends, it gets the index of the environment and the metrics of the
+    episode as a dict of floats, and returns the config of the environment's further episodes, or None to keep the
+    config. Environments are passed in ascending order, so results are reproducible if the function is. New configs must
+    fit the arrays: `num_agents` and `map_size` reserve room. Neither a config's seed nor `reset` changes them back: the
+    seeds of later episodes follow from the seed of the last reset.
 
     Calls from two threads at the same time, and calls in a forked child, raise a RuntimeError. A config is read once;
     later changes to it have no effect. Warnings about single instances are not shown.
@@ -96,11 +116,17 @@ class VecEnv(VectorEnv, Generic[Observations]):
         masks: bool = False,
         rewards: Union[str, RewardFunction] = "own",
         statistics: bool = False,
+        num_agents: Optional[int] = None,
+        map_size: Union[None, int, tuple[int, int]] = None,
+        curriculum: Optional[Curriculum] = None,
+        film: Optional[Film] = None,
     ) -> None:
         """Makes one environment for each config of a list, or `num_envs` of a single config.
 
-        A config is a GridConfig or a dict. The configs of a list may have different maps, but must agree on agents,
-        radius and rules. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
+        A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
+        must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
+        or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
+        N-th episode of one environment. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
         largest number of threads [default: as many as suit the work of a step, at most one per core and environment].
         A step uses fewer while measured times show that more do not make it faster.
 
@@ -115,15 +141,24 @@ class VecEnv(VectorEnv, Generic[Observations]):
         dtype = _vec_spaces.read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
         reward, self._change_rewards = read_rewards(rewards)
+        if not (curriculum is None or callable(curriculum)):
+            raise TypeError(f"curriculum is a {type(curriculum).__name__}, expected a function")
+        self._reward, self._curriculum = reward, curriculum
         configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
+        # A curriculum chooses the config of the next episode between the end of an episode and this next episode.
+        self._begins_ended = curriculum is not None and self.autoreset_mode == AutoresetMode.SAME_STEP
+        mode = AutoresetMode.DISABLED if self._begins_ended else self.autoreset_mode
         self._batch = _engine.Batch(
-            configs,
-            of_env,
+            (configs, of_env),
             self.num_envs,
-            self.autoreset_mode.value,
-            self.semantics.occupancy_is_exact,
+            (mode.value, self.semantics.occupancy_is_exact),
             (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
+            read_room(num_agents, map_size),
         )
+        self._films: Optional[list[str]] = None
+        self._is_filmed = film is not None
+        if film is not None:
+            start_film(self._batch, film, self.num_envs)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
@@ -142,6 +177,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._next_buffer = 0
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
+        # Of the current episodes.
+        self._agent_mask = np.ones((self.num_envs, self.num_agents), dtype=np.bool_)
+        # The environments that have no next episode, and the reason.
+        self._stuck: tuple[list[int], Optional[Exception]] = ([], None)
         self.closed = False
 
     # Gymnasium defines an attribute.
@@ -180,16 +219,19 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """
         chosen = read_mask(options, self.num_envs)
         one, each = read_seed(seed, self.num_envs)
+        self._warn_of_films()
         observations = self._observations(out)
-        active, masks = self._new_state(self.num_envs)
-        self._batch.reset((_vec_spaces.for_engine(observations), active, masks), chosen, one, each)
+        agents, masks = self._new_state(self.num_envs)
+        self._batch.reset((_vec_spaces.for_engine(observations), agents, masks), chosen, one, each)
+        self._stuck = ([] if chosen is None else [env for env in self._stuck[0] if not chosen[env]], self._stuck[1])
         if self._statistics is not None:
             self._statistics.begin(chosen)
         if seed is not None:
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
         self._swap_buffers(out)
-        return observations, self._state_infos(active, masks, self._all)
+        self._agent_mask = agents[1].copy()
+        return observations, self._state_infos(agents, masks, self._all)
 
     def step(
         self, actions: Any, *, out: Optional[Observations] = None
@@ -201,27 +243,66 @@ class VecEnv(VectorEnv, Generic[Observations]):
         as indices from the end of a list, and wrong actions of inactive agents; this class rejects both.
 
         Errors: ValueError or TypeError for wrong actions, before anything is played; `InstanceError` if an environment
-        has no next episode. TypeError or ValueError for wrong results of the function `rewards`, after the step.
+        has no next episode. TypeError or ValueError for wrong results of the function `rewards`, after the step. If
+        `curriculum` raises an exception or returns a config that does not fit, the step ends as if it had returned None
+        for all environments, and then raises.
         """
         numbers = read_actions(actions, (self.num_envs, self.num_agents))
+        self._warn_of_films()
+        if self._stuck[0] and self._stuck[1] is not None:
+            raise self._stuck[1]
         observations = self._observations(out)
         shape = (self.num_envs, self.num_agents)
         rewards = np.empty(shape, dtype=np.float32)
         terminated, truncated = np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)
-        active, masks = self._new_state(self.num_envs)
-        state = (_vec_spaces.for_engine(observations), active, masks)
+        agents, masks = self._new_state(self.num_envs)
+        state = (_vec_spaces.for_engine(observations), agents, masks)
         ended = self._batch.step(numbers, (rewards, terminated, truncated), state)
         self._swap_buffers(out)
-        infos = self._state_infos(active, masks, self._all)
+        infos = self._state_infos(agents, masks, self._all)
+        failure = None
         if ended:
             self._add_ends(infos, ended)
+            failure = self._follow_curriculum(ended, state)
+        # With `SAME_STEP`, the rewards are those of the old episodes.
+        played = self._agent_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else agents[1]
         if self._change_rewards is not None:
             rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
+            if not played.all():
+                rewards = np.where(played, rewards, np.float32(0))
         if self._statistics is not None:
-            self._statistics.count(rewards)
+            self._statistics.count(rewards, played)
             if ended:
                 infos["episode"], infos["_episode"] = self._statistics.end(ended)
+        self._agent_mask = agents[1].copy()
+        if failure is not None:
+            raise failure
         return observations, rewards, terminated, truncated, infos
+
+    def set_configs(self, configs: Any, envs: Optional[Sequence[int]] = None) -> None:
+        """Changes configs from the next episode of each environment on; the current episodes continue.
+
+        `configs` is one config for all environments, or a list with one for each. With `envs`, the indices of
+        environments, only their configs change, and a list holds one config for each of them.
+
+        A config may have another map and another number of agents, within the room that the `num_agents` and `map_size`
+        of the constructor reserve. Radius and rules cannot change. A config's seed has no effect: the episodes keep
+        their seeds and numbers. With `NEXT_STEP`, the next episode of an environment whose episode has just ended
+        already is one of the new config.
+
+        Errors: ValueError or TypeError for wrong arguments or a config that does not fit; with `NEXT_STEP`,
+        `InstanceError` if such a next episode does not exist. After an error no config is changed.
+        """
+        read, of_env, chosen = read_changes(configs, envs, self.num_envs, self._reward)
+        if chosen:
+            self._batch.set_configs((read, of_env), chosen)
+
+    @property
+    def films(self) -> list[str]:
+        """The paths of the films that are complete, in the order of their episodes; after `close`, of all films."""
+        if self._films is None:
+            return [str(path) for path in self._batch.films()]
+        return list(self._films)
 
     def action_masks(self) -> np.ndarray:
         """Returns the masks of the actions that no obstacle blocks now.
@@ -258,8 +339,18 @@ class VecEnv(VectorEnv, Generic[Observations]):
         return self.np_random.integers(NUM_ACTIONS, size=(self.num_envs, self.num_agents))
 
     def close(self, **kwargs: Any) -> None:
-        """Frees the environments and threads; later calls except `close` raise a RuntimeError."""
-        if not self.closed:
+        """Completes the films, and frees the environments and threads.
+
+        A film of an episode that has not ended shows the steps so far. Later calls except `close` raise a RuntimeError.
+        """
+        if self.closed:
+            return
+        try:
+            if self._is_filmed:
+                films, failures = self._batch.finish_films()
+                self._films = [str(path) for path in films]
+                _warn(failures)
+        finally:
             self._batch.close()
             self.closed = True
 
@@ -269,13 +360,53 @@ class VecEnv(VectorEnv, Generic[Observations]):
     def _global_state(self, num_envs: int, ended: Optional[list[int]]) -> dict[str, np.ndarray]:
         """Returns the current states of all environments, or the final states of some."""
         arrays: dict[str, np.ndarray] = _vec_spaces.zeros(self.single_state_space, num_envs)
-        self._batch.global_state(arrays, arrays["active"], ended)
+        agent_mask = np.empty((num_envs, self.num_agents), dtype=np.bool_)
+        self._batch.global_state(arrays, (arrays["active"], agent_mask), ended)
         return arrays
 
-    def _new_state(self, num_envs: int) -> tuple[np.ndarray, Optional[np.ndarray]]:
+    def _follow_curriculum(self, ended: list[int], state: Any) -> Optional[Exception]:
+        """Changes the configs of the environments whose episodes ended, and begins their next episodes if it must.
+
+        Returns the error that the step raises when it is complete.
+        """
+        if self._curriculum is None:
+            return None
+        failure: Optional[Exception] = None
+        try:
+            changed = {}
+            for env, metrics in zip(ended, self._batch.metrics(ended)):
+                config = self._curriculum(env, metrics)
+                if config is not None:
+                    changed[env] = config
+            self.set_configs(list(changed.values()), list(changed))
+        except Exception as error:
+            failure = error
+        finally:
+            # Even if Ctrl-C interrupts the function, the environments continue.
+            if self._begins_ended:
+                failure = self._begin(ended, state) or failure
+        return failure
+
+    def _begin(self, ended: list[int], state: Any) -> Optional[Exception]:
+        """Begins the next episodes of the environments whose episodes ended, or returns why there are none."""
+        chosen = np.zeros(self.num_envs, dtype=np.bool_)
+        chosen[ended] = True
+        try:
+            self._batch.reset(state, chosen.tolist())
+        except Exception as error:
+            self._stuck = (ended, error)
+            return error
+        return None
+
+    def _warn_of_films(self) -> None:
+        if self._is_filmed:
+            _warn(self._batch.take_film_failures())
+
+    def _new_state(self, num_envs: int) -> tuple[tuple[np.ndarray, np.ndarray], Optional[np.ndarray]]:
+        """Returns arrays for the flags of agents, active or not and agent or padding, and for the action masks."""
         shape = (num_envs, self.num_agents)
         masks = np.empty((*shape, NUM_ACTIONS), dtype=np.int8) if self._has_masks else None
-        return np.empty(shape, dtype=np.bool_), masks
+        return (np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)), masks
 
     def _observations(self, out: Optional[Observations]) -> Any:
         buffer = self._buffers[self._next_buffer]
@@ -285,8 +416,11 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if out is None:
             self._next_buffer = (self._next_buffer + 1) % len(self._buffers)
 
-    def _state_infos(self, active: np.ndarray, masks: Optional[np.ndarray], present: np.ndarray) -> dict[str, Any]:
-        infos = {"is_active": active, "_is_active": present}
+    def _state_infos(
+        self, agents: tuple[np.ndarray, np.ndarray], masks: Optional[np.ndarray], present: np.ndarray
+    ) -> dict[str, Any]:
+        active, agent_mask = agents
+        infos = {"is_active": active, "_is_active": present, "agent_mask": agent_mask, "_agent_mask": present}
         if masks is not None:
             infos.update(action_masks=masks, _action_masks=present)
         return infos
@@ -305,12 +439,13 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if self.autoreset_mode != AutoresetMode.SAME_STEP:
             return
         observations = _vec_spaces.zeros(self.single_observation_space, len(ended))
-        active, masks = self._new_state(len(ended))
-        self._batch.ended(ended, (_vec_spaces.for_engine(observations), active, masks))
+        agents, masks = self._new_state(len(ended))
+        self._batch.ended(ended, (_vec_spaces.for_engine(observations), agents, masks))
         final = _vec_spaces.per_env(observations, ended, self.num_envs)
         state = _vec_spaces.per_env(self._global_state(len(ended), ended), ended, self.num_envs)
-        every_active, every_masks = self._spread(ended, active), None if masks is None else self._spread(ended, masks)
-        info = {**self._state_infos(every_active, every_masks, present), "metrics": metrics, "_metrics": present}
+        every_agents = (self._spread(ended, agents[0]), self._spread(ended, agents[1]))
+        every_masks = None if masks is None else self._spread(ended, masks)
+        info = {**self._state_infos(every_agents, every_masks, present), "metrics": metrics, "_metrics": present}
         infos.update(final_obs=final, _final_obs=present, final_info=info, _final_info=present)
         infos.update(final_state=state, _final_state=present)
 
@@ -318,3 +453,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         every = np.zeros((self.num_envs, *values.shape[1:]), dtype=values.dtype)
         every[envs] = values
         return every
+
+
+def _warn(failures: list[str]) -> None:
+    """Warns about films that are missing; training continues without them."""
+    for reason in failures:
+        warnings.warn(reason, RuntimeWarning, stacklevel=4)

@@ -4,7 +4,7 @@ use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadwriteArray2, PyReadwriteArray3, PyReadwriteArrayDyn,
     PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Error};
+use pogema_core::Error;
 use pogema_fast::{ApartBuffers, Batch, GlobalBuffers, Observations, Windows};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
@@ -138,36 +138,39 @@ pub fn masks_mut<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResu
     Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
 }
 
-/// Writes which agents are active: now in all environments, or at the end of the episode in some.
-pub fn write_active(
+/// Flags of the agents that are active, and of the rows that are agents and not padding.
+///
+/// Shape: `(envs, agents)` each
+pub type Agents<'py> = (PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
+
+/// Writes the flags of the agents: now in all environments, or at the ends of the last episodes of some.
+pub fn write_agents(
     batch: &Batch,
     ended: Option<&[usize]>,
-    mut active: PyReadwriteArray2<'_, bool>,
+    (mut active, mut present): Agents<'_>,
 ) -> Result<(), Error> {
     let not_contiguous =
-        |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
-    let active = active.as_slice_mut().map_err(not_contiguous)?;
+        |_| Error::Corrupt { what: "agents".into(), reason: "the array is not contiguous".into() };
+    let (active, present) =
+        (active.as_slice_mut().map_err(not_contiguous)?, present.as_slice_mut().map_err(not_contiguous)?);
     let num_agents = batch.config().num_agents;
     let expected = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
     Error::check_length("active", expected, active.len())?;
-    for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
+    Error::check_length("agents", expected, present.len())?;
+    let parts = active.chunks_exact_mut(num_agents).zip(present.chunks_exact_mut(num_agents));
+    for (index, (active, present)) in parts.enumerate() {
         let engine = match ended {
             Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
             None => Some(batch.lane(index)?),
         };
         // INVARIANT: `observe_ended` has rejected environments without an ended episode.
-        if let Some(engine) = engine {
-            part.copy_from_slice(engine.active());
-        }
+        let theirs = engine.map_or(&[][..], pogema_fast::Engine::active);
+        let (agents, padding) = active.split_at_mut(theirs.len());
+        agents.copy_from_slice(theirs);
+        padding.fill(false);
+        let (agents, padding) = present.split_at_mut(theirs.len());
+        agents.fill(true);
+        padding.fill(false);
     }
     Ok(())
-}
-
-/// Writes the action masks at the end of the last episodes of some environments.
-pub fn write_ended_masks(batch: &Batch, envs: &[usize], out: &mut [i8]) -> Result<(), Error> {
-    let per_env = batch.config().num_agents * Action::ALL.len();
-    Error::check_length("action masks", envs.len() * per_env, out.len())?;
-    envs.iter()
-        .zip(out.chunks_exact_mut(per_env))
-        .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }
