@@ -60,6 +60,8 @@ pub struct Results {
 
 /// A filmed episode so far.
 struct Take {
+    /// The number in the name of the file.
+    number: u64,
     source: EnvSource,
     env: usize,
     episode: u64,
@@ -151,7 +153,7 @@ impl Film {
         name.push(format!("{number}.{format}"));
         let config = *batch.lane(*env)?.config();
         let (source, actions, path) = (source.clone(), Vec::new(), PathBuf::from(name));
-        self.take = Some(Take { source, env: *env, episode, config, actions, path, format: *format });
+        self.take = Some(Take { number, source, env: *env, episode, config, actions, path, format: *format });
         Ok(())
     }
 
@@ -175,7 +177,14 @@ impl Take {
     fn trace(&self) -> Result<Trace, Error> {
         let mut episode = Episode::new(Engine::new(self.config)?).with_recording();
         episode.start(self.source.instance(self.env, self.episode)?)?;
-        self.actions.chunks_exact(self.config.num_agents).try_for_each(|actions| episode.step(actions))?;
+        for actions in self.actions.chunks_exact(self.config.num_agents) {
+            let active = episode.state().active;
+            let actions = actions.iter().zip(active);
+            // The environment ignores the actions of finished agents, so the picture shows none.
+            let actions: Vec<_> =
+                actions.map(|(&action, &active)| if active { action } else { Action::Stay }).collect();
+            episode.step(&actions)?;
+        }
         episode.trace()
     }
 
@@ -202,7 +211,7 @@ fn draw_caught(take: &Take) -> Result<(), String> {
     let drawn = drawn.unwrap_or_else(|panic: Box<dyn Any + Send>| {
         Err(Error::external("film", crate::guard::text(&*panic)))
     });
-    drawn.map_err(|error| format!("the film of episode {} is missing: {error}", take.episode))
+    drawn.map_err(|error| format!("the film of episode {} is missing: {error}", take.number))
 }
 
 fn lock(results: &Mutex<Results>) -> MutexGuard<'_, Results> {
