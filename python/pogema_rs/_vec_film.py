@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
@@ -14,8 +15,6 @@ from pogema_rs._vec_configs import check_whole
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Batch
-
-__all__ = ["Film"]
 
 _FORMATS = ("svg", "html", "mp4")
 
@@ -37,12 +36,48 @@ class Film:
     name_prefix: str = "pogema"
 
 
-def start_film(batch: Batch, film: Any, num_envs: int) -> None:
-    """Makes the folder of a film, and films from the next reset on.
+class Films:
+    """The films of a batch, which draws them on a thread of its own."""
 
-    Errors: TypeError or ValueError for wrong values; OSError if no file can be written to the folder, or if ffmpeg is
-    missing for a video.
-    """
+    def __init__(self, batch: Batch, film: Any, num_envs: int) -> None:
+        """Makes the folder, and films from the next reset on.
+
+        Errors: TypeError or ValueError for wrong values; OSError if no file can be written to the folder, or if ffmpeg
+        is missing for a video.
+        """
+        _check(film, num_envs)
+        folder = os.path.abspath(os.fspath(film.folder))
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        path = os.path.join(folder, f"{film.name_prefix}-episode-")
+        batch.film(int(film.env), min(int(film.every), 2**63), path, film.format)
+        self._batch = batch
+        self._finished: Optional[list[str]] = None
+
+    def paths(self) -> list[str]:
+        """Returns the paths of the films that are complete."""
+        if self._finished is None:
+            return [str(path) for path in self._batch.films()]
+        return list(self._finished)
+
+    def warn(self) -> None:
+        """Warns about films that are missing; training continues without them."""
+        _warn(self._batch.take_film_failures())
+
+    def finish(self) -> None:
+        """Ends the current film, and waits until all are complete."""
+        paths, failures = self._batch.finish_films()
+        self._finished = [str(path) for path in paths]
+        _warn(failures)
+
+
+def _warn(failures: list[str]) -> None:
+    for reason in failures:
+        warnings.warn(reason, RuntimeWarning, stacklevel=4)
+
+
+def _check(film: Any, num_envs: int) -> None:
     if not isinstance(film, Film):
         raise TypeError(f"film is a {type(film).__name__}, expected a Film")
     check_whole("every", film.every)
@@ -55,9 +90,3 @@ def start_film(batch: Batch, film: Any, num_envs: int) -> None:
     prefix = film.name_prefix
     if not isinstance(prefix, str) or os.path.basename(prefix) != prefix or "\0" in prefix:
         raise ValueError(f"name_prefix is {prefix!r}, expected the beginning of a file name")
-    folder = os.path.abspath(os.fspath(film.folder))
-    os.makedirs(folder, exist_ok=True)
-    with tempfile.TemporaryFile(dir=folder):
-        pass
-    path = os.path.join(folder, f"{prefix}-episode-")
-    batch.film(int(film.env), min(int(film.every), 2**63), path, film.format)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, Optional, Union, cast
 
@@ -14,19 +13,16 @@ from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, _vec_spaces
 from pogema_rs._vec_configs import read_changes, read_configs, read_room, read_threads
-from pogema_rs._vec_film import Film, start_film
+from pogema_rs._vec_curriculum import Curriculum, NextEpisodes
+from pogema_rs._vec_film import Film, Films
 from pogema_rs._vec_input import AutoresetMode, read_actions, read_autoreset, read_mask, read_seed
 from pogema_rs._vec_rewards import RewardFunction, changed_rewards, read_rewards
 from pogema_rs._vec_statistics import EpisodeStatistics
 from pogema_rs.semantics import Semantics
 
-__all__ = ["AutoresetMode", "Curriculum", "Film", "VecEnv"]
+__all__ = ["AutoresetMode", "Film", "VecEnv"]
 
 NUM_ACTIONS = 5
-
-# Gets the index of an environment and the metrics of its episode that just ended. Returns the config of its further
-# episodes, or `None` to keep the config.
-Curriculum = Callable[[int, dict[str, float]], Any]
 
 # The observations: an array, or a dictionary of arrays with the observation types `POMAPF` and `MAPF`.
 if TYPE_CHECKING:
@@ -126,9 +122,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
         or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
-        N-th episode of one environment. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
-        largest number of threads [default: as many as suit the work of a step, at most one per core and environment].
-        A step uses fewer while measured times show that more do not make it faster.
+        N-th episode of one environment. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line.
+        `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
+        core and environment]. A step uses fewer while measured times show that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.
@@ -141,13 +137,11 @@ class VecEnv(VectorEnv, Generic[Observations]):
         dtype = _vec_spaces.read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
         reward, self._change_rewards = read_rewards(rewards)
-        if not (curriculum is None or callable(curriculum)):
-            raise TypeError(f"curriculum is a {type(curriculum).__name__}, expected a function")
-        self._reward, self._curriculum = reward, curriculum
+        self._reward = reward
         configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
         # A curriculum chooses the config of the next episode between the end of an episode and this next episode.
-        self._begins_ended = curriculum is not None and self.autoreset_mode == AutoresetMode.SAME_STEP
-        mode = AutoresetMode.DISABLED if self._begins_ended else self.autoreset_mode
+        begins_ended = curriculum is not None and self.autoreset_mode == AutoresetMode.SAME_STEP
+        mode = AutoresetMode.DISABLED if begins_ended else self.autoreset_mode
         self._batch = _engine.Batch(
             (configs, of_env),
             self.num_envs,
@@ -155,10 +149,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
             (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
             read_room(num_agents, map_size),
         )
-        self._films: Optional[list[str]] = None
-        self._is_filmed = film is not None
-        if film is not None:
-            start_film(self._batch, film, self.num_envs)
+        self._next_episodes: Optional[NextEpisodes] = None
+        if curriculum is not None:
+            self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
+        self._films = None if film is None else Films(self._batch, film, self.num_envs)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
@@ -177,10 +171,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._next_buffer = 0
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
-        # Of the current episodes.
+        # The agents of the current episodes, kept for rewards and statistics.
         self._agent_mask = np.ones((self.num_envs, self.num_agents), dtype=np.bool_)
-        # The environments that have no next episode, and the reason.
-        self._stuck: tuple[list[int], Optional[Exception]] = ([], None)
+        self._counts_agents = statistics or self._change_rewards is not None
         self.closed = False
 
     # Gymnasium defines an attribute.
@@ -219,18 +212,21 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """
         chosen = read_mask(options, self.num_envs)
         one, each = read_seed(seed, self.num_envs)
-        self._warn_of_films()
+        if self._films is not None:
+            self._films.warn()
         observations = self._observations(out)
         agents, masks = self._new_state(self.num_envs)
         self._batch.reset((_vec_spaces.for_engine(observations), agents, masks), chosen, one, each)
-        self._stuck = ([] if chosen is None else [env for env in self._stuck[0] if not chosen[env]], self._stuck[1])
+        if self._next_episodes is not None:
+            self._next_episodes.follow_reset(chosen)
         if self._statistics is not None:
             self._statistics.begin(chosen)
         if seed is not None:
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
         self._swap_buffers(out)
-        self._agent_mask = agents[1].copy()
+        if self._counts_agents:
+            self._agent_mask = agents[1].copy()
         return observations, self._state_infos(agents, masks, self._all)
 
     def step(
@@ -248,9 +244,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
         for all environments, and then raises.
         """
         numbers = read_actions(actions, (self.num_envs, self.num_agents))
-        self._warn_of_films()
-        if self._stuck[0] and self._stuck[1] is not None:
-            raise self._stuck[1]
+        if self._films is not None:
+            self._films.warn()
+        if self._next_episodes is not None:
+            self._next_episodes.check()
         observations = self._observations(out)
         shape = (self.num_envs, self.num_agents)
         rewards = np.empty(shape, dtype=np.float32)
@@ -263,18 +260,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         failure = None
         if ended:
             self._add_ends(infos, ended)
-            failure = self._follow_curriculum(ended, state)
-        # With `SAME_STEP`, the rewards are those of the old episodes.
-        played = self._agent_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else agents[1]
-        if self._change_rewards is not None:
-            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
-            if not played.all():
-                rewards = np.where(played, rewards, np.float32(0))
-        if self._statistics is not None:
-            self._statistics.count(rewards, played)
-            if ended:
-                infos["episode"], infos["_episode"] = self._statistics.end(ended)
-        self._agent_mask = agents[1].copy()
+            failure = None if self._next_episodes is None else self._next_episodes.follow(ended, state)
+        if self._counts_agents:
+            rewards = self._count(rewards, terminated, truncated, infos, ended)
         if failure is not None:
             raise failure
         return observations, rewards, terminated, truncated, infos
@@ -300,9 +288,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     @property
     def films(self) -> list[str]:
         """The paths of the films that are complete, in the order of their episodes; after `close`, of all films."""
-        if self._films is None:
-            return [str(path) for path in self._batch.films()]
-        return list(self._films)
+        return [] if self._films is None else self._films.paths()
 
     def action_masks(self) -> np.ndarray:
         """Returns the masks of the actions that no obstacle blocks now.
@@ -346,10 +332,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if self.closed:
             return
         try:
-            if self._is_filmed:
-                films, failures = self._batch.finish_films()
-                self._films = [str(path) for path in films]
-                _warn(failures)
+            if self._films is not None:
+                self._films.finish()
         finally:
             self._batch.close()
             self.closed = True
@@ -364,43 +348,27 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._batch.global_state(arrays, (arrays["active"], agent_mask), ended)
         return arrays
 
-    def _follow_curriculum(self, ended: list[int], state: Any) -> Optional[Exception]:
-        """Changes the configs of the environments whose episodes ended, and begins their next episodes if it must.
-
-        Returns the error that the step raises when it is complete.
-        """
-        if self._curriculum is None:
-            return None
-        failure: Optional[Exception] = None
-        try:
-            changed = {}
-            for env, metrics in zip(ended, self._batch.metrics(ended)):
-                config = self._curriculum(env, metrics)
-                if config is not None:
-                    changed[env] = config
-            self.set_configs(list(changed.values()), list(changed))
-        except Exception as error:
-            failure = error
-        finally:
-            # Even if Ctrl-C interrupts the function, the environments continue.
-            if self._begins_ended:
-                failure = self._begin(ended, state) or failure
-        return failure
-
-    def _begin(self, ended: list[int], state: Any) -> Optional[Exception]:
-        """Begins the next episodes of the environments whose episodes ended, or returns why there are none."""
-        chosen = np.zeros(self.num_envs, dtype=np.bool_)
-        chosen[ended] = True
-        try:
-            self._batch.reset(state, chosen.tolist())
-        except Exception as error:
-            self._stuck = (ended, error)
-            return error
-        return None
-
-    def _warn_of_films(self) -> None:
-        if self._is_filmed:
-            _warn(self._batch.take_film_failures())
+    def _count(
+        self,
+        rewards: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        infos: dict[str, Any],
+        ended: list[int],
+    ) -> np.ndarray:
+        """Returns the rewards of a step as the caller's function changes them, and adds the statistics to the infos."""
+        # With `SAME_STEP`, the rewards are those of the old episodes.
+        played = self._agent_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else infos["agent_mask"]
+        self._agent_mask = infos["agent_mask"].copy()
+        if self._change_rewards is not None:
+            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
+            if not played.all():
+                rewards = np.where(played, rewards, np.float32(0))
+        if self._statistics is not None:
+            self._statistics.count(rewards, played)
+            if ended:
+                infos["episode"], infos["_episode"] = self._statistics.end(ended)
+        return rewards
 
     def _new_state(self, num_envs: int) -> tuple[tuple[np.ndarray, np.ndarray], Optional[np.ndarray]]:
         """Returns arrays for the flags of agents, active or not and agent or padding, and for the action masks."""
@@ -453,9 +421,3 @@ class VecEnv(VectorEnv, Generic[Observations]):
         every = np.zeros((self.num_envs, *values.shape[1:]), dtype=values.dtype)
         every[envs] = values
         return every
-
-
-def _warn(failures: list[str]) -> None:
-    """Warns about films that are missing; training continues without them."""
-    for reason in failures:
-        warnings.warn(reason, RuntimeWarning, stacklevel=4)
