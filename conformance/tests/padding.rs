@@ -134,7 +134,7 @@ impl Alone {
                 self.begin_next(drawn);
                 let num_agents = self.environment.config().num_agents;
                 (rewards, terminated) = (vec![0.0; num_agents], vec![false; num_agents]);
-                truncated = terminated.clone();
+                truncated.clone_from(&terminated);
             }
             Some(last) => (terminated, truncated) = last,
             None => {
@@ -260,8 +260,8 @@ fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut 
         assert_eq!(observed[lane * per_lane..(lane + 1) * per_lane], one.observed, "lane {lane}");
         assert_eq!(batch.episode(lane).unwrap(), Some(alone[lane].episode));
         assert_eq!(batch.has_just_ended(lane).unwrap(), one.metrics.is_some());
-        if one.metrics.is_some() {
-            assert_eq!(batch.ended(lane).unwrap().unwrap().1, one.metrics.unwrap());
+        if let Some(metrics) = one.metrics {
+            assert_eq!(batch.ended(lane).unwrap().unwrap().1, metrics);
             let mut terminal = vec![0.5; per_lane];
             batch.observe_ended(&[lane], Observations::F32(&mut terminal)).unwrap();
             assert_eq!(terminal, one.terminal);
@@ -279,7 +279,7 @@ fn check(drawn: &Drawn) {
     batch.reset().unwrap();
     let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(drawn, lane, 0, 0)).collect();
     for step in 0..drawn.num_steps {
-        let action = |agent: usize| Action::ALL[(agent * 7919 + step * 40_503 >> 5) % 5];
+        let action = |agent: usize| Action::ALL[((agent * 7919 + step * 40_503) >> 5) % 5];
         let actions: Vec<_> = (0..NUM_LANES * MOST_AGENTS).map(action).collect();
         check_step(&mut batch, drawn, &actions, &mut alone);
         if step % drawn.replaced_every == 1 {

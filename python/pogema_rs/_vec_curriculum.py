@@ -68,7 +68,7 @@ class NextEpisodes:
 
     def _begin(self, ended: list[int], state: Any) -> Optional[Exception]:
         """Begins the next episodes of some environments, or returns why there are none."""
-        chosen = np.zeros(len(state[1][0]), dtype=np.bool_)
+        chosen = np.zeros(len(state[1]), dtype=np.bool_)
         chosen[ended] = True
         try:
             self._batch.reset(state, chosen.tolist())

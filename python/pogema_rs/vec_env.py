@@ -70,6 +70,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     The rows after the agents of an environment are padding, with observations, rewards and positions of 0,
     `terminated` and `truncated` True, `is_active` False, and action masks that only allow staying. Their actions must
     be valid and have no effect. `infos["agent_mask"]`, `(num_envs, agents)`, is True for agents and False for padding.
+    It is read-only, because later calls return the same array until it changes.
 
     Autoreset, as in Gymnasium: with `SAME_STEP` the step that ends an episode also begins the next one, and
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `NEXT_STEP` the following step
@@ -78,12 +79,12 @@ class VecEnv(VectorEnv, Generic[Observations]):
 
     `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations: with
     `SAME_STEP`, a step that ends an episode returns rewards and ends of the old one, whose `agent_mask` is in
-    `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
-    int8, 1 where no obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays
-    `(num_envs,)` that are NaN where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode`
-    in the form of Gymnasium's `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of
-    the agents' returns, the length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the
-    global state at the end of each of these episodes, as `final_obs` holds the observations.
+    `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where no obstacle blocks the
+    move. When episodes ended it holds `metrics`, a dict of float arrays `(num_envs,)` that are NaN where `_metrics` is
+    False. With `statistics` it then also holds `episode` and `_episode` in the form of Gymnasium's
+    `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of the agents' returns, the
+    length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the global state at the end
+    of each of these episodes, as `final_obs` holds the observations.
 
     Curriculum: `set_configs` changes configs from the next episode of each environment on. The function `curriculum`
     does so automatically: each time an episode ends, it gets the index of the environment and the metrics of the
@@ -171,9 +172,12 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._next_buffer = 0
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
-        # The agents of the current episodes, kept for rewards and statistics.
+        # The agents of the current episodes, and whether an episode may have fewer than the arrays have room for.
         self._agent_mask = np.ones((self.num_envs, self.num_agents), dtype=np.bool_)
-        self._counts_agents = statistics or self._change_rewards is not None
+        self._is_padded = True
+        # Whether the number of agents of an environment may change.
+        self._may_change = False
+        self._has_ends = False
         self.closed = False
 
     # Gymnasium defines an attribute.
@@ -215,8 +219,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if self._films is not None:
             self._films.warn()
         observations = self._observations(out)
-        agents, masks = self._new_state(self.num_envs)
-        self._batch.reset((_vec_spaces.for_engine(observations), agents, masks), chosen, one, each)
+        active, masks = self._new_state(self.num_envs)
+        self._batch.reset((_vec_spaces.for_engine(observations), active, masks), chosen, one, each)
         if self._next_episodes is not None:
             self._next_episodes.follow_reset(chosen)
         if self._statistics is not None:
@@ -225,9 +229,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
         self._swap_buffers(out)
-        if self._counts_agents:
-            self._agent_mask = agents[1].copy()
-        return observations, self._state_infos(agents, masks, self._all)
+        if self._is_padded:
+            self._agent_mask = self._new_agent_mask(None)
+            self._is_padded = self._may_change or not self._agent_mask.all()
+        return observations, self._state_infos(active, self._agent_mask, masks, self._all)
 
     def step(
         self, actions: Any, *, out: Optional[Observations] = None
@@ -252,17 +257,25 @@ class VecEnv(VectorEnv, Generic[Observations]):
         shape = (self.num_envs, self.num_agents)
         rewards = np.empty(shape, dtype=np.float32)
         terminated, truncated = np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)
-        agents, masks = self._new_state(self.num_envs)
-        state = (_vec_spaces.for_engine(observations), agents, masks)
+        active, masks = self._new_state(self.num_envs)
+        state = (_vec_spaces.for_engine(observations), active, masks)
+        old_mask = self._agent_mask
         ended = self._batch.step(numbers, (rewards, terminated, truncated), state)
         self._swap_buffers(out)
-        infos = self._state_infos(agents, masks, self._all)
+        infos: dict[str, Any] = {}
         failure = None
-        if ended:
-            self._add_ends(infos, ended)
-            failure = None if self._next_episodes is None else self._next_episodes.follow(ended, state)
-        if self._counts_agents:
-            rewards = self._count(rewards, terminated, truncated, infos, ended)
+        try:
+            if ended:
+                self._add_ends(infos, ended)
+                failure = None if self._next_episodes is None else self._next_episodes.follow(ended, state)
+        finally:
+            # Episodes begin in the step that ends the last ones, or in the step after it.
+            if self._is_padded and (ended or self._has_ends):
+                self._agent_mask = self._new_agent_mask(None)
+            self._has_ends = bool(ended)
+        infos.update(self._state_infos(active, self._agent_mask, masks, self._all))
+        if self._change_rewards is not None or self._statistics is not None:
+            rewards = self._count(rewards, terminated, truncated, infos, ended, old_mask)
         if failure is not None:
             raise failure
         return observations, rewards, terminated, truncated, infos
@@ -284,6 +297,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         read, of_env, chosen = read_changes(configs, envs, self.num_envs, self._reward)
         if chosen:
             self._batch.set_configs((read, of_env), chosen)
+            self._is_padded = self._may_change = True
 
     @property
     def films(self) -> list[str]:
@@ -344,8 +358,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     def _global_state(self, num_envs: int, ended: Optional[list[int]]) -> dict[str, np.ndarray]:
         """Returns the current states of all environments, or the final states of some."""
         arrays: dict[str, np.ndarray] = _vec_spaces.zeros(self.single_state_space, num_envs)
-        agent_mask = np.empty((num_envs, self.num_agents), dtype=np.bool_)
-        self._batch.global_state(arrays, (arrays["active"], agent_mask), ended)
+        self._batch.global_state(arrays, arrays["active"], ended)
         return arrays
 
     def _count(
@@ -355,11 +368,11 @@ class VecEnv(VectorEnv, Generic[Observations]):
         truncated: np.ndarray,
         infos: dict[str, Any],
         ended: list[int],
+        old_mask: np.ndarray,
     ) -> np.ndarray:
         """Returns the rewards of a step as the caller's function changes them, and adds the statistics to the infos."""
         # With `SAME_STEP`, the rewards are those of the old episodes.
-        played = self._agent_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else infos["agent_mask"]
-        self._agent_mask = infos["agent_mask"].copy()
+        played = old_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else self._agent_mask
         if self._change_rewards is not None:
             rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
             if not played.all():
@@ -370,11 +383,18 @@ class VecEnv(VectorEnv, Generic[Observations]):
                 infos["episode"], infos["_episode"] = self._statistics.end(ended)
         return rewards
 
-    def _new_state(self, num_envs: int) -> tuple[tuple[np.ndarray, np.ndarray], Optional[np.ndarray]]:
-        """Returns arrays for the flags of agents, active or not and agent or padding, and for the action masks."""
+    def _new_state(self, num_envs: int) -> tuple[np.ndarray, Optional[np.ndarray]]:
         shape = (num_envs, self.num_agents)
         masks = np.empty((*shape, NUM_ACTIONS), dtype=np.int8) if self._has_masks else None
-        return (np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)), masks
+        return np.empty(shape, dtype=np.bool_), masks
+
+    def _new_agent_mask(self, ended: Optional[list[int]]) -> np.ndarray:
+        """Returns which rows are agents: now in all environments, or in the last episodes of some."""
+        num_envs = self.num_envs if ended is None else len(ended)
+        mask = np.empty((num_envs, self.num_agents), dtype=np.bool_)
+        self._batch.mask_agents(mask, ended)
+        mask.flags.writeable = False
+        return mask
 
     def _observations(self, out: Optional[Observations]) -> Any:
         buffer = self._buffers[self._next_buffer]
@@ -385,9 +405,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
             self._next_buffer = (self._next_buffer + 1) % len(self._buffers)
 
     def _state_infos(
-        self, agents: tuple[np.ndarray, np.ndarray], masks: Optional[np.ndarray], present: np.ndarray
+        self, active: np.ndarray, agent_mask: np.ndarray, masks: Optional[np.ndarray], present: np.ndarray
     ) -> dict[str, Any]:
-        active, agent_mask = agents
         infos = {"is_active": active, "_is_active": present, "agent_mask": agent_mask, "_agent_mask": present}
         if masks is not None:
             infos.update(action_masks=masks, _action_masks=present)
@@ -407,13 +426,13 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if self.autoreset_mode != AutoresetMode.SAME_STEP:
             return
         observations = _vec_spaces.zeros(self.single_observation_space, len(ended))
-        agents, masks = self._new_state(len(ended))
-        self._batch.ended(ended, (_vec_spaces.for_engine(observations), agents, masks))
+        active, masks = self._new_state(len(ended))
+        self._batch.ended(ended, (_vec_spaces.for_engine(observations), active, masks))
         final = _vec_spaces.per_env(observations, ended, self.num_envs)
         state = _vec_spaces.per_env(self._global_state(len(ended), ended), ended, self.num_envs)
-        every_agents = (self._spread(ended, agents[0]), self._spread(ended, agents[1]))
+        agents = (self._spread(ended, active), self._spread(ended, self._new_agent_mask(ended)))
         every_masks = None if masks is None else self._spread(ended, masks)
-        info = {**self._state_infos(every_agents, every_masks, present), "metrics": metrics, "_metrics": present}
+        info = {**self._state_infos(*agents, every_masks, present), "metrics": metrics, "_metrics": present}
         infos.update(final_obs=final, _final_obs=present, final_info=info, _final_info=present)
         infos.update(final_state=state, _final_state=present)
 

@@ -5,7 +5,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pogema_core::Error;
-use pogema_fast::{ApartBuffers, Batch, GlobalBuffers, Observations, Windows};
+use pogema_fast::{ApartBuffers, Batch, Engine, GlobalBuffers, Observations, Windows};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -138,39 +138,48 @@ pub fn masks_mut<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResu
     Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
 }
 
-/// Flags of the agents that are active, and of the rows that are agents and not padding.
-///
-/// Shape: `(envs, agents)` each
-pub type Agents<'py> = (PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
+/// Writes which agents are active: now in all environments, or at the ends of the last episodes of some.
+pub fn write_active(
+    batch: &Batch,
+    ended: Option<&[usize]>,
+    active: PyReadwriteArray2<'_, bool>,
+) -> Result<(), Error> {
+    write_flags(batch, ended, active, |engine, agents| agents.copy_from_slice(engine.active()))
+}
 
-/// Writes the flags of the agents: now in all environments, or at the ends of the last episodes of some.
+/// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
 pub fn write_agents(
     batch: &Batch,
     ended: Option<&[usize]>,
-    (mut active, mut present): Agents<'_>,
+    agents: PyReadwriteArray2<'_, bool>,
+) -> Result<(), Error> {
+    write_flags(batch, ended, agents, |_, agents| agents.fill(true))
+}
+
+/// Writes a flag for each agent with a function, and false into padding.
+fn write_flags(
+    batch: &Batch,
+    ended: Option<&[usize]>,
+    mut flags: PyReadwriteArray2<'_, bool>,
+    write: impl Fn(&Engine, &mut [bool]),
 ) -> Result<(), Error> {
     let not_contiguous =
-        |_| Error::Corrupt { what: "agents".into(), reason: "the array is not contiguous".into() };
-    let (active, present) =
-        (active.as_slice_mut().map_err(not_contiguous)?, present.as_slice_mut().map_err(not_contiguous)?);
+        |_| Error::Corrupt { what: "flags".into(), reason: "the array is not contiguous".into() };
+    let flags = flags.as_slice_mut().map_err(not_contiguous)?;
     let num_agents = batch.config().num_agents;
     let expected = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
-    Error::check_length("active", expected, active.len())?;
-    Error::check_length("agents", expected, present.len())?;
-    let parts = active.chunks_exact_mut(num_agents).zip(present.chunks_exact_mut(num_agents));
-    for (index, (active, present)) in parts.enumerate() {
+    Error::check_length("flags", expected, flags.len())?;
+    for (index, part) in flags.chunks_exact_mut(num_agents).enumerate() {
         let engine = match ended {
             Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
             None => Some(batch.lane(index)?),
         };
         // INVARIANT: `observe_ended` has rejected environments without an ended episode.
-        let theirs = engine.map_or(&[][..], pogema_fast::Engine::active);
-        let (agents, padding) = active.split_at_mut(theirs.len());
-        agents.copy_from_slice(theirs);
-        padding.fill(false);
-        let (agents, padding) = present.split_at_mut(theirs.len());
-        agents.fill(true);
-        padding.fill(false);
+        if let Some(engine) = engine {
+            let (agents, padding) = part.split_at_mut(engine.active().len());
+            write(engine, agents);
+            padding.fill(false);
+        }
     }
     Ok(())
 }

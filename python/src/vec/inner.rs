@@ -73,7 +73,9 @@ impl Inner {
         let source = self.source.clone().with_configs(configs, &of_env, &envs)?;
         check_room(&source, self.batch.config().num_agents, self.map_size)?;
         let mut changed = vec![false; num_envs];
-        envs.iter().for_each(|&env| changed[env] = true);
+        for env in envs {
+            changed[env] = true;
+        }
         self.batch.replace_source(source.clone(), &changed, stop)?;
         self.source = source;
         Ok(())

@@ -19,7 +19,7 @@ use pyo3::types::PyDict;
 use crate::guard::guarded;
 use crate::{errors, interrupt};
 
-use buffers::{Agents, Buffer, Global, masks_mut, write_agents};
+use buffers::{Buffer, Global, masks_mut, write_active, write_agents};
 use film::{Film, Format, Plan};
 use inner::{Configs, Inner, Room, read_autoreset};
 
@@ -27,11 +27,11 @@ use inner::{Configs, Inner, Room, read_autoreset};
 ///
 /// Shape: `(envs, agents)` each
 type Ends<'py> = (PyReadwriteArray2<'py, f32>, PyReadwriteArray2<'py, bool>, PyReadwriteArray2<'py, bool>);
-/// Output arrays of a state: observations (an array, or a dictionary of arrays), flags of agents, and optional action
-/// masks.
+/// Output arrays of a state: observations (an array, or a dictionary of arrays), flags of active agents, and optional
+/// action masks.
 ///
-/// Shape: `(envs, agents, ...)`, `(envs, agents)` twice, `(envs, agents, 5)`
-type State<'py> = (Bound<'py, PyAny>, Agents<'py>, Option<PyReadwriteArray3<'py, i8>>);
+/// Shape: `(envs, agents, ...)`, `(envs, agents)`, `(envs, agents, 5)`
+type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyReadwriteArray3<'py, i8>>);
 
 /// A batch of environments that writes into buffers of the caller.
 ///
@@ -136,13 +136,13 @@ impl Batch {
             interrupt::detach_scoped(py, &self.stop, || inner.fetch(chosen, seed, seeds, &self.stop))?;
         let reset = fetched.and_then(|next| py.detach(|| inner.begin(next)));
         reset.map_err(|error| errors::batch(py, &error))?;
-        let (observations, agents, mut masks) = state;
+        let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
         let view =
             ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
         let batch = &mut inner.batch;
         py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
-        write_agents(batch, None, agents).map_err(|error| errors::batch(py, &error))
+        write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
     }
 
     /// Plays one step and returns the indices of the environments whose episode ended.
@@ -165,7 +165,7 @@ impl Batch {
             errors::action(py, text)
         })?;
         let (mut rewards, mut terminated, mut truncated) = ends;
-        let (observations, agents, mut masks) = state;
+        let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
         let view =
             ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
@@ -178,7 +178,7 @@ impl Batch {
         }
         let played = py.detach(|| inner.step(out, view));
         let batch = &inner.batch;
-        let shown = played.and_then(|()| write_agents(batch, None, agents));
+        let shown = played.and_then(|()| write_active(batch, None, active));
         shown.map_err(|error| errors::batch(py, &error))?;
         let has_ended = |&env: &usize| batch.has_just_ended(env).unwrap_or_default();
         Ok((0..batch.num_lanes()).filter(has_ended).collect())
@@ -188,13 +188,13 @@ impl Batch {
     fn ended(&self, py: Python<'_>, envs: Vec<usize>, state: State<'_>) -> PyResult<()> {
         let mut guard = self.lock()?;
         let inner = Self::open(&mut guard)?;
-        let (observations, agents, mut masks) = state;
+        let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
         let view =
             ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
         let batch = &inner.batch;
         let written = py.detach(|| batch.observe_ended(&envs, view));
-        let written = written.and_then(|()| write_agents(batch, Some(&envs), agents));
+        let written = written.and_then(|()| write_active(batch, Some(&envs), active));
         written.map_err(|error| errors::batch(py, &error))
     }
 
@@ -203,7 +203,7 @@ impl Batch {
         &self,
         py: Python<'_>,
         arrays: Bound<'_, PyDict>,
-        agents: Agents<'_>,
+        active: PyReadwriteArray2<'_, bool>,
         ended: Option<Vec<usize>>,
     ) -> PyResult<()> {
         let mut guard = self.lock()?;
@@ -214,8 +214,20 @@ impl Batch {
             Some(envs) => batch.observe_ended(envs, buffers),
             None => batch.observe(buffers),
         });
-        let written = written.and_then(|()| write_agents(batch, ended.as_deref(), agents));
+        let written = written.and_then(|()| write_active(batch, ended.as_deref(), active));
         written.map_err(|error| errors::batch(py, &error))
+    }
+
+    /// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
+    fn mask_agents(
+        &self,
+        py: Python<'_>,
+        mask: PyReadwriteArray2<'_, bool>,
+        ended: Option<Vec<usize>>,
+    ) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let batch = &Self::open(&mut guard)?.batch;
+        write_agents(batch, ended.as_deref(), mask).map_err(|error| errors::batch(py, &error))
     }
 
     /// Returns the metrics of the last episodes of some environments, by name.
