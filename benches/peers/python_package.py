@@ -20,6 +20,8 @@ ROOT = HERE.parent.parent
 OURS = ROOT / "target/python/new/bin/python"
 PROGRAM = ROOT / "target/release/pogema"
 BATCH = "64 lanes of 64 agents"
+# Rows whose observations are compared with writing zeros.
+WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]
 
 
 class Worker:
@@ -53,13 +55,24 @@ def imports_per_second(python, statement):
     return 1 / (min(seconds(statement) for _ in range(5)) - min(seconds("pass") for _ in range(5)))
 
 
+def rust_rows(part):
+    """Returns the rows of `pogema bench` whose names contain a text."""
+    table = ROOT / "target/python/batch.json"
+    command = [PROGRAM, "bench", "--rows", part, "--seconds", "0.3", "--json", table]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return json.loads(table.read_text())["rows"]
+
+
 def rust_batch():
     """Returns steps of the whole Rust batch per second, with observations."""
-    table = ROOT / "target/python/batch.json"
-    command = [PROGRAM, "bench", "--rows", BATCH, "--seconds", "0.3", "--json", table]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    (row,) = json.loads(table.read_text())["rows"]
+    (row,) = rust_rows(BATCH)
     return row["speed"]["step_f32"] / 64 / 64
+
+
+def against_zeros(part):
+    """Yields how many observations per second can be filled with zeros and written as f32."""
+    for row in rust_rows(part):
+        yield f"zeros, {row['name']}", row["speed"]["fill_f32"], row["speed"]["f32"]
 
 
 def measure(peer, ours, pogema):
@@ -71,7 +84,9 @@ def measure(peer, ours, pogema):
         ("step, 1 agent", peer.time("step", 1), ours.time("step", 1)),
         ("reset with a new seed, 64 agents", peer.time("reset", 64), ours.time("reset", 64)),
         ("VecEnv of 64, 64 agents, 2 threads", step_64, 64 * vector),
-        ("the same, against the Rust batch", rust_batch(), vector),
+        ("the same, packed into bits", step_64, 64 * ours.time("vector", 64, 64, 2, "bits")),
+        ("the same as f32, against the Rust batch", rust_batch(), vector),
+        *(row for part in WRITTEN for row in against_zeros(part)),
         ("import", imports_per_second(pogema, "import pogema"), imports_per_second(OURS, "import pogema_rs")),
         (
             "import for an environment",
@@ -96,9 +111,9 @@ def main():
         table.append({"work": name, "peer": theirs, "ours": own, "times": statistics.median(r[2] / r[1] for r in rows)})
     if arguments.json:
         arguments.json.write_text(json.dumps(table, indent=2) + "\n")
-    print(f"{'work':36}{'peer/s':>12}{'ours/s':>12}{'times':>9}")
+    print(f"{'work':60}{'peer/s':>12}{'ours/s':>12}{'times':>9}")
     for row in table:
-        print(f"{row['work']:36}{row['peer']:12.4g}{row['ours']:12.4g}{row['times']:9.2f}")
+        print(f"{row['work']:60}{row['peer']:12.4g}{row['ours']:12.4g}{row['times']:9.2f}")
 
 
 main()

@@ -75,9 +75,9 @@ def reset(num_agents):
     return fastest(work)
 
 
-def vector(num_envs, num_agents, num_threads):
+def vector(num_envs, num_agents, num_threads, dtype="float32"):
     """Returns steps of the whole VecEnv per second, with observations."""
-    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads)
+    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads, dtype=dtype)
     env.reset(seed=0)
     actions, at = random_actions(num_envs, num_agents), 0
 

@@ -214,7 +214,8 @@ fn a_reset_without_a_next_instance_changes_nothing() {
     };
     let before = state(&batch);
     assert_eq!(error_of(batch.reset_lanes(&chosen)), "instance: no further instance");
-    assert_eq!(error_of(batch.reset_with(source_with_one_agent, &chosen)), "starts has length 1, expected 5");
+    let expected = "starts has length 6, expected 5";
+    assert_eq!(error_of(batch.reset_with(source_with_six_agents, &chosen)), expected);
     assert_eq!(state(&batch), before);
     // The lanes whose instances were already generated start those now, not the ones after them.
     chosen[2] = false;
@@ -223,8 +224,8 @@ fn a_reset_without_a_next_instance_changes_nothing() {
     assert_eq!(episodes, [1, 1, 0, 1, 1, 0]);
 }
 
-fn source_with_one_agent(_: usize, _: u64) -> Result<Instance, Error> {
-    let fields = json!({"map": "..", "agents_xy": [[0, 0]], "targets_xy": [[0, 1]]});
+fn source_with_six_agents(_: usize, _: u64) -> Result<Instance, Error> {
+    let fields = json!({"size": 9, "num_agents": 6});
     Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
 }
 

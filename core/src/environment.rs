@@ -160,6 +160,17 @@ pub struct StepOut<'a> {
 }
 
 impl StepOut<'_> {
+    /// Splits every buffer after some agents.
+    pub fn split_at(self, num_agents: usize) -> (Self, Self) {
+        let (rewards, other_rewards) = self.rewards.split_at_mut(num_agents);
+        let (terminated, other_terminated) = self.terminated.split_at_mut(num_agents);
+        let (truncated, other_truncated) = self.truncated.split_at_mut(num_agents);
+        (
+            Self { rewards, terminated, truncated },
+            Self { rewards: other_rewards, terminated: other_terminated, truncated: other_truncated },
+        )
+    }
+
     /// Checks that every buffer has one entry per agent.
     ///
     /// # Errors

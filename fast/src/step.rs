@@ -97,7 +97,15 @@ impl Engine {
     /// If the instance does not fit the config, or there is not enough memory.
     pub fn start(&mut self, instance: Instance) -> Result<(), Error> {
         instance.check_fits(&self.config)?;
+        self.start_resized(instance)
+    }
+
+    /// Begins an episode with an instance of any number of agents, which the config takes over.
+    ///
+    /// The instance must fit the config otherwise.
+    pub(crate) fn start_resized(&mut self, instance: Instance) -> Result<(), Error> {
         self.resize(instance.map().height(), instance.map().width())?;
+        self.config.num_agents = instance.starts().len();
         self.load(&instance);
         self.streams = instance.into_goals();
         Ok(())
@@ -166,9 +174,6 @@ impl Engine {
         self.board = Board::walls(height, width)?;
         (self.obstacles, self.occupied) = (obstacles, occupied);
         (self.height, self.width) = (height, width);
-        let num_agents = self.config.num_agents;
-        self.targets = vec![0; num_agents];
-        self.ahead = vec![0; num_agents];
         Ok(())
     }
 
@@ -187,6 +192,9 @@ impl Engine {
         self.active.resize(num_agents, true);
         self.on_goal.clear();
         self.on_goal.resize(num_agents, false);
+        for list in [&mut self.targets, &mut self.ahead] {
+            list.resize(num_agents, 0);
+        }
         self.step = 0;
         self.occupied.clear_all();
         self.place_agents();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Error, Instance, Map};
+use pogema_core::{Config, Error, Instance, Map};
 use pogema_fast::{Batch, Instances, suited_threads};
 use pogema_maps::{GridConfig, InstanceSource};
 
@@ -24,14 +24,13 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
 }
 
 /// A config and the map that its `map_name` names.
-type Named = (GridConfig, Option<Map>);
+pub type Named = (GridConfig, Option<Map>);
 
-/// Source of the instances of many environments that share rules and array shapes, but not maps.
+/// Source of the instances of many environments that share rules and radius, but not maps and numbers of agents.
 #[derive(Clone, Debug)]
 pub struct EnvSource {
-    configs: Arc<[Named]>,
-    /// Index of each environment's config.
-    of_env: Arc<[usize]>,
+    /// The config of each environment. Environments with equal configs share one.
+    configs: Arc<[Arc<Named>]>,
     seeds: Vec<Seed>,
 }
 
@@ -42,20 +41,17 @@ impl EnvSource {
     /// # Errors
     /// [`Error::Argument`] if there are no environments or an index is out of range; [`Error::Config`] if a config does
     /// not fit a batch, or differs from another in a field that all must share.
-    pub fn new(configs: Vec<(GridConfig, Option<Map>)>, of_env: Vec<usize>) -> Result<Self, Error> {
-        if of_env.is_empty() {
-            return Err(Error::argument("num_envs", 0, "at least 1"));
-        }
+    pub fn new(configs: Vec<Named>, of_env: Vec<usize>) -> Result<Self, Error> {
+        let configs = per_env(configs, &of_env)?;
+        let Some(first) = configs.first() else { return Err(Error::argument("num_envs", 0, "at least 1")) };
         let shared = Seed::from_os()?;
-        let mut seeds = Vec::with_capacity(of_env.len());
-        for (env, &index) in of_env.iter().enumerate() {
-            let config = configs.get(index).map(|(config, _)| config);
-            let config = config.ok_or_else(|| Error::argument("of_env", index, "the index of a config"))?;
-            check_playable(config)?;
-            check_alike(env, config, &configs[of_env[0]].0)?;
-            seeds.push(config.seed.map_or(shared, Seed::Shared));
+        let mut seeds = Vec::with_capacity(configs.len());
+        for (env, config) in configs.iter().enumerate() {
+            let reason = || format!("because environment {env} must share it with environment 0");
+            check_alike(&config.0, &first.0, reason)?;
+            seeds.push(config.0.seed.map_or(shared, Seed::Shared));
         }
-        Ok(Self { configs: configs.into(), of_env: of_env.into(), seeds })
+        Ok(Self { configs: configs.into(), seeds })
     }
 
     /// Replaces the seeds, one for each environment.
@@ -63,8 +59,32 @@ impl EnvSource {
     /// # Errors
     /// [`Error::Length`] if the numbers of seeds and environments differ.
     pub fn with_seeds(self, seeds: Vec<Seed>) -> Result<Self, Error> {
-        Error::check_length("seeds", self.of_env.len(), seeds.len())?;
+        Error::check_length("seeds", self.configs.len(), seeds.len())?;
         Ok(Self { seeds, ..self })
+    }
+
+    /// Replaces the configs of some environments and keeps their seeds; `of_env` holds the index of the config of each
+    /// environment in `envs`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if an index is out of range; [`Error::Length`] if the numbers of indices differ;
+    /// [`Error::Config`] if a config does not fit a batch, or if a field that all environments must share would change.
+    pub fn with_configs(self, configs: Vec<Named>, of_env: &[usize], envs: &[usize]) -> Result<Self, Error> {
+        Error::check_length("configs", envs.len(), of_env.len())?;
+        let mut every = self.configs.to_vec();
+        for (config, &env) in per_env(configs, of_env)?.into_iter().zip(envs) {
+            check_alike(&config.0, self.config(0), || "which cannot change".into())?;
+            let expected = || format!("below {}, the number of environments", self.configs.len());
+            *every.get_mut(env).ok_or_else(|| Error::argument("envs", env, expected()))? = config;
+        }
+        Ok(Self { configs: every.into(), ..self })
+    }
+
+    /// Returns the rules of all environments, with the largest number of their agents.
+    pub fn rules(&self) -> Config {
+        let num_agents = self.configs.iter().map(|config| config.0.num_agents).max();
+        let rules = self.config(0).rules();
+        Config { num_agents: num_agents.unwrap_or(rules.num_agents), ..rules }
     }
 
     /// Returns each environment's source of seeds.
@@ -79,22 +99,22 @@ impl EnvSource {
 
     /// Returns the numbers of rows and columns that hold the map of every environment.
     pub fn largest_map(&self) -> (usize, usize) {
-        let sizes = self.configs.iter().map(|(config, registered)| match registered {
-            Some(map) if config.map_name.is_some() => (map.height(), map.width()),
-            _ => (config.height, config.width),
+        let sizes = self.configs.iter().map(|named| match &**named {
+            (config, Some(map)) if config.map_name.is_some() => (map.height(), map.width()),
+            (config, _) => (config.height, config.width),
         });
         sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)))
     }
 
     /// Returns the config of an environment.
     pub fn config(&self, env: usize) -> &GridConfig {
-        &self.configs[self.of_env[env]].0
+        &self.configs[env].0
     }
 }
 
 impl Instances for EnvSource {
     fn instance(&self, env: usize, episode: u64) -> Result<Instance, Error> {
-        let (config, registered) = &self.configs[self.of_env[env]];
+        let (config, registered) = &*self.configs[env];
         let seed = self.seeds[env].of_episode(env, episode);
         // A new source for each episode, because pools would depend on earlier episodes.
         let config = GridConfig { seed: Some(seed), ..config.clone() };
@@ -105,6 +125,17 @@ impl Instances for EnvSource {
     }
 }
 
+/// Returns the config of each environment, given as indices into a list.
+fn per_env(configs: Vec<Named>, of_env: &[usize]) -> Result<Vec<Arc<Named>>, Error> {
+    configs.iter().try_for_each(|(config, _)| check_playable(config))?;
+    let configs: Vec<_> = configs.into_iter().map(Arc::new).collect();
+    let config = |&index: &usize| {
+        let config = configs.get(index).map(Arc::clone);
+        config.ok_or_else(|| Error::argument("of_env", index, "the index of a config"))
+    };
+    of_env.iter().map(config).collect()
+}
+
 fn check_playable(config: &GridConfig) -> Result<(), Error> {
     if config.persistent {
         return Err(Error::config("persistent", true, "false, because a batch keeps no steps"));
@@ -112,10 +143,9 @@ fn check_playable(config: &GridConfig) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that a config has the same shapes and rules as that of the first environment.
-fn check_alike(env: usize, config: &GridConfig, first: &GridConfig) -> Result<(), Error> {
-    const SHARED: [&str; 8] = [
-        "num_agents",
+/// Checks that a config has the same rules as another, except for the number of agents.
+fn check_alike(config: &GridConfig, first: &GridConfig, reason: impl Fn() -> String) -> Result<(), Error> {
+    const SHARED: [&str; 7] = [
         "obs_radius",
         "collision_system",
         "on_target",
@@ -124,11 +154,11 @@ fn check_alike(env: usize, config: &GridConfig, first: &GridConfig) -> Result<()
         "occupancy",
         "reward",
     ];
-    if config.rules() == first.rules() {
+    if (Config { num_agents: first.num_agents, ..config.rules() }) == first.rules() {
         return Ok(());
     }
     let (own, first) = (config.to_value(), first.to_value());
     let field = SHARED.into_iter().find(|&field| own[field] != first[field]).unwrap_or("config");
-    let expected = format!("{}, because environment {env} must share it with environment 0", first[field]);
+    let expected = format!("{}, {}", first[field], reason());
     Err(Error::config(field, &own[field], expected))
 }

@@ -45,7 +45,7 @@ mod batch;
 mod episode;
 mod seeds;
 
-pub use batch::{EnvSource, batch};
+pub use batch::{EnvSource, Named, batch};
 pub use episode::{start, start_on};
 pub use pogema_core::{
     Action, Cell, Change, Collision, Config, Environment, Episode, Error, GoalStream, Instance, Map, Meters,

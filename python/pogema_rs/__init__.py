@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from pogema_rs.semantics import Semantics
     from pogema_rs.svg_animation.animation_drawer import SvgAnimation
     from pogema_rs.svg_animation.animation_wrapper import AnimationConfig, AnimationMonitor
-    from pogema_rs.vec_env import VecEnv
+    from pogema_rs.vec_env import Film, VecEnv
     from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = [
@@ -57,6 +57,7 @@ __all__ = [
     "AnimationConfig",
     "AnimationMonitor",
     "BatchAStarAgent",
+    "Film",
     "GridConfig",
     "Semantics",
     "SvgAnimation",
@@ -73,6 +74,7 @@ _HOMES = {
     "AnimationConfig": "svg_animation.animation_wrapper",
     "AnimationMonitor": "svg_animation.animation_wrapper",
     "BatchAStarAgent": "a_star_policy",
+    "Film": "vec_env",
     "GridConfig": "grid_config",
     "Semantics": "semantics",
     "SvgAnimation": "svg_animation.animation_drawer",

@@ -1,6 +1,7 @@
 """The compiled part of the package; the other modules define the public names."""
 
 from collections.abc import Callable
+from pathlib import PurePath
 from typing import Any, Optional, Union, final
 
 import numpy as np
@@ -39,6 +40,7 @@ __version__: str
 
 _Pairs = list[tuple[int, int]]
 _State = tuple[Union[NDArray[Any], dict[str, NDArray[Any]]], NDArray[np.bool_], Optional[NDArray[np.int8]]]
+_Configs = tuple[list[tuple[dict[str, Any], Optional[str]]], Optional[list[int]]]
 
 @final
 class Engine:
@@ -101,13 +103,17 @@ class Engine:
 class Batch:
     def __new__(
         cls,
-        configs: list[tuple[dict[str, Any], Optional[str]]],
-        of_env: Optional[list[int]],
+        configs: _Configs,
         num_envs: int,
-        autoreset: str,
-        exact: bool,
+        rules: tuple[str, bool],
         threads: tuple[Optional[int], int],
+        room: tuple[Optional[int], Optional[tuple[int, int]]],
     ) -> Batch: ...
+    def film(self, /, env: int, every: int, prefix: str, format: str) -> None: ...
+    def films(self, /) -> list[PurePath]: ...
+    def take_film_failures(self, /) -> list[str]: ...
+    def finish_films(self, /) -> tuple[list[PurePath], list[str]]: ...
+    def set_configs(self, /, configs: _Configs, envs: Optional[list[int]]) -> None: ...
     def reset(
         self,
         /,
@@ -127,6 +133,7 @@ class Batch:
     def global_state(
         self, /, arrays: dict[str, NDArray[Any]], active: NDArray[np.bool_], ended: Optional[list[int]]
     ) -> None: ...
+    def mask_agents(self, /, mask: NDArray[np.bool_], ended: Optional[list[int]]) -> None: ...
     def metrics(self, /, envs: list[int]) -> list[dict[str, float]]: ...
     def mask_actions(self, /, masks: NDArray[np.int8]) -> None: ...
     def episode_seeds(self, /) -> list[int]: ...

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 import numpy as np
@@ -15,6 +15,8 @@ from pogema_rs.grid_config import GridConfig, engine_fields
 
 # The fields that the engine reads, and the text of a named map.
 Config = tuple[dict[str, Any], Optional[str]]
+# The numbers of agents, and of rows and columns.
+Room = tuple[Optional[int], Optional[tuple[int, int]]]
 
 
 def _engine_config(config: Any, reward: str) -> Config:
@@ -42,7 +44,7 @@ def read_configs(
     """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
     if not isinstance(grid_config, (list, tuple)):
         num_envs = 1 if num_envs is None else num_envs
-        _check_whole("num_envs", num_envs)
+        check_whole("num_envs", num_envs)
         return [_engine_config(grid_config, reward)], None, min(int(num_envs), sys.maxsize)
     if num_envs not in (None, len(grid_config)):
         raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
@@ -56,10 +58,57 @@ def read_configs(
     return [first[place] for place in range(len(places))], [places[key] for key in keys], len(configs)
 
 
+def read_changes(
+    configs: Any, envs: Optional[Sequence[int]], num_envs: int, reward: str
+) -> tuple[list[Config], Optional[list[int]], list[int]]:
+    """Returns new configs as `read_configs` does, and the environments that get them.
+
+    Errors: TypeError or ValueError for wrong arguments.
+    """
+    if isinstance(envs, str) or not (envs is None or hasattr(envs, "__iter__")):
+        raise TypeError(f"envs is {envs!r}, expected a list of indices")
+    every = range(num_envs) if envs is None else envs
+    chosen = [_env_index(f"envs[{place}]", env, num_envs) for place, env in enumerate(every)]
+    if len(set(chosen)) != len(chosen):
+        raise ValueError(f"envs is {chosen}, expected each environment once")
+    if not isinstance(configs, (list, tuple)):
+        return [_engine_config(configs, reward)], None, chosen
+    if len(configs) != len(chosen):
+        raise ValueError(f"configs holds {len(configs)} configs, expected {len(chosen)}, one per environment")
+    if not chosen:
+        return [], [], []
+    read, of_env, _ = read_configs(configs, None, reward)
+    return read, of_env, chosen
+
+
+def read_room(num_agents: Any, map_size: Any) -> Room:
+    """Returns the numbers of agents, and of rows and columns, for which the arrays must have room at least."""
+    if num_agents is not None:
+        check_whole("num_agents", num_agents)
+        num_agents = min(int(num_agents), sys.maxsize)
+    if map_size is None:
+        return num_agents, None
+    sides = (map_size, map_size) if isinstance(map_size, (int, np.integer)) else map_size
+    if not isinstance(sides, (list, tuple)) or len(sides) != 2:
+        raise TypeError(f"map_size is {map_size!r}, expected a whole number or a pair (rows, columns)")
+    rows, columns = sides
+    check_whole("map_size", rows)
+    check_whole("map_size", columns)
+    return num_agents, (min(int(rows), sys.maxsize), min(int(columns), sys.maxsize))
+
+
+def _env_index(name: str, env: Any, num_envs: int) -> int:
+    if isinstance(env, bool) or not isinstance(env, (int, np.integer)):
+        raise TypeError(f"{name} is {env!r}, expected a whole number")
+    if not 0 <= env < num_envs:
+        raise ValueError(f"{name} is {env}, expected 0 to {num_envs - 1}, an index of an environment")
+    return int(env)
+
+
 def read_threads(num_threads: Optional[int]) -> Optional[int]:
     if num_threads is None:
         return None
-    _check_whole("num_threads", num_threads)
+    check_whole("num_threads", num_threads)
     if num_threads > _engine.MAX_THREADS:
         raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")
     if num_threads > _engine.num_cores():
@@ -68,7 +117,8 @@ def read_threads(num_threads: Optional[int]) -> Optional[int]:
     return int(num_threads)
 
 
-def _check_whole(name: str, value: Any) -> None:
+def check_whole(name: str, value: Any) -> None:
+    """Checks that an argument is a whole number of at least 1."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         raise TypeError(f"{name} is {value!r}, expected a whole number")
     if value < 1:

@@ -52,8 +52,9 @@ def observation_space(
     if kind == "MAPF":
         rows, columns = (length + 2 * radius for length in size)
         parts["global_obstacles"] = spaces.Box(0, 1, (rows, columns), np.uint8)
-        parts["global_xy"] = _cells(num_agents, radius, radius + max(size) - 1)
-        parts["global_target_xy"] = _cells(num_agents, radius, radius + max(size) - 1)
+        # 0 only occurs as padding.
+        parts["global_xy"] = _cells(num_agents, 0, radius + max(size) - 1)
+        parts["global_target_xy"] = _cells(num_agents, 0, radius + max(size) - 1)
     return spaces.Dict(parts)
 
 

@@ -28,12 +28,13 @@ class EpisodeStatistics:
         self._starts[which] = time.perf_counter()
         self._is_over[which] = False
 
-    def count(self, rewards: np.ndarray) -> None:
-        """Counts a step of the episodes that were not over before it.
+    def count(self, rewards: np.ndarray, agent_mask: np.ndarray) -> None:
+        """Counts a step of the episodes that were not over before it. The rewards of padding are 0.
 
-        Shape: `rewards` is `(num_envs, agents)`
+        Shape: `rewards` and `agent_mask` are `(num_envs, agents)`
         """
-        self._returns += np.where(self._is_over, 0, rewards.mean(axis=1, dtype=np.float64))
+        means = rewards.sum(axis=1, dtype=np.float64) / agent_mask.sum(axis=1)
+        self._returns += np.where(self._is_over, 0, means)
         self._lengths += ~self._is_over
         if self._mode == AutoresetMode.NEXT_STEP:
             # This step has begun the next episodes.

@@ -12,13 +12,15 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, _vec_spaces
-from pogema_rs._vec_configs import read_configs, read_threads
+from pogema_rs._vec_configs import read_changes, read_configs, read_room, read_threads
+from pogema_rs._vec_curriculum import Curriculum, NextEpisodes
+from pogema_rs._vec_film import Film, Films
 from pogema_rs._vec_input import AutoresetMode, read_actions, read_autoreset, read_mask, read_seed
 from pogema_rs._vec_rewards import RewardFunction, changed_rewards, read_rewards
 from pogema_rs._vec_statistics import EpisodeStatistics
 from pogema_rs.semantics import Semantics
 
-__all__ = ["AutoresetMode", "VecEnv"]
+__all__ = ["AutoresetMode", "Film", "VecEnv"]
 
 NUM_ACTIONS = 5
 
@@ -64,17 +66,32 @@ class VecEnv(VectorEnv, Generic[Observations]):
     config has none. No episode depends on the number of environments or threads. `episode_seeds` returns the seeds of
     the current episodes.
 
+    Padding: the configs of a list may differ in the number of agents, and `agents` is the largest of these numbers.
+    The rows after the agents of an environment are padding, with observations, rewards and positions of 0,
+    `terminated` and `truncated` True, `is_active` False, and action masks that only allow staying. Their actions must
+    be valid and have no effect. `infos["agent_mask"]`, `(num_envs, agents)`, is True for agents and False for padding.
+    It is read-only, because later calls return the same array until it changes.
+
     Autoreset, as in Gymnasium: with `SAME_STEP` the step that ends an episode also begins the next one, and
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `NEXT_STEP` the following step
     ignores the environment's actions and begins the next episode. With `DISABLED` the environment keeps its final
     state, with rewards of 0 and the last `terminated` and `truncated`, until `reset(options={"reset_mask": ...})`.
 
-    `infos` holds `is_active`, `(num_envs, agents)`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`,
-    int8, 1 where no obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays
-    `(num_envs,)` that are NaN where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode`
-    in the form of Gymnasium's `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of
-    the agents' returns, the length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the
-    global state at the end of each of these episodes, as `final_obs` holds the observations.
+    `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations: with
+    `SAME_STEP`, a step that ends an episode returns rewards and ends of the old one, whose `agent_mask` is in
+    `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where no obstacle blocks the
+    move. When episodes ended it holds `metrics`, a dict of float arrays `(num_envs,)` that are NaN where `_metrics` is
+    False. With `statistics` it then also holds `episode` and `_episode` in the form of Gymnasium's
+    `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of the agents' returns, the
+    length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the global state at the end
+    of each of these episodes, as `final_obs` holds the observations.
+
+    Curriculum: `set_configs` changes configs from the next episode of each environment on. The function `curriculum`
+    does so automatically: each time an episode ends, it gets the index of the environment and the metrics of the
+    episode as a dict of floats, and returns the config of the environment's further episodes, or None to keep the
+    config. Environments are passed in ascending order, so results are reproducible if the function is. New configs must
+    fit the arrays: `num_agents` and `map_size` reserve room. Neither a config's seed nor `reset` changes them back: the
+    seeds of later episodes follow from the seed of the last reset.
 
     Calls from two threads at the same time, and calls in a forked child, raise a RuntimeError. A config is read once;
     later changes to it have no effect. Warnings about single instances are not shown.
@@ -96,13 +113,19 @@ class VecEnv(VectorEnv, Generic[Observations]):
         masks: bool = False,
         rewards: Union[str, RewardFunction] = "own",
         statistics: bool = False,
+        num_agents: Optional[int] = None,
+        map_size: Union[None, int, tuple[int, int]] = None,
+        curriculum: Optional[Curriculum] = None,
+        film: Optional[Film] = None,
     ) -> None:
         """Makes one environment for each config of a list, or `num_envs` of a single config.
 
-        A config is a GridConfig or a dict. The configs of a list may have different maps, but must agree on agents,
-        radius and rules. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line. `num_threads` is the
-        largest number of threads [default: as many as suit the work of a step, at most one per core and environment].
-        A step uses fewer while measured times show that more do not make it faster.
+        A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
+        must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
+        or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
+        N-th episode of one environment. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line.
+        `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
+        core and environment]. A step uses fewer while measured times show that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.
@@ -115,15 +138,22 @@ class VecEnv(VectorEnv, Generic[Observations]):
         dtype = _vec_spaces.read_dtype(dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
         reward, self._change_rewards = read_rewards(rewards)
+        self._reward = reward
         configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
+        # A curriculum chooses the config of the next episode between the end of an episode and this next episode.
+        begins_ended = curriculum is not None and self.autoreset_mode == AutoresetMode.SAME_STEP
+        mode = AutoresetMode.DISABLED if begins_ended else self.autoreset_mode
         self._batch = _engine.Batch(
-            configs,
-            of_env,
+            (configs, of_env),
             self.num_envs,
-            self.autoreset_mode.value,
-            self.semantics.occupancy_is_exact,
+            (mode.value, self.semantics.occupancy_is_exact),
             (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
+            read_room(num_agents, map_size),
         )
+        self._next_episodes: Optional[NextEpisodes] = None
+        if curriculum is not None:
+            self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
+        self._films = None if film is None else Films(self._batch, film, self.num_envs)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
@@ -142,6 +172,12 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._next_buffer = 0
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
+        # The agents of the current episodes, and whether an episode may have fewer than the arrays have room for.
+        self._agent_mask = np.ones((self.num_envs, self.num_agents), dtype=np.bool_)
+        self._is_padded = True
+        # Whether the number of agents of an environment may change.
+        self._may_change = False
+        self._has_ends = False
         self.closed = False
 
     # Gymnasium defines an attribute.
@@ -180,16 +216,23 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """
         chosen = read_mask(options, self.num_envs)
         one, each = read_seed(seed, self.num_envs)
+        if self._films is not None:
+            self._films.warn()
         observations = self._observations(out)
         active, masks = self._new_state(self.num_envs)
         self._batch.reset((_vec_spaces.for_engine(observations), active, masks), chosen, one, each)
+        if self._next_episodes is not None:
+            self._next_episodes.follow_reset(chosen)
         if self._statistics is not None:
             self._statistics.begin(chosen)
         if seed is not None:
             self._np_random = np.random.default_rng(one if each is None else each)
             self._np_random_seed = one if each is None else each[0]
         self._swap_buffers(out)
-        return observations, self._state_infos(active, masks, self._all)
+        if self._is_padded:
+            self._agent_mask = self._new_agent_mask(None)
+            self._is_padded = self._may_change or not self._agent_mask.all()
+        return observations, self._state_infos(active, self._agent_mask, masks, self._all)
 
     def step(
         self, actions: Any, *, out: Optional[Observations] = None
@@ -201,27 +244,65 @@ class VecEnv(VectorEnv, Generic[Observations]):
         as indices from the end of a list, and wrong actions of inactive agents; this class rejects both.
 
         Errors: ValueError or TypeError for wrong actions, before anything is played; `InstanceError` if an environment
-        has no next episode. TypeError or ValueError for wrong results of the function `rewards`, after the step.
+        has no next episode. TypeError or ValueError for wrong results of the function `rewards`, after the step. If
+        `curriculum` raises an exception or returns a config that does not fit, the step ends as if it had returned None
+        for all environments, and then raises.
         """
         numbers = read_actions(actions, (self.num_envs, self.num_agents))
+        if self._films is not None:
+            self._films.warn()
+        if self._next_episodes is not None:
+            self._next_episodes.check()
         observations = self._observations(out)
         shape = (self.num_envs, self.num_agents)
         rewards = np.empty(shape, dtype=np.float32)
         terminated, truncated = np.empty(shape, dtype=np.bool_), np.empty(shape, dtype=np.bool_)
         active, masks = self._new_state(self.num_envs)
         state = (_vec_spaces.for_engine(observations), active, masks)
+        old_mask = self._agent_mask
         ended = self._batch.step(numbers, (rewards, terminated, truncated), state)
         self._swap_buffers(out)
-        infos = self._state_infos(active, masks, self._all)
-        if ended:
-            self._add_ends(infos, ended)
-        if self._change_rewards is not None:
-            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
-        if self._statistics is not None:
-            self._statistics.count(rewards)
+        infos: dict[str, Any] = {}
+        failure = None
+        try:
             if ended:
-                infos["episode"], infos["_episode"] = self._statistics.end(ended)
+                self._add_ends(infos, ended)
+                failure = None if self._next_episodes is None else self._next_episodes.follow(ended, state)
+        finally:
+            # Episodes begin in the step that ends the last ones, or in the step after it.
+            if self._is_padded and (ended or self._has_ends):
+                self._agent_mask = self._new_agent_mask(None)
+            self._has_ends = bool(ended)
+        infos.update(self._state_infos(active, self._agent_mask, masks, self._all))
+        if self._change_rewards is not None or self._statistics is not None:
+            rewards = self._count(rewards, terminated, truncated, infos, ended, old_mask)
+        if failure is not None:
+            raise failure
         return observations, rewards, terminated, truncated, infos
+
+    def set_configs(self, configs: Any, envs: Optional[Sequence[int]] = None) -> None:
+        """Changes configs from the next episode of each environment on; the current episodes continue.
+
+        `configs` is one config for all environments, or a list with one for each. With `envs`, the indices of
+        environments, only their configs change, and a list holds one config for each of them.
+
+        A config may have another map and another number of agents, within the room that the `num_agents` and `map_size`
+        of the constructor reserve. Radius and rules cannot change. A config's seed has no effect: the episodes keep
+        their seeds and numbers. With `NEXT_STEP`, the next episode of an environment whose episode has just ended
+        already is one of the new config.
+
+        Errors: ValueError or TypeError for wrong arguments or a config that does not fit; with `NEXT_STEP`,
+        `InstanceError` if such a next episode does not exist. After an error no config is changed.
+        """
+        read, of_env, chosen = read_changes(configs, envs, self.num_envs, self._reward)
+        if chosen:
+            self._batch.set_configs((read, of_env), chosen)
+            self._is_padded = self._may_change = True
+
+    @property
+    def films(self) -> list[str]:
+        """The paths of the films that are complete, in the order of their episodes; after `close`, of all films."""
+        return [] if self._films is None else self._films.paths()
 
     def action_masks(self) -> np.ndarray:
         """Returns the masks of the actions that no obstacle blocks now.
@@ -258,8 +339,16 @@ class VecEnv(VectorEnv, Generic[Observations]):
         return self.np_random.integers(NUM_ACTIONS, size=(self.num_envs, self.num_agents))
 
     def close(self, **kwargs: Any) -> None:
-        """Frees the environments and threads; later calls except `close` raise a RuntimeError."""
-        if not self.closed:
+        """Completes the films, and frees the environments and threads.
+
+        A film of an episode that has not ended shows the steps so far. Later calls except `close` raise a RuntimeError.
+        """
+        if self.closed:
+            return
+        try:
+            if self._films is not None:
+                self._films.finish()
+        finally:
             self._batch.close()
             self.closed = True
 
@@ -272,10 +361,40 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._batch.global_state(arrays, arrays["active"], ended)
         return arrays
 
+    def _count(
+        self,
+        rewards: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        infos: dict[str, Any],
+        ended: list[int],
+        old_mask: np.ndarray,
+    ) -> np.ndarray:
+        """Returns the rewards of a step as the caller's function changes them, and adds the statistics to the infos."""
+        # With `SAME_STEP`, the rewards are those of the old episodes.
+        played = old_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else self._agent_mask
+        if self._change_rewards is not None:
+            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
+            if not played.all():
+                rewards = np.where(played, rewards, np.float32(0))
+        if self._statistics is not None:
+            self._statistics.count(rewards, played)
+            if ended:
+                infos["episode"], infos["_episode"] = self._statistics.end(ended)
+        return rewards
+
     def _new_state(self, num_envs: int) -> tuple[np.ndarray, Optional[np.ndarray]]:
         shape = (num_envs, self.num_agents)
         masks = np.empty((*shape, NUM_ACTIONS), dtype=np.int8) if self._has_masks else None
         return np.empty(shape, dtype=np.bool_), masks
+
+    def _new_agent_mask(self, ended: Optional[list[int]]) -> np.ndarray:
+        """Returns which rows are agents: now in all environments, or in the last episodes of some."""
+        num_envs = self.num_envs if ended is None else len(ended)
+        mask = np.empty((num_envs, self.num_agents), dtype=np.bool_)
+        self._batch.mask_agents(mask, ended)
+        mask.flags.writeable = False
+        return mask
 
     def _observations(self, out: Optional[Observations]) -> Any:
         buffer = self._buffers[self._next_buffer]
@@ -285,8 +404,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if out is None:
             self._next_buffer = (self._next_buffer + 1) % len(self._buffers)
 
-    def _state_infos(self, active: np.ndarray, masks: Optional[np.ndarray], present: np.ndarray) -> dict[str, Any]:
-        infos = {"is_active": active, "_is_active": present}
+    def _state_infos(
+        self, active: np.ndarray, agent_mask: np.ndarray, masks: Optional[np.ndarray], present: np.ndarray
+    ) -> dict[str, Any]:
+        infos = {"is_active": active, "_is_active": present, "agent_mask": agent_mask, "_agent_mask": present}
         if masks is not None:
             infos.update(action_masks=masks, _action_masks=present)
         return infos
@@ -309,8 +430,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._batch.ended(ended, (_vec_spaces.for_engine(observations), active, masks))
         final = _vec_spaces.per_env(observations, ended, self.num_envs)
         state = _vec_spaces.per_env(self._global_state(len(ended), ended), ended, self.num_envs)
-        every_active, every_masks = self._spread(ended, active), None if masks is None else self._spread(ended, masks)
-        info = {**self._state_infos(every_active, every_masks, present), "metrics": metrics, "_metrics": present}
+        agents = (self._spread(ended, active), self._spread(ended, self._new_agent_mask(ended)))
+        every_masks = None if masks is None else self._spread(ended, masks)
+        info = {**self._state_infos(*agents, every_masks, present), "metrics": metrics, "_metrics": present}
         infos.update(final_obs=final, _final_obs=present, final_info=info, _final_info=present)
         infos.update(final_state=state, _final_state=present)
 

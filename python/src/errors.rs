@@ -2,7 +2,7 @@
 
 use pogema_core::{Error, one_line};
 use pyo3::PyErrArguments;
-use pyo3::exceptions::{PyMemoryError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -97,6 +97,14 @@ pub fn map(py: Python<'_>, error: &Error) -> PyErr {
         // pogema-toolbox asserts the sides of maps.
         (_, Some("width" | "height")) => of_class(py, "MapShapeError", error),
         _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Converts an error from the start of a film: a missing program, or a thread that cannot be started.
+pub fn film(py: Python<'_>, error: &Error) -> PyErr {
+    match error {
+        Error::Request { .. } => PyFileNotFoundError::new_err(error.to_string()),
+        _ => call(py, error),
     }
 }
 

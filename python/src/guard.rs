@@ -47,7 +47,8 @@ pub fn run<T>(body: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| Err(errors::internal(&text(&*panic))))
 }
 
-fn text(panic: &(dyn Any + Send)) -> String {
+/// Returns the message of a panic.
+pub fn text(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message").to_owned()
 }

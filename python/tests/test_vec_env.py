@@ -35,7 +35,9 @@ def test_every_autoreset_mode_equals_single_engines(mode, on_target, dtype):
     config = {**CONFIG, "on_target": on_target}
     env = VecEnv(config, 4, autoreset_mode=mode, dtype=dtype, masks=True)
     observations, infos = env.reset(seed=11)
-    assert observations.dtype == dtype and set(infos) == {"is_active", "_is_active", "action_masks", "_action_masks"}
+    names = {"is_active", "agent_mask", "action_masks"}
+    assert observations.dtype == dtype and set(infos) == names | {f"_{name}" for name in names}
+    assert infos["agent_mask"].all() and infos["agent_mask"].shape == (4, 5)
     plain = [Plain(config, index, shared_seed(11)) for index in range(4)]
     np.testing.assert_array_equal(observations, [one.observe() for one in plain])
     np.testing.assert_array_equal(infos["action_masks"], [one.masks() for one in plain])

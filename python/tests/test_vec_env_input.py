@@ -159,7 +159,6 @@ BAD_VECTORS = [
     ({"grid_config": 7}, TypeError, "grid_config holds a int, expected a GridConfig or a dict"),
     ({"grid_config": []}, ValueError, "expected 0, one for each config"),
     ({"grid_config": [CONFIG] * 3}, ValueError, "num_envs is 2, expected 3, one for each config of the list"),
-    ({"grid_config": [CONFIG, {**CONFIG, "num_agents": 4}]}, ValueError, "`num_agents` is `4`, expected 5, because"),
     ({"grid_config": [CONFIG, {**CONFIG, "obs_radius": 3}]}, ValueError, "`obs_radius` is `3`, expected 2"),
     ({"grid_config": [CONFIG, {**CONFIG, "on_target": "nothing"}]}, ValueError, "environment 1 must share it"),
     (

@@ -31,10 +31,11 @@ def own_seeds(seeds):
 
 
 class Plain:
-    """An environment that is reset by hand."""
+    """An environment that is reset by hand; the rows after its agents are padding up to `room` agents."""
 
-    def __init__(self, config, env, seed_of, exact=False):
+    def __init__(self, config, env, seed_of, exact=False, room=None):
         self.config, self.env, self.seed_of, self.exact = config, env, seed_of, exact
+        self.room = config["num_agents"] if room is None else room
         self.episode = -1
         self.begin()
 
@@ -43,10 +44,16 @@ class Plain:
         self.seed = self.seed_of(self.env, self.episode)
         self.engine = _engine.Engine({**self.config, "seed": self.seed}, None, self.exact)
         self.engine.reset()
+        self.num_agents = len(self.engine.active)
         self.last = None
 
+    def padded(self, rows, value=0):
+        rows = np.asarray(rows)
+        padding = np.full((self.room - self.num_agents, *rows.shape[1:]), value, rows.dtype)
+        return np.concatenate([rows, padding])
+
     def observe(self):
-        return np.array(self.engine.observe())
+        return self.padded(self.engine.observe())
 
     def masks(self):
         """Returns the action masks, computed cell by cell."""
@@ -55,49 +62,63 @@ class Plain:
         for (row, col), is_active in zip(cells, self.engine.active):
             around = [(row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)]
             masks.append([1] + [int(is_active and not walls[place]) for place in around])
-        return np.array(masks, dtype=np.int8)
+        padding = [[1, 0, 0, 0, 0]] * (self.room - self.num_agents)
+        return np.array(masks + padding, dtype=np.int8)
+
+    def state(self):
+        """Returns the flags of active agents and of agents."""
+        return {"active": self.padded(self.engine.active), "agents": np.arange(self.room) < self.num_agents}
 
     def step(self, mode, actions):
         """Plays one step and returns what `VecEnv` must return, as a dict."""
-        num_agents = self.config["num_agents"]
-        rewards, terminated, truncated = np.zeros(num_agents), np.zeros(num_agents, bool), np.zeros(num_agents, bool)
-        shown = {}
-        if self.last is None:
-            _, rewards, terminated, truncated, infos = self.engine.step(actions.tolist())
-            if all(terminated) or all(truncated):
-                self.last = (terminated, truncated)
-                shown["metrics"] = infos[0]["metrics"]
-                if mode == AutoresetMode.SAME_STEP:
-                    shown.update(final_obs=self.observe(), final_active=self.engine.active, final_masks=self.masks())
-                    self.begin()
-        elif mode == AutoresetMode.NEXT_STEP:
+        was_over, shown = self.last is not None, {}
+        if was_over and mode == AutoresetMode.NEXT_STEP:
             self.begin()
+        if was_over:
+            rewards = np.zeros(self.num_agents)
+            terminated, truncated = self.last or np.zeros((2, self.num_agents), bool)
         else:
-            terminated, truncated = self.last
-        shown.update(rewards=rewards, terminated=terminated, truncated=truncated, active=self.engine.active)
-        return {**shown, "obs": self.observe(), "masks": self.masks(), "seed": self.seed}
+            _, rewards, terminated, truncated, infos = self.engine.step(actions[: self.num_agents].tolist())
+        ends = {
+            "rewards": self.padded(rewards),
+            "terminated": self.padded(terminated, True),
+            "truncated": self.padded(truncated, True),
+        }
+        if not was_over and (all(terminated) or all(truncated)):
+            self.last = (terminated, truncated)
+            shown["metrics"] = infos[0]["metrics"]
+            if mode == AutoresetMode.SAME_STEP:
+                final = {f"final_{name}": value for name, value in self.state().items()}
+                shown.update(final_obs=self.observe(), final_masks=self.masks(), **final)
+                self.begin_after(shown["metrics"])
+        return {**shown, **ends, **self.state(), "obs": self.observe(), "masks": self.masks(), "seed": self.seed}
+
+    def begin_after(self, metrics):
+        """Begins the next episode after an episode with these metrics."""
+        self.begin()
 
 
-def check_step(got, plain, mode, actions, seeds):
+def check_step(got, plain, mode, actions, seeds, unpack=np.asarray):
     """Compares a step of a `VecEnv` with masks to the same step of engines; returns the number of ended episodes."""
     obs, rewards, terminated, truncated, infos = got
     shown = [one.step(mode, actions[env]) for env, one in enumerate(plain)]
     for env, one in enumerate(shown):
-        np.testing.assert_array_equal(obs[env], one["obs"])
+        np.testing.assert_array_equal(unpack(obs[env]), one["obs"])
         np.testing.assert_array_equal(rewards[env], np.array(one["rewards"], np.float32))
         np.testing.assert_array_equal(terminated[env], one["terminated"])
         np.testing.assert_array_equal(truncated[env], one["truncated"])
         np.testing.assert_array_equal(infos["is_active"][env], one["active"])
+        np.testing.assert_array_equal(infos["agent_mask"][env], one["agents"])
         np.testing.assert_array_equal(infos["action_masks"][env], one["masks"])
         assert seeds[env] == one["seed"]
-    check_ends(infos, shown, mode)
+    check_ends(infos, shown, mode, unpack)
     return sum("metrics" in one for one in shown)
 
 
-def check_ends(infos, shown, mode):
+def check_ends(infos, shown, mode, unpack):
     ended = ["metrics" in one for one in shown]
     has_final = any(ended) and mode == AutoresetMode.SAME_STEP
-    names = {"is_active", "action_masks"} | ({"metrics"} if any(ended) else set())
+    names = {"is_active", "agent_mask", "action_masks"} | ({"metrics"} if any(ended) else set())
     names |= {"final_obs", "final_info", "final_state"} if has_final else set()
     assert set(infos) == names | {f"_{name}" for name in names}
     if not any(ended):
@@ -108,7 +129,8 @@ def check_ends(infos, shown, mode):
             if not name.startswith("_"):
                 assert values[env] == one["metrics"][name] if ended[env] else np.isnan(values[env])
         if has_final and ended[env]:
-            np.testing.assert_array_equal(infos["final_obs"][env], one["final_obs"])
+            np.testing.assert_array_equal(unpack(infos["final_obs"][env]), one["final_obs"])
+            np.testing.assert_array_equal(infos["final_info"]["agent_mask"][env], one["final_agents"])
             np.testing.assert_array_equal(infos["final_info"]["is_active"][env], one["final_active"])
             np.testing.assert_array_equal(infos["final_info"]["action_masks"][env], one["final_masks"])
         elif has_final:

@@ -11,6 +11,8 @@ use crate::motion::Motion;
 use crate::scene::Scene;
 use crate::style::Style;
 
+/// Default length of the longer side of a video. Units: pixels.
+pub const LONGER_SIDE: u32 = 720;
 /// Frame rate; higher if a step is shorter than a frame. Units: frames per second.
 const RATE: f64 = 30.0;
 /// Maximum length of a quoted error message of ffmpeg. Units: characters.

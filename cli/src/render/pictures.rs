@@ -15,7 +15,6 @@ use crate::words::word;
 /// Default length of the longer side of pictures. Units: pixels.
 const LONGER_SIDE_OF_PNG: u32 = 1024;
 const LONGER_SIDE_OF_GIF: u32 = 512;
-const LONGER_SIDE_OF_VIDEO: u32 = 720;
 
 /// Steps per second that can be shown. In files, times are rounded to thousandths of a second.
 const FPS: RangeInclusive<f64> = 0.001..=1000.0;
@@ -151,7 +150,7 @@ impl Pictures {
             files::write(path, &bytes)?;
         }
         if let Some(path) = &self.video {
-            video::write(trace, &style, width(LONGER_SIDE_OF_VIDEO), path, &mut progress("video"))?;
+            video::write(trace, &style, width(video::LONGER_SIDE), path, &mut progress("video"))?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use pogema_core::{Action, Error, StepOut};
+use pogema_core::{Action, Config, Error, StepOut};
 
 use crate::buffers::{ObservationBuffers, Observations};
 use crate::simd::fetch_all;
@@ -13,6 +13,8 @@ use super::team::Team;
 
 /// Some lanes, the actions and results of their step if there is one, and the buffers for their observations.
 pub(super) struct Jobs<'a> {
+    /// The config of the batch, which determines the sizes of buffers.
+    pub config: &'a Config,
     pub lanes: &'a mut [Lane],
     pub steps: Option<(&'a [Action], StepOut<'a>)>,
     pub buffers: ObservationBuffers<'a>,
@@ -83,16 +85,14 @@ impl Jobs<'_> {
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {
-        let Some(lane) = self.lanes.first() else { unreachable!("a split needs at least one lane") };
-        let config = pogema_core::Environment::config(&lane.engine);
+        let Self { config, beyond_cache, .. } = self;
         let num_agents = num_lanes * config.num_agents;
-        let beyond_cache = self.beyond_cache;
         let (left, right) = self.buffers.split_at(num_lanes, config);
         let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
         let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
         (
-            Self { lanes: left_lanes, steps: left_steps, buffers: left, beyond_cache },
-            Self { lanes: right_lanes, steps: right_steps, buffers: right, beyond_cache },
+            Self { config, lanes: left_lanes, steps: left_steps, buffers: left, beyond_cache },
+            Self { config, lanes: right_lanes, steps: right_steps, buffers: right, beyond_cache },
         )
     }
 }
@@ -101,11 +101,6 @@ type Steps<'a> = (&'a [Action], StepOut<'a>);
 
 fn split_steps((actions, out): Steps<'_>, index: usize) -> (Steps<'_>, Steps<'_>) {
     let (left, right) = actions.split_at(index);
-    let (left_rewards, right_rewards) = out.rewards.split_at_mut(index);
-    let (left_terminated, right_terminated) = out.terminated.split_at_mut(index);
-    let (left_truncated, right_truncated) = out.truncated.split_at_mut(index);
-    let left_out = StepOut { rewards: left_rewards, terminated: left_terminated, truncated: left_truncated };
-    let right_out =
-        StepOut { rewards: right_rewards, terminated: right_terminated, truncated: right_truncated };
+    let (left_out, right_out) = out.split_at(index);
     ((left, left_out), (right, right_out))
 }

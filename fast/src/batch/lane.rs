@@ -5,11 +5,13 @@ use pogema_core::{Action, Config, EpisodeMeter, Error, Instance, Metrics, StepOu
 use crate::{Engine, SimdPath};
 
 use super::Autoreset;
-use super::prepare::Preparer;
+use super::prepare::{Instances, Preparer, make};
 
 /// One environment of a batch.
 pub struct Lane {
     pub index: usize,
+    /// The config of the batch. An episode has at most as many agents.
+    config: Config,
     pub engine: Engine,
     meter: EpisodeMeter,
     /// The number of the current episode.
@@ -35,6 +37,7 @@ impl Lane {
     pub fn new(index: usize, config: Config, path: SimdPath) -> Result<Self, Error> {
         Ok(Self {
             index,
+            config,
             engine: Engine::with_path(config, path)?,
             meter: EpisodeMeter::new(&config),
             episode: None,
@@ -49,6 +52,7 @@ impl Lane {
         })
     }
 
+    /// Plays a step of the lane's agents. In the rows of padding, rewards are 0 and all ends are true.
     pub fn step(
         &mut self,
         actions: &[Action],
@@ -56,14 +60,23 @@ impl Lane {
         autoreset: Autoreset,
         preparer: &Preparer,
     ) -> Result<(), Error> {
-        if self.is_over {
-            self.step_after_end(out);
+        let was_over = self.is_over;
+        if self.is_next_ready {
+            self.switch_to_next();
+        }
+        let num_agents = self.engine.config.num_agents;
+        let (out, padding) = out.split_at(num_agents);
+        padding.rewards.fill(0.0);
+        padding.terminated.fill(true);
+        padding.truncated.fill(true);
+        if was_over {
+            self.skip_step(out);
             return Ok(());
         }
         let StepOut { rewards, terminated, truncated } = out;
         pogema_core::Environment::step(
             &mut self.engine,
-            actions,
+            &actions[..num_agents],
             StepOut { rewards, terminated, truncated },
         )?;
         let metrics = self.meter.feed(self.engine.on_goal(), terminated, truncated);
@@ -82,17 +95,16 @@ impl Lane {
         !self.is_over && i64::try_from(self.engine.step).is_ok_and(|step| step.saturating_add(1) >= max_steps)
     }
 
-    /// Begins the next episode if it is ready, and otherwise leaves the environment as it ended.
-    fn step_after_end(&mut self, out: StepOut<'_>) {
+    /// Writes the results of a step that plays nothing: of an episode that has just begun, or of one that has ended.
+    fn skip_step(&mut self, out: StepOut<'_>) {
         out.rewards.fill(0.0);
         self.has_just_ended = false;
-        if self.is_next_ready {
-            self.switch_to_next();
-            out.terminated.fill(false);
-            out.truncated.fill(false);
-        } else {
+        if self.is_over {
             self.engine.terminate(out.terminated);
             self.engine.truncate(out.truncated);
+        } else {
+            out.terminated.fill(false);
+            out.truncated.fill(false);
         }
     }
 
@@ -112,7 +124,12 @@ impl Lane {
 
     fn prepare_next(&mut self, preparer: &Preparer) -> Result<(), Error> {
         self.fetch_next(preparer)?;
-        self.pending.take().map_or(Ok(()), |instance| self.ended.start(instance))?;
+        self.start_next()
+    }
+
+    /// Starts the next episode in the engine that is not playing.
+    fn start_next(&mut self) -> Result<(), Error> {
+        self.pending.take().map_or(Ok(()), |instance| self.ended.start_resized(instance))?;
         self.is_next_ready = true;
         Ok(())
     }
@@ -127,6 +144,9 @@ impl Lane {
     fn mark_begun(&mut self) {
         self.episode = self.requested.checked_sub(1);
         self.is_over = false;
+        if self.meter.num_agents() != self.engine.config.num_agents {
+            self.meter = EpisodeMeter::new(&self.engine.config);
+        }
     }
 
     /// Fetches the instance of the next episode, unless the lane already has it.
@@ -141,21 +161,54 @@ impl Lane {
             self.pending = Some(taken?);
         }
         // INVARIANT: `pending` holds an instance now.
-        self.pending.as_ref().map_or(Ok(()), |instance| instance.check_fits(&self.engine.config))
+        self.pending.as_ref().map_or(Ok(()), |instance| self.check_fits(instance))
     }
 
     /// Begins the next episode. Call [`Lane::fetch_next`] first.
     pub fn begin(&mut self) -> Result<(), Error> {
+        if self.is_over && !self.is_next_ready {
+            // `engine` holds the ended episode, which stays readable.
+            self.start_next()?;
+        }
         if self.is_next_ready {
             self.switch_to_next();
         } else {
-            self.pending.take().map_or(Ok(()), |instance| self.engine.start(instance))?;
+            self.pending.take().map_or(Ok(()), |instance| self.engine.start_resized(instance))?;
             self.mark_begun();
         }
         self.meter.reset();
         self.failure = None;
         self.has_just_ended = false;
         Ok(())
+    }
+
+    /// Returns the instance of the lane's next episode from another source, if that episode is ready to begin.
+    pub fn replace_next(&self, source: &dyn Instances) -> Result<Option<Instance>, Error> {
+        if !self.is_next_ready {
+            return Ok(None);
+        }
+        let instance = make(source, self.index, self.requested - 1)?;
+        self.check_fits(&instance)?;
+        Ok(Some(instance))
+    }
+
+    /// Continues with the episodes of another source, which the preparer already has. `next` is the result of
+    /// [`Lane::replace_next`].
+    pub fn change_source(&mut self, next: Option<Instance>, preparer: &Preparer) -> Result<(), Error> {
+        self.requested -= u64::from(self.pending.take().is_some());
+        preparer.request(self.index, self.requested);
+        let started = next.map_or(Ok(()), |instance| self.ended.start_resized(instance));
+        if let Err(error) = &started {
+            self.is_next_ready = false;
+            self.failure = Some(error.clone());
+        }
+        started
+    }
+
+    /// Checks that an instance has no more agents than the config, and fits it otherwise.
+    pub fn check_fits(&self, instance: &Instance) -> Result<(), Error> {
+        let num_agents = instance.starts().len().clamp(1, self.config.num_agents);
+        instance.check_fits(&Config { num_agents, ..self.config })
     }
 
     /// Begins episode 0 of another source with its instance.

@@ -6,11 +6,12 @@ mod pace;
 mod prepare;
 mod team;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
-use crate::buffers::{ObservationBuffers, Observations};
+use crate::buffers::ObservationBuffers;
 use crate::{Engine, SimdPath};
 
 use jobs::Jobs;
@@ -38,7 +39,11 @@ pub enum Autoreset {
 
 /// Many environments (lanes) of one config, each with its own map and its own episodes.
 ///
-/// Every array has a leading axis `lanes`. An episode ends when all agents are terminated or all are truncated. The
+/// Every array has a leading axis `lanes`, and then an axis `agents` with the config's number of agents. An instance may
+/// have fewer: the other rows are then padding, with observations and rewards of 0, all ends true, and action masks that
+/// only allow staying.
+///
+/// An episode ends when all agents are terminated or all are truncated. The
 /// lane then continues according to [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next
 /// episode ends.
 ///
@@ -77,7 +82,7 @@ impl Batch {
         let lane = |index| Lane::new(index, config, path);
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;
         let team = Team::new(num_threads)?;
-        let preparer = Preparer::new(Box::new(source), num_lanes)?;
+        let preparer = Preparer::new(Arc::new(source), num_lanes)?;
         let (autoreset, pace) = (Autoreset::default(), Pace::default());
         Ok(Self { config, autoreset, lanes, team, pace, preparer, is_started: false })
     }
@@ -107,8 +112,8 @@ impl Batch {
     /// Begins the next episode of every lane; the first call begins episode 0.
     ///
     /// # Errors
-    /// If a lane has no next instance, or one that does not fit the config; every lane is then unchanged. If there is
-    /// not enough memory for a lane's map; that lane is then unchanged.
+    /// If a lane has no next instance, or one that does not fit the config, such as one with more agents; every lane is
+    /// then unchanged. If there is not enough memory for a lane's map; that lane is then unchanged.
     pub fn reset(&mut self) -> Result<(), Error> {
         self.reset_lanes(&vec![true; self.lanes.len()])
     }
@@ -196,11 +201,10 @@ impl Batch {
         stop: &AtomicBool,
     ) -> Result<Firsts, Error> {
         self.check_chosen(chosen)?;
-        let config = &self.config;
-        let preparer = Preparer::new(Box::new(source), self.lanes.len())?;
+        let preparer = Preparer::new(Arc::new(source), self.lanes.len())?;
         let first = |lane: &mut Lane| {
             let instance = preparer.take(lane.index)?;
-            instance.check_fits(config).map(|()| instance)
+            lane.check_fits(&instance).map(|()| instance)
         };
         let instances = over_chosen(&self.team, &mut self.lanes, chosen, stop, first)?;
         Ok(Firsts { preparer, instances })
@@ -224,6 +228,31 @@ impl Batch {
         }
         self.is_started |= begun.is_ok();
         begun
+    }
+
+    /// Replaces the source of the instances of all episodes that have not begun.
+    ///
+    /// The current episodes continue, and so do the numbers of the episodes. `changed` tells which lanes have other
+    /// instances in the new source; instances that are already prepared for the other lanes are kept. Another thread may
+    /// set `stop` to end the call soon.
+    ///
+    /// # Errors
+    /// If there is not one flag per lane. With [`Autoreset::NextStep`], if the source has no instance that fits for an
+    /// episode that begins with the next step; [`Error::Cancelled`] if the call was stopped. Every lane is then
+    /// unchanged. If there is not enough memory for such an episode; the step of this lane then fails, too.
+    pub fn replace_source(
+        &mut self,
+        source: impl Instances + 'static,
+        changed: &[bool],
+        stop: &AtomicBool,
+    ) -> Result<(), Error> {
+        Error::check_length("changed lanes", self.lanes.len(), changed.len())?;
+        let next = |lane: &mut Lane| lane.replace_next(&source);
+        let instances = over_chosen(&self.team, &mut self.lanes, changed, stop, next)?;
+        self.preparer.replace(Arc::new(source));
+        let lanes = self.lanes.iter_mut().zip(instances);
+        let lanes = lanes.filter_map(|(lane, next)| Some(lane.change_source(next?, &self.preparer)));
+        lanes.fold(Ok(()), Result::and)
     }
 
     /// Plays one step in every lane, begins new episodes according to [`Autoreset`], and fills the buffers.
@@ -251,7 +280,7 @@ impl Batch {
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
         let beyond_cache = buffers.observations.is_beyond_cache();
         let steps = Some((actions, out));
-        let jobs = Jobs { lanes: &mut self.lanes, steps, buffers, beyond_cache };
+        let jobs = Jobs { config: &self.config, lanes: &mut self.lanes, steps, buffers, beyond_cache };
         jobs.run(&self.team, &mut self.pace, &|lane, actions, out| {
             lane.step(actions, out, autoreset, preparer)
         })
@@ -268,27 +297,34 @@ impl Batch {
         self.check_started()?;
         buffers.check(self.lanes.len(), &self.config)?;
         let beyond_cache = buffers.observations.is_beyond_cache();
-        let jobs = Jobs { lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
+        let config = &self.config;
+        let jobs = Jobs { config, lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
         jobs.run(&self.team, &mut self.pace, &|_, _, _| Ok(()))
     }
 
-    /// Writes the terminal observations or global states of the last ended episodes of some lanes, in the given order.
+    /// Fills the buffers with the terminal observations, or global states, and action masks of the last ended episodes
+    /// of some lanes, in the given order.
     ///
     /// # Errors
     /// For a lane that does not exist or has no ended episode, or for a buffer of the wrong length.
-    pub fn observe_ended(&self, lanes: &[usize], observations: Observations<'_>) -> Result<(), Error> {
+    pub fn observe_ended<'a>(
+        &self,
+        lanes: &[usize],
+        buffers: impl Into<ObservationBuffers<'a>>,
+    ) -> Result<(), Error> {
+        let buffers = buffers.into();
         let no_end = |lane| Error::NotEnded { lane };
         let engine = |&lane| Ok(self.ended(lane)?.ok_or_else(|| no_end(lane))?.0);
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
-        observations.check(lanes.len(), &self.config)?;
-        let beyond_cache = observations.is_beyond_cache();
-        let mut rest = observations;
-        let parts = engines.into_iter().map(|engine| {
-            let (first, others) = std::mem::replace(&mut rest, Observations::None).split_at(1, &self.config);
+        buffers.check(lanes.len(), &self.config)?;
+        let beyond_cache = buffers.observations.is_beyond_cache();
+        let mut rest = buffers;
+        let mut parts = Vec::with_capacity(engines.len());
+        for engine in engines {
+            let (first, others) = rest.split_at(1, &self.config);
             rest = others;
-            (engine, first)
-        });
-        let parts = parts.collect();
+            parts.push((engine, first));
+        }
         self.team.share(parts, |(engine, part)| part.write(engine, beyond_cache)).into_iter().collect()
     }
 

@@ -49,17 +49,15 @@ impl Slot {
 }
 
 struct Shared {
-    source: Box<dyn Instances>,
+    source: Mutex<Arc<dyn Instances>>,
     slots: Vec<Slot>,
     is_over: AtomicBool,
 }
 
 impl Shared {
     fn make(&self, lane: usize, episode: u64) -> Result<Instance, Error> {
-        let made = catch_unwind(AssertUnwindSafe(|| self.source.instance(lane, episode)));
-        made.unwrap_or_else(|_| {
-            Err(Error::instance(format!("the source panicked at lane {lane}, episode {episode}")))
-        })
+        let source = Arc::clone(&self.source.lock().unwrap_or_else(PoisonError::into_inner));
+        make(&*source, lane, episode)
     }
 
     fn prepare(&self, lane: usize) {
@@ -68,9 +66,21 @@ impl Shared {
         *progress = Progress::Generating;
         drop(progress);
         let made = self.make(lane, episode);
-        *self.slots[lane].lock() = Progress::Ready(made);
-        self.slots[lane].ready.notify_all();
+        let mut progress = self.slots[lane].lock();
+        // Otherwise the lane has requested another instance meanwhile, and this one may be of an old source.
+        if matches!(*progress, Progress::Generating) {
+            *progress = Progress::Ready(made);
+            self.slots[lane].ready.notify_all();
+        }
     }
+}
+
+/// Asks a source for an instance; a panic of the source becomes an error.
+pub fn make(source: &dyn Instances, lane: usize, episode: u64) -> Result<Instance, Error> {
+    let made = catch_unwind(AssertUnwindSafe(|| source.instance(lane, episode)));
+    made.unwrap_or_else(|_| {
+        Err(Error::instance(format!("the source panicked at lane {lane}, episode {episode}")))
+    })
 }
 
 /// A background thread that generates instances in advance.
@@ -83,10 +93,10 @@ pub struct Preparer {
 
 impl Preparer {
     /// Starts the thread, with the first episode of each lane requested.
-    pub fn new(source: Box<dyn Instances>, num_lanes: usize) -> Result<Self, Error> {
+    pub fn new(source: Arc<dyn Instances>, num_lanes: usize) -> Result<Self, Error> {
         let slot = |_| Slot { progress: Mutex::new(Progress::Requested(0)), ready: Condvar::new() };
         let slots = (0..num_lanes).map(slot).collect();
-        let shared = Arc::new(Shared { source, slots, is_over: AtomicBool::new(false) });
+        let shared = Arc::new(Shared { source: Mutex::new(source), slots, is_over: AtomicBool::new(false) });
         let (requests, lanes) = channel();
         let thread = std::thread::Builder::new().name("pogema instances".into());
         let theirs = Arc::clone(&shared);
@@ -120,7 +130,12 @@ impl Preparer {
         }
     }
 
-    /// Requests the instance of an episode.
+    /// Replaces the source. Instances that are ready or in progress still come from the old one.
+    pub fn replace(&self, source: Arc<dyn Instances>) {
+        *self.shared.source.lock().unwrap_or_else(PoisonError::into_inner) = source;
+    }
+
+    /// Requests the instance of an episode, in place of any other of the lane.
     pub fn request(&self, lane: usize, episode: u64) {
         *self.shared.slots[lane].lock() = Progress::Requested(episode);
         if let Some(requests) = &self.requests {

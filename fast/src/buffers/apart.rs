@@ -6,6 +6,7 @@ use crate::Engine;
 use crate::observe::is_beyond_cache;
 
 use super::global::{GlobalBuffers, write_pairs};
+use super::pad;
 
 /// The buffers for the windows of obstacles and agents.
 ///
@@ -92,9 +93,14 @@ impl ApartBuffers<'_> {
     ///
     /// Rule: observe/pomapf, observe/pomapf/relative, observe/mapf
     pub(super) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+        let len = engine.config.num_observed() / 3;
         match self.windows {
-            Windows::F32(obstacles, agents) => engine.write_windows(obstacles, agents, beyond_cache),
-            Windows::U8(obstacles, agents) => engine.write_windows(obstacles, agents, beyond_cache),
+            Windows::F32(obstacles, agents) => {
+                engine.write_windows(pad(obstacles, len), pad(agents, len), beyond_cache);
+            }
+            Windows::U8(obstacles, agents) => {
+                engine.write_windows(pad(obstacles, len), pad(agents, len), beyond_cache);
+            }
         }
         write_pairs(from_starts(&engine.cells, &engine.starts), self.xy);
         write_pairs(from_starts(&engine.goals, &engine.starts), self.target_xy);

@@ -74,10 +74,12 @@ impl GlobalBuffers<'_> {
     }
 }
 
-/// Writes pairs of numbers into a list that holds two numbers for each pair.
+/// Writes pairs of numbers into a list, and 0 behind them.
 pub(super) fn write_pairs(pairs: impl Iterator<Item = [i32; 2]>, out: &mut [i64]) {
-    for (out, pair) in out.chunks_exact_mut(2).zip(pairs) {
+    let mut rest = out.chunks_exact_mut(2);
+    for (pair, out) in pairs.zip(rest.by_ref()) {
         out[0] = pair[0].into();
         out[1] = pair[1].into();
     }
+    rest.for_each(|padding| padding.fill(0));
 }

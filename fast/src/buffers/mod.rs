@@ -91,19 +91,20 @@ impl Observations<'_> {
         }
     }
 
-    /// Writes the buffers of one lane.
+    /// Writes the buffers of one lane; the rows beyond its agents become 0.
     pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+        let num_entries = self.per_lane(&engine.config);
         match self {
             Self::None => Ok(()),
             Self::F32(out) => {
-                engine.observe_all(out, beyond_cache);
+                engine.observe_all(pad(out, num_entries), beyond_cache);
                 Ok(())
             }
             Self::U8(out) => {
-                engine.observe_all(out, beyond_cache);
+                engine.observe_all(pad(out, num_entries), beyond_cache);
                 Ok(())
             }
-            Self::Bits(out) => engine.observe_bits(0..engine.config.num_agents, out),
+            Self::Bits(out) => engine.observe_bits(0..engine.config.num_agents, pad(out, num_entries)),
             Self::Apart(out) => out.write(engine, beyond_cache),
             Self::Global(out) => out.write(engine),
         }
@@ -156,6 +157,19 @@ impl ObservationBuffers<'_> {
 
     pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
         self.observations.write(engine, beyond_cache)?;
-        self.masks.map_or(Ok(()), |masks| engine.mask_actions(masks))
+        let Some(masks) = self.masks else { return Ok(()) };
+        let (masks, padding) = masks.split_at_mut(engine.config.num_agents * Action::ALL.len());
+        for mask in padding.chunks_exact_mut(Action::ALL.len()) {
+            mask.fill(0);
+            mask[0] = 1;
+        }
+        engine.mask_actions(masks)
     }
+}
+
+/// Fills a buffer with 0 behind the entries of a lane's agents, and returns these entries.
+fn pad<T: Default + Clone>(buffer: &mut [T], num_entries: usize) -> &mut [T] {
+    let (entries, padding) = buffer.split_at_mut(num_entries);
+    padding.fill(T::default());
+    entries
 }

@@ -4,8 +4,8 @@ use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadwriteArray2, PyReadwriteArray3, PyReadwriteArrayDyn,
     PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Error};
-use pogema_fast::{ApartBuffers, Batch, GlobalBuffers, Observations, Windows};
+use pogema_core::Error;
+use pogema_fast::{ApartBuffers, Batch, Engine, GlobalBuffers, Observations, Windows};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -138,36 +138,48 @@ pub fn masks_mut<'a>(masks: &'a mut Option<PyReadwriteArray3<'_, i8>>) -> PyResu
     Ok(masks.as_mut().map(|masks| masks.as_slice_mut()).transpose()?)
 }
 
-/// Writes which agents are active: now in all environments, or at the end of the episode in some.
+/// Writes which agents are active: now in all environments, or at the ends of the last episodes of some.
 pub fn write_active(
     batch: &Batch,
     ended: Option<&[usize]>,
-    mut active: PyReadwriteArray2<'_, bool>,
+    active: PyReadwriteArray2<'_, bool>,
+) -> Result<(), Error> {
+    write_flags(batch, ended, active, |engine, agents| agents.copy_from_slice(engine.active()))
+}
+
+/// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
+pub fn write_agents(
+    batch: &Batch,
+    ended: Option<&[usize]>,
+    agents: PyReadwriteArray2<'_, bool>,
+) -> Result<(), Error> {
+    write_flags(batch, ended, agents, |_, agents| agents.fill(true))
+}
+
+/// Writes a flag for each agent with a function, and false into padding.
+fn write_flags(
+    batch: &Batch,
+    ended: Option<&[usize]>,
+    mut flags: PyReadwriteArray2<'_, bool>,
+    write: impl Fn(&Engine, &mut [bool]),
 ) -> Result<(), Error> {
     let not_contiguous =
-        |_| Error::Corrupt { what: "active".into(), reason: "the array is not contiguous".into() };
-    let active = active.as_slice_mut().map_err(not_contiguous)?;
+        |_| Error::Corrupt { what: "flags".into(), reason: "the array is not contiguous".into() };
+    let flags = flags.as_slice_mut().map_err(not_contiguous)?;
     let num_agents = batch.config().num_agents;
     let expected = num_agents * ended.map_or(batch.num_lanes(), <[usize]>::len);
-    Error::check_length("active", expected, active.len())?;
-    for (index, part) in active.chunks_exact_mut(num_agents).enumerate() {
+    Error::check_length("flags", expected, flags.len())?;
+    for (index, part) in flags.chunks_exact_mut(num_agents).enumerate() {
         let engine = match ended {
             Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
             None => Some(batch.lane(index)?),
         };
         // INVARIANT: `observe_ended` has rejected environments without an ended episode.
         if let Some(engine) = engine {
-            part.copy_from_slice(engine.active());
+            let (agents, padding) = part.split_at_mut(engine.active().len());
+            write(engine, agents);
+            padding.fill(false);
         }
     }
     Ok(())
-}
-
-/// Writes the action masks at the end of the last episodes of some environments.
-pub fn write_ended_masks(batch: &Batch, envs: &[usize], out: &mut [i8]) -> Result<(), Error> {
-    let per_env = batch.config().num_agents * Action::ALL.len();
-    Error::check_length("action masks", envs.len() * per_env, out.len())?;
-    envs.iter()
-        .zip(out.chunks_exact_mut(per_env))
-        .try_for_each(|(&env, out)| batch.ended(env)?.map_or(Ok(()), |(engine, _)| engine.mask_actions(out)))
 }

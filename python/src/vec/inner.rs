@@ -2,10 +2,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use pogema::{EnvSource, Seed};
-use pogema_core::{Action, Config, Error, Occupancy};
-use pogema_fast::{Autoreset, Firsts, suited_threads};
+use pogema::{EnvSource, Named, Seed};
+use pogema_core::{Action, Config, Error, Occupancy, StepOut};
+use pogema_fast::{Autoreset, Firsts, ObservationBuffers, suited_threads};
+use pogema_maps::GridConfig;
 
+use super::film::Film;
 use crate::fields::Fields;
 use crate::{config, interrupt, memory};
 
@@ -14,7 +16,18 @@ pub struct Inner {
     pub batch: pogema_fast::Batch,
     pub source: EnvSource,
     pub actions: Vec<Action>,
+    /// The numbers of rows and columns for which the arrays have room.
+    pub map_size: (usize, usize),
+    pub film: Option<Film>,
 }
+
+/// Configs, each with the text of the map that its `map_name` names, and the index of each environment's config.
+///
+/// Without indices, all environments have the first config.
+pub type Configs = (Vec<(Fields, Option<String>)>, Option<Vec<usize>>);
+
+/// The requested number of agents, and rows and columns of maps, for which the arrays have room.
+pub type Room = (Option<usize>, Option<(usize, usize)>);
 
 /// The next episodes of some environments, before they begin.
 pub struct Next {
@@ -25,27 +38,47 @@ pub struct Next {
 
 impl Inner {
     pub fn new(
-        configs: &[(Fields, Option<String>)],
-        of_env: Option<Vec<usize>>,
+        configs: &Configs,
+        room: Room,
         num_envs: usize,
         exact: bool,
         (num_threads, cell_bits): (Option<usize>, usize),
     ) -> Result<Self, Error> {
-        let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
-        let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        // A batch of several configs holds a list of them, and is therefore small: the largest map counts for all.
-        let largest = configs.iter().max_by_key(|(config, _)| config.height.saturating_mul(config.width));
-        let bytes = largest.and_then(|(config, _)| memory::of_environments(config, num_envs));
-        memory::check("the batch", bytes)?;
-        let source = EnvSource::new(configs, of_env.unwrap_or_else(|| vec![0; num_envs]))?;
-        let rules = source.config(0).rules();
+        let (configs, of_env) = read_configs(configs, num_envs, room)?;
+        let source = EnvSource::new(configs, of_env)?;
+        let (rules, map_size) = with_room(&source, room)?;
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
         let rules = Config { occupancy, ..rules };
         let bytes_per_agent = rules.num_observed() / rules.num_agents * cell_bits / 8;
         let num_threads =
             num_threads.unwrap_or_else(|| suited_threads(num_envs, rules.num_agents, bytes_per_agent));
         let batch = pogema_fast::Batch::new(rules, num_envs, num_threads, source.clone())?;
-        Ok(Self { batch, source, actions: Vec::with_capacity(num_envs * rules.num_agents) })
+        let actions = Vec::with_capacity(num_envs * rules.num_agents);
+        Ok(Self { batch, source, actions, map_size, film: None })
+    }
+
+    /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
+    ///
+    /// An error changes nothing. [`Error::Instance`] is about an episode, any other error about the configs.
+    pub fn set_configs(
+        &mut self,
+        configs: &Configs,
+        envs: Option<Vec<usize>>,
+        stop: &AtomicBool,
+    ) -> Result<(), Error> {
+        let num_envs = self.batch.num_lanes();
+        let envs = envs.unwrap_or_else(|| (0..num_envs).collect());
+        let room = (Some(self.batch.config().num_agents), Some(self.map_size));
+        let (configs, of_env) = read_configs(configs, envs.len(), room)?;
+        let source = self.source.clone().with_configs(configs, &of_env, &envs)?;
+        check_room(&source, self.batch.config().num_agents, self.map_size)?;
+        let mut changed = vec![false; num_envs];
+        for env in envs {
+            changed[env] = true;
+        }
+        self.batch.replace_source(source.clone(), &changed, stop)?;
+        self.source = source;
+        Ok(())
     }
 
     /// Fetches the instances of a reset, and changes no episode.
@@ -77,10 +110,23 @@ impl Inner {
     }
 
     pub fn begin(&mut self, next: Next) -> Result<(), Error> {
-        let Some((source, firsts)) = next.seeded else { return self.batch.reset_lanes(&next.chosen) };
-        self.batch.begin_with(firsts)?;
-        self.source = source;
-        Ok(())
+        let Next { chosen, seeded } = next;
+        match seeded {
+            None => self.batch.reset_lanes(&chosen)?,
+            Some((source, firsts)) => {
+                self.batch.begin_with(firsts)?;
+                self.source = source;
+            }
+        }
+        let Self { film, batch, source, .. } = self;
+        film.as_mut().map_or(Ok(()), |film| film.follow_reset(&chosen, batch, source))
+    }
+
+    /// Plays a step with the stored actions.
+    pub fn step(&mut self, out: StepOut<'_>, buffers: ObservationBuffers<'_>) -> Result<(), Error> {
+        let Self { batch, source, actions, film, .. } = self;
+        batch.step(actions, out, buffers)?;
+        film.as_mut().map_or(Ok(()), |film| film.follow_step(actions, batch, source))
     }
 
     /// Returns whether the next step ends episodes whose next instances may take long.
@@ -104,6 +150,49 @@ impl Inner {
         self.actions.extend(numbers.iter().map(|&number| Action::ALL[number as usize]));
         Ok(())
     }
+}
+
+/// Reads configs, and checks that there is memory for environments of the requested room.
+fn read_configs(
+    (configs, of_env): &Configs,
+    num_envs: usize,
+    (num_agents, map_size): Room,
+) -> Result<(Vec<Named>, Vec<usize>), Error> {
+    let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
+    let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    // A batch of several configs holds a list of them, and is therefore small: the largest sizes count for all.
+    if let Some(mut largest) = configs.first().map(|(config, _)| config.clone()) {
+        let most = |each: fn(&GridConfig) -> usize, room: Option<usize>| {
+            configs.iter().map(|(config, _)| each(config)).chain(room).max().unwrap_or_default()
+        };
+        largest.num_agents = most(|config| config.num_agents, num_agents);
+        largest.height = most(|config| config.height, map_size.map(|(rows, _)| rows));
+        largest.width = most(|config| config.width, map_size.map(|(_, columns)| columns));
+        memory::check("the batch", memory::of_environments(&largest, num_envs))?;
+    }
+    Ok((configs, of_env.clone().unwrap_or_else(|| vec![0; num_envs])))
+}
+
+/// Returns the rules of a source and the size of its largest map, both enlarged to the requested room.
+fn with_room(source: &EnvSource, (num_agents, map_size): Room) -> Result<(Config, (usize, usize)), Error> {
+    let (rules, size) = (source.rules(), source.largest_map());
+    let (num_agents, map_size) = (num_agents.unwrap_or(rules.num_agents), map_size.unwrap_or(size));
+    check_room(source, num_agents, map_size)?;
+    Ok((Config { num_agents, ..rules }, map_size))
+}
+
+/// Checks that every config fits into the arrays.
+fn check_room(source: &EnvSource, num_agents: usize, map_size: (usize, usize)) -> Result<(), Error> {
+    let (rules, (rows, columns)) = (source.rules(), source.largest_map());
+    if rules.num_agents > num_agents {
+        let expected = format!("at most {num_agents}, the number of agents for which the arrays have room");
+        return Err(Error::config("num_agents", rules.num_agents, expected));
+    }
+    if rows > map_size.0 || columns > map_size.1 {
+        let expected = format!("at most {} x {}, for which the arrays have room", map_size.0, map_size.1);
+        return Err(Error::config("map_size", format!("{rows} x {columns}"), expected));
+    }
+    Ok(())
 }
 
 /// Reads Gymnasium's name of an autoreset mode.

@@ -1,25 +1,27 @@
 //! The batch of environments behind `VecEnv`.
 
 mod buffers;
+mod film;
 mod inner;
 
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pogema::Seed;
-use pogema_core::{Error, StepOut};
+use pogema_core::{Error, StepOut, Words};
 use pogema_fast::{ObservationBuffers, Observations};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::fields::Fields;
 use crate::guard::guarded;
 use crate::{errors, interrupt};
 
-use buffers::{Buffer, Global, masks_mut, write_active, write_ended_masks};
-use inner::{Inner, read_autoreset};
+use buffers::{Buffer, Global, masks_mut, write_active, write_agents};
+use film::{Film, Format, Plan};
+use inner::{Configs, Inner, Room, read_autoreset};
 
 /// Output arrays of a step: rewards, terminated, truncated.
 ///
@@ -48,24 +50,72 @@ guarded! {
 impl Batch {
     /// Makes environments from configs.
     ///
-    /// Each config comes with the text of the map that its `map_name` names. `of_env` holds the index of each
-    /// environment's config; without it, all have the first. `threads` are the number of threads and the bits of an
-    /// observed cell, which determine the default number.
+    /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode and whether
+    /// the occupancy is exact. `threads` are the number of threads and the bits of an observed cell, which determine the
+    /// default number. `room` are the numbers of agents, and of rows and columns, for which the arrays have room.
     #[new]
     fn new(
         py: Python<'_>,
-        configs: Vec<(Fields, Option<String>)>,
-        of_env: Option<Vec<usize>>,
+        configs: Configs,
         num_envs: usize,
-        autoreset: &str,
-        exact: bool,
+        rules: (String, bool),
         threads: (Option<usize>, usize),
+        room: Room,
     ) -> PyResult<Self> {
-        let autoreset = read_autoreset(autoreset).map_err(|error| errors::config(py, &error))?;
-        let make = move || Inner::new(&configs, of_env, num_envs, exact, threads);
+        let (autoreset, exact) = rules;
+        let autoreset = read_autoreset(&autoreset).map_err(|error| errors::config(py, &error))?;
+        let make = move || Inner::new(&configs, room, num_envs, exact, threads);
         let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
         Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process: std::process::id() })
+    }
+
+    /// Films every N-th episode of an environment, from the next reset on.
+    fn film(&self, py: Python<'_>, env: usize, every: u64, prefix: PathBuf, format: &str) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let inner = Self::open(&mut guard)?;
+        let format = Format::of_word(format).ok_or_else(|| PyRuntimeError::new_err("unknown format"))?;
+        let film = Film::new(Plan { env, every, prefix, format });
+        inner.film = Some(film.map_err(|error| errors::film(py, &error))?);
+        Ok(())
+    }
+
+    /// Returns the paths of the finished films.
+    fn films(&self) -> PyResult<Vec<PathBuf>> {
+        let mut guard = self.lock()?;
+        let film = Self::open(&mut guard)?.film.as_ref();
+        Ok(film.map(|film| film.results().files.clone()).unwrap_or_default())
+    }
+
+    /// Returns, once each, the reasons why films are missing.
+    fn take_film_failures(&self) -> PyResult<Vec<String>> {
+        let mut guard = self.lock()?;
+        let film = Self::open(&mut guard)?.film.as_ref();
+        Ok(film.map(|film| std::mem::take(&mut film.results().failures)).unwrap_or_default())
+    }
+
+    /// Finishes the current film, waits until all are drawn, and films no more. Returns what [`Batch::films`] and
+    /// [`Batch::take_film_failures`] return.
+    fn finish_films(&self, py: Python<'_>) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
+        let film = Self::open(&mut self.lock()?)?.film.take();
+        interrupt::detach(py, move || {
+            let Some(mut film) = film else { return Default::default() };
+            film.close();
+            let results = film.results();
+            (results.files.clone(), results.failures.clone())
+        })
+    }
+
+    /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
+    fn set_configs(&self, py: Python<'_>, configs: Configs, envs: Option<Vec<usize>>) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let inner = Self::open(&mut guard)?;
+        let set =
+            interrupt::detach_scoped(py, &self.stop, || inner.set_configs(&configs, envs, &self.stop))?;
+        set.map_err(|error| match error {
+            Error::Instance { .. } => errors::instance(py, &error),
+            _ => errors::config(py, &error),
+        })
     }
 
     /// Begins the next episode in all environments, or in the chosen ones.
@@ -126,8 +176,8 @@ impl Batch {
                 interrupt::detach_scoped(py, &self.stop, || inner.batch.fetch_truncated(&self.stop))?;
             fetched.map_err(|error| errors::batch(py, &error))?;
         }
-        let (batch, actions) = (&mut inner.batch, &inner.actions);
-        let played = py.detach(|| batch.step(actions, out, view));
+        let played = py.detach(|| inner.step(out, view));
+        let batch = &inner.batch;
         let shown = played.and_then(|()| write_active(batch, None, active));
         shown.map_err(|error| errors::batch(py, &error))?;
         let has_ended = |&env: &usize| batch.has_just_ended(env).unwrap_or_default();
@@ -140,11 +190,10 @@ impl Batch {
         let inner = Self::open(&mut guard)?;
         let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
-        let (batch, observed, masks) = (&inner.batch, buffer.observations_mut(radius)?, masks_mut(&mut masks)?);
-        let written = py.detach(|| {
-            batch.observe_ended(&envs, observed)?;
-            masks.map_or(Ok(()), |masks| write_ended_masks(batch, &envs, masks))
-        });
+        let view =
+            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
+        let batch = &inner.batch;
+        let written = py.detach(|| batch.observe_ended(&envs, view));
         let written = written.and_then(|()| write_active(batch, Some(&envs), active));
         written.map_err(|error| errors::batch(py, &error))
     }
@@ -167,6 +216,18 @@ impl Batch {
         });
         let written = written.and_then(|()| write_active(batch, ended.as_deref(), active));
         written.map_err(|error| errors::batch(py, &error))
+    }
+
+    /// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
+    fn mask_agents(
+        &self,
+        py: Python<'_>,
+        mask: PyReadwriteArray2<'_, bool>,
+        ended: Option<Vec<usize>>,
+    ) -> PyResult<()> {
+        let mut guard = self.lock()?;
+        let batch = &Self::open(&mut guard)?.batch;
+        write_agents(batch, ended.as_deref(), mask).map_err(|error| errors::batch(py, &error))
     }
 
     /// Returns the metrics of the last episodes of some environments, by name.
@@ -205,12 +266,13 @@ impl Batch {
         inner.source.seeds().iter().enumerate().map(seed).collect()
     }
 
-    /// Returns the number of agents of each environment, their radius, and the size that holds every map.
+    /// Returns the number of agents for which each environment has room, their radius, and the size that holds every
+    /// map.
     fn sizes(&self) -> PyResult<(usize, usize, (usize, usize))> {
         let mut guard = self.lock()?;
         let inner = Self::open(&mut guard)?;
         let config = inner.batch.config();
-        Ok((config.num_agents, config.radius, inner.source.largest_map()))
+        Ok((config.num_agents, config.radius, inner.map_size))
     }
 
     /// Returns the type of observations that the configs request.
@@ -231,8 +293,7 @@ impl Batch {
             return Ok(());
         }
         let inner = self.lock()?.take();
-        py.detach(|| drop(inner));
-        Ok(())
+        interrupt::detach(py, move || drop(inner))
     }
 }
 }
