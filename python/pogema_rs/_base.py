@@ -43,7 +43,7 @@ class PogemaBase(Overridable, gymnasium.Env):
 
     def __init__(self, grid_config: Optional[GridConfig] = None) -> None:
         self.grid_config = GridConfig() if grid_config is None else grid_config
-        self.__dict__["grid"] = None  # an environment of the package lets nobody else set its grid
+        self.__dict__["grid"] = None  # `Pogema` rejects assignments to its grid
         self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 

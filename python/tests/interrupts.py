@@ -47,7 +47,7 @@ def interrupt(call, delay=0.3):
 
 def planners():
     for planner in ["lacam", "cbs", "ecbs", "pbs"]:
-        interrupt(lambda: plan(EMPTY, STARTS, GOALS, planner, seconds=100.0))  # noqa: B023 - called at once
+        interrupt(lambda: plan(EMPTY, STARTS, GOALS, planner, seconds=100.0))  # noqa: B023 - called immediately
     assert plan(EMPTY, [(0, 0)], [(3, 3)]).makespan == 6
 
 
@@ -55,7 +55,7 @@ def planner_agents():
     seen = [{"global_obstacles": EMPTY, "global_xy": a, "global_target_xy": b} for a, b in zip(STARTS, GOALS)]
     for planner, lifelong in [("lacam", False), ("rhcr", True), ("rhcr-pbs", True), ("rhcr-ecbs", True)]:
         agents = PlannerAgents(planner, seconds=100.0, nodes=10**9, lifelong=lifelong)
-        interrupt(lambda: [agents.act(seen) for _ in range(10**6)])  # noqa: B023 - called at once
+        interrupt(lambda: [agents.act(seen) for _ in range(10**6)])  # noqa: B023 - called immediately
         one = [{**seen[0], "global_target_xy": (1, 0)}]
         assert agents.act(one) == [2], planner
 
@@ -80,7 +80,7 @@ def batch_reset():
     env.reset()
     twin.reset()
     for arguments in [{"seed": 7}, {"seed": 7, "options": {"reset_mask": np.arange(4000) < 3999}}]:
-        interrupt(lambda: env.reset(**arguments))  # noqa: B023 - called at once
+        interrupt(lambda: env.reset(**arguments))  # noqa: B023 - called immediately
         check_equal(env, twin)
     env.reset(seed=8)
     twin.reset(seed=8)
@@ -195,7 +195,7 @@ def process_pool():
     ToolboxRegistry.register_algorithm("Sleepy", Sleepy)
     for backend in ["multiprocessing", "dask"]:
         config = suite(8, name="Sleepy", parallel_backend=backend, num_process=2)
-        interrupt(lambda: evaluation(config, backend), 5.0)  # noqa: B023 - called at once
+        interrupt(lambda: evaluation(config, backend), 5.0)  # noqa: B023 - called immediately
         config["algorithms"]["A"] = {"name": "stay"}
         assert len(evaluation(config, backend, begin="anew")) == 8
 
