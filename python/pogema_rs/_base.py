@@ -60,7 +60,7 @@ class PogemaBase(Overridable, gymnasium.Env):
     def check_reset(self) -> None:
         """Raises `NotResetError` if the environment was not reset yet."""
         if self.grid is None:
-            raise NotResetError("the environment was not reset yet")
+            raise NotResetError("the environment was not reset yet; call `reset` first")
 
     def render(self, mode: str = "human") -> Optional[str]:
         """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
