@@ -204,7 +204,7 @@ fn a_reset_without_a_next_instance_changes_nothing() {
     assert_eq!(error_of(batch.reset_lanes(&[true; 2])), expected);
     let mut chosen = [true; NUM_LANES];
     chosen[5] = false;
-    assert_eq!(error_of(batch.reset_lanes(&chosen)), "the environment was not reset yet");
+    assert_eq!(error_of(batch.reset_lanes(&chosen)), "the environment was not reset yet; call `reset` first");
     batch.reset().unwrap();
     let state = |batch: &Batch| {
         let lanes = 0..NUM_LANES;
@@ -284,7 +284,10 @@ fn masks_forbid_only_moves_into_obstacles() {
     }
     let mut batch = new_batch(Autoreset::SameStep, 2);
     let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];
-    assert_eq!(error_of(batch.observe(view(&mut masks))), "the environment was not reset yet");
+    assert_eq!(
+        error_of(batch.observe(view(&mut masks))),
+        "the environment was not reset yet; call `reset` first"
+    );
     batch.reset().unwrap();
     assert_eq!(error_of(batch.observe(view(&mut [0]))), "action masks has length 1, expected 150");
     let (mut num_inactive, mut num_forbidden) = (0, 0);

@@ -164,7 +164,10 @@ fn wrong_calls_report_both_numbers_and_change_nothing() {
     assert_eq!(new(2, 1025), "`num_threads` is `1025`, expected 1 to 1024");
     assert_eq!(new(2, 0), "`num_threads` is `0`, expected 1 to 1024");
     let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
-    assert_eq!(error_of(batch.observe(Observations::None)), "the environment was not reset yet");
+    assert_eq!(
+        error_of(batch.observe(Observations::None)),
+        "the environment was not reset yet; call `reset` first"
+    );
     batch.reset().unwrap();
     let before = [0, 1].map(|lane| batch.lane(lane).unwrap().snapshot());
     let mut step = |num_actions: usize, num_rewards: usize, num_observed: usize| {

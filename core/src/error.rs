@@ -48,7 +48,7 @@ pub enum Error {
     #[error("{what} has length {got}, expected {want}")]
     Length { what: &'static str, want: usize, got: usize },
     /// A call requires an episode, but the environment has not been reset.
-    #[error("the environment was not reset yet")]
+    #[error("the environment was not reset yet; call `reset` first")]
     NotReset,
     /// A call undoes a step, but the config keeps no steps.
     ///

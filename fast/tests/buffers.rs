@@ -110,6 +110,6 @@ fn wrong_buffers_are_rejected() {
     let fresh = Engine::new(Config::default()).unwrap();
     assert_eq!(
         fresh.observe_into(Observations::None).unwrap_err().to_string(),
-        "the environment was not reset yet"
+        "the environment was not reset yet; call `reset` first"
     );
 }

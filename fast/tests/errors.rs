@@ -167,7 +167,7 @@ fn wrong_instances_are_rejected() {
 #[test]
 fn every_call_fails_before_a_reset() {
     let mut engine = Engine::new(CONFIG).unwrap();
-    let expected = "the environment was not reset yet";
+    let expected = "the environment was not reset yet; call `reset` first";
     let mut values = [7.0; 3 * PER_AGENT];
     let outcomes = [
         step(&mut engine, [3; 4]),

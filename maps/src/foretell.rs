@@ -1,5 +1,7 @@
 //! The future goals of the agents in a lifelong episode.
 
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
 use pogema_core::{Cell, GoalStream, Instance};
 
 use crate::config::{GridConfig, Targets};
@@ -14,12 +16,13 @@ use crate::config::{GridConfig, Targets};
 ///
 /// Source: POGEMA 1.4.0, `envs.py`, `PogemaLifeLong.get_lifelong_targets_xy`
 pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Vec<Cell>>> {
-    foretold_from(config, instance, instance.starts(), &instance.first_goals())
+    foretold_from(config, instance, instance.starts(), &instance.first_goals(), &AtomicBool::new(false))
 }
 
 /// Returns the goals that POGEMA foretells later in the episode.
 ///
-/// POGEMA repeats the draws of the reset, but starts from the agents' current cells and current goals.
+/// POGEMA repeats the draws of the reset, but starts from the agents' current cells and current goals. If `stop` is set,
+/// returns `None` soon.
 ///
 /// Rule: goal/restart/foretold
 pub fn foretold_from(
@@ -27,17 +30,25 @@ pub fn foretold_from(
     instance: &Instance,
     cells: &[Cell],
     goals: &[Cell],
+    stop: &AtomicBool,
 ) -> Option<Vec<Vec<Cell>>> {
     if let Some(Targets::Sequences(sequences)) = &config.targets_xy {
         return Some(sequences.clone());
     }
     let agents = instance.goals().iter().zip(cells.iter().zip(goals));
-    agents
-        .map(|(stream, (&cell, &goal))| goals_of_agent(stream.clone(), cell, goal, config.max_episode_steps))
-        .collect()
+    let goals_of = |(stream, (&cell, &goal)): (&GoalStream, (&Cell, &Cell))| {
+        goals_of_agent(stream.clone(), cell, goal, config.max_episode_steps, stop)
+    };
+    agents.map(goals_of).collect()
 }
 
-fn goals_of_agent(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i64) -> Option<Vec<Cell>> {
+fn goals_of_agent(
+    mut stream: GoalStream,
+    start: Cell,
+    goal: Cell,
+    max_steps: i64,
+    stop: &AtomicBool,
+) -> Option<Vec<Cell>> {
     /// More equal draws in a row than this are not chance: no other goal can be drawn.
     const MOST_REPEATS: usize = 10_000;
     let mut at = goal;
@@ -47,7 +58,7 @@ fn goals_of_agent(mut stream: GoalStream, start: Cell, goal: Cell, max_steps: i6
     while length < max_steps {
         let next = stream.advance(at);
         num_repeats = if next == at { num_repeats + 1 } else { 0 };
-        if num_repeats > MOST_REPEATS {
+        if num_repeats > MOST_REPEATS || stop.load(Relaxed) {
             return None;
         }
         length += distance(at, next);

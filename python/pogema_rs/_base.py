@@ -43,7 +43,7 @@ class PogemaBase(Overridable, gymnasium.Env):
 
     def __init__(self, grid_config: Optional[GridConfig] = None) -> None:
         self.grid_config = GridConfig() if grid_config is None else grid_config
-        self.__dict__["grid"] = None  # an environment of the package lets nobody else set its grid
+        self.__dict__["grid"] = None  # `Pogema` rejects assignments to its grid
         self.action_space: gymnasium.spaces.Discrete = gymnasium.spaces.Discrete(len(self.grid_config.MOVES))
         self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
@@ -60,7 +60,7 @@ class PogemaBase(Overridable, gymnasium.Env):
     def check_reset(self) -> None:
         """Raises `NotResetError` if the environment was not reset yet."""
         if self.grid is None:
-            raise NotResetError("the environment was not reset yet")
+            raise NotResetError("the environment was not reset yet; call `reset` first")
 
     def render(self, mode: str = "human") -> Optional[str]:
         """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""

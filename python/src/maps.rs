@@ -6,13 +6,15 @@ use pogema_maps::generators::{Bays, Maze, RandomMap, Warehouse};
 use pogema_maps::parse_map_text;
 use pyo3::prelude::*;
 
-use crate::errors;
 use crate::guard::guarded;
+use crate::{errors, interrupt};
 
 type Cells = Vec<(u16, u16)>;
 
-fn text(py: Python<'_>, map: Result<Map, Error>) -> PyResult<String> {
-    map.map(|map| map.rows().join("\n")).map_err(|error| errors::map(py, &error))
+/// Makes a map, off the main thread so that a signal ends a long call, and returns its text.
+fn text(py: Python<'_>, make: impl FnOnce() -> Result<Map, Error> + Send + 'static) -> PyResult<String> {
+    let text = interrupt::detach(py, move || Ok(make()?.rows().join("\n")))?;
+    text.map_err(|error: Error| errors::map(py, &error))
 }
 
 guarded! {
@@ -26,7 +28,7 @@ pub fn random_map(
 ) -> PyResult<String> {
     let (width, height) = sides;
     let map = RandomMap { width, height, obstacle_density, seed };
-    text(py, py.detach(move || map.generate()))
+    text(py, move || map.generate())
 }
 }
 
@@ -43,7 +45,7 @@ pub fn maze(
 ) -> PyResult<String> {
     let (width, height) = sides;
     let maze = Maze { width, height, obstacle_density, wall_components, go_straight, seed };
-    text(py, py.detach(move || maze.generate()))
+    text(py, move || maze.generate())
 }
 }
 
@@ -51,8 +53,7 @@ guarded! {
 /// Returns a warehouse without marks.
 #[pyfunction]
 pub fn warehouse(py: Python<'_>, settings: [i64; 7]) -> PyResult<String> {
-    let map = read_warehouse(settings).and_then(|warehouse| Ok(warehouse.generate(Bays::None)?.map));
-    text(py, map)
+    text(py, move || Ok(read_warehouse(settings)?.generate(Bays::None)?.map))
 }
 }
 
@@ -65,9 +66,12 @@ pub fn warehouse_cells(
     bottom_gap: i64,
     vertical_gap: i64,
 ) -> PyResult<(Cells, Cells)> {
-    let found = read_warehouse([0, 0, 0, 0, bottom_gap, 0, vertical_gap])
-        .and_then(|warehouse| warehouse.cells(&parse_map_text(map)?.map, Bays::Toolbox));
-    let (starts, goals) = found.map_err(|error| errors::map(py, &error))?;
+    let map = map.to_owned();
+    let find = move || {
+        let warehouse = read_warehouse([0, 0, 0, 0, bottom_gap, 0, vertical_gap])?;
+        warehouse.cells(&parse_map_text(&map)?.map, Bays::Toolbox)
+    };
+    let (starts, goals) = interrupt::detach(py, find)?.map_err(|error: Error| errors::map(py, &error))?;
     let pairs = |cells: Vec<Cell>| cells.into_iter().map(|cell| (cell.row, cell.col)).collect();
     Ok((pairs(starts), pairs(goals)))
 }
@@ -77,8 +81,11 @@ guarded! {
 /// Returns a map of MovingAI's benchmark, without the ring of cells at its border if `has_ring` is false.
 #[pyfunction]
 pub fn movingai_map(py: Python<'_>, file: &str, has_ring: bool) -> PyResult<String> {
-    let map = read_movingai(file, Water::Free);
-    text(py, if has_ring { map } else { map.and_then(|map| without_ring(&map)) })
+    let file = file.to_owned();
+    text(py, move || {
+        let map = read_movingai(&file, Water::Free)?;
+        if has_ring { Ok(map) } else { without_ring(&map) }
+    })
 }
 }
 

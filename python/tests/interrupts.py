@@ -1,23 +1,27 @@
-"""Interrupts one long call: interrupts.py CASE. Without a case, lists all of them.
+"""Interrupts long calls of compiled entries: interrupts.py CASE.
 
-Prints the time from the signal to the exception, for a person to read.
+Prints each interrupted entry with the time from the signal to the exception, for a person to read. `SHORT` lists the
+entries that no case interrupts, because they end soon.
 """
 
+import json
 import os
 import pickle
 import signal
 import sys
 import threading
 import time
+import traceback
 from pathlib import Path
 
 import numpy as np
-from pogema_rs import AnimationMonitor, GridConfig, pogema_v0
+from pogema_rs import AnimationMonitor, GridConfig, _engine, pogema_v0
 from pogema_rs._engine import restore_engine
 from pogema_rs.errors import NotResetError
 from pogema_rs.planners import PlannerAgents, plan
 from pogema_rs.toolbox.evaluator import evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views import show
 from pogema_rs.vec_env import VecEnv
 
 EMPTY = np.zeros((48, 48), int)
@@ -26,8 +30,50 @@ STARTS = [(row, col) for row in range(12) for col in range(48)]
 GOALS = [(47 - row, 47 - col) for row, col in STARTS]
 
 
-def interrupt(call, delay=0.3):
-    """Calls a function and sends SIGINT after a delay; fails if the call ends first."""
+#: The cases by name, each with the entries of `_engine.pyi` that it interrupts.
+CASES = {}
+
+#: The other entries by the reason why they end soon. A signal arrives when they return.
+SHORT = {
+    "their work is linear in the agents, cells or goals that they read or return": {
+        "Engine.__new__", "Engine.__reduce__", "Engine.active", "Engine.cells", "Engine.executed", "Engine.goal_generators",
+        "Engine.goals", "Engine.history", "Engine.infos", "Engine.is_drawn", "Engine.obstacles", "Engine.observe",
+        "Engine.occupied", "Engine.on_goal", "Engine.pools", "Engine.reseed", "Engine.set_goal_generators", "Engine.starts",
+        "Engine.step_back", "derive_config",
+    },
+    "they play or observe at most one step": {
+        "AStarAgent.act", "Batch.ended", "Batch.global_state", "Batch.mask_actions", "Engine.step",
+    },
+    "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.metrics"},
+    "they read or write the files of one algorithm once": {
+        "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note", "Evaluation.picks",
+    },
+    "they read or set a few values": {
+        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
+        "Engine.clear_metrics", "Engine.elapsed", "Engine.film", "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure",
+        "Engine.num_steps", "Engine.size", "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask",
+        "Evaluation.environment", "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
+        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset", "_panic",
+        "machine", "nearest_name", "num_cores",
+    },
+}  # fmt: skip
+
+
+def interrupts(*entries):
+    """Registers a case and the entries that it interrupts."""
+
+    def register(case):
+        CASES[case.__name__.strip("_")] = (case, entries)
+        return case
+
+    return register
+
+
+def interrupt(entry, call, delay=0.3, *, is_abandoned=False):
+    """Calls a function and sends SIGINT after a delay; fails if the call of the entry ends first.
+
+    With `is_abandoned`, another thread has to do the work and still be at it after the exception.
+    """
     sent = []
 
     def send():
@@ -38,24 +84,41 @@ def interrupt(call, delay=0.3):
     timer.start()
     try:
         call()
-    except KeyboardInterrupt:
-        print(f"{call.__qualname__}: KeyboardInterrupt after {time.monotonic() - sent[0]:.3f} s")
+    except KeyboardInterrupt as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        # An entry asks for the main thread before its work. A signal until then prevents the work.
+        has_begun = frames[-1].filename != threading.__file__
+        if is_abandoned and has_begun:
+            check_abandoned(entry)
+        print(f"{entry}: KeyboardInterrupt after {time.monotonic() - sent[0]:.3f} s")
+        name = entry.removesuffix(".__new__").split(".")[-1]
+        line = [frame.line for frame in frames if frame.filename != threading.__file__][-1]
+        assert f"{name}(" in line or f"{name})" in line, f"the signal reached `{line}`, not {entry}"
         return
     timer.cancel()
-    raise AssertionError(f"{call.__qualname__} ended before it was interrupted")
+    raise AssertionError(f"{entry} ended before it was interrupted")
 
 
+def check_abandoned(entry):
+    threads = Path("/proc/self/task")
+    if threads.exists():
+        names = [path.read_text().strip() for path in threads.glob("*/comm")]
+        assert "pogema work" in names, f"{entry} was complete before the exception: {names}"
+
+
+@interrupts("make_plan")
 def planners():
     for planner in ["lacam", "cbs", "ecbs", "pbs"]:
-        interrupt(lambda: plan(EMPTY, STARTS, GOALS, planner, seconds=100.0))  # noqa: B023 - called at once
+        interrupt("make_plan", lambda: plan(EMPTY, STARTS, GOALS, planner, seconds=100.0))  # noqa: B023 - called immediately
     assert plan(EMPTY, [(0, 0)], [(3, 3)]).makespan == 6
 
 
+@interrupts("PlanFollower.act")
 def planner_agents():
     seen = [{"global_obstacles": EMPTY, "global_xy": a, "global_target_xy": b} for a, b in zip(STARTS, GOALS)]
     for planner, lifelong in [("lacam", False), ("rhcr", True), ("rhcr-pbs", True), ("rhcr-ecbs", True)]:
         agents = PlannerAgents(planner, seconds=100.0, nodes=10**9, lifelong=lifelong)
-        interrupt(lambda: [agents.act(seen) for _ in range(10**6)])  # noqa: B023 - called at once
+        interrupt("PlanFollower.act", lambda: [agents.act(seen) for _ in range(10**6)])  # noqa: B023 - called immediately
         one = [{**seen[0], "global_target_xy": (1, 0)}]
         assert agents.act(one) == [2], planner
 
@@ -64,14 +127,16 @@ def batch(num_envs, **config):
     return VecEnv({"size": 64, "num_agents": 16, "seed": 5, "on_target": "restart", **config}, num_envs, dtype="uint8")
 
 
+@interrupts("Batch.__new__")
 def batch_construction():
-    interrupt(lambda: batch(300_000, size=8, num_agents=1, obs_radius=1), 0.1)
+    interrupt("Batch.__new__", lambda: batch(300_000, size=8, num_agents=1, obs_radius=1), 0.1)
     batch(2).reset()
 
 
+@interrupts("Batch.reset")
 def batch_reset():
     env, twin = batch(4000), batch(4000)
-    interrupt(env.reset)
+    interrupt("Batch.reset", env.reset)
     try:
         env.episode_seeds  # noqa: B018 - raises
         raise AssertionError("the first reset was only partly undone")
@@ -80,7 +145,7 @@ def batch_reset():
     env.reset()
     twin.reset()
     for arguments in [{"seed": 7}, {"seed": 7, "options": {"reset_mask": np.arange(4000) < 3999}}]:
-        interrupt(lambda: env.reset(**arguments))  # noqa: B023 - called at once
+        interrupt("Batch.reset", lambda: env.reset(**arguments))  # noqa: B023 - called immediately
         check_equal(env, twin)
     env.reset(seed=8)
     twin.reset(seed=8)
@@ -95,21 +160,23 @@ def check_equal(env, twin):
     np.testing.assert_array_equal(env.episode_seeds, twin.episode_seeds)
 
 
+@interrupts("Batch.step")
 def batch_step():
     env, twin = batch(8000, max_episode_steps=1), batch(8000, max_episode_steps=1)
     env.reset()
     # All episodes end, and all lanes need their next instances.
-    interrupt(lambda: env.step(np.zeros((8000, 16), int)), 0.1)
+    interrupt("Batch.step", lambda: env.step(np.zeros((8000, 16), int)), 0.1)
     twin.reset()
     check_equal(env, twin)
 
 
+@interrupts("Engine.reset")
 def reset():
     env = pogema_v0(GridConfig(size=12, num_agents=2, seed=1))
     env.reset()
     before = env.get_agents_xy()
     env.grid_config = GridConfig(size=4096, num_agents=2, seed=1, on_target="restart")
-    interrupt(env.reset, 0.1)
+    interrupt("Engine.reset", env.reset, 0.1)
     assert env.get_agents_xy() == before
     assert len(env.step([0, 0])[0]) == 2
 
@@ -123,21 +190,25 @@ def _filmed():
     return env
 
 
+@interrupts("Engine.pack_film", "Engine.draw_svg", "Engine.draw_html")
 def animation():
     env = _filmed()
-    interrupt(env.unwrapped._engine.pack_film, 0.1)
-    interrupt(lambda: env.unwrapped._engine.draw_svg(), 0.1)
+    engine = env.unwrapped._engine
+    interrupt("Engine.pack_film", lambda: engine.pack_film(), 0.1)
+    interrupt("Engine.draw_svg", lambda: engine.draw_svg(), 0.1)
+    interrupt("Engine.draw_html", lambda: engine.draw_html("a film"), 0.1)
 
 
+@interrupts("restore_engine")
 def pickle_():
     env = pogema_v0(GridConfig(size=64, num_agents=400, seed=1, max_episode_steps=3000, persistent=True))
     env.reset()
     for _ in range(1000):
         env.step([0] * 400)
     engine = env.unwrapped._engine
-    interrupt(lambda: [pickle.dumps(engine) for _ in range(100)], 0.1)
     saved = engine.__reduce__()[1][0]
-    interrupt(lambda: [restore_engine(saved) for _ in range(100)], 0.1)
+    interrupt("restore_engine", lambda: restore_engine(saved), 0.1, is_abandoned=True)
+    assert pickle.loads(pickle.dumps(engine)).cells(0) == engine.cells(0)
     assert restore_engine(saved).cells(0) == engine.cells(0)
 
 
@@ -149,24 +220,27 @@ def suite(seeds, **algorithm):
     return {"environment": environment, "algorithms": {"A": algorithm}}
 
 
+@interrupts("Evaluation.run_built_in")
 def built_in_evaluation():
     config = suite(200, name="pibt")
-    interrupt(lambda: evaluation(config, "out"))
+    interrupt("Evaluation.run_built_in", lambda: evaluation(config, "out"))
     assert not Path("out/A.json").exists()
-    interrupt(lambda: evaluation(config, "out", begin="resume"))
+    interrupt("Evaluation.run_built_in", lambda: evaluation(config, "out", begin="resume"))
     evaluation(config, "out", begin="resume")
     evaluation(config, "whole")
     assert Path("out/A.json").read_bytes() == Path("whole/A.json").read_bytes()
 
 
+@interrupts("Evaluation.run_built_in")
 def long_episode():
     config = suite(1, name="rhcr", seconds=100.0, nodes=10**9)
-    interrupt(lambda: evaluation(config, "out"))
+    interrupt("Evaluation.run_built_in", lambda: evaluation(config, "out"))
     assert not Path("out/A.jsonl").read_bytes() and not Path("out/A.failed.jsonl").exists()
     config["algorithms"]["A"] = {"name": "stay"}
     assert len(evaluation(config, "out", begin="anew")) == 1
 
 
+@interrupts("Evaluation.write_report")
 def page():
     # The page plays the episode again.
     config = suite(1, name="rhcr", seconds=0.01)
@@ -174,7 +248,7 @@ def page():
     began = time.monotonic()
     evaluation(config, "out")
     taken = time.monotonic() - began
-    interrupt(lambda: evaluation(config, "out", begin="resume", html="page.html"), taken / 2)
+    interrupt("Evaluation.write_report", lambda: evaluation(config, "out", begin="resume", html="page.html"), taken / 2)
     assert not Path("page.html").exists()
     evaluation(config, "out", begin="resume", html="page.html")
     assert Path("page.html").exists()
@@ -191,28 +265,98 @@ class Sleepy:
         """Does nothing."""
 
 
+@interrupts()
 def process_pool():
     ToolboxRegistry.register_algorithm("Sleepy", Sleepy)
     for backend in ["multiprocessing", "dask"]:
         config = suite(8, name="Sleepy", parallel_backend=backend, num_process=2)
-        interrupt(lambda: evaluation(config, backend), 5.0)  # noqa: B023 - called at once
+        timer = threading.Timer(5.0, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        try:
+            evaluation(config, backend)
+            raise AssertionError("the evaluation ended before it was interrupted")
+        except KeyboardInterrupt:
+            pass
         config["algorithms"]["A"] = {"name": "stay"}
         assert len(evaluation(config, backend, begin="anew")) == 8
 
 
-CASES = {
-    case.__name__.strip("_"): case
-    for case in [
-        animation, batch_construction, batch_reset, batch_step, built_in_evaluation, long_episode, page, pickle_,
-        planner_agents, planners, process_pool, reset,
-    ]
-}  # fmt: skip
+@interrupts("play_built_in")
+def one_episode():
+    config = json.dumps(suite(1, name="rhcr", seconds=100.0, nodes=10**9))
+    interrupt("play_built_in", lambda: _engine.play_built_in(config, []), is_abandoned=True)
+
+
+@interrupts("show_views")
+def views():
+    config = suite(4, name="stay")
+    config["results_views"] = {"Plot": {"type": "plot", "x": "seed", "y": "avg_throughput"}}
+    evaluation(config, "out")
+    # The bands of the plot need a thousand samples of all rows.
+    path = Path("out/A.json")
+    path.write_text(json.dumps(json.loads(path.read_text()) * 100_000))
+    interrupt("show_views", lambda: show("out"), 0.5, is_abandoned=True)
+
+
+@interrupts("random_map", "maze", "warehouse", "warehouse_cells", "movingai_map")
+def maps():
+    row = "." * 8000
+    shelves = "\n".join([row] * 8000)
+    file = f"type octile\nheight 8000\nwidth 8000\nmap\n{shelves}"
+    for entry, call in {
+        "random_map": lambda: _engine.random_map((8000, 8000), 0.3, 1),
+        "maze": lambda: _engine.maze((4001, 4001), 0.9, 100, 0.8, 1),
+        "warehouse": lambda: _engine.warehouse([10, 2, 1000, 2000, 5, 1, 5]),
+        "warehouse_cells": lambda: _engine.warehouse_cells(shelves, 5, 5),
+        "movingai_map": lambda: _engine.movingai_map(file, True),
+    }.items():
+        interrupt(entry, call, 0.02, is_abandoned=True)
+
+
+@interrupts("cost_to_go", "check_plan")
+def distances_and_validation():
+    interrupt("cost_to_go", lambda: _engine.cost_to_go(np.zeros((4096, 4096), np.float32), (0, 0)), 0.05, is_abandoned=True)
+    places = np.array([(row, 0) for row in range(4000)])
+    steps = np.tile(places, (4000, 1, 1))
+    obstacles = np.zeros((4000, 1), np.float32)
+    interrupt("check_plan", lambda: _engine.check_plan(obstacles, places, places, steps), 0.02, is_abandoned=True)
+
+
+@interrupts("Engine.foretold_goals")
+def foretold_goals():
+    env = pogema_v0(GridConfig(size=8, num_agents=2, seed=1, on_target="restart", max_episode_steps=10**9))
+    env.reset()
+    engine = env.unwrapped._engine
+    interrupt("Engine.foretold_goals", lambda: engine.foretold_goals())
+    assert len(env.step([0, 0])[0]) == 2
+
+
+@interrupts()
+def one_step():
+    # A signal during a step arrives after it: the step is complete, and its results are lost.
+    config = GridConfig(size=500, num_agents=40_000, density=0.1, obs_radius=1, seed=1, on_target="restart")
+    env, twin = pogema_v0(config), pogema_v0(config)
+    env.reset()
+    twin.reset()
+    num_steps, actions = 0, [1] * 40_000
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        while True:
+            env.step(actions)
+            num_steps += 1
+    except KeyboardInterrupt:
+        pass
+    num_played = env.unwrapped._engine.num_steps
+    assert num_steps <= num_played <= num_steps + 1, (num_steps, num_played)
+    for _ in range(num_played):
+        twin.step(actions)
+    assert env.get_agents_xy() == twin.get_agents_xy()
+    for one, other in zip(env.step(actions)[:4], twin.step(actions)[:4]):
+        np.testing.assert_array_equal(one, other)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        # A shell starts a background process with SIGINT ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        CASES[sys.argv[1]]()
-    else:
-        print(*CASES)
+    # A shell starts a background process with SIGINT ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    CASES[sys.argv[1]][0]()

@@ -16,6 +16,18 @@ def test_the_conformance_page_fits_a_phone(world):
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
     wide = page.evaluate("[...document.querySelectorAll('.wide')].filter((box) => box.scrollWidth > box.clientWidth).length")
     equal(wide, 0, "the table of one port needs no scrolling")
+    broken = page.evaluate("""[...document.querySelectorAll('th[scope=row]')].filter((cell) => {
+      const text = document.createRange();
+      const nodes = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+      for (let node = nodes.nextNode(); node; node = nodes.nextNode())
+        for (const word of node.data.matchAll(/[^-]+-?/g)) {
+          text.setStart(node, word.index);
+          text.setEnd(node, word.index + word[0].length);
+          if (text.getClientRects().length > 1) return true;
+        }
+      return false;
+    }).map((cell) => cell.textContent)""")
+    equal(broken, [], "no name of a rule breaks inside a word")
     sizes = page.evaluate("[...document.querySelectorAll('th, td, caption')].map((cell) => parseFloat(getComputedStyle(cell).fontSize))")
     assert min(sizes) >= 12, min(sizes)
     context.close()

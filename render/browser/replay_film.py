@@ -56,6 +56,7 @@ def test_names_come_from_the_episode_and_are_escaped(world):
         assert "<script>" in title
         equal(text(page, "title"), title)
         equal(page.title(), title)
+        assert text(page, "metrics").startswith("· ISR "), "the metrics are apart from the facts"
         equal(text(page, "facts"), f"8 × 8 · 4 agents · {len(world.film('finish')['states']) - 1} steps · priority · finish · radius 5")
 
 

@@ -16,7 +16,7 @@ ACTIONS = 64
 
 
 def fastest(work, seconds=SECONDS):
-    """Return the calls of `work` per second, in the fastest interval."""
+    """Returns the calls of `work` per second, in the fastest interval."""
     best = 0.0
     for _ in range(INTERVALS):
         calls, start = 0, time.perf_counter()
@@ -28,7 +28,7 @@ def fastest(work, seconds=SECONDS):
 
 
 def measure(config):
-    """Return the observations and resets per second of a config."""
+    """Returns the observations and resets per second of a config."""
     env = pogema_v0(GridConfig(**config))
     env.reset()
     generator = np.random.default_rng(0)

@@ -30,6 +30,7 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
     };
     let page = json!({
         "style": STYLE,
+        "images": "data:",
         "title": format!("{} and POGEMA 1.4.0", names.join(", ")),
         "outcomes": OUTCOMES,
         "ports": reports.iter().zip(&names).enumerate().map(port).collect::<Vec<_>>(),
@@ -38,7 +39,7 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
         "stopped": leftover.stopped,
         "not_played": leftover.not_played,
     });
-    fill(include_str!("report.html"), page)
+    fill(concat!(include_str!("head.html"), include_str!("report.html")), page)
 }
 
 fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
@@ -66,9 +67,12 @@ fn id(port: usize, cause: usize) -> String {
     format!("port-{}-cause-{}", port + 1, cause + 1)
 }
 
-/// Returns the address, within the page, of the first cause of the failures of a rule. `port` is the index of the
-/// report in the page.
-pub fn place_of(report: &PortReport, port: usize, rule: &str) -> Option<String> {
+/// Returns the address, within the page, of the first cause of the failures of a rule, or `None` if the class of a cell
+/// is not that of a failure. `port` is the index of the report in the page.
+pub fn place_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Option<String> {
+    if !["failed", "error", "known"].contains(&class) {
+        return None;
+    }
     let first = causes_of(report, rule).next()?;
     let number = report.causes.iter().position(|cause| std::ptr::eq(cause, first))?;
     Some(format!("#{}", id(port, number)))
@@ -80,10 +84,8 @@ fn row(reports: &[PortReport], rule: &str) -> Value {
         let is_known = standing(report, rule) == Standing::Known;
         let [failed, error] = if is_known { ["known"; 2] } else { ["failed", "error"] };
         let cells = counts(report, rule).into_iter().zip(["passed", failed, "unclaimed", error]);
-        let place = place_of(report, port, rule);
-        let url = |class: &str, count: &str| {
-            place.clone().filter(|_| ["failed", "error", "known"].contains(&class) && !count.is_empty())
-        };
+        let url =
+            |class: &str, count: &str| place_of(report, port, rule, class).filter(|_| !count.is_empty());
         cells
             .map(|(count, class)| json!({"class": class, "url": url(class, &count), "count": count}))
             .collect::<Vec<_>>()

@@ -80,20 +80,20 @@ fn index(reports: &[PortReport], files: &[String], leftover: &Leftover) -> Resul
     };
     let page = json!({
         "style": STYLE,
+        "images": "'self' data: file:",
         "title": "Which implementation follows which rule",
         "ports": reports.iter().zip(names(reports)).zip(files).map(port).collect::<Vec<_>>(),
         "rows": summary::rows(reports).into_iter().map(|rule| row(reports, files, rule)).collect::<Vec<_>>(),
         "stopped": leftover.stopped,
         "not_played": leftover.not_played,
     });
-    fill(include_str!("site.html"), page)
+    fill(concat!(include_str!("head.html"), include_str!("site.html")), page)
 }
 
 fn row(reports: &[PortReport], files: &[String], rule: &str) -> Value {
     let cell = |(report, file): (&PortReport, &String)| {
         let (mark, class) = mark(report, rule);
-        let is_bad = ["failed", "error", "known"].contains(&class);
-        let url = place_of(report, 0, rule).filter(|_| is_bad).map(|place| format!("{file}.html{place}"));
+        let url = place_of(report, 0, rule, class).map(|place| format!("{file}.html{place}"));
         json!({"mark": mark, "class": class, "url": url})
     };
     json!({"rule": link(rule), "cells": reports.iter().zip(files).map(cell).collect::<Vec<_>>()})

@@ -108,13 +108,14 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
             }
         }
     }
-    if let Some(rule) = result.case_rule {
+    // A rule whose cases were all skipped has no row.
+    let has_verdict = is_played || !result.is_cut_off || verdict != Verdicts::default();
+    if let Some(rule) = result.case_rule.filter(|_| has_verdict) {
         let row = report.row(&rule);
         match verdict {
             Verdicts { errors: 1.., .. } => row.errors += 1,
             Verdicts { failed: 1.., .. } => row.failed += 1,
             _ if is_played => row.passed += 1,
-            _ if result.is_cut_off => {}
             _ => row.not_claimed += 1,
         }
     }

@@ -1,4 +1,4 @@
-"""A port that misbehaves in its third step, in the way that its argument names, once per folder."""
+"""A port that misbehaves in its third step, once per folder. Its argument names the misbehaviour."""
 
 import json
 import os
@@ -20,20 +20,20 @@ steps = 0
 
 
 def state(request):
-    """Return a well-formed state: all agents stay at their starts, since moves are not checked here."""
+    """Returns a well-formed state. All agents stay at their starts, because no test checks moves."""
     instance = request["instance"]
     cells = instance["starts"]
     return {"cells": cells, "goals": [goals[0] for goals in instance["goals"]], "active": [True] * len(cells)}
 
 
 def print_line(text):
-    """Print a line."""
+    """Prints a line."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
 def is_first():
-    """Return whether no port has misbehaved in this folder yet, and mark that one has now."""
+    """Returns whether this is the first misbehaviour in this folder, and marks the folder."""
     try:
         os.close(os.open(f"{FOLDER}/marker", os.O_CREAT | os.O_EXCL))
     except FileExistsError:
@@ -42,7 +42,7 @@ def is_first():
 
 
 def misbehave(answer):
-    """Misbehave in the way that the argument names."""
+    """Misbehaves as the argument says."""
     if WAY == "exit":
         print("the reason is here", file=sys.stderr, flush=True)
         sys.exit(7)

@@ -16,7 +16,8 @@ mod avx512_layout;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512_windows;
-#[cfg(test)]
+// Miri supports no guard pages, and needs none.
+#[cfg(all(test, not(miri)))]
 #[allow(unsafe_code, reason = "slices next to pages without access")]
 mod guard_pages;
 #[cfg(target_arch = "x86_64")]

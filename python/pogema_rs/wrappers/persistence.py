@@ -75,7 +75,7 @@ class PersistentWrapper(Wrapper):
 
     def _started(self) -> History:
         if self._changes is None:
-            raise NoHistoryError("the environment was not reset yet")
+            raise NoHistoryError("the environment was not reset yet; call `reset` first")
         return self._changes
 
     def _now(self) -> list[AgentState]:

@@ -1,5 +1,7 @@
 //! The methods of an environment for Python.
 
+use std::sync::atomic::AtomicBool;
+
 use numpy::PyArray2;
 use pogema_core::{Environment, Error, Trace};
 use pogema_maps::{GridConfig, foretold_from};
@@ -186,10 +188,14 @@ impl Engine {
     /// Returns the future goals of each agent as POGEMA predicts them, or `None` if the list would be infinite.
     fn foretold_goals(&self, py: Python<'_>) -> PyResult<Option<Vec<Pairs>>> {
         let inner = self.lock(py)?;
-        let state = inner.episode.state();
-        let goals = inner.episode.instance().ok().and_then(|instance| {
-            foretold_from(inner.source.config(), instance, state.cells, state.goals)
-        });
+        let (config, state, stop) = (inner.source.config(), inner.episode.state(), AtomicBool::new(false));
+        let Ok(instance) = inner.episode.instance() else { return Ok(None) };
+        let foretell = || foretold_from(config, instance, state.cells, state.goals, &stop);
+        let num_goals = usize::try_from(config.max_episode_steps).unwrap_or(0).saturating_mul(state.cells.len());
+        let goals = match num_goals < interrupt::LONG {
+            true => foretell(),
+            false => interrupt::detach_scoped(py, &stop, foretell)?,
+        };
         Ok(goals.map(|goals| goals.iter().map(|goals| pairs(goals, 0)).collect()))
     }
 

@@ -303,7 +303,7 @@ def generator_of_a_grid() -> Any:
 
 
 def generator_states(env: Any) -> Any:
-    """Returns the states of the generators of goals; a half that was used is of no effect."""
+    """Returns the states of the generators of goals; a used half has no effect."""
     states = [generator.bit_generator.state for generator in env.random_generators]
     return [(state["state"], state["has_uint32"] and state["uinteger"]) for state in states]
 

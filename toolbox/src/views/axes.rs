@@ -11,6 +11,8 @@ use super::compose::plain_layout;
 /// Colour of the grid lines behind a plot.
 const GRID: &str = "#DDDDDD";
 
+/// The largest number of ticks on a logarithmic axis with multiples by 2 and 5.
+const MOST_LOG_TICKS: usize = 9;
 /// Share of an axis that is left free at each end.
 const MARGIN: f64 = 0.05;
 
@@ -97,20 +99,20 @@ fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
 }
 
-/// Returns powers of ten within a range above zero, with their labels.
+/// Returns powers of ten and their multiples by 2 and 5 within a range above zero, with their labels.
 ///
-/// If those are too few, also their multiples by 2 and 5; in a narrow range, round numbers.
+/// In a wide range, returns only the powers of ten; in a narrow one, round numbers.
 fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     let of = |factors: &[f64]| -> Vec<(f64, String)> {
         let counts = low.log10().floor() as i32..=high.log10().ceil() as i32;
         let all = counts.flat_map(|count| factors.iter().map(move |factor| factor * 10f64.powi(count)));
         all.filter(|tick| (low..=high).contains(tick)).map(|tick| (tick, number(tick))).collect()
     };
-    let (decades, more) = (of(&[1.0]), of(&[1.0, 2.0, 5.0]));
-    match (decades.len(), more.len()) {
-        (3.., _) => decades,
-        (_, 3..) => more,
-        _ => round_numbers((low, high)),
+    let ticks = of(&[1.0, 2.0, 5.0]);
+    match ticks.len() {
+        0..3 => round_numbers((low, high)),
+        3..=MOST_LOG_TICKS => ticks,
+        _ => of(&[1.0]),
     }
 }
 
@@ -267,6 +269,10 @@ mod tests {
         assert_eq!(
             texts(Axis::of_numbers("", &[130.0, 8100.0], true, None)),
             ["200", "500", "1,000", "2,000", "5,000"]
+        );
+        assert_eq!(
+            texts(Axis::of_numbers("", &[118.0, 8190.0], true, None)),
+            ["100", "200", "500", "1,000", "2,000", "5,000", "10,000"]
         );
         assert_eq!(texts(Axis::of_numbers("", &[610.0, 680.0], true, None)), ["620", "640", "660", "680"]);
         assert_eq!(

@@ -40,7 +40,7 @@ class Page {
     const facts = [size, count(film.numAgents, "agent"), count(film.numSteps, "step"), collision, on_goal, `radius ${radius}`];
     setText(byId("facts"), facts.join(" · "));
     const figures = Object.entries(film.metrics).map(([name, value]) => `${name} ${number(value)}`);
-    setText(byId("metrics"), figures.join(" · "));
+    setText(byId("metrics"), figures.map((figure) => ` · ${figure}`).join(""));
   }
 
   wire() {
