@@ -4,21 +4,25 @@
     python train_ppo.py --plot learning.svg --save policy.pt --replay episode.html
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
-network for every agent of every environment. Finished agents do not contribute to the loss. The policy is evaluated on
-unseen seeds, next to a random policy and POGEMA's A* agents.
+network for every agent of every environment. Finished agents do not contribute to the loss. If the time limit ends an
+episode, the value of its final observation stands in for the rewards after it. The policy is evaluated on unseen seeds,
+next to a random policy and POGEMA's A* agents.
 """
 
 import argparse
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Union
 
 import numpy as np
 import torch
 from pogema_rs import BatchAStarAgent, GridConfig, VecEnv, pogema_v0
+from pogema_rs.envs import Pogema
 from torch import nn
 from torch.distributions import Categorical
 
-CONFIG = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
+CONFIG: dict[str, Any] = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
 # Training derives its 63-bit seeds from a `SeedSequence`, which practically never yields one of these.
 EVALUATION_SEEDS = range(10_000, 10_512)
 
@@ -79,11 +83,13 @@ class Rollout:
     @classmethod
     def empty(cls, params: Params, num_agents: int, seen_shape: tuple[int, ...]) -> "Rollout":
         shape = (params.num_steps, num_agents)
-        flags, numbers = (lambda: torch.zeros(shape, dtype=torch.bool)), (lambda: torch.zeros(shape))
+        flags = [torch.zeros(shape, dtype=torch.bool) for _ in range(2)]
+        numbers = [torch.zeros(shape) for _ in range(3)]
         masks = torch.zeros((*shape, 5), dtype=torch.int8)
         actions = torch.zeros(shape, dtype=torch.int64)
         seen = torch.zeros((*shape, *seen_shape), dtype=torch.float32)
-        return cls(seen, masks, flags(), actions, numbers(), numbers(), numbers(), flags())
+        odds, values, rewards = numbers
+        return cls(seen, masks, flags[0], actions, odds, values, rewards, flags[1])
 
 
 class Trainer:
@@ -123,7 +129,19 @@ class Trainer:
             self.seconds_in_env += time.perf_counter() - began
             self.seen = self._flat(observations)
             rollout.rewards[step] = torch.from_numpy(rewards).flatten() - params.step_cost
+            self._bootstrap(rollout.rewards[step].view(params.num_envs, -1), truncated & ~terminated)
             rollout.is_over[step] = torch.from_numpy(terminated | truncated).flatten()
+
+    def _bootstrap(self, rewards: torch.Tensor, truncated: np.ndarray) -> None:
+        """Adds the discounted value of the final observation to the last reward of each truncated agent."""
+        envs = np.flatnonzero(truncated.any(axis=1))
+        if len(envs) == 0:
+            return
+        seen = torch.from_numpy(np.stack(self.infos["final_obs"][envs])).flatten(0, 1)
+        masks = torch.from_numpy(self.infos["final_info"]["action_masks"][envs]).flatten(0, 1)
+        _, values = self.policy(seen, masks)
+        cut = torch.from_numpy(truncated[envs])
+        rewards[torch.from_numpy(envs)] += self.params.discount * values.view(cut.shape) * cut
 
     @torch.no_grad()
     def advantages(self) -> torch.Tensor:
@@ -153,7 +171,7 @@ class Trainer:
         advantages = (advantages - mean) / (spread + 1e-8)
         for _ in range(params.num_epochs):
             order = active[torch.randperm(len(active))]
-            for part in order.split(params.batch_size):
+            for part in torch.split(order, params.batch_size):
                 odds, values = self.policy(flat["seen"][part], flat["masks"][part])
                 gain = advantages[part]
                 ratio = (odds.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
@@ -183,14 +201,18 @@ def evaluate(policy: Policy, seeds: range) -> float:
     return float(shares.mean())
 
 
-def evaluate_agents(make_team, seeds: range) -> float:
+Act = Callable[[list[dict[str, Any]]], Union[Sequence[int], np.ndarray]]
+
+
+def evaluate_agents(make_team: Callable[[Pogema[dict[str, Any]]], Act], seeds: range) -> float:
     """Returns the mean ISR of a team that acts on POGEMA's own lists."""
     shares = []
     for seed in seeds:
-        env = pogema_v0(GridConfig(**CONFIG, seed=seed, observation_type="POMAPF"), semantics="2.0")
+        config = GridConfig(**CONFIG, seed=seed, observation_type="POMAPF")
+        env: Pogema[dict[str, Any]] = pogema_v0(config, semantics="2.0")
         act = make_team(env)
         observations, _ = env.reset()
-        infos = [{}]
+        infos: list[dict[str, Any]] = [{}]
         while "metrics" not in infos[0]:
             observations, _, _, _, infos = env.step(act(observations))
         shares.append(infos[0]["metrics"]["ISR"])
