@@ -48,7 +48,7 @@ pub mod sipp;
 mod team_task;
 mod validate;
 
-pub use bfs::UNREACHABLE;
+pub use bfs::{Bfs, UNREACHABLE};
 pub use budget::Budget;
 pub use cbs::{Cbs, CbsParams, Ecbs, EcbsParams};
 pub use distances::{CostToGo, Distances};

@@ -1,4 +1,12 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
+//!
+//! An [`Encoder`] turns the states of an environment into what a policy sees.
+
+#![forbid(unsafe_code)]
+
+mod encode;
+
+pub use encode::{Channel, Encoder, EncoderSettings, Feature};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

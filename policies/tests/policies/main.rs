@@ -1,0 +1,5 @@
+//! Encoders, planners and policies against slow code, recordings and bad input.
+
+mod common;
+mod encode_errors;
+mod encoders;
