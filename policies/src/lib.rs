@@ -5,8 +5,10 @@
 #![forbid(unsafe_code)]
 
 mod encode;
+mod follower;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Feature};
+pub use follower::FollowerVersion;
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

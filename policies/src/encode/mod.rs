@@ -15,13 +15,15 @@ mod words;
 use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
 
 use costs::{Costs, write_plain, write_tracer};
-use layout::Layout;
-use marks::Marks;
+pub(crate) use layout::Layout;
+pub(crate) use marks::Marks;
 use memory::Memory;
 use offsets::{feature, offset, write_goal};
 use path::{draw_path, shortest_path};
 pub use settings::EncoderSettings;
 pub use words::{Channel, Feature};
+
+use crate::follower::{FollowerPlanner, FollowerVersion};
 
 /// An encoder for one environment.
 ///
@@ -58,6 +60,7 @@ struct Episode {
     marks: Option<Marks>,
     all: Option<Marks>,
     costs: Option<Costs>,
+    follower: Option<FollowerPlanner>,
     memories: Vec<Memory>,
 }
 
@@ -85,6 +88,15 @@ impl Encoder {
         let layout = Layout::new(map, self.settings.radius.max(self.settings.sight));
         let remembers = has(&[Channel::SeenObstacles]);
         let needs_costs = has(&[Channel::CostToGo, Channel::CostTracer, Channel::Path]);
+        let follower = has(&[Channel::FollowerPath]).then(|| {
+            let EncoderSettings { sight, follower: version, .. } = self.settings;
+            let seen = match version {
+                FollowerVersion::Cpp => Occupancy::Exact,
+                FollowerVersion::Python => occupancy,
+            };
+            let present = Marks::new(layout, seen);
+            FollowerPlanner::new(layout, map, starts.len(), sight, version, present)
+        });
         self.episode = Some(Episode {
             layout,
             starts: starts.to_vec(),
@@ -92,6 +104,7 @@ impl Encoder {
             marks: has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
             all: has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             costs: needs_costs.then(|| Costs::new(layout, map)),
+            follower,
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
         });
     }
@@ -151,6 +164,9 @@ impl Episode {
         if let Some(costs) = &mut self.costs {
             costs.follow(state);
         }
+        if let Some(follower) = &mut self.follower {
+            follower.plan(state);
+        }
         for (agent, memory) in self.memories.iter_mut().enumerate().filter(|(agent, _)| state.active[*agent])
         {
             let cell = state.cells[agent];
@@ -188,12 +204,25 @@ impl Episode {
                 let radius = window.len().isqrt() / 2;
                 draw_path(layout, shortest_path(layout, costs.of(agent), place), radius, window);
             }
+            (Channel::FollowerPath, ..) => self.write_follower_path(agent, place, window),
             (Channel::SeenObstacles, ..) => {
                 let at = offset(self.starts[agent], cell);
                 self.memories[agent].copy_window(at, window);
             }
             // INVARIANT: `begin` prepares what the channels of the settings need.
             _ => window.fill(0.0),
+        }
+    }
+
+    fn write_follower_path(&self, agent: usize, place: usize, window: &mut [f32]) {
+        self.layout.copy_window(&self.obstacles, place, window);
+        for value in &mut *window {
+            // Not `-*value`, which would be -0 for a free cell.
+            *value = 0.0 - *value;
+        }
+        if let Some(follower) = &self.follower {
+            let cut = follower.cut(window.len().isqrt() / 2);
+            draw_path(self.layout, follower.path(agent, place), cut, window);
         }
     }
 

@@ -4,6 +4,7 @@ use pogema_core::{Config, Error};
 use serde::{Deserialize, Serialize};
 
 use crate::encode::words::{Channel, Feature};
+use crate::follower::FollowerVersion;
 
 /// What a policy sees, as data: the windows and numbers of each agent.
 ///
@@ -25,9 +26,13 @@ pub struct EncoderSettings {
     /// The numbers of each agent, in this order.
     #[serde(default)]
     pub features: Vec<Feature>,
-    /// Number of cells that an agent sees in each direction, 1 to 128, for channels that remember.
+    /// Number of cells that an agent sees in each direction, 1 to 128, for `seen_obstacles` and
+    /// `follower_path`.
     #[serde(default = "EncoderSettings::default_sight")]
     pub sight: usize,
+    /// The version of Follower whose path `follower_path` shows.
+    #[serde(default)]
+    pub follower: FollowerVersion,
 }
 
 impl EncoderSettings {
@@ -37,7 +42,19 @@ impl EncoderSettings {
 
     /// Creates settings with these windows, no numbers, and POGEMA's default radius as sight.
     pub fn new(radius: usize, channels: impl Into<Vec<Channel>>) -> Self {
-        Self { radius, channels: channels.into(), features: Vec::new(), sight: Self::default_sight() }
+        Self {
+            radius,
+            channels: channels.into(),
+            features: Vec::new(),
+            sight: Self::default_sight(),
+            follower: FollowerVersion::default(),
+        }
+    }
+
+    /// Creates the settings of Follower: its path and the agents. The authors' networks have radius 5 (Follower) and 3
+    /// (Follower-lite).
+    pub fn follower(radius: usize, version: FollowerVersion) -> Self {
+        Self { follower: version, ..Self::new(radius, [Channel::FollowerPath, Channel::Agents]) }
     }
 
     /// Returns the side of a window. Units: cells.

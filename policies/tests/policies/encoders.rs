@@ -91,7 +91,7 @@ impl Plain {
                     flags(&places, |place| path.contains(&place))
                 }
                 Channel::SeenObstacles => flags(&places, |place| self.seen[agent].contains(&place)),
-                Channel::Obstacles | Channel::Agents | Channel::Goal => Vec::new(),
+                Channel::Obstacles | Channel::Agents | Channel::Goal | Channel::FollowerPath => Vec::new(),
             };
             out.extend(values);
         }

@@ -1,5 +1,7 @@
 //! Episodes for tests.
 
+pub mod recorded;
+
 use pogema_core::{Action, Episode, Error, Instance};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
