@@ -1,14 +1,19 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 //!
-//! An [`Encoder`] turns the states of an environment into what a policy sees.
-
-#![forbid(unsafe_code)]
+//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] turns that into
+//! logits of its actions.
 
 mod encode;
 mod follower;
+mod network;
+mod simd;
 
-pub use encode::{Channel, Encoder, EncoderSettings, Feature};
+pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
 pub use follower::FollowerVersion;
+pub use network::{
+    Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
+    SamplingConfig, Workspace, softmax,
+};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

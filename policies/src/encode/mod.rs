@@ -18,10 +18,10 @@ use costs::{Costs, write_plain, write_tracer};
 pub(crate) use layout::Layout;
 pub(crate) use marks::Marks;
 use memory::Memory;
-use offsets::{feature, offset, write_goal};
+use offsets::{offset, scalars, write_goal};
 use path::{draw_path, shortest_path};
 pub use settings::EncoderSettings;
-pub use words::{Channel, Feature};
+pub use words::{Channel, Scalars};
 
 use crate::follower::{FollowerPlanner, FollowerVersion};
 
@@ -111,7 +111,7 @@ impl Encoder {
 
     /// Writes the windows and the numbers of all agents; those of an inactive agent are 0.
     ///
-    /// Shape: `windows` is `[agents, channels, side, side]`, `features` is `[agents, features, 2]`.
+    /// Shape: `windows` is `[agents, channels, side, side]`, `scalars` is `[agents, scalars, 2]`.
     ///
     /// # Errors
     /// [`Error::NotReset`] before [`Encoder::begin`]; [`Error::Length`] for a buffer or a list of the wrong length;
@@ -120,7 +120,7 @@ impl Encoder {
         &mut self,
         state: State<'_>,
         windows: &mut [f32],
-        features: &mut [f32],
+        scalars: &mut [f32],
     ) -> Result<(), Error> {
         let Self { settings, episode } = self;
         let episode = episode.as_mut().ok_or(Error::NotReset)?;
@@ -129,7 +129,7 @@ impl Encoder {
         Error::check_length("goals", num_agents, state.goals.len())?;
         Error::check_length("active", num_agents, state.active.len())?;
         Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
-        Error::check_length("features", num_agents * settings.features_len(), features.len())?;
+        Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())?;
         episode.check_inside("cell", state.cells)?;
         episode.check_inside("goal", state.goals)?;
         episode.follow(state, settings);
@@ -138,9 +138,9 @@ impl Encoder {
                 episode.write_windows(agent, state, settings, out);
             }
         }
-        if settings.features_len() > 0 {
-            for (agent, out) in features.chunks_exact_mut(settings.features_len()).enumerate() {
-                episode.write_features(agent, state, settings, out);
+        if settings.scalars_len() > 0 {
+            for (agent, out) in scalars.chunks_exact_mut(settings.scalars_len()).enumerate() {
+                episode.write_scalars(agent, state, settings, out);
             }
         }
         Ok(())
@@ -226,10 +226,10 @@ impl Episode {
         }
     }
 
-    fn write_features(&self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
+    fn write_scalars(&self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
         let (start, cell, goal) = (self.starts[agent], state.cells[agent], state.goals[agent]);
-        for (&known, out) in settings.features.iter().zip(out.chunks_exact_mut(Feature::LEN)) {
-            let values = if state.active[agent] { feature(known, start, cell, goal) } else { [0.0; 2] };
+        for (&known, out) in settings.scalars.iter().zip(out.chunks_exact_mut(Scalars::LEN)) {
+            let values = if state.active[agent] { scalars(known, start, cell, goal) } else { [0.0; 2] };
             out.copy_from_slice(&values);
         }
     }

@@ -49,8 +49,8 @@ words! {
 }
 
 words! {
-    /// Numbers of each agent beside its windows.
-    pub enum Feature {
+    /// Numbers beside the windows of an agent, two of each kind.
+    pub enum Scalars {
         /// The cell relative to the start: rows and columns, each `x / max(|x|, 64)`.
         Position = "position",
         /// The goal relative to the start: rows and columns, each `x / max(|x|, 64)`.
@@ -62,7 +62,7 @@ words! {
     }
 }
 
-impl Feature {
-    /// The number of values of each feature.
+impl Scalars {
+    /// The number of numbers of each kind.
     pub const LEN: usize = 2;
 }
