@@ -6,6 +6,7 @@
 mod encode;
 mod follower;
 mod network;
+mod policy;
 mod simd;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
@@ -14,6 +15,7 @@ pub use network::{
     Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
     SamplingConfig, Workspace, softmax,
 };
+pub use policy::{Learned, LearnedName, LearnedPolicy, NamedPolicy, PolicySettings, SimplePolicy};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

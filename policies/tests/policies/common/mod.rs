@@ -1,6 +1,7 @@
 //! Episodes for tests.
 
 pub mod recorded;
+pub mod weights;
 
 use pogema_core::{Action, Episode, Error, Instance};
 use pogema_fast::Engine;
