@@ -6,6 +6,8 @@ mod heap;
 mod planner;
 mod search;
 mod static_costs;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use planner::FollowerPlanner;
 pub use planner::FollowerVersion;

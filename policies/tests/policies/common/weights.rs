@@ -37,6 +37,7 @@ pub fn follower_lite(onnx: &Path, folder: &Path) -> PathBuf {
                 convolution("encoder.conv_head.0"), "relu", {"residual": residual}, "relu", "flatten",
             ],
             "actions": "action_parameterization.distribution_linear",
+            "value": "critic_linear",
         },
     });
     std::fs::write(path.with_extension("json"), json.to_string()).unwrap();
