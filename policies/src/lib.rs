@@ -1,6 +1,7 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 
 mod network;
+mod onnx;
 mod simd;
 
 pub use network::{

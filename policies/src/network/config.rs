@@ -27,6 +27,13 @@ impl NetworkConfig {
     pub const VERSION: u32 = 1;
 }
 
+impl Default for NetworkConfig {
+    fn default() -> Self {
+        let (version, sampling) = (Self::VERSION, SamplingConfig::default());
+        Self { version, architecture: None, encoder: None, sampling }
+    }
+}
+
 /// The input of a network: the window and the numbers beside it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
