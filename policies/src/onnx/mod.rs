@@ -28,8 +28,14 @@ pub fn read(bytes: &[u8]) -> Result<(Architecture, Tensors), String> {
     let logits = match (named(&LOGITS), &*graph.output) {
         (Some(output), _) | (None, [output]) => output,
         _ => {
-            return Err(format!("{} outputs, expected one of them to be called `logits`", graph.output.len()));
+            return Err(format!(
+                "{} outputs, expected one of them to be called `logits`",
+                graph.output.len()
+            ));
         }
     };
     reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name))
 }
+
+#[cfg(test)]
+mod tests;
