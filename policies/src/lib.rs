@@ -6,6 +6,7 @@
 mod encode;
 mod follower;
 mod network;
+mod onnx;
 mod policy;
 mod simd;
 

@@ -93,48 +93,44 @@ impl Costs {
 }
 
 /// Writes the window of `cost_to_go`: `(cost of the own cell - cost) / (2 * radius)`, limited to -1 to 1.
-pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, out: &mut [f32]) {
+///
+/// `window` is memory for the costs of the window.
+pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, window: &mut [i32], out: &mut [f32]) {
     if costs.now == NO_COST {
         return out.fill(-1.0);
     }
-    let side = out.len().isqrt();
-    let scale = (side - 1) as f32;
-    for (row, first) in out.chunks_exact_mut(side).zip(layout.window_rows(place, side / 2)) {
-        for (value, &cost) in row.iter_mut().zip(&costs.grid[first..first + side]) {
-            let nearer = ((costs.now - cost) as f32 / scale).clamp(-1.0, 1.0);
-            *value = if cost == NO_COST { -1.0 } else { nearer };
-        }
+    layout.copy_window(&costs.grid, place, window);
+    let most = out.len().isqrt() as i32 - 1;
+    for (value, &cost) in out.iter_mut().zip(&*window) {
+        let nearer = if cost == NO_COST { -most } else { (costs.now - cost).clamp(-most, most) };
+        *value = nearer as f32 / most as f32;
     }
 }
 
 /// Writes the window of `cost_tracer`.
-pub(crate) fn write_tracer(layout: Layout, costs: &ToGoal, place: usize, out: &mut [f32]) {
-    let side = out.len().isqrt();
+///
+/// `window` is memory for the costs of the window.
+pub(crate) fn write_tracer(layout: Layout, costs: &ToGoal, place: usize, window: &mut [i32], out: &mut [f32]) {
+    let centre = out.len() / 2;
     if costs.now == NO_COST {
         out.fill(0.0);
-    } else {
-        let rows = || layout.window_rows(place, side / 2).map(|first| &costs.grid[first..first + side]);
-        let (mut largest, mut smallest) = (NO_COST, u32::MAX);
-        let mut lowest = 0;
-        for row in rows() {
-            for &cost in row {
-                largest = largest.max(cost);
-                // A missing cost becomes the largest number here.
-                smallest = smallest.min(cost as u32);
-                lowest = lowest.min(cost);
-            }
-        }
-        // Cells without a cost count as four steps farther than the farthest cell.
-        let missing = largest + 4;
-        let farthest = if lowest == NO_COST { missing } else { largest };
-        let span = ((farthest - smallest as i32) as f32).max(1.0);
-        for (out, row) in out.chunks_exact_mut(side).zip(rows()) {
-            for (value, &cost) in out.iter_mut().zip(row) {
-                let cost = if cost == NO_COST { missing } else { cost };
-                *value = (farthest - cost) as f32 / span;
-            }
-        }
+        out[centre] = -1.0;
+        return;
+    }
+    layout.copy_window(&costs.grid, place, window);
+    let (mut largest, mut smallest, mut is_missing) = (NO_COST, i32::MAX, false);
+    for &cost in &*window {
+        largest = largest.max(cost);
+        smallest = smallest.min(if cost == NO_COST { i32::MAX } else { cost });
+        is_missing |= cost == NO_COST;
+    }
+    // Cells without a cost count as four steps farther than the farthest cell.
+    let farthest = if is_missing { largest + 4 } else { largest };
+    let span = (farthest - smallest) as f32;
+    for (value, &cost) in out.iter_mut().zip(&*window) {
+        let nearer = if cost == NO_COST { 0 } else { farthest - cost };
+        *value = nearer as f32 / span;
     }
     let behind = (costs.now - costs.best + 1) as f32 / 64.0;
-    out[side * side / 2] = if costs.now == NO_COST { -1.0 } else { -behind.min(1.0) };
+    out[centre] = -behind.min(1.0);
 }

@@ -62,6 +62,8 @@ struct Episode {
     costs: Option<Costs>,
     follower: Option<FollowerPlanner>,
     memories: Vec<Memory>,
+    /// Memory for the costs of one window.
+    window: Vec<i32>,
 }
 
 impl Encoder {
@@ -106,6 +108,7 @@ impl Encoder {
             costs: needs_costs.then(|| Costs::new(layout, map)),
             follower,
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
+            window: vec![0; self.settings.side() * self.settings.side()],
         });
     }
 
@@ -197,8 +200,8 @@ impl Episode {
                 window.fill(0.0);
                 write_goal(cell, goal, window);
             }
-            (Channel::CostToGo, .., Some(costs)) => write_plain(layout, costs.of(agent), place, window),
-            (Channel::CostTracer, .., Some(costs)) => write_tracer(layout, costs.of(agent), place, window),
+            (Channel::CostToGo, .., Some(costs)) => write_plain(layout, costs.of(agent), place, &mut self.window, window),
+            (Channel::CostTracer, .., Some(costs)) => write_tracer(layout, costs.of(agent), place, &mut self.window, window),
             (Channel::Path, .., Some(costs)) => {
                 window.fill(0.0);
                 let radius = window.len().isqrt() / 2;
