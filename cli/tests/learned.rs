@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn pogema(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let output = Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
     (text(output.stdout), text(output.stderr), output.status.code().unwrap())
 }
@@ -50,16 +51,26 @@ fn wrong_input_ends_with_one_line() {
     fs::copy(folder.path().join("descent.json"), folder.path().join("text.json")).unwrap();
     let json = fs::read_to_string(folder.path().join("descent.json")).unwrap();
     let copy = |name: &str, json: String| {
-        fs::copy(folder.path().join("descent.safetensors"), folder.path().join(format!("{name}.safetensors"))).unwrap();
+        fs::copy(
+            folder.path().join("descent.safetensors"),
+            folder.path().join(format!("{name}.safetensors")),
+        )
+        .unwrap();
         fs::write(folder.path().join(format!("{name}.json")), json).unwrap();
     };
     copy("wide", json.replace("\"radius\": 1", "\"radius\": 2"));
     copy("blind", json.lines().filter(|line| !line.contains("encoder")).collect());
     let cases: [(&[&str], &str); 8] = [
         (&["--policy", "follower"], "`--policy follower` needs `--weights FILE`"),
-        (&["--policy", "astar", "--weights", "descent.safetensors"], "`--weights` needs `--policy follower` or `--policy network`"),
+        (
+            &["--policy", "astar", "--weights", "descent.safetensors"],
+            "`--weights` needs `--policy follower` or `--policy network`",
+        ),
         (&["--mask-actions"], "`--mask-actions` needs `--policy follower` or `--policy network`"),
-        (&["--policy", "network", "--weights", "none.safetensors"], "none.json: No such file or directory (os error 2)"),
+        (
+            &["--policy", "network", "--weights", "none.safetensors"],
+            "none.json: No such file or directory (os error 2)",
+        ),
         (&["--policy", "network", "--weights", "text.safetensors"], "text.safetensors: "),
         (
             &["--policy", "network", "--weights", "wide.safetensors"],
@@ -69,7 +80,10 @@ fn wrong_input_ends_with_one_line() {
             &["--policy", "network", "--weights", "blind.safetensors"],
             "blind.safetensors: the network names no encoder, expected `encoder` in its JSON file",
         ),
-        (&["--policy", "network", "--weights", "descent.safetensors", "--future-goals"], "`network` does not use future goals; only lifelong planners do"),
+        (
+            &["--policy", "network", "--weights", "descent.safetensors", "--future-goals"],
+            "`network` does not use future goals; only lifelong planners do",
+        ),
     ];
     for (arguments, expected) in cases {
         let (text, error, status) = run(folder.path(), &[arguments, &["--trace", "out.jsonl"]].concat());
@@ -85,11 +99,14 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     let folder = folder();
     let results: Vec<[String; 2]> = ["1", "2", "8"]
         .map(|threads| {
-            let (_, error, status) =
-                pogema(folder.path(), &["evaluate", "descent.yaml", "--out", threads, "--threads", threads, "--html"]);
+            let (_, error, status) = pogema(
+                folder.path(),
+                &["evaluate", "descent.yaml", "--out", threads, "--threads", threads, "--html"],
+            );
             assert_eq!(status, 0, "{error}");
             ["Descent", "Greedy"].map(|name| {
-                let rows = fs::read_to_string(folder.path().join(threads).join(format!("{name}.json"))).unwrap();
+                let rows =
+                    fs::read_to_string(folder.path().join(threads).join(format!("{name}.json"))).unwrap();
                 // Run times differ.
                 rows.lines().filter(|line| !line.contains("runtime")).collect::<Vec<_>>().join("\n")
             })
@@ -115,9 +132,15 @@ fn wrong_suites_name_file_line_and_key() {
     let cases = [
         ("{name: network}", "`Descent.weights` is missing, expected the path of a network"),
         ("{name: network, weights: 3}", "`Descent.weights`, expected the path of a network"),
-        ("{name: network, weights: descent.safetensors, sampling: best}", "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`"),
+        (
+            "{name: network, weights: descent.safetensors, sampling: best}",
+            "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`",
+        ),
         ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
-        ("{name: network, weight: descent.safetensors}", "unknown parameter `Descent.weight`; did you mean `weights`?"),
+        (
+            "{name: network, weight: descent.safetensors}",
+            "unknown parameter `Descent.weight`; did you mean `weights`?",
+        ),
     ];
     for (algorithm, expected) in cases {
         fs::write(folder.path().join("wrong.yaml"), suite.replace(descent, algorithm)).unwrap();

@@ -110,7 +110,13 @@ pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, window: 
 /// Writes the window of `cost_tracer`.
 ///
 /// `window` is memory for the costs of the window.
-pub(crate) fn write_tracer(layout: Layout, costs: &ToGoal, place: usize, window: &mut [i32], out: &mut [f32]) {
+pub(crate) fn write_tracer(
+    layout: Layout,
+    costs: &ToGoal,
+    place: usize,
+    window: &mut [i32],
+    out: &mut [f32],
+) {
     let centre = out.len() / 2;
     if costs.now == NO_COST {
         out.fill(0.0);

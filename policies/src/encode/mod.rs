@@ -200,8 +200,12 @@ impl Episode {
                 window.fill(0.0);
                 write_goal(cell, goal, window);
             }
-            (Channel::CostToGo, .., Some(costs)) => write_plain(layout, costs.of(agent), place, &mut self.window, window),
-            (Channel::CostTracer, .., Some(costs)) => write_tracer(layout, costs.of(agent), place, &mut self.window, window),
+            (Channel::CostToGo, .., Some(costs)) => {
+                write_plain(layout, costs.of(agent), place, &mut self.window, window)
+            }
+            (Channel::CostTracer, .., Some(costs)) => {
+                write_tracer(layout, costs.of(agent), place, &mut self.window, window)
+            }
             (Channel::Path, .., Some(costs)) => {
                 window.fill(0.0);
                 let radius = window.len().isqrt() / 2;
