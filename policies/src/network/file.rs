@@ -10,10 +10,20 @@ use safetensors::{Dtype, SafeTensorError, SafeTensors};
 
 use super::config::NetworkConfig;
 use super::tensors::Tensors;
-use crate::onnx;
+use crate::onnx::{self, Graph};
 
-/// Reads a file of weights and its JSON, which an ONNX file may lack. The config that is returned has an architecture.
-pub fn read(path: &Path) -> Result<(NetworkConfig, Tensors), Error> {
+/// What a file holds beside its config.
+pub enum Content {
+    /// The tensors of the layers that the config names.
+    Layers(Tensors),
+    /// A graph with other operators.
+    #[cfg(feature = "onnx")]
+    Runtime(Box<onnx::Runtime>),
+}
+
+/// Reads a file of weights and its JSON, which an ONNX file may lack. If the network consists of layers, the config
+/// that is returned has an architecture.
+pub fn read(path: &Path) -> Result<(NetworkConfig, Content), Error> {
     let json = path.with_extension("json");
     let bytes = read_bytes(path)?;
     if path.extension().is_some_and(|extension| extension == "onnx") {
@@ -21,8 +31,13 @@ pub fn read(path: &Path) -> Result<(NetworkConfig, Tensors), Error> {
         if config.architecture.is_some() {
             return Err(Error::io(&json, "`architecture` is given, expected none beside an ONNX file"));
         }
-        let (architecture, tensors) = onnx::read(&bytes).map_err(|reason| Error::io(path, reason))?;
-        return Ok((NetworkConfig { architecture: Some(architecture), ..config }, tensors));
+        return match onnx::read(&bytes).map_err(|reason| Error::io(path, reason))? {
+            Graph::Layers(architecture, tensors) => {
+                Ok((NetworkConfig { architecture: Some(architecture), ..config }, Content::Layers(tensors)))
+            }
+            #[cfg(feature = "onnx")]
+            Graph::Runtime(runtime) => Ok((config, Content::Runtime(runtime))),
+        };
     }
     let config = read_config(&json)?;
     if config.architecture.is_none() {
@@ -32,7 +47,7 @@ pub fn read(path: &Path) -> Result<(NetworkConfig, Tensors), Error> {
         ));
     }
     let tensors = parse_tensors(&bytes).map_err(|reason| Error::io(path, reason))?;
-    Ok((config, tensors))
+    Ok((config, Content::Layers(tensors)))
 }
 
 fn read_config(path: &Path) -> Result<NetworkConfig, Error> {

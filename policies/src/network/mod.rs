@@ -11,6 +11,7 @@ mod error;
 mod file;
 mod gru;
 mod layers;
+mod program;
 mod slots;
 mod softmax;
 mod steps;
@@ -26,11 +27,13 @@ use pogema_core::Error;
 pub use architecture::{Architecture, Layer};
 pub use config::{NetworkConfig, Sampling, SamplingConfig};
 pub use error::ForwardError;
+pub use program::Workspace;
 pub use softmax::softmax;
 
 use crate::simd::{AGENTS, Path};
-use agents::AgentBuffers;
-use steps::{Buffers, GROUP, Group, Heads, Steps};
+use file::Content;
+use program::{Layers, Program};
+use steps::Group;
 pub(crate) use tensors::Tensors;
 
 /// A network with its weights, which any number of threads can share.
@@ -41,9 +44,7 @@ pub struct Network(Arc<Inner>);
 struct Inner {
     config: NetworkConfig,
     window: [usize; 3],
-    steps: Steps,
-    heads: Heads,
-    path: Path,
+    program: Program,
 }
 
 /// The inputs of a batch, agent by agent.
@@ -64,18 +65,6 @@ pub struct Outputs<'a> {
     pub logits: &'a [f32],
     /// Empty if the network has no value head. Shape: batch.
     pub values: &'a [f32],
-}
-
-/// The buffers of a thread that runs a network.
-///
-/// They are allocated here and when a batch is larger than all before.
-#[derive(Clone, Debug)]
-pub struct Workspace {
-    buffers: Buffers,
-    agents: AgentBuffers,
-    heads: Vec<f32>,
-    logits: Vec<f32>,
-    values: Vec<f32>,
 }
 
 /// The state that a recurrent network keeps for each agent through an episode.
@@ -128,8 +117,16 @@ impl Network {
     /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator.
     pub fn read(path: impl AsRef<FilePath>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let (config, mut tensors) = file::read(path)?;
-        Self::new(config, &mut tensors, Path::best()).map_err(|reason| Error::io(path, reason))
+        let (config, content) = file::read(path)?;
+        let network = match content {
+            Content::Layers(mut tensors) => Self::new(config, &mut tensors, Path::best()),
+            #[cfg(feature = "onnx")]
+            Content::Runtime(runtime) => {
+                let window = runtime.window;
+                Ok(Self(Arc::new(Inner { config, window, program: Program::Runtime(runtime) })))
+            }
+        };
+        network.map_err(|reason| Error::io(path, reason))
     }
 
     /// Writes the network of a file as a `.safetensors` file and the JSON beside it.
@@ -137,9 +134,15 @@ impl Network {
     /// # Errors
     /// Those of [`Network::read`], and [`Error::Io`] if a file cannot be written.
     pub fn convert(from: impl AsRef<FilePath>, to: impl AsRef<FilePath>) -> Result<(), Error> {
-        let (config, tensors) = file::read(from.as_ref())?;
+        let from = from.as_ref();
+        let (config, content) = file::read(from)?;
+        let tensors = match content {
+            Content::Layers(tensors) => tensors,
+            #[cfg(feature = "onnx")]
+            Content::Runtime(runtime) => return Err(Error::io(from, runtime.reason)),
+        };
         let network = Self::new(config, &mut tensors.clone(), Path::best());
-        let network = network.map_err(|reason| Error::io(from.as_ref(), reason))?;
+        let network = network.map_err(|reason| Error::io(from, reason))?;
         file::write(to.as_ref(), network.config(), &tensors)
     }
 
@@ -148,8 +151,8 @@ impl Network {
             return Err("`architecture` is missing".into());
         };
         let window = architecture.window;
-        let (steps, heads) = build::build(architecture, tensors)?;
-        Ok(Self(Arc::new(Inner { window, steps, heads, path, config })))
+        let program = Program::Layers(Box::new(Layers::new(architecture, tensors, path)?));
+        Ok(Self(Arc::new(Inner { config, window, program })))
     }
 
     /// Returns the channels, rows and columns of the window.
@@ -159,22 +162,22 @@ impl Network {
 
     /// Returns the number of numbers beside the window.
     pub fn num_scalars(&self) -> usize {
-        self.0.steps.num_scalars
+        self.0.program.num_scalars()
     }
 
     /// Returns the number of logits.
     pub fn num_actions(&self) -> usize {
-        self.0.heads.num_actions
+        self.0.program.num_actions()
     }
 
     /// Returns whether the network also returns a value.
     pub fn has_value(&self) -> bool {
-        self.0.heads.dense.num_outputs > self.0.heads.num_actions
+        self.0.program.has_value()
     }
 
     /// Returns the number of floats of an agent's recurrent state, 0 without a recurrent layer.
     pub fn state_size(&self) -> usize {
-        self.0.steps.state_size
+        self.0.program.state_size()
     }
 
     /// Returns the content of the JSON file.
@@ -184,20 +187,14 @@ impl Network {
 
     /// Creates the buffers that a thread needs to run this network.
     pub fn workspace(&self) -> Workspace {
-        let (steps, heads) = (&self.0.steps, &self.0.heads);
-        Workspace {
-            buffers: Buffers::new(steps),
-            agents: AgentBuffers::new(steps, heads),
-            heads: vec![0.0; GROUP * heads.dense.stride()],
-            logits: Vec::new(),
-            values: Vec::new(),
-        }
+        self.0.program.workspace()
     }
 
     /// Computes the logits of a batch and updates the state of its agents.
     ///
     /// # Errors
     /// [`ForwardError::Length`] if an input has the wrong length; the state is then unchanged.
+    /// [`ForwardError::Runtime`] if an operator of an ONNX graph fails.
     /// [`ForwardError::NotFinite`] if an output is infinite or no number.
     ///
     /// # Panics
@@ -225,7 +222,8 @@ impl Network {
                 windows: &inputs.windows[first * window..][..num_agents * window],
                 scalars: &inputs.scalars[first * scalars..][..num_agents * scalars],
             };
-            self.run(group, &mut state.values[first * size..][..num_agents * size], workspace);
+            let states = &mut state.values[first * size..][..num_agents * size];
+            self.0.program.run(group, states, workspace).map_err(ForwardError::Runtime)?;
         }
         let actions = self.num_actions();
         let logits =
@@ -234,28 +232,6 @@ impl Network {
         match logits.or(value) {
             Some(row) => Err(ForwardError::NotFinite { row }),
             None => Ok(Outputs { logits: &workspace.logits, values: &workspace.values }),
-        }
-    }
-
-    /// Computes the outputs of up to 16 agents.
-    fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
-        let Inner { steps, heads, path, .. } = &*self.0;
-        let Workspace { buffers, agents, heads: outputs, logits, values } = workspace;
-        let num_outputs = heads.dense.num_outputs;
-        if group.num_agents > steps.most_apart() {
-            steps.run_agents(*path, group, heads, states, agents);
-            for agent in 0..group.num_agents {
-                logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
-                values.extend((heads.num_actions..num_outputs).map(|output| agents.output(agent, output)));
-            }
-            return;
-        }
-        steps.run(*path, group, states, buffers);
-        let rows = steps.rows(heads.input, &buffers.flats);
-        heads.dense.run(*path, group.num_agents, rows, false, outputs);
-        for row in outputs.chunks_exact(heads.dense.stride()).take(group.num_agents) {
-            logits.extend(&row[..heads.num_actions]);
-            values.extend(&row[heads.num_actions..num_outputs]);
         }
     }
 }

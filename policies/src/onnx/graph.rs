@@ -89,6 +89,15 @@ impl<'a> Reader<'a> {
         Err(format!("{windows} inputs of shape (batch, channels, rows, columns), expected one"))
     }
 
+    /// Returns the shape of the window.
+    #[cfg(feature = "onnx")]
+    pub fn window(&self) -> [usize; 3] {
+        match self.steps[self.window].shape {
+            Shape::Window(window) => window,
+            Shape::List(_) => unreachable!("`new` checked that the input is a window"),
+        }
+    }
+
     pub fn push(&mut self, step: Step) -> usize {
         self.steps.push(step);
         self.steps.len() - 1

@@ -1,4 +1,5 @@
-//! The parts of the messages of ONNX files that a network needs. Fields that are absent here are skipped.
+//! The parts of the messages of ONNX files that a network needs. Fields that are absent here are skipped. Lists of numbers
+//! are written one by one, as in the files of PyTorch; both forms are read.
 //!
 //! Source: <https://github.com/onnx/onnx/blob/main/onnx/onnx.proto3>
 
@@ -53,7 +54,7 @@ pub struct Attribute {
     /// A graph, which no layer has.
     #[prost(bytes = "vec", optional, tag = "6")]
     pub g: Option<Vec<u8>>,
-    #[prost(int64, repeated, tag = "8")]
+    #[prost(int64, repeated, packed = "false", tag = "8")]
     pub ints: Vec<i64>,
     #[prost(bytes = "vec", repeated, tag = "11")]
     pub graphs: Vec<Vec<u8>>,
@@ -61,13 +62,13 @@ pub struct Attribute {
 
 #[derive(Clone, PartialEq, Message)]
 pub struct TensorProto {
-    #[prost(int64, repeated, tag = "1")]
+    #[prost(int64, repeated, packed = "false", tag = "1")]
     pub dims: Vec<i64>,
     #[prost(int32, tag = "2")]
     pub data_type: i32,
-    #[prost(float, repeated, tag = "4")]
+    #[prost(float, repeated, packed = "false", tag = "4")]
     pub float_data: Vec<f32>,
-    #[prost(int64, repeated, tag = "7")]
+    #[prost(int64, repeated, packed = "false", tag = "7")]
     pub int64_data: Vec<i64>,
     #[prost(string, tag = "8")]
     pub name: String,

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
-use prost::Message;
 use serde_json::json;
 
-use super::proto::{
-    Attribute, Dimension, Graph, Model, Node, Shape, TensorProto, TensorType, Type, ValueInfo,
-};
+use super::graph::Reader;
+use super::proto::{Attribute, Dimension, Graph, Node, Shape, TensorProto, TensorType, Type, ValueInfo};
 
 fn node(op_type: &str, inputs: &[&str], output: &str, attribute: Vec<Attribute>) -> Node {
     let input = inputs.iter().map(|name| (*name).into()).collect();
@@ -40,7 +38,9 @@ fn read(nodes: Vec<Node>, initializer: Vec<TensorProto>) -> Result<serde_json::V
         input: vec![value("obs", &[0, 2, 3, 3]), value("numbers", &[0, 4])],
         output: vec![value("logits", &[])],
     };
-    let (architecture, _) = super::read(&Model { graph: Some(graph) }.encode_to_vec())?;
+    let mut reader = Reader::new(&graph)?;
+    graph.node.iter().for_each(|node| reader.add(node));
+    let (architecture, _) = reader.finish("logits", None)?;
     Ok(serde_json::to_value(architecture).unwrap())
 }
 
@@ -120,8 +120,53 @@ fn hostile_files_are_refused() {
         ..TensorProto::default()
     };
     assert!(read(nodes, vec![empty]).unwrap_err().contains("expected sizes above 0"));
-    assert!(super::read(b"").unwrap_err().contains("no graph"));
-    assert!(super::read(b"\x89PNG").unwrap_err().starts_with("no ONNX file: "));
+    let error = |bytes: &[u8]| super::read(bytes).err().unwrap();
+    assert!(error(b"").contains("no graph"));
+    assert!(error(b"\x89PNG").starts_with("no ONNX file: "));
     // A length of an exabyte.
     assert!(super::read(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());
+}
+
+/// A head on a window whose values are doubled by an operator that is no layer.
+#[cfg(feature = "onnx")]
+fn other_operator(op_type: &str) -> Vec<u8> {
+    use prost::Message;
+
+    use super::proto::Model;
+
+    let graph = Graph {
+        node: vec![
+            node(op_type, &["obs", "obs"], "double", vec![]),
+            node("Flatten", &["double"], "flat", vec![int("axis", 1)]),
+            node("Gemm", &["flat", "head.weight", "bias"], "logits", vec![int("transB", 1)]),
+            node("Multinomial", &["logits"], "actions", vec![]),
+        ],
+        initializer: vec![tensor("head.weight", &[5, 18]), tensor("bias", &[5])],
+        input: vec![value("obs", &[1, 2, 3, 3]), value("numbers", &[1, 4])],
+        output: vec![value("actions", &[1, 1]), value("logits", &[1, 5])],
+    };
+    // Field 1, the version of the format, is 8.
+    [vec![0x08, 0x08], Model { graph: Some(graph) }.encode_to_vec()].concat()
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn the_runtime_runs_other_operators() {
+    let super::Graph::Runtime(runtime) = super::read(&other_operator("Mul")).unwrap() else {
+        panic!("no runtime")
+    };
+    assert_eq!((runtime.num_actions, runtime.window), (5, [2, 3, 3]));
+    let mut logits = Vec::new();
+    let window: Vec<f32> = (0..18u8).map(f32::from).collect();
+    runtime.run(&window, &mut logits).unwrap();
+    let expected = (0..5u32).map(|row| (0..18u32).map(|col| (18 * row + col) * col * col).sum::<u32>());
+    let expected: Vec<f32> = expected.zip(0..5u8).map(|(sum, bias)| sum as f32 + f32::from(bias)).collect();
+    assert_eq!(logits, expected);
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn the_runtime_names_an_operator_that_it_does_not_know() {
+    let error = super::read(&other_operator("Frobnicate")).err().unwrap();
+    assert!(error.contains("Frobnicate") && !error.contains('\n'), "{error}");
 }

@@ -124,13 +124,14 @@ impl LearnedPolicy {
         self.encoder.encode(state, &mut self.windows, &mut self.scalars)?;
         let (num_agents, step) = (state.cells.len(), state.step);
         let inputs = Inputs { windows: &self.windows, scalars: &self.scalars, batch: num_agents };
+        let wrong = |reason| Error::Corrupt { what: "network".into(), reason };
         let outputs = self.network.forward(inputs, &mut self.state, &mut self.workspace);
         let outputs = outputs.map_err(|error| match error {
             ForwardError::Length(error) => error,
-            ForwardError::NotFinite { row } => Error::Corrupt {
-                what: "network".into(),
-                reason: format!("the logits of agent {row} in step {step} are not finite"),
-            },
+            ForwardError::NotFinite { row } => {
+                wrong(format!("the logits of agent {row} in step {step} are not finite"))
+            }
+            ForwardError::Runtime(reason) => wrong(format!("step {step}: {reason}")),
         })?;
         self.sampler.begin_step();
         let (rows, _) = outputs.logits.as_chunks::<NUM_ACTIONS>();

@@ -7,38 +7,37 @@ use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource, Library};
 use pogema_policies::{LearnedName, Sampling};
 
-use crate::common::recorded::{Array, arrays, folder};
-use crate::common::weights::follower_lite;
+use crate::recorded::{read_array, weights};
 
 /// A recorded episode.
-pub struct Recorded {
-    pub name: String,
-    pub cells: Vec<i8>,
-    pub goals: Vec<i8>,
-    pub actions: Vec<i8>,
-    pub num_agents: usize,
+struct Recorded {
+    name: String,
+    cells: Vec<f32>,
+    goals: Vec<f32>,
+    actions: Vec<f32>,
+    num_agents: usize,
 }
 
 impl Recorded {
-    /// Reads all recorded episodes.
-    pub fn all(folder: &Path) -> Vec<Self> {
-        let arrays = arrays(&folder.join("traces-follower-lite.npz"));
-        let names = arrays.keys().filter_map(|name| name.strip_suffix("|action"));
-        let of = |name: &str| {
-            let array = |field: &str| -> &Array { &arrays[&format!("{name}|{field}")] };
-            Self {
-                name: name.to_owned(),
-                cells: array("xy").i8(),
-                goals: array("goal").i8(),
-                actions: array("action").i8(),
-                num_agents: array("action").shape[1],
-            }
+    /// Reads the twelve episodes.
+    fn all(folder: &Path) -> Vec<Self> {
+        let path = folder.join("traces-follower-lite.npz");
+        let sets = [("01-random", "random"), ("02-mazes", "mazes")];
+        let crowds = [(0, 8), (11, 16), (22, 24), (33, 32), (44, 48), (55, 64)];
+        let names = sets.into_iter().flat_map(|(set, maps)| {
+            crowds.map(|(map, num_agents)| {
+                (format!("{set}|validation-{maps}-seed-{map:03}|{num_agents}"), num_agents)
+            })
+        });
+        let of = |(name, num_agents): (String, usize)| {
+            let array = |field: &str| read_array(&path, &format!("{name}|{field}"));
+            Self { cells: array("xy"), goals: array("goal"), actions: array("action"), num_agents, name }
         };
         names.map(of).collect()
     }
 
     /// Starts the same episode.
-    pub fn start(&self) -> Episode<Engine> {
+    fn start(&self) -> Episode<Engine> {
         let map_name = self.name.split('|').nth(1).unwrap();
         let mut library = Library::built_in();
         library.add_published([map_name]).unwrap();
@@ -53,13 +52,13 @@ impl Recorded {
     }
 
     /// Returns the actions of a step.
-    pub fn actions(&self, step: usize) -> Vec<Action> {
+    fn actions(&self, step: usize) -> Vec<Action> {
         let numbers = &self.actions[step * self.num_agents..][..self.num_agents];
-        numbers.iter().map(|&number| Action::try_from(i64::from(number)).unwrap()).collect()
+        numbers.iter().map(|&number| Action::try_from(number as i64).unwrap()).collect()
     }
 
     /// Returns the cells or goals of a step; those of the file are counted from the border of width 5.
-    pub fn places(&self, places: &[i8], step: usize) -> Vec<Cell> {
+    fn places(&self, places: &[f32], step: usize) -> Vec<Cell> {
         let pairs = places[step * self.num_agents * 2..][..self.num_agents * 2].chunks(2);
         pairs.map(|pair| Cell::new(pair[0] as u16 - 5, pair[1] as u16 - 5)).collect()
     }
@@ -67,10 +66,8 @@ impl Recorded {
 
 #[test]
 fn recorded_episodes_are_played_action_for_action() {
-    let Some(folder) = folder("recorded_episodes_are_played_action_for_action") else { return };
-    let files = tempfile::tempdir().unwrap();
-    let weights = follower_lite(&folder.join("follower-lite.onnx"), files.path());
-    let learned = LearnedName::Follower.read(&weights).unwrap();
+    let Some(folder) = weights("the recorded episodes of Follower-lite") else { return };
+    let learned = LearnedName::Follower.read(&folder.join("follower-lite.onnx")).unwrap();
     let learned = learned.with_sampling(Sampling::Follower);
     let mut different = Vec::new();
     for recorded in Recorded::all(&folder) {

@@ -4,3 +4,6 @@ mod common;
 mod encode_errors;
 mod encoders;
 mod follower_recorded;
+mod learned;
+#[path = "../common/mod.rs"]
+mod recorded;
