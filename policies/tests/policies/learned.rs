@@ -13,15 +13,13 @@ fn descent() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors")
 }
 
-/// Reads the network with a multiple of its weights.
-fn scaled(factor: f32, folder: &Path) -> Learned {
+/// Reads the network with one number for all its weights and biases.
+fn filled(number: f32, folder: &Path) -> Learned {
     let bytes = fs::read(descent()).unwrap();
     let begin = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
     let (header, data) = bytes.split_at(begin);
-    let weights =
-        data.as_chunks().0.iter().flat_map(|bytes| (f32::from_le_bytes(*bytes) * factor).to_le_bytes());
-    let path = folder.join("scaled.safetensors");
-    fs::write(&path, [header, &weights.collect::<Vec<u8>>()].concat()).unwrap();
+    let path = folder.join("filled.safetensors");
+    fs::write(&path, [header, &number.to_le_bytes().repeat(data.len() / 4)].concat()).unwrap();
     fs::copy(descent().with_extension("json"), path.with_extension("json")).unwrap();
     LearnedName::Network.read(&path).unwrap()
 }
@@ -71,9 +69,9 @@ fn actions_depend_on_the_seed_alone() {
 #[test]
 fn masks_forbid_moves_into_obstacles() {
     let folder = tempfile::tempdir().unwrap();
-    let mut blocked = |is_masked| {
+    let blocked = |is_masked| {
         // Weights of 0 choose all actions with the same probability.
-        let learned = scaled(0.0, folder.path()).with_masks(is_masked);
+        let learned = filled(0.0, folder.path()).with_masks(is_masked);
         let mut episode = start(12);
         let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
         let mut num_blocked = 0;
@@ -98,7 +96,7 @@ fn masks_forbid_moves_into_obstacles() {
 #[test]
 fn logits_that_are_not_finite_name_agent_and_step() {
     let folder = tempfile::tempdir().unwrap();
-    let learned = scaled(1e38, folder.path());
+    let learned = filled(3e38, folder.path());
     let episode = start(3);
     let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
     let error = policy.act(episode.state()).unwrap_err();
