@@ -5,6 +5,7 @@
 
 mod encode;
 mod follower;
+mod grid;
 mod network;
 mod onnx;
 mod policy;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pogema_core::{Cell, Map, State};
 use pogema_planners::{Bfs, Graph, UNREACHABLE};
 
-use crate::encode::layout::Layout;
+use crate::grid::Layout;
 
 /// Steps from each place to one goal, or [`NO_COST`].
 pub(crate) type CostGrid = Arc<[i32]>;

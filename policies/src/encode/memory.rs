@@ -1,6 +1,6 @@
 //! The obstacles that each agent has seen in its episode.
 
-use crate::encode::layout::Layout;
+use crate::grid::Layout;
 
 /// A square memory of obstacles around the start of an agent. It grows when the agent comes near its rim.
 #[derive(Clone, Debug)]

@@ -4,8 +4,6 @@
 //! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
 
 mod costs;
-mod layout;
-mod marks;
 mod memory;
 mod offsets;
 mod path;
@@ -15,8 +13,6 @@ mod words;
 use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
 
 use costs::{Costs, write_plain, write_tracer};
-pub(crate) use layout::Layout;
-pub(crate) use marks::Marks;
 use memory::Memory;
 use offsets::{offset, scalars, write_goal};
 use path::{draw_path, shortest_path};
@@ -24,6 +20,7 @@ pub use settings::EncoderSettings;
 pub use words::{Channel, Scalars};
 
 use crate::follower::{FollowerPlanner, FollowerVersion};
+use crate::grid::{Layout, Marks};
 
 /// An encoder for one environment.
 ///
@@ -201,10 +198,10 @@ impl Episode {
                 write_goal(cell, goal, window);
             }
             (Channel::CostToGo, .., Some(costs)) => {
-                write_plain(layout, costs.of(agent), place, &mut self.window, window)
+                write_plain(layout, costs.of(agent), place, &mut self.window, window);
             }
             (Channel::CostTracer, .., Some(costs)) => {
-                write_tracer(layout, costs.of(agent), place, &mut self.window, window)
+                write_tracer(layout, costs.of(agent), place, &mut self.window, window);
             }
             (Channel::Path, .., Some(costs)) => {
                 window.fill(0.0);

@@ -1,7 +1,7 @@
 //! Paths drawn into windows.
 
 use crate::encode::costs::{NO_COST, ToGoal};
-use crate::encode::layout::Layout;
+use crate::grid::Layout;
 
 /// Writes 1 to each cell of a path, up to its first cell farther than `cut` from the centre.
 ///

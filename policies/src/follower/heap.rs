@@ -80,7 +80,9 @@ mod tests {
 
     fn order(entries: &[Entry]) -> Vec<u32> {
         let mut heap = Heap::default();
-        entries.iter().for_each(|&entry| heap.push(entry));
+        for &entry in entries {
+            heap.push(entry);
+        }
         std::iter::from_fn(|| heap.pop()).map(|entry| entry.place).collect()
     }
 

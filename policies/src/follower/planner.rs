@@ -6,9 +6,9 @@ use std::sync::Arc;
 use pogema_core::{Cell, Map, State, words};
 use pogema_planners::Graph;
 
-use crate::encode::{Layout, Marks};
 use crate::follower::search::{OBSTACLE, Search, heuristic};
 use crate::follower::static_costs::static_costs;
+use crate::grid::{Layout, Marks};
 
 words! {
     /// The two versions of Follower that its authors released.

@@ -8,7 +8,7 @@ use pogema_numpy::Generator;
 use proptest::prelude::*;
 
 use super::{FollowerPlanner, FollowerVersion};
-use crate::encode::{Layout, Marks};
+use crate::grid::{Layout, Marks};
 
 /// Row and column on the map.
 type Place = (i32, i32);

@@ -3,6 +3,7 @@
 use pogema_core::{Action, Config, Error, Instance, Map, State};
 
 use crate::encode::{Encoder, EncoderSettings};
+use crate::follower::FollowerVersion;
 use crate::network::{ForwardError, Inputs, Network, RecurrentState, Sampling, Workspace};
 use crate::policy::sampler::{Logits, NUM_ACTIONS, Sampler};
 
@@ -55,13 +56,9 @@ impl Learned {
     /// # Errors
     /// Those of [`Learned::new`].
     pub fn follower(network: Network) -> Result<Self, Error> {
-        let encoder = match &network.config().encoder {
-            Some(encoder) => encoder.clone(),
-            None => {
-                let [_, side, _] = network.input_shape();
-                EncoderSettings::follower(side / 2, crate::FollowerVersion::default())
-            }
-        };
+        let [_, side, _] = network.input_shape();
+        let usual = || EncoderSettings::follower(side / 2, FollowerVersion::default());
+        let encoder = network.config().encoder.clone().unwrap_or_else(usual);
         Self::with_encoder(network, encoder)
     }
 

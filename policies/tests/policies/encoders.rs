@@ -213,7 +213,7 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
         ..EncoderSettings::new(radius, COMPUTED)
     };
     let mut encoders = [&observed, &computed].map(|settings| begin(settings.clone(), &episode).unwrap());
-    let mut plain = Plain { best: vec![None; num_agents], seen: vec![HashSet::new(); num_agents] };
+    let mut slow = Plain { best: vec![None; num_agents], seen: vec![HashSet::new(); num_agents] };
     let mut generator = Generator::seeded(seed);
     loop {
         let mut seen = vec![f32::NAN; episode.config().num_observed()];
@@ -233,7 +233,7 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
         encoders[1].encode(episode.state(), &mut windows, &mut numbers).unwrap();
         prop_assert_eq!(numbers, scalars(episode.state(), episode.instance().unwrap().starts()));
         for (agent, windows) in windows.chunks(computed.window_len()).enumerate() {
-            let expected = plain.windows(agent, &episode, &computed).unwrap();
+            let expected = slow.windows(agent, &episode, &computed).unwrap();
             prop_assert_eq!(windows, expected, "agent {} in step {}", agent, episode.num_steps());
         }
         if episode.is_over() {

@@ -1,5 +1,7 @@
 //! Encoders, planners and policies against slow code, recordings and bad input.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod common;
 mod encode_errors;
 mod encoders;

@@ -2,7 +2,7 @@
 
 use pogema_core::{Occupancy, State};
 
-use crate::encode::layout::Layout;
+use crate::grid::layout::Layout;
 
 /// The marks of an occupancy grid: 1 for a cell that counts as occupied, else 0.
 ///
