@@ -8,7 +8,7 @@ use std::path::Path;
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 /// The layer of each crate; a crate may use crates of lower layers only.
-const LAYERS: [(&str, u8); 14] = [
+const LAYERS: [(&str, u8); 15] = [
     ("pogema-core", 0),
     ("workspace-hack", 0),
     ("pogema-numpy", 0),
@@ -16,6 +16,7 @@ const LAYERS: [(&str, u8); 14] = [
     ("pogema-fast", 1),
     ("pogema-maps", 1),
     ("pogema-planners", 1),
+    ("pogema-policies", 2),
     ("pogema-render", 1),
     ("pogema-conformance", 3),
     ("pogema-toolbox", 3),

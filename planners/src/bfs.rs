@@ -9,7 +9,7 @@ pub const UNREACHABLE: u32 = u32::MAX;
 
 /// A map with a wall around it, and the memory of its searches.
 #[derive(Debug)]
-pub(crate) struct Bfs {
+pub struct Bfs {
     width: usize,
     /// For each vertex, its place in the walled map, row by row.
     places: Vec<u32>,

@@ -48,7 +48,7 @@ pub mod sipp;
 mod team_task;
 mod validate;
 
-pub use bfs::UNREACHABLE;
+pub use bfs::{Bfs, UNREACHABLE};
 pub use budget::Budget;
 pub use cbs::{Cbs, CbsParams, Ecbs, EcbsParams};
 pub use distances::{CostToGo, Distances};
@@ -63,8 +63,8 @@ pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
 pub use planner::Planner;
 pub use policies::{
-    AStarAgent, AStarTeam, LifelongPolicy, NamedPolicy, PlannerPolicy, PolicySettings, PomapfObservation,
-    PomapfObservations, SimplePolicy, pogema_team, sample,
+    AStarAgent, AStarTeam, LifelongPolicy, PlannerPolicy, PomapfObservation, PomapfObservations, pogema_team,
+    sample,
 };
 pub use problem::Problem;
 pub use registry::{LifelongName, PlannerName, PlannerSettings};

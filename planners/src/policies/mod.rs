@@ -6,14 +6,12 @@ mod astar;
 mod goal_forecast;
 mod heapq;
 mod lifelong_policy;
-mod named;
 mod observations;
 mod planner_policy;
 mod pogema;
 
 pub use astar::{AStarAgent, AStarTeam, pogema_team};
 pub use lifelong_policy::LifelongPolicy;
-pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
 pub use observations::{PomapfObservation, PomapfObservations};
 pub use planner_policy::PlannerPolicy;
 pub use pogema::sample;

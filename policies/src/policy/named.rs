@@ -1,16 +1,16 @@
 //! Policies by name.
 
+use std::path::Path;
+
 use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
+use pogema_planners::{
+    AStarTeam, Budget, LifelongName, LifelongPolicy, Outcome, PlannerName, PlannerPolicy, PlannerSettings,
+    PomapfObservations, pogema_team, sample,
+};
 
-use crate::budget::Budget;
-use crate::outcome::Outcome;
-use crate::policies::astar::{AStarTeam, pogema_team};
-use crate::policies::lifelong_policy::LifelongPolicy;
-use crate::policies::observations::PomapfObservations;
-use crate::policies::planner_policy::PlannerPolicy;
-use crate::policies::pogema::sample;
-use crate::registry::{LifelongName, PlannerName, PlannerSettings};
+use crate::network::Network;
+use crate::policy::learned::{Learned, LearnedPolicy};
 
 words! {
     /// The policies without a joint plan.
@@ -24,17 +24,44 @@ words! {
     }
 }
 
+words! {
+    /// The policies that need the weights of a network.
+    pub enum LearnedName {
+        /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
+        Follower = "follower",
+        /// Any network whose JSON file names its encoder.
+        Network = "network",
+    }
+}
+
+impl LearnedName {
+    /// Reads the policy from a file with the weights of its network.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy.
+    pub fn read(self, weights: &Path) -> Result<Learned, Error> {
+        let network = Network::read(weights)?;
+        let learned = match self {
+            Self::Follower => Learned::follower(network),
+            Self::Network => Learned::new(network),
+        };
+        learned.map_err(|error| Error::io(weights, error))
+    }
+}
+
 /// The settings of a policy.
 #[derive(Clone, Debug, Default)]
 pub struct PolicySettings {
     /// The budget of one plan.
     pub budget: Budget,
-    /// Settings of the planner.
+    /// Settings of the planner. A network draws its actions from the same seed.
     pub planner: PlannerSettings,
     /// Whether a lifelong planner knows future goals.
     pub future_goals: bool,
     /// Whether a one-shot planner that finds no plan is not called again in that episode.
     pub single_attempt: bool,
+    /// The network of a learned policy, as [`LearnedName::read`] returns it.
+    pub learned: Option<Learned>,
 }
 
 /// A policy for all agents of one episode, made by name.
@@ -46,6 +73,7 @@ enum Kind {
     Stay,
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
+    Learned(Box<LearnedPolicy>),
 }
 
 impl NamedPolicy {
@@ -55,9 +83,8 @@ impl NamedPolicy {
             T::WORDS.iter().map(|known| (known.word, known.help()))
         }
         let mut all: Vec<(&str, &str)> = Vec::new();
-        for (name, help) in
-            listed::<SimplePolicy>().chain(listed::<PlannerName>()).chain(listed::<LifelongName>())
-        {
+        let planners = listed::<PlannerName>().chain(listed::<LifelongName>());
+        for (name, help) in listed::<SimplePolicy>().chain(planners).chain(listed::<LearnedName>()) {
             if !all.iter().any(|(known, _)| *known == name) {
                 all.push((name, help));
             }
@@ -78,7 +105,7 @@ impl NamedPolicy {
         instance: &Instance,
         generator: Generator,
     ) -> Result<Self, Error> {
-        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt } =
+        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt, learned } =
             settings.clone();
         let one_shot = PlannerName::of_word(name);
         let lifelong = LifelongName::of_word(name);
@@ -90,6 +117,15 @@ impl NamedPolicy {
         if single_attempt && (lifelong.is_some() || one_shot.is_none()) {
             let reason = format!("`{name}` does not support a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
+        }
+        let name_of_learned = LearnedName::of_word(name);
+        if name_of_learned.is_none() && learned.is_some() {
+            return Err(Error::Request { reason: format!("`{name}` does not use weights") });
+        }
+        if name_of_learned.is_some() {
+            let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
+            let policy = learned.ok_or_else(missing)?.begin(instance, config, planner_settings.seed)?;
+            return Ok(Self(Kind::Learned(Box::new(policy))));
         }
         if let Some(planner) = lifelong {
             let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
@@ -133,6 +169,7 @@ impl NamedPolicy {
             Kind::Stay => Ok(vec![Action::Stay; num_agents]),
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),
+            Kind::Learned(policy) => policy.act(episode.state()),
         }
     }
 }

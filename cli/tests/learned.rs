@@ -1,0 +1,149 @@
+//! Tests of learned policies in `pogema run`, `evaluate` and `replay`.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn pogema(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
+    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+}
+
+/// Returns a folder with the suite `descent.yaml` and its network.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let suites = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../suites/policies");
+    for name in ["descent.safetensors", "descent.json", "descent.yaml"] {
+        fs::copy(suites.join(name), folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+const RUN: [&str; 7] = ["run", "--size", "12", "--num-agents", "6", "--seed", "1"];
+
+fn run(folder: &Path, more: &[&str]) -> (String, String, i32) {
+    pogema(folder, &[&RUN, more].concat())
+}
+
+#[test]
+fn a_network_plays_and_its_trace_replays() {
+    let folder = folder();
+    let learned = ["--policy", "network", "--weights", "descent.safetensors", "--trace", "trace.jsonl"];
+    let (summary, error, status) = run(folder.path(), &learned);
+    assert_eq!((error.as_str(), status), ("", 0));
+    assert_eq!(run(folder.path(), &learned).0, summary);
+    let replayed = run(folder.path(), &["--policy", "file", "--actions", "trace.jsonl"]);
+    assert_eq!(replayed, (summary.clone(), String::new(), 0));
+    let other_seed = [&learned[..4], &["--planner-seed", "1"]].concat();
+    assert_ne!(run(folder.path(), &other_seed).0, summary);
+}
+
+#[test]
+fn wrong_input_ends_with_one_line() {
+    let folder = folder();
+    fs::write(folder.path().join("text.safetensors"), "weights").unwrap();
+    fs::copy(folder.path().join("descent.json"), folder.path().join("text.json")).unwrap();
+    let json = fs::read_to_string(folder.path().join("descent.json")).unwrap();
+    let copy = |name: &str, json: String| {
+        fs::copy(
+            folder.path().join("descent.safetensors"),
+            folder.path().join(format!("{name}.safetensors")),
+        )
+        .unwrap();
+        fs::write(folder.path().join(format!("{name}.json")), json).unwrap();
+    };
+    copy("wide", json.replace("\"radius\": 1", "\"radius\": 2"));
+    copy("blind", json.lines().filter(|line| !line.contains("encoder")).collect());
+    let cases: [(&[&str], &str); 8] = [
+        (&["--policy", "follower"], "`--policy follower` needs `--weights FILE`"),
+        (
+            &["--policy", "astar", "--weights", "descent.safetensors"],
+            "`--weights` needs `--policy follower` or `--policy network`",
+        ),
+        (&["--mask-actions"], "`--mask-actions` needs `--policy follower` or `--policy network`"),
+        (
+            &["--policy", "network", "--weights", "none.safetensors"],
+            "none.safetensors: No such file or directory (os error 2)",
+        ),
+        (&["--policy", "network", "--weights", "text.safetensors"], "text.safetensors: "),
+        (
+            &["--policy", "network", "--weights", "wide.safetensors"],
+            "wide.safetensors: the network reads windows of shape [1, 3, 3] and 0 scalars, the encoder writes [1, 5, 5] and 0",
+        ),
+        (
+            &["--policy", "network", "--weights", "blind.safetensors"],
+            "blind.safetensors: the network names no encoder, expected `encoder` in its JSON file",
+        ),
+        (
+            &["--policy", "network", "--weights", "descent.safetensors", "--future-goals"],
+            "`network` does not use future goals; only lifelong planners do",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let (text, error, status) = run(folder.path(), &[arguments, &["--trace", "out.jsonl"]].concat());
+        assert_eq!((text.as_str(), status), ("", 2), "{arguments:?}: {error}");
+        assert!(error.starts_with(&format!("error: {expected}")), "{arguments:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(!folder.path().join("out.jsonl").exists());
+    }
+}
+
+#[test]
+fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
+    let folder = folder();
+    let results: Vec<[String; 2]> = ["1", "2", "8"]
+        .map(|threads| {
+            let (_, error, status) = pogema(
+                folder.path(),
+                &["evaluate", "descent.yaml", "--out", threads, "--threads", threads, "--html"],
+            );
+            assert_eq!(status, 0, "{error}");
+            ["Descent", "Greedy"].map(|name| {
+                let rows =
+                    fs::read_to_string(folder.path().join(threads).join(format!("{name}.json"))).unwrap();
+                // Run times differ.
+                rows.lines().filter(|line| !line.contains("runtime")).collect::<Vec<_>>().join("\n")
+            })
+        })
+        .into();
+    assert!(results.iter().all(|result| *result == results[0]), "{results:#?}");
+    assert_ne!(results[0][0], results[0][1]);
+    let (text, error, status) = pogema(folder.path(), &["views", "1"]);
+    assert!(text.contains("Descent"), "{text}");
+    assert_eq!(status, 0, "{error}");
+    let replay = ["replay", "1", "Descent", "2", "--trace", "replay.jsonl"];
+    let (_, error, status) = pogema(folder.path(), &replay);
+    assert_eq!(status, 0, "{error}");
+    assert!(!error.contains("differ"), "{error}");
+}
+
+#[test]
+fn wrong_suites_name_file_line_and_key() {
+    let folder = folder();
+    let suite = fs::read_to_string(folder.path().join("descent.yaml")).unwrap();
+    let descent = "{name: network, weights: descent.safetensors}";
+    let line = suite.lines().position(|line| line.contains(descent)).unwrap() + 1;
+    let cases = [
+        ("{name: network}", "`Descent.weights` is missing, expected the path of a network"),
+        ("{name: network, weights: 3}", "`Descent.weights`, expected the path of a network"),
+        (
+            "{name: network, weights: descent.safetensors, sampling: best}",
+            "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`",
+        ),
+        ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
+        (
+            "{name: network, weight: descent.safetensors}",
+            "unknown parameter `Descent.weight`; did you mean `weights`?",
+        ),
+    ];
+    for (algorithm, expected) in cases {
+        fs::write(folder.path().join("wrong.yaml"), suite.replace(descent, algorithm)).unwrap();
+        let (_, error, status) = pogema(folder.path(), &["evaluate", "wrong.yaml", "--out", "out"]);
+        assert_eq!((error, status), (format!("error: wrong.yaml: line {line}: {expected}"), 2));
+        assert!(!folder.path().join("out").exists());
+    }
+}

@@ -1,0 +1,240 @@
+//! Encoders: what a policy sees, as data.
+//!
+//! An [`Encoder`] turns the states of one environment into windows and numbers of its agents. It needs no engine: it
+//! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
+
+mod costs;
+mod memory;
+mod offsets;
+mod path;
+mod settings;
+mod words;
+
+use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
+
+use costs::{Costs, write_plain, write_tracer};
+use memory::Memory;
+use offsets::{offset, scalars, write_goal};
+use path::{draw_path, shortest_path};
+pub use settings::EncoderSettings;
+pub use words::{Channel, Scalars};
+
+use crate::follower::{FollowerPlanner, FollowerVersion};
+use crate::grid::{Layout, Marks};
+
+/// An encoder for one environment.
+///
+/// [`Encoder::begin`] starts an episode. [`Encoder::encode`] is then called once for the state after the reset and once
+/// after each step, because some channels remember earlier states. Encoding takes no random numbers and no threads.
+///
+/// ```
+/// use pogema_core::{Cell, Map, Occupancy, Outside, State};
+/// use pogema_policies::{Channel, Encoder, EncoderSettings};
+///
+/// let map = Map::from_rows(&["..#", "...", "#.."])?;
+/// let mut encoder = Encoder::new(EncoderSettings::new(1, [Channel::Obstacles, Channel::Goal]))?;
+/// let (cells, goals) = ([Cell::new(0, 0)], [Cell::new(1, 2)]);
+/// encoder.begin(&map, &Outside::Free, Occupancy::default(), &cells);
+/// let mut windows = [0.0; 2 * 3 * 3];
+/// let state = State { step: 0, cells: &cells, goals: &goals, active: &[true], on_goal: &[false] };
+/// encoder.encode(state, &mut windows, &mut [])?;
+/// assert_eq!(windows[..9], [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+/// assert_eq!(windows[9..], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+/// # Ok::<(), pogema_core::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Encoder {
+    settings: EncoderSettings,
+    episode: Option<Episode>,
+}
+
+/// The memory of an episode.
+#[derive(Debug)]
+struct Episode {
+    layout: Layout,
+    starts: Vec<Cell>,
+    obstacles: Vec<f32>,
+    marks: Option<Marks>,
+    all: Option<Marks>,
+    costs: Option<Costs>,
+    follower: Option<FollowerPlanner>,
+    memories: Vec<Memory>,
+    /// Memory for the costs of one window.
+    window: Vec<i32>,
+}
+
+impl Encoder {
+    /// Creates an encoder.
+    ///
+    /// # Errors
+    /// [`Error::Config`] naming the first setting that is out of range.
+    pub fn new(settings: EncoderSettings) -> Result<Self, Error> {
+        settings.check()?;
+        Ok(Self { settings, episode: None })
+    }
+
+    /// Returns the settings.
+    pub fn settings(&self) -> &EncoderSettings {
+        &self.settings
+    }
+
+    /// Starts an episode: forgets the last one, and prepares the map.
+    ///
+    /// `starts` holds the cell of each agent after the reset. For [`Outside::Noise`], an engine's map with its border
+    /// is suitable, too: the encoder draws the wall and reads only the cells beyond it.
+    pub fn begin(&mut self, map: &Map, outside: &Outside, occupancy: Occupancy, starts: &[Cell]) {
+        let has = |channels: &[Channel]| self.settings.channels.iter().any(|known| channels.contains(known));
+        let layout = Layout::new(map, self.settings.radius.max(self.settings.sight));
+        let remembers = has(&[Channel::SeenObstacles]);
+        let needs_costs = has(&[Channel::CostToGo, Channel::CostTracer, Channel::Path]);
+        let follower = has(&[Channel::FollowerPath]).then(|| {
+            let EncoderSettings { sight, follower: version, .. } = self.settings;
+            let seen = match version {
+                FollowerVersion::Cpp => Occupancy::Exact,
+                FollowerVersion::Python => occupancy,
+            };
+            let present = Marks::new(layout, seen);
+            FollowerPlanner::new(layout, map, starts.len(), sight, version, present)
+        });
+        self.episode = Some(Episode {
+            layout,
+            starts: starts.to_vec(),
+            obstacles: layout.obstacles(map, outside),
+            marks: has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
+            all: has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
+            costs: needs_costs.then(|| Costs::new(layout, map)),
+            follower,
+            memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
+            window: vec![0; self.settings.side() * self.settings.side()],
+        });
+    }
+
+    /// Writes the windows and the numbers of all agents; those of an inactive agent are 0.
+    ///
+    /// Shape: `windows` is `[agents, channels, side, side]`, `scalars` is `[agents, scalars, 2]`.
+    ///
+    /// # Errors
+    /// [`Error::NotReset`] before [`Encoder::begin`]; [`Error::Length`] for a buffer or a list of the wrong length;
+    /// [`Error::Agent`] for a cell or a goal outside the map. No memory changes then.
+    pub fn encode(
+        &mut self,
+        state: State<'_>,
+        windows: &mut [f32],
+        scalars: &mut [f32],
+    ) -> Result<(), Error> {
+        let Self { settings, episode } = self;
+        let episode = episode.as_mut().ok_or(Error::NotReset)?;
+        let num_agents = episode.starts.len();
+        Error::check_length("cells", num_agents, state.cells.len())?;
+        Error::check_length("goals", num_agents, state.goals.len())?;
+        Error::check_length("active", num_agents, state.active.len())?;
+        Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
+        Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())?;
+        episode.check_inside("cell", state.cells)?;
+        episode.check_inside("goal", state.goals)?;
+        episode.follow(state, settings);
+        if settings.window_len() > 0 {
+            for (agent, out) in windows.chunks_exact_mut(settings.window_len()).enumerate() {
+                episode.write_windows(agent, state, settings, out);
+            }
+        }
+        if settings.scalars_len() > 0 {
+            for (agent, out) in scalars.chunks_exact_mut(settings.scalars_len()).enumerate() {
+                episode.write_scalars(agent, state, settings, out);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Episode {
+    fn check_inside(&self, what: &str, cells: &[Cell]) -> Result<(), Error> {
+        let (height, width) = self.layout.map_size();
+        let is_outside = |cell: &Cell| usize::from(cell.row) >= height || usize::from(cell.col) >= width;
+        match cells.iter().position(is_outside) {
+            None => Ok(()),
+            Some(agent) => Err(Error::outside(agent, what, cells[agent], height, width)),
+        }
+    }
+
+    fn follow(&mut self, state: State<'_>, settings: &EncoderSettings) {
+        for marks in self.marks.iter_mut().chain(&mut self.all) {
+            marks.follow(state);
+        }
+        if let Some(costs) = &mut self.costs {
+            costs.follow(state);
+        }
+        if let Some(follower) = &mut self.follower {
+            follower.plan(state);
+        }
+        for (agent, memory) in self.memories.iter_mut().enumerate().filter(|(agent, _)| state.active[*agent])
+        {
+            let cell = state.cells[agent];
+            let at = offset(self.starts[agent], cell);
+            memory.see(self.layout, &self.obstacles, self.layout.place(cell), at, settings.sight);
+        }
+    }
+
+    fn write_windows(&mut self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
+        if !state.active[agent] {
+            return out.fill(0.0);
+        }
+        let area = settings.side() * settings.side();
+        for (&channel, window) in settings.channels.iter().zip(out.chunks_exact_mut(area)) {
+            self.write_window(channel, agent, state, window);
+        }
+    }
+
+    fn write_window(&mut self, channel: Channel, agent: usize, state: State<'_>, window: &mut [f32]) {
+        let (cell, goal, layout) = (state.cells[agent], state.goals[agent], self.layout);
+        let place = layout.place(cell);
+        match (channel, &self.marks, &self.all, &self.costs) {
+            (Channel::Obstacles, ..) => layout.copy_window(&self.obstacles, place, window),
+            (Channel::Agents, Some(marks), ..) | (Channel::AllAgents, _, Some(marks), _) => {
+                layout.copy_window(marks.grid(), place, window);
+            }
+            (Channel::Goal, ..) => {
+                window.fill(0.0);
+                write_goal(cell, goal, window);
+            }
+            (Channel::CostToGo, .., Some(costs)) => {
+                write_plain(layout, costs.of(agent), place, &mut self.window, window);
+            }
+            (Channel::CostTracer, .., Some(costs)) => {
+                write_tracer(layout, costs.of(agent), place, &mut self.window, window);
+            }
+            (Channel::Path, .., Some(costs)) => {
+                window.fill(0.0);
+                let radius = window.len().isqrt() / 2;
+                draw_path(layout, shortest_path(layout, costs.of(agent), place), radius, window);
+            }
+            (Channel::FollowerPath, ..) => self.write_follower_path(agent, place, window),
+            (Channel::SeenObstacles, ..) => {
+                let at = offset(self.starts[agent], cell);
+                self.memories[agent].copy_window(at, window);
+            }
+            // INVARIANT: `begin` prepares what the channels of the settings need.
+            _ => window.fill(0.0),
+        }
+    }
+
+    fn write_follower_path(&self, agent: usize, place: usize, window: &mut [f32]) {
+        self.layout.copy_window(&self.obstacles, place, window);
+        for value in &mut *window {
+            // Not `-*value`, which would be -0 for a free cell.
+            *value = 0.0 - *value;
+        }
+        if let Some(follower) = &self.follower {
+            let cut = follower.cut(window.len().isqrt() / 2);
+            draw_path(self.layout, follower.path(agent, place), cut, window);
+        }
+    }
+
+    fn write_scalars(&self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
+        let (start, cell, goal) = (self.starts[agent], state.cells[agent], state.goals[agent]);
+        for (&known, out) in settings.scalars.iter().zip(out.chunks_exact_mut(Scalars::LEN)) {
+            let values = if state.active[agent] { scalars(known, start, cell, goal) } else { [0.0; 2] };
+            out.copy_from_slice(&values);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! A padded grid: the map with a margin on every side, so that no window needs a bounds check.
+
+use pogema_core::{Cell, Map, Outside};
+
+/// The shape of a padded grid, row-major.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    height: usize,
+    width: usize,
+    /// Width of the margin, at least 1. Units: cells.
+    margin: usize,
+}
+
+impl Layout {
+    /// Returns the layout of a map for windows up to a radius.
+    pub fn new(map: &Map, radius: usize) -> Self {
+        Self { height: map.height(), width: map.width(), margin: radius.max(1) }
+    }
+
+    /// Returns the height and the width of the map.
+    pub fn map_size(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// Returns the number of places.
+    pub fn len(&self) -> usize {
+        (self.height + 2 * self.margin) * self.stride()
+    }
+
+    /// Returns the distance between two places of a column.
+    pub fn stride(&self) -> usize {
+        self.width + 2 * self.margin
+    }
+
+    /// Returns the place of a cell of the map.
+    pub fn place(&self, cell: Cell) -> usize {
+        (usize::from(cell.row) + self.margin) * self.stride() + usize::from(cell.col) + self.margin
+    }
+
+    /// Returns the first place of each row of the window around a place.
+    pub fn window_rows(&self, place: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
+        let (first, stride) = (place - radius * self.stride() - radius, self.stride());
+        (0..=2 * radius).map(move |row| first + row * stride)
+    }
+
+    /// Copies the window around a place.
+    pub fn copy_window<T: Copy>(&self, grid: &[T], place: usize, out: &mut [T]) {
+        let side = out.len().isqrt();
+        for (row, first) in out.chunks_exact_mut(side).zip(self.window_rows(place, side / 2)) {
+            row.copy_from_slice(&grid[first..first + side]);
+        }
+    }
+
+    /// Returns one value per place: 1 for an obstacle as POGEMA shows it, else 0.
+    ///
+    /// A wall one cell thick surrounds the map. Beyond it lie free cells, or the noise of the instance as far as it
+    /// reaches.
+    ///
+    /// Rule: border/ring, border/outside, border/noise
+    pub fn obstacles(&self, map: &Map, outside: &Outside) -> Vec<f32> {
+        let noise = match outside {
+            Outside::Free => None,
+            Outside::Noise(noise) => Some((noise, (noise.height() - map.height()) / 2)),
+        };
+        let is_obstacle = |row: i64, col: i64| {
+            let (rows, cols) = (-1..=self.height as i64, -1..=self.width as i64);
+            if rows.contains(&row) && cols.contains(&col) {
+                // A cell outside the map counts as an obstacle: the wall.
+                return cell(row, col).is_none_or(|cell| map.is_obstacle(cell));
+            }
+            noise.is_some_and(|(noise, border)| {
+                let place = cell(row + border as i64, col + border as i64);
+                place.is_some_and(|cell| noise.contains(cell) && noise.is_obstacle(cell))
+            })
+        };
+        let margin = self.margin as i64;
+        let rows = -margin..self.height as i64 + margin;
+        let all = rows.flat_map(|row| (-margin..self.width as i64 + margin).map(move |col| (row, col)));
+        all.map(|(row, col)| f32::from(u8::from(is_obstacle(row, col)))).collect()
+    }
+}
+
+fn cell(row: i64, col: i64) -> Option<Cell> {
+    Some(Cell::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
+}

@@ -1,0 +1,25 @@
+//! Learned policies for POGEMA environments, which play on all cores and without Python.
+//!
+//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] turns that into
+//! logits of its actions.
+
+mod encode;
+mod follower;
+mod grid;
+mod network;
+mod onnx;
+mod policy;
+mod simd;
+
+pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
+pub use follower::FollowerVersion;
+pub use network::{
+    Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
+    SamplingConfig, Workspace, softmax,
+};
+pub use policy::{Learned, LearnedName, LearnedPolicy, NamedPolicy, PolicySettings, SimplePolicy};
+
+/// The README, whose example the tests compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,135 @@
+//! What a network runs: layers of ours, or a graph of a runtime.
+
+use super::agents::AgentBuffers;
+use super::architecture::Architecture;
+use super::build;
+use super::steps::{Buffers, GROUP, Group, Heads, Steps};
+use super::tensors::Tensors;
+#[cfg(feature = "onnx")]
+use crate::onnx::Runtime;
+use crate::simd::Path;
+
+/// The layers of a network, packed for a path.
+#[derive(Debug)]
+pub struct Layers {
+    pub steps: Steps,
+    pub heads: Heads,
+    path: Path,
+}
+
+impl Layers {
+    pub fn new(architecture: &Architecture, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
+        let (steps, heads) = build::build(architecture, tensors)?;
+        Ok(Self { steps, heads, path })
+    }
+
+    /// Appends the logits and values of up to 16 agents.
+    fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
+        let Self { steps, heads, path } = self;
+        let Workspace { buffers, logits, values } = workspace;
+        let Some(LayerBuffers { apart, agents, heads: outputs }) = buffers else { return };
+        let num_outputs = heads.dense.num_outputs;
+        if group.num_agents > steps.most_apart() {
+            steps.run_agents(*path, group, heads, states, agents);
+            for agent in 0..group.num_agents {
+                logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
+                values.extend((heads.num_actions..num_outputs).map(|output| agents.output(agent, output)));
+            }
+            return;
+        }
+        steps.run(*path, group, states, apart);
+        let rows = steps.rows(heads.input, &apart.flats);
+        heads.dense.run(*path, group.num_agents, rows, false, outputs);
+        for row in outputs.chunks_exact(heads.dense.stride()).take(group.num_agents) {
+            logits.extend(&row[..heads.num_actions]);
+            values.extend(&row[heads.num_actions..num_outputs]);
+        }
+    }
+}
+
+/// What a network runs.
+#[derive(Debug)]
+pub enum Program {
+    Layers(Box<Layers>),
+    #[cfg(feature = "onnx")]
+    Runtime(Box<Runtime>),
+}
+
+impl Program {
+    pub fn num_scalars(&self) -> usize {
+        match self {
+            Self::Layers(layers) => layers.steps.num_scalars,
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => 0,
+        }
+    }
+
+    pub fn state_size(&self) -> usize {
+        match self {
+            Self::Layers(layers) => layers.steps.state_size,
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => 0,
+        }
+    }
+
+    pub fn num_actions(&self) -> usize {
+        match self {
+            Self::Layers(layers) => layers.heads.num_actions,
+            #[cfg(feature = "onnx")]
+            Self::Runtime(runtime) => runtime.num_actions,
+        }
+    }
+
+    pub fn has_value(&self) -> bool {
+        match self {
+            Self::Layers(layers) => layers.heads.dense.num_outputs > layers.heads.num_actions,
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => false,
+        }
+    }
+
+    pub fn workspace(&self) -> Workspace {
+        let buffers = match self {
+            Self::Layers(layers) => Some(LayerBuffers {
+                apart: Buffers::new(&layers.steps),
+                agents: AgentBuffers::new(&layers.steps, &layers.heads),
+                heads: vec![0.0; GROUP * layers.heads.dense.stride()],
+            }),
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => None,
+        };
+        Workspace { buffers, logits: Vec::new(), values: Vec::new() }
+    }
+
+    /// Appends the outputs of up to 16 agents. An error is a text, only from a runtime.
+    pub fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
+        match self {
+            Self::Layers(layers) => {
+                layers.run(group, states, workspace);
+                Ok(())
+            }
+            #[cfg(feature = "onnx")]
+            Self::Runtime(runtime) => group
+                .windows
+                .chunks_exact(group.windows.len() / group.num_agents)
+                .try_for_each(|window| runtime.run(window, &mut workspace.logits)),
+        }
+    }
+}
+
+/// The buffers of a thread that runs a network.
+///
+/// They are allocated here and when a batch is larger than all before.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    buffers: Option<LayerBuffers>,
+    pub(super) logits: Vec<f32>,
+    pub(super) values: Vec<f32>,
+}
+
+#[derive(Clone, Debug)]
+struct LayerBuffers {
+    apart: Buffers,
+    agents: AgentBuffers,
+    heads: Vec<f32>,
+}

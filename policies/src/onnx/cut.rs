@@ -1,0 +1,61 @@
+//! Cuts a graph at its logits, without a loss of what this program does not read.
+
+use std::collections::HashSet;
+
+use prost::Message;
+
+use super::proto::{Node, ValueInfo};
+
+/// A model whose parts are kept as bytes.
+#[derive(Clone, PartialEq, Message)]
+struct RawModel {
+    #[prost(int64, tag = "1")]
+    ir_version: i64,
+    #[prost(message, optional, tag = "7")]
+    graph: Option<RawGraph>,
+    #[prost(bytes = "vec", repeated, tag = "8")]
+    opset_import: Vec<Vec<u8>>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct RawGraph {
+    #[prost(bytes = "vec", repeated, tag = "1")]
+    node: Vec<Vec<u8>>,
+    #[prost(string, tag = "2")]
+    name: String,
+    #[prost(bytes = "vec", repeated, tag = "5")]
+    initializer: Vec<Vec<u8>>,
+    #[prost(bytes = "vec", repeated, tag = "11")]
+    input: Vec<Vec<u8>>,
+    #[prost(bytes = "vec", repeated, tag = "12")]
+    output: Vec<Vec<u8>>,
+}
+
+/// Returns the file with only the operators that the logits need. An error is a text.
+pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
+    let failed = |error: prost::DecodeError| format!("no ONNX file: {error}");
+    let mut model = RawModel::decode(bytes).map_err(failed)?;
+    let graph = model.graph.as_mut().ok_or("no ONNX file: the model has no graph")?;
+    let mut needed = HashSet::from([logits.to_owned()]);
+    let mut nodes = Vec::new();
+    for raw in std::mem::take(&mut graph.node).into_iter().rev() {
+        let node = Node::decode(&*raw).map_err(failed)?;
+        if !node.output.iter().any(|output| needed.contains(output)) {
+            continue;
+        }
+        if node.attribute.iter().any(|attribute| attribute.g.is_some() || !attribute.graphs.is_empty()) {
+            return Err(format!(
+                "operator `{}` contains a graph, which this program does not run",
+                node.op_type
+            ));
+        }
+        needed.extend(node.input);
+        nodes.push(raw);
+    }
+    nodes.reverse();
+    graph.node = nodes;
+    let named = |raw: &Vec<u8>| ValueInfo::decode(&**raw).ok().map(|value| value.name);
+    graph.output.retain(|output| named(output).is_some_and(|name| name == logits));
+    graph.input.retain(|input| named(input).is_some_and(|name| needed.contains(&name)));
+    Ok(model.encode_to_vec())
+}

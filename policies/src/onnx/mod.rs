@@ -1,0 +1,66 @@
+//! Reads networks from ONNX files. If all operators are layers of ours, they become a network of layers. Otherwise a
+//! runtime runs the graph, if the feature `onnx` is enabled.
+
+#[cfg(feature = "onnx")]
+mod cut;
+mod graph;
+mod operators;
+mod proto;
+#[cfg(feature = "onnx")]
+mod runtime;
+
+use prost::Message;
+
+use crate::network::{Architecture, Tensors};
+use graph::Reader;
+use proto::Model;
+#[cfg(feature = "onnx")]
+pub use runtime::Runtime;
+
+/// Names of the output that holds the logits. If there is none of them, it is the only output.
+const LOGITS: [&str; 2] = ["action_logits", "logits"];
+
+/// Names of the output that holds the value.
+const VALUES: [&str; 2] = ["values", "value"];
+
+/// A graph that was read.
+pub enum Graph {
+    /// All operators are layers.
+    Layers(Architecture, Tensors),
+    /// Some operator is none.
+    #[cfg(feature = "onnx")]
+    Runtime(Box<Runtime>),
+}
+
+/// Reads an ONNX file. What follows the logits is cut off. An error is a text.
+pub fn read(bytes: &[u8]) -> Result<Graph, String> {
+    let model = Model::decode(bytes).map_err(|error| format!("no ONNX file: {error}"))?;
+    let graph = model.graph.ok_or("no ONNX file: the model has no graph")?;
+    let mut reader = Reader::new(&graph)?;
+    for node in &graph.node {
+        reader.add(node);
+    }
+    let named = |names: &[&str]| graph.output.iter().find(|output| names.contains(&&*output.name));
+    let logits = match (named(&LOGITS), &*graph.output) {
+        (Some(output), _) | (None, [output]) => output,
+        _ => {
+            return Err(format!(
+                "{} outputs, expected one of them to be called `logits`",
+                graph.output.len()
+            ));
+        }
+    };
+    match reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name)) {
+        Ok((architecture, tensors)) => Ok(Graph::Layers(architecture, tensors)),
+        #[cfg(feature = "onnx")]
+        Err(reason) => {
+            let runtime = Runtime::read(cut::cut(bytes, &logits.name)?, reader.window(), reason)?;
+            Ok(Graph::Runtime(Box::new(runtime)))
+        }
+        #[cfg(not(feature = "onnx"))]
+        Err(reason) => Err(reason),
+    }
+}
+
+#[cfg(test)]
+mod tests;

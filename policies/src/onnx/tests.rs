@@ -1,0 +1,172 @@
+//! Graphs that are layers, and graphs that are none.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+
+use serde_json::json;
+
+use super::graph::Reader;
+use super::proto::{Attribute, Dimension, Graph, Node, Shape, TensorProto, TensorType, Type, ValueInfo};
+
+fn node(op_type: &str, inputs: &[&str], output: &str, attribute: Vec<Attribute>) -> Node {
+    let input = inputs.iter().map(|name| (*name).into()).collect();
+    Node { input, output: vec![output.into()], op_type: op_type.into(), attribute, ..Node::default() }
+}
+
+fn int(name: &str, i: i64) -> Attribute {
+    Attribute { name: name.into(), i, ..Attribute::default() }
+}
+
+fn ints(name: &str, ints: &[i64]) -> Attribute {
+    Attribute { name: name.into(), ints: ints.into(), ..Attribute::default() }
+}
+
+fn tensor(name: &str, dims: &[i64]) -> TensorProto {
+    let float_data = (0..dims.iter().product()).map(|index| index as f32).collect();
+    TensorProto { name: name.into(), dims: dims.into(), data_type: 1, float_data, ..TensorProto::default() }
+}
+
+fn value(name: &str, sizes: &[i64]) -> ValueInfo {
+    let dim = sizes.iter().map(|size| Dimension { dim_value: *size }).collect();
+    let tensor_type = Some(TensorType { shape: Some(Shape { dim }) });
+    ValueInfo { name: name.into(), r#type: Some(Type { tensor_type }) }
+}
+
+fn read(nodes: Vec<Node>, initializer: Vec<TensorProto>) -> Result<serde_json::Value, String> {
+    let graph = Graph {
+        node: nodes,
+        initializer,
+        input: vec![value("obs", &[0, 2, 3, 3]), value("numbers", &[0, 4])],
+        output: vec![value("logits", &[])],
+    };
+    let mut reader = Reader::new(&graph)?;
+    graph.node.iter().for_each(|node| reader.add(node));
+    let (architecture, _) = reader.finish("logits", None)?;
+    Ok(serde_json::to_value(architecture).unwrap())
+}
+
+fn convolution(input: &str, output: &str, name: &str) -> Node {
+    node("Conv", &[input, name], output, vec![ints("pads", &[1; 4])])
+}
+
+/// The head, on a list of 18 values.
+fn head(input: &str) -> Node {
+    node("Gemm", &[input, "head.weight"], "logits", vec![int("transB", 1)])
+}
+
+#[test]
+fn both_kinds_of_residual_blocks_are_read() {
+    let nodes = |added: &str| {
+        vec![
+            node("Relu", &["obs"], "x", vec![]),
+            convolution("x", "y", "conv.weight"),
+            node("Add", &["y", added], "sum", vec![]),
+            node("Flatten", &["sum"], "flat", vec![]),
+            head("flat"),
+        ]
+    };
+    let tensors = || vec![tensor("conv.weight", &[2, 2, 3, 3]), tensor("head.weight", &[5, 18])];
+    let convolution = json!({"convolution": {"name": "conv", "padding": 1}});
+    let in_place = read(nodes("x"), tensors()).unwrap();
+    assert_eq!(in_place["layers"], json!(["relu", {"residual": [convolution]}, "flatten"]));
+    let outside = read(nodes("obs"), tensors()).unwrap();
+    assert_eq!(outside["layers"], json!([{"residual": ["relu", convolution]}, "flatten"]));
+}
+
+#[test]
+fn scalars_and_products_are_read() {
+    let nodes = vec![
+        node("Flatten", &["obs"], "flat", vec![]),
+        node("MatMul", &["numbers", "m"], "product", vec![]),
+        node("Add", &["bias", "product"], "sum", vec![]),
+        node("Relu", &["sum"], "relu", vec![]),
+        node("Concat", &["flat", "relu"], "all", vec![int("axis", 1)]),
+        head("all"),
+    ];
+    let tensors = vec![tensor("m", &[4, 3]), tensor("bias", &[3]), tensor("head.weight", &[5, 21])];
+    let got = read(nodes, tensors).unwrap();
+    assert_eq!(got["layers"], json!(["flatten", {"scalars": [{"dense": "layer-0"}, "relu"]}]));
+    assert_eq!((&got["scalars"], &got["actions"]), (&json!(4), &json!("head")));
+}
+
+#[test]
+fn operators_after_the_logits_do_not_matter_but_those_before_do() {
+    let mut nodes = vec![node("Flatten", &["obs"], "flat", vec![]), head("flat")];
+    nodes.push(node("Multinomial", &["logits"], "actions", vec![]));
+    let tensors = || vec![tensor("head.weight", &[5, 18])];
+    assert!(read(nodes.clone(), tensors()).is_ok());
+    nodes[0].op_type = "Celu".into();
+    let error = read(nodes.clone(), tensors()).unwrap_err();
+    assert_eq!(error, "output `logits` depends on operator `Celu`, which is no layer of this program");
+    nodes[0] = node("Flatten", &["logits"], "flat", vec![]);
+    assert!(
+        read(nodes, tensors()).unwrap_err().contains("value `logits`, which no earlier operator returns")
+    );
+}
+
+#[test]
+fn hostile_files_are_refused() {
+    let huge = TensorProto {
+        dims: vec![1 << 60, 18],
+        data_type: 1,
+        name: "head.weight".into(),
+        ..TensorProto::default()
+    };
+    let nodes = vec![node("Flatten", &["obs"], "flat", vec![]), head("flat")];
+    assert!(read(nodes.clone(), vec![huge]).unwrap_err().contains("tensor `head.weight` has 0 values"));
+    let empty = TensorProto {
+        dims: vec![1 << 60, 0],
+        data_type: 1,
+        name: "head.weight".into(),
+        ..TensorProto::default()
+    };
+    assert!(read(nodes, vec![empty]).unwrap_err().contains("expected sizes above 0"));
+    let error = |bytes: &[u8]| super::read(bytes).err().unwrap();
+    assert!(error(b"").contains("no graph"));
+    assert!(error(b"\x89PNG").starts_with("no ONNX file: "));
+    // A length of an exabyte.
+    assert!(super::read(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());
+}
+
+/// A head on a window whose values are doubled by an operator that is no layer.
+#[cfg(feature = "onnx")]
+fn other_operator(op_type: &str) -> Vec<u8> {
+    use prost::Message;
+
+    use super::proto::Model;
+
+    let graph = Graph {
+        node: vec![
+            node(op_type, &["obs", "obs"], "double", vec![]),
+            node("Flatten", &["double"], "flat", vec![int("axis", 1)]),
+            node("Gemm", &["flat", "head.weight", "bias"], "logits", vec![int("transB", 1)]),
+            node("Multinomial", &["logits"], "actions", vec![]),
+        ],
+        initializer: vec![tensor("head.weight", &[5, 18]), tensor("bias", &[5])],
+        input: vec![value("obs", &[1, 2, 3, 3]), value("numbers", &[1, 4])],
+        output: vec![value("actions", &[1, 1]), value("logits", &[1, 5])],
+    };
+    // Field 1, the version of the format, is 8.
+    [vec![0x08, 0x08], Model { graph: Some(graph) }.encode_to_vec()].concat()
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn the_runtime_runs_other_operators() {
+    let super::Graph::Runtime(runtime) = super::read(&other_operator("Mul")).unwrap() else {
+        panic!("no runtime")
+    };
+    assert_eq!((runtime.num_actions, runtime.window), (5, [2, 3, 3]));
+    let mut logits = Vec::new();
+    let window: Vec<f32> = (0..18u8).map(f32::from).collect();
+    runtime.run(&window, &mut logits).unwrap();
+    let expected = (0..5u32).map(|row| (0..18u32).map(|col| (18 * row + col) * col * col).sum::<u32>());
+    let expected: Vec<f32> = expected.zip(0..5u8).map(|(sum, bias)| sum as f32 + f32::from(bias)).collect();
+    assert_eq!(logits, expected);
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn the_runtime_names_an_operator_that_it_does_not_know() {
+    let error = super::read(&other_operator("Frobnicate")).err().unwrap();
+    assert!(error.contains("Frobnicate") && !error.contains('\n'), "{error}");
+}

@@ -1,0 +1,11 @@
+//! Encoders, planners and policies against slow code, recordings and bad input.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+mod encode_errors;
+mod encoders;
+mod follower_recorded;
+mod learned;
+#[path = "../common/mod.rs"]
+mod recorded;
