@@ -63,7 +63,7 @@ pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
 pub use planner::Planner;
 pub use policies::{
-    AStarAgent, AStarTeam, LifelongPolicy, NamedPolicy, PlannerPolicy, PolicySettings, PomapfObservation,
+    AStarAgent, AStarTeam, GoalForecast, LifelongPolicy, NamedPolicy, PlannerPolicy, PolicySettings, PomapfObservation,
     PomapfObservations, SimplePolicy, pogema_team, sample,
 };
 pub use problem::Problem;

@@ -1,12 +1,14 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 //!
-//! An [`Encoder`] turns the states of an environment into what a policy sees.
+//! An [`Encoder`] turns the states of an environment into what a policy sees. [`MatsLp`] searches with a network.
 
 #![forbid(unsafe_code)]
 
 mod encode;
+mod mats_lp;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Feature};
+pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, Prior};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

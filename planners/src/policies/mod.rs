@@ -12,6 +12,7 @@ mod planner_policy;
 mod pogema;
 
 pub use astar::{AStarAgent, AStarTeam, pogema_team};
+pub use goal_forecast::GoalForecast;
 pub use lifelong_policy::LifelongPolicy;
 pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
 pub use observations::{PomapfObservation, PomapfObservations};

@@ -3,8 +3,8 @@
 //! An [`Encoder`] turns the states of one environment into windows and numbers of its agents. It needs no engine: it
 //! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
 
-mod costs;
-mod layout;
+pub(crate) mod costs;
+pub(crate) mod layout;
 mod marks;
 mod memory;
 mod offsets;
@@ -117,8 +117,8 @@ impl Encoder {
         Error::check_length("active", num_agents, state.active.len())?;
         Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
         Error::check_length("features", num_agents * settings.features_len(), features.len())?;
-        episode.check_inside("cell", state.cells)?;
-        episode.check_inside("goal", state.goals)?;
+        episode.layout.check_inside("cell", state.cells)?;
+        episode.layout.check_inside("goal", state.goals)?;
         episode.follow(state, settings);
         if settings.window_len() > 0 {
             for (agent, out) in windows.chunks_exact_mut(settings.window_len()).enumerate() {
@@ -135,15 +135,6 @@ impl Encoder {
 }
 
 impl Episode {
-    fn check_inside(&self, what: &str, cells: &[Cell]) -> Result<(), Error> {
-        let (height, width) = self.layout.map_size();
-        let is_outside = |cell: &Cell| usize::from(cell.row) >= height || usize::from(cell.col) >= width;
-        match cells.iter().position(is_outside) {
-            None => Ok(()),
-            Some(agent) => Err(Error::outside(agent, what, cells[agent], height, width)),
-        }
-    }
-
     fn follow(&mut self, state: State<'_>, settings: &EncoderSettings) {
         for marks in self.marks.iter_mut().chain(&mut self.all) {
             marks.follow(state);

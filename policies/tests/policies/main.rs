@@ -3,3 +3,4 @@
 mod common;
 mod encode_errors;
 mod encoders;
+mod mats_lp;
