@@ -10,6 +10,14 @@ mod mats_lp;
 pub use encode::{Channel, Encoder, EncoderSettings, Feature};
 pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, Prior};
 
+mod network;
+mod simd;
+
+pub use network::{
+    Architecture, Channel, EncoderConfig, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs,
+    RecurrentState, Sampling, SamplingConfig, Scalars, Workspace, softmax,
+};
+
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

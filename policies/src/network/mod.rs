@@ -1,0 +1,227 @@
+//! Neural networks that map what agents see to logits of their actions.
+//!
+//! A [`Network`] is read from a file of weights and a JSON that names its layers. Its results have the same bits for any
+//! size of a batch, on any machine and with any vector instructions: each output is a sum whose order is fixed.
+
+mod architecture;
+mod build;
+mod config;
+mod error;
+mod file;
+mod gru;
+mod layers;
+mod softmax;
+mod steps;
+mod tensors;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path as FilePath;
+use std::sync::Arc;
+
+use pogema_core::Error;
+
+pub use architecture::{Architecture, Layer};
+pub use config::{Channel, EncoderConfig, NetworkConfig, Sampling, SamplingConfig, Scalars};
+pub use error::ForwardError;
+pub use softmax::softmax;
+
+use crate::simd::Path;
+use steps::{Buffers, GROUP, Group, Heads, Steps};
+use tensors::Tensors;
+
+/// A network with its weights, which any number of threads can share.
+#[derive(Clone, Debug)]
+pub struct Network(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    config: NetworkConfig,
+    window: [usize; 3],
+    steps: Steps,
+    heads: Heads,
+    path: Path,
+}
+
+/// The inputs of a batch, agent by agent.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inputs<'a> {
+    /// Shape: batch, then [`Network::input_shape`].
+    pub windows: &'a [f32],
+    /// The numbers beside the window. Shape: batch, [`Network::num_scalars`].
+    pub scalars: &'a [f32],
+    /// Number of agents.
+    pub batch: usize,
+}
+
+/// The outputs of a batch, agent by agent.
+#[derive(Clone, Copy, Debug)]
+pub struct Outputs<'a> {
+    /// Shape: batch, [`Network::num_actions`].
+    pub logits: &'a [f32],
+    /// Empty if the network has no value head. Shape: batch.
+    pub values: &'a [f32],
+}
+
+/// The buffers of a thread that runs a network.
+///
+/// They are allocated here and when a batch is larger than all before.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    buffers: Buffers,
+    heads: Vec<f32>,
+    logits: Vec<f32>,
+    values: Vec<f32>,
+}
+
+/// The state that a recurrent network keeps for each agent through an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecurrentState {
+    size: usize,
+    values: Vec<f32>,
+}
+
+impl RecurrentState {
+    /// Creates the state of agents at the beginning of an episode: zeros.
+    pub fn new(network: &Network, num_agents: usize) -> Self {
+        let size = network.state_size();
+        Self { size, values: vec![0.0; num_agents * size] }
+    }
+
+    /// Sets the state of one agent to that at the beginning of an episode.
+    ///
+    /// # Panics
+    /// If there is no such agent.
+    pub fn reset(&mut self, agent: usize) {
+        self.values[agent * self.size..][..self.size].fill(0.0);
+    }
+
+    /// Sets the state of every agent to that at the beginning of an episode.
+    pub fn reset_all(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// Returns the state. Shape: agents, [`Network::state_size`].
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// Returns the state, to restore one that was saved. Shape: agents, [`Network::state_size`].
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+}
+
+impl Network {
+    /// Reads a network from a `.safetensors` file and the JSON file beside it, which has the same name but the extension
+    /// `json`. Its content is a [`NetworkConfig`].
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor or layer.
+    pub fn read(path: impl AsRef<FilePath>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let (config, mut tensors) = file::read(path)?;
+        Self::new(config, &mut tensors, Path::best()).map_err(|reason| Error::io(path, reason))
+    }
+
+    fn new(config: NetworkConfig, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
+        let Some(architecture) = &config.architecture else {
+            return Err("the JSON has no `architecture`, which weights without a graph need".into());
+        };
+        let window = architecture.window;
+        let (steps, heads) = build::build(architecture, tensors)?;
+        Ok(Self(Arc::new(Inner { window, steps, heads, path, config })))
+    }
+
+    /// Returns the channels, rows and columns of the window.
+    pub fn input_shape(&self) -> [usize; 3] {
+        self.0.window
+    }
+
+    /// Returns the number of numbers beside the window.
+    pub fn num_scalars(&self) -> usize {
+        self.0.steps.num_scalars
+    }
+
+    /// Returns the number of logits.
+    pub fn num_actions(&self) -> usize {
+        self.0.heads.num_actions
+    }
+
+    /// Returns whether the network also returns a value.
+    pub fn has_value(&self) -> bool {
+        self.0.heads.dense.num_outputs > self.0.heads.num_actions
+    }
+
+    /// Returns the number of floats of an agent's recurrent state, 0 without a recurrent layer.
+    pub fn state_size(&self) -> usize {
+        self.0.steps.state_size
+    }
+
+    /// Returns the content of the JSON file.
+    pub fn config(&self) -> &NetworkConfig {
+        &self.0.config
+    }
+
+    /// Creates the buffers that a thread needs to run this network.
+    pub fn workspace(&self) -> Workspace {
+        let heads = vec![0.0; GROUP * self.0.heads.dense.stride()];
+        Workspace { buffers: Buffers::new(&self.0.steps), heads, logits: Vec::new(), values: Vec::new() }
+    }
+
+    /// Computes the logits of a batch and updates the state of its agents.
+    ///
+    /// # Errors
+    /// [`ForwardError::Length`] if an input has the wrong length; the state is then unchanged.
+    /// [`ForwardError::NotFinite`] if an output is infinite or no number.
+    ///
+    /// # Panics
+    /// If the workspace belongs to another network.
+    pub fn forward<'w>(
+        &self,
+        inputs: Inputs<'_>,
+        state: &mut RecurrentState,
+        workspace: &'w mut Workspace,
+    ) -> Result<Outputs<'w>, ForwardError> {
+        let window: usize = self.0.window.iter().product();
+        let (scalars, size) = (self.num_scalars(), self.state_size());
+        let check = |what, got: usize, each: usize| {
+            Error::check_length(what, inputs.batch.saturating_mul(each), got).map_err(ForwardError::Length)
+        };
+        check("the list of windows", inputs.windows.len(), window)?;
+        check("the list of scalars", inputs.scalars.len(), scalars)?;
+        check("the recurrent state", state.values.len(), size)?;
+        workspace.logits.clear();
+        workspace.values.clear();
+        for first in (0..inputs.batch).step_by(GROUP) {
+            let num_agents = GROUP.min(inputs.batch - first);
+            let windows = &inputs.windows[first * window..][..num_agents * window];
+            let group = Group {
+                num_agents,
+                windows,
+                scalars: &inputs.scalars[first * scalars..][..num_agents * scalars],
+            };
+            let states = &mut state.values[first * size..][..num_agents * size];
+            self.0.steps.run(self.0.path, group, states, &mut workspace.buffers);
+            self.run_heads(num_agents, workspace);
+        }
+        let actions = self.num_actions();
+        let logits =
+            workspace.logits.iter().position(|value| !value.is_finite()).map(|index| index / actions);
+        let value = workspace.values.iter().position(|value| !value.is_finite());
+        match logits.or(value) {
+            Some(row) => Err(ForwardError::NotFinite { row }),
+            None => Ok(Outputs { logits: &workspace.logits, values: &workspace.values }),
+        }
+    }
+
+    fn run_heads(&self, num_agents: usize, workspace: &mut Workspace) {
+        let Heads { dense, input, num_actions } = &self.0.heads;
+        let rows = self.0.steps.rows(*input, &workspace.buffers.flats);
+        dense.run(self.0.path, num_agents, rows, false, &mut workspace.heads);
+        for row in workspace.heads.chunks_exact(dense.stride()).take(num_agents) {
+            workspace.logits.extend(&row[..*num_actions]);
+            workspace.values.extend(&row[*num_actions..dense.num_outputs]);
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Probabilities from logits.
+
+/// Replaces logits by their probabilities.
+///
+/// The exponential is the same on every machine. Values: positive, with a sum of 1 but for rounding.
+pub fn softmax(logits: &mut [f32]) {
+    let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut sum = 0.0;
+    for logit in &mut *logits {
+        *logit = libm::expf(*logit - largest);
+        sum += *logit;
+    }
+    for logit in logits {
+        *logit /= sum;
+    }
+}

@@ -1,0 +1,217 @@
+//! The steps of a network and their execution.
+
+use super::build::Flat;
+use super::gru::{Gru, Output, States};
+use super::layers::{Activation, Convolution, Dense, Rows};
+use crate::simd::{Path, Plane};
+
+/// The number of agents whose lists are computed together. Windows are computed one agent after the other, since those
+/// of one agent fit the cache.
+pub const GROUP: usize = 12;
+
+/// A step on the windows of one agent. Numbers are slots of the workspace.
+#[derive(Debug)]
+pub enum PlaneStep {
+    Convolve {
+        convolution: Convolution,
+        input: usize,
+        added: Option<usize>,
+        relu: bool,
+        output: usize,
+    },
+    Activate {
+        activation: Activation,
+        input: usize,
+        output: usize,
+    },
+    Add {
+        inputs: [usize; 2],
+        output: usize,
+    },
+    /// Writes a window to a list, pixel by pixel.
+    Flatten {
+        input: usize,
+        output: usize,
+    },
+}
+
+/// A step on the lists of a group of agents.
+#[derive(Debug)]
+pub enum FlatStep {
+    Dense { dense: Dense, input: usize, relu: bool, output: usize },
+    Activate { activation: Activation, input: usize, output: usize },
+    Add { inputs: [usize; 2], output: usize },
+    Gru { gru: Gru, input: usize, offset: usize, output: usize },
+    Scalars { output: usize },
+    Join { inputs: [usize; 2], output: usize },
+}
+
+/// The layers of a network as a list of steps. Slot 0 of the planes is the window.
+#[derive(Debug, Default)]
+pub struct Steps {
+    pub planes: Vec<Plane>,
+    pub flats: Vec<Flat>,
+    pub of_planes: Vec<PlaneStep>,
+    pub of_flats: Vec<FlatStep>,
+    pub num_scalars: usize,
+    pub state_size: usize,
+}
+
+/// The heads of a network: the logits, then the value if there is one, as one layer.
+#[derive(Debug)]
+pub struct Heads {
+    pub dense: Dense,
+    /// The list that is their input.
+    pub input: usize,
+    pub num_actions: usize,
+}
+
+/// The inputs of a group of agents.
+#[derive(Clone, Copy, Debug)]
+pub struct Group<'a> {
+    pub num_agents: usize,
+    pub windows: &'a [f32],
+    pub scalars: &'a [f32],
+}
+
+impl Steps {
+    /// Computes all lists of a group of agents.
+    pub fn run(&self, path: Path, group: Group<'_>, states: &mut [f32], workspace: &mut Buffers) {
+        let num_values = group.windows.len() / group.num_agents;
+        for (agent, window) in group.windows.chunks_exact(num_values).enumerate() {
+            load(&self.planes[0], window, &mut workspace.planes[0]);
+            for step in &self.of_planes {
+                self.run_planes(path, step, agent, workspace);
+            }
+        }
+        for step in &self.of_flats {
+            self.run_flats(path, step, group, states, workspace);
+        }
+    }
+
+    fn run_planes(&self, path: Path, step: &PlaneStep, agent: usize, buffers: &mut Buffers) {
+        let Buffers { planes, flats, .. } = buffers;
+        match step {
+            PlaneStep::Convolve { convolution, input, added, relu, output } => {
+                write(planes, *output, |planes, to| {
+                    let added = added.map(|slot| &*planes[slot]);
+                    convolution.run(path, &planes[*input], added, *relu, to);
+                })
+            }
+            PlaneStep::Activate { activation, input, output } => write(planes, *output, |planes, to| {
+                to.copy_from_slice(&planes[*input]);
+                activation.apply(to);
+            }),
+            PlaneStep::Add { inputs, output } => {
+                write(planes, *output, |planes, to| add(planes, *inputs, to))
+            }
+            PlaneStep::Flatten { input, output } => {
+                let flat = &self.flats[*output];
+                let to = &mut flats[*output][agent * flat.stride()..][..flat.len()];
+                store(&self.planes[*input], &planes[*input], to);
+            }
+        }
+    }
+
+    fn run_flats(
+        &self,
+        path: Path,
+        step: &FlatStep,
+        group: Group<'_>,
+        states: &mut [f32],
+        buffers: &mut Buffers,
+    ) {
+        let Buffers { flats, scratch, .. } = buffers;
+        let num_agents = group.num_agents;
+        match step {
+            FlatStep::Dense { dense, input, relu, output } => write(flats, *output, |flats, to| {
+                dense.run(path, num_agents, self.rows(*input, flats), *relu, to);
+            }),
+            FlatStep::Activate { activation, input, output } => write(flats, *output, |flats, to| {
+                to.copy_from_slice(&flats[*input]);
+                activation.apply(to);
+            }),
+            FlatStep::Add { inputs, output } => write(flats, *output, |flats, to| add(flats, *inputs, to)),
+            FlatStep::Gru { gru, input, offset, output } => write(flats, *output, |flats, to| {
+                let mut states = States { values: states, stride: self.state_size, offset: *offset };
+                let to = Output { values: to, stride: self.flats[*output].stride(), scratch };
+                gru.run(path, num_agents, self.rows(*input, flats), &mut states, to);
+            }),
+            FlatStep::Scalars { output } => {
+                let stride = self.flats[*output].stride();
+                let rows = group.scalars.chunks_exact(self.num_scalars);
+                for (row, scalars) in flats[*output].chunks_exact_mut(stride).zip(rows) {
+                    row[..scalars.len()].copy_from_slice(scalars);
+                }
+            }
+            FlatStep::Join { inputs, output } => write(flats, *output, |flats, to| {
+                let mut start = 0;
+                for input in *inputs {
+                    let from = &self.flats[input];
+                    for (agent, row) in flats[input].chunks_exact(from.stride()).take(num_agents).enumerate()
+                    {
+                        let to = &mut to[agent * self.flats[*output].stride() + start..];
+                        to[..from.len()].copy_from_slice(&row[..from.len()]);
+                    }
+                    start += from.len();
+                }
+            }),
+        }
+    }
+
+    /// Returns the lists of a slot.
+    pub fn rows<'a>(&self, slot: usize, flats: &'a [Vec<f32>]) -> Rows<'a> {
+        Rows { values: &flats[slot], stride: self.flats[slot].stride() }
+    }
+}
+
+/// The buffers of one group: a window for each plane, and a list for each agent and flat.
+#[derive(Clone, Debug)]
+pub struct Buffers {
+    planes: Vec<Vec<f32>>,
+    pub flats: Vec<Vec<f32>>,
+    scratch: Vec<f32>,
+}
+
+impl Buffers {
+    pub fn new(steps: &Steps) -> Self {
+        let scratch = steps.of_flats.iter().map(|step| match step {
+            FlatStep::Gru { gru, .. } => gru.scratch(),
+            _ => 0,
+        });
+        Self {
+            planes: steps.planes.iter().map(|plane| vec![0.0; plane.len()]).collect(),
+            flats: steps.flats.iter().map(|flat| vec![0.0; GROUP * flat.stride()]).collect(),
+            scratch: vec![0.0; GROUP * scratch.max().unwrap_or(0)],
+        }
+    }
+}
+
+/// Lets a closure write one slot while it reads the others.
+fn write(slots: &mut [Vec<f32>], output: usize, run: impl FnOnce(&[Vec<f32>], &mut [f32])) {
+    let mut to = std::mem::take(&mut slots[output]);
+    run(slots, &mut to);
+    slots[output] = to;
+}
+
+fn add(slots: &[Vec<f32>], [one, other]: [usize; 2], to: &mut [f32]) {
+    for ((to, one), other) in to.iter_mut().zip(&slots[one]).zip(&slots[other]) {
+        *to = one + other;
+    }
+}
+
+/// Writes channels of pixels as pixels of channels.
+fn load(plane: &Plane, window: &[f32], to: &mut [f32]) {
+    for (index, value) in window.iter().enumerate() {
+        let (pixel, channel) = (index % (plane.rows * plane.cols), index / (plane.rows * plane.cols));
+        to[plane.index(pixel / plane.cols, pixel % plane.cols) + channel] = *value;
+    }
+}
+
+/// Writes pixels of channels without margins and padding.
+fn store(plane: &Plane, from: &[f32], to: &mut [f32]) {
+    let pixels = (0..plane.rows).flat_map(|row| (0..plane.cols).map(move |col| (row, col)));
+    for ((row, col), to) in pixels.zip(to.chunks_exact_mut(plane.channels)) {
+        to.copy_from_slice(&from[plane.index(row, col)..][..plane.channels]);
+    }
+}

@@ -1,0 +1,61 @@
+//! Tensors by name, each of which a layer takes once.
+
+use std::collections::BTreeMap;
+
+/// A tensor of finite floats.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    pub shape: Vec<usize>,
+    pub values: Vec<f32>,
+}
+
+/// All tensors of a file that no layer has taken yet. A problem is the text of an error that names the tensor.
+#[derive(Clone, Debug, Default)]
+pub struct Tensors(BTreeMap<String, Tensor>);
+
+impl Tensors {
+    /// Adds a tensor whose bytes are floats in little-endian order.
+    pub fn insert(&mut self, name: &str, shape: &[usize], bytes: &[u8]) -> Result<(), String> {
+        let (floats, rest) = bytes.as_chunks::<4>();
+        let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
+        if expected != Some(floats.len()) || !rest.is_empty() {
+            return Err(format!(
+                "tensor `{name}` has {} bytes, expected a float for each value of {shape:?}",
+                bytes.len()
+            ));
+        }
+        let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+            let value = values[index];
+            return Err(format!("tensor `{name}`: value {index} is `{value}`, expected a finite number"));
+        }
+        match self.0.insert(name.into(), Tensor { shape: shape.into(), values }) {
+            None => Ok(()),
+            Some(_) => Err(format!("tensor `{name}` occurs twice")),
+        }
+    }
+
+    /// Takes a tensor. `None` stands for any size above 0.
+    pub fn take(&mut self, name: &str, shape: &[Option<usize>]) -> Result<Tensor, String> {
+        let Some(tensor) = self.0.remove(name) else {
+            return Err(format!("tensor `{name}` is missing or used by two layers"));
+        };
+        let fits = |(got, want): (&usize, &Option<usize>)| want.map_or(*got > 0, |want| *got == want);
+        if tensor.shape.len() == shape.len() && tensor.shape.iter().zip(shape).all(fits) {
+            return Ok(tensor);
+        }
+        let sizes: Vec<String> =
+            shape.iter().map(|size| size.map_or("any size".into(), |size| size.to_string())).collect();
+        Err(format!("tensor `{name}` has shape {:?}, expected [{}]", tensor.shape, sizes.join(", ")))
+    }
+
+    /// Checks that every tensor was taken.
+    pub fn check_all_taken(&self) -> Result<(), String> {
+        self.0.keys().next().map_or(Ok(()), |name| Err(format!("tensor `{name}` belongs to no layer")))
+    }
+
+    /// Returns the tensors by name.
+    pub fn iter(&self) -> impl Iterator<Item = (&String, &Tensor)> {
+        self.0.iter()
+    }
+}
