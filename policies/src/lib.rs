@@ -2,20 +2,16 @@
 //!
 //! An [`Encoder`] turns the states of an environment into what a policy sees. [`MatsLp`] searches with a network.
 
-#![forbid(unsafe_code)]
-
 mod encode;
 mod mats_lp;
-
-pub use encode::{Channel, Encoder, EncoderSettings, Feature};
-pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, Prior};
-
 mod network;
 mod simd;
 
+pub use encode::{Channel, Encoder, EncoderSettings, Feature};
+pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, NetworkPrior, Prior};
 pub use network::{
-    Architecture, Channel, EncoderConfig, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs,
-    RecurrentState, Sampling, SamplingConfig, Scalars, Workspace, softmax,
+    Architecture, Channel as NetworkChannel, EncoderConfig, ForwardError, Inputs, Layer, Network,
+    NetworkConfig, Outputs, RecurrentState, Sampling, SamplingConfig, Scalars, Workspace, softmax,
 };
 
 /// The README, whose example the tests compile and run.

@@ -109,7 +109,9 @@ mod tests {
     #[test]
     fn the_cache_keeps_recent_entries_within_its_limit() {
         let cache = Cache::new();
-        let key = |number: usize| Key::new(Cell::new((number / 100) as u16, (number % 100) as u16), Cell::new(0, 0), 1);
+        let key = |number: usize| {
+            Key::new(Cell::new((number / 100) as u16, (number % 100) as u16), Cell::new(0, 0), 1)
+        };
         let outlook = |number: usize| Outlook { probabilities: [0.2; 5], value: number as f32 };
         let count = 4 * Cache::NUM_SHARDS * Cache::MAX_ENTRIES;
         for number in 0..count {
@@ -118,9 +120,14 @@ mod tests {
             assert_eq!(cache.get(&key(0)), Some(outlook(0)), "used in every turn");
         }
         assert_eq!(cache.get(&key(1)), None);
-        let held = |shard: &Mutex<Shard>| shard.lock().map(|shard| shard.newer.len() + shard.older.len()).unwrap_or(0);
+        let held = |shard: &Mutex<Shard>| {
+            shard.lock().map(|shard| shard.newer.len() + shard.older.len()).unwrap_or(0)
+        };
         let num_held: usize = cache.shards.iter().map(held).sum();
         assert!(num_held <= 2 * Cache::NUM_SHARDS * Cache::MAX_ENTRIES);
-        assert!(num_held > Cache::NUM_SHARDS * Cache::MAX_ENTRIES / 2, "the shards are used evenly: {num_held}");
+        assert!(
+            num_held > Cache::NUM_SHARDS * Cache::MAX_ENTRIES / 2,
+            "the shards are used evenly: {num_held}"
+        );
     }
 }

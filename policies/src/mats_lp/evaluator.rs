@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 
 use crate::mats_lp::cache::{Cache, Key, Outlook};
 use crate::mats_lp::prior::{Evaluate, Evaluation, Prior};
+use crate::network::softmax;
 
 /// An outlook that is known, or the row of the batch that will give it.
 #[derive(Clone, Copy, Debug)]
@@ -96,10 +97,13 @@ impl Evaluator {
 
 /// Turns logits into probabilities. Logits that are not finite give probabilities that are not.
 fn outlook(output: &Evaluation) -> Outlook {
-    let largest = output.logits.into_iter().fold(f32::NEG_INFINITY, f32::max);
-    let weights = output.logits.map(|logit| if logit.is_finite() { (logit - largest).exp() } else { f32::NAN });
-    let sum: f32 = weights.iter().sum();
-    Outlook { probabilities: weights.map(|weight| weight / sum), value: output.value }
+    let mut probabilities = output.logits;
+    if probabilities.iter().all(|logit| logit.is_finite()) {
+        softmax(&mut probabilities);
+    } else {
+        probabilities.fill(f32::NAN);
+    }
+    Outlook { probabilities, value: output.value }
 }
 
 fn is_finite(outlook: &Outlook) -> bool {

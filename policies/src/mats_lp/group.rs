@@ -53,7 +53,9 @@ impl<'a> Groups<'a> {
                     *reached = self.num_searches;
                     self.next.push(target);
                     let other = self.occupants[target as usize];
-                    if other != NOBODY && is_within(self.cells[agent], self.cells[other as usize], params.radius) {
+                    if other != NOBODY
+                        && is_within(self.cells[agent], self.cells[other as usize], params.radius)
+                    {
                         group.push(other as usize);
                     }
                 }

@@ -17,6 +17,7 @@
 mod cache;
 mod evaluator;
 mod group;
+mod network_prior;
 mod params;
 mod policy;
 mod prior;
@@ -27,6 +28,7 @@ mod tree;
 mod workers;
 mod world;
 
+pub use network_prior::NetworkPrior;
 pub use params::MatsLpParams;
 pub use policy::MatsLp;
 pub use prior::{Evaluate, Evaluation, Prior};

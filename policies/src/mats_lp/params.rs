@@ -71,7 +71,12 @@ impl MatsLpParams {
             ("discount", self.discount, self.discount > 0.0 && self.discount <= 1.0, "above 0, at most 1"),
             ("exploration", self.exploration, (0.0..=1e6).contains(&self.exploration), "0 to 1000000"),
             ("root_noise", self.root_noise, (0.0..=1.0).contains(&self.root_noise), "0 to 1"),
-            ("progress_reward", self.progress_reward, (0.0..=1e6).contains(&self.progress_reward), "0 to 1000000"),
+            (
+                "progress_reward",
+                self.progress_reward,
+                (0.0..=1e6).contains(&self.progress_reward),
+                "0 to 1000000",
+            ),
         ];
         for (name, value, is_valid, expected) in real {
             if !is_valid {

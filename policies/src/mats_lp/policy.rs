@@ -126,8 +126,10 @@ impl Episode {
     fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let is_first = self.next_step == 0;
         if now.step != self.next_step || (!is_first && now.cells.len() != self.best.len()) {
-            let reason =
-                format!("found the state of step {}, expected step {} of the same episode", now.step, self.next_step);
+            let reason = format!(
+                "found the state of step {}, expected step {} of the same episode",
+                now.step, self.next_step
+            );
             return Err(Error::OutOfStep { reason });
         }
         Error::check_length("goals", now.cells.len(), now.goals.len())?;

@@ -94,7 +94,10 @@ impl<'a> Search<'a> {
             let plans = position < self.params.agents_to_plan;
             let is_possible = |action: &Action| self.simulation.is_possible(position, *action);
             let choice = if plans {
-                Action::ALL.into_iter().filter(is_possible).fold(0, |choice, action| choice | 1 << action as u8)
+                Action::ALL
+                    .into_iter()
+                    .filter(is_possible)
+                    .fold(0, |choice, action| choice | 1 << action as u8)
             } else {
                 1 << likeliest(outlook)
             };

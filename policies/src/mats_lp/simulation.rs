@@ -145,7 +145,8 @@ impl<'a> Simulation<'a> {
     /// Returns what determines the network's input for an agent.
     pub fn key(&self, position: usize, radius: usize) -> Key {
         let agent = self.agents[position];
-        let mut key = Key::new(agent.cell, self.goals[position].list[agent.goal as usize], self.behind(position));
+        let mut key =
+            Key::new(agent.cell, self.goals[position].list[agent.goal as usize], self.behind(position));
         for other in &self.agents {
             let down = i32::from(other.cell.row) - i32::from(agent.cell.row) + radius as i32;
             let right = i32::from(other.cell.col) - i32::from(agent.cell.col) + radius as i32;

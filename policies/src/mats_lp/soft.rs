@@ -55,7 +55,7 @@ mod tests {
     /// Draws a map and agents on its free cells, in a drawn order.
     fn draw(generator: &mut Generator) -> Result<(Map, Vec<Cell>), Error> {
         let mut below = |most: usize| (generator.random() * most as f64) as usize;
-        let (height, width) = (1 + below(4), 1 + below(4));
+        let (height, width) = (1 + below(5), 1 + below(5));
         let obstacles = (0..height * width).map(|_| generator.random() < 0.15).collect();
         let map = Map::new(height, width, obstacles)?;
         let free = (0..height * width).map(|index| map.cell_at(index)).filter(|&cell| !map.is_obstacle(cell));
@@ -95,14 +95,17 @@ mod tests {
                 .map(|(&target, &action)| action != Action::Stay && world.is_free(target))
                 .collect();
             withdraw_conflicts(&places, &targets, &mut moves);
-            let expected: Vec<u32> =
-                by_engine(&map, &cells, &actions)?.into_iter().map(|cell| world.layout.place(cell) as u32).collect();
-            let reached: Vec<u32> =
-                (0..cells.len()).map(|agent| if moves[agent] { targets[agent] } else { places[agent] }).collect();
+            let expected: Vec<u32> = by_engine(&map, &cells, &actions)?
+                .into_iter()
+                .map(|cell| world.layout.place(cell) as u32)
+                .collect();
+            let reached: Vec<u32> = (0..cells.len())
+                .map(|agent| if moves[agent] { targets[agent] } else { places[agent] })
+                .collect();
             assert_eq!(reached, expected, "{number}: {:?} {cells:?} {actions:?}", map.rows());
             num_moved += moves.iter().filter(|&&moves| moves).count();
         }
-        assert!(num_moved > 10_000);
+        assert!(num_moved > 10_000, "{num_moved}");
         Ok(())
     }
 }

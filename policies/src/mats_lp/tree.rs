@@ -126,7 +126,9 @@ impl Tree {
         let range = parent.first_child as usize..(parent.first_child + parent.num_children) as usize;
         let root = f64::from(parent.num_visits).sqrt();
         let (mut best, mut best_score) = (0, f32::NEG_INFINITY);
-        for (index, (&prior, &child)) in self.priors[range.clone()].iter().zip(&self.children[range]).enumerate() {
+        for (index, (&prior, &child)) in
+            self.priors[range.clone()].iter().zip(&self.children[range]).enumerate()
+        {
             let score = self.score(root, prior, child);
             if score > best_score {
                 (best, best_score) = (index, score);

@@ -50,8 +50,9 @@ pub(super) fn search_all(
     let mut work = evaluators.iter_mut().zip(shares);
     let first = work.next();
     let results: Vec<Result<Answers, Failure>> = std::thread::scope(|scope| {
-        let others: Vec<_> =
-            work.map(|(evaluator, groups)| scope.spawn(move || search_some(task, groups, evaluator))).collect();
+        let others: Vec<_> = work
+            .map(|(evaluator, groups)| scope.spawn(move || search_some(task, groups, evaluator)))
+            .collect();
         let own = first.map(|(evaluator, groups)| search_some(task, groups, evaluator));
         let joined = others.into_iter().map(|thread| match thread.join() {
             Ok(result) => result,
@@ -86,7 +87,11 @@ impl From<Error> for Failure {
 }
 
 /// Searches for some groups in lockstep, on one thread.
-fn search_some(task: &Task<'_>, groups: Vec<Vec<usize>>, evaluator: &mut Evaluator) -> Result<Answers, Failure> {
+fn search_some(
+    task: &Task<'_>,
+    groups: Vec<Vec<usize>>,
+    evaluator: &mut Evaluator,
+) -> Result<Answers, Failure> {
     let Task { params, radius, cache, .. } = *task;
     let mut searches: Vec<(&[usize], Search<'_>)> =
         groups.iter().map(|group| (group.as_slice(), new_search(task, group))).collect();

@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pogema_core::{Action, Cell, Config, Episode, Error, GoalStream, Instance, Map, OnGoal, Outside};
 use pogema_fast::Engine;
-use pogema_maps::GridConfig;
 use pogema_numpy::Generator;
 use pogema_policies::{Evaluate, Evaluation, MatsLp, MatsLpParams, Prior};
 use proptest::prelude::*;
@@ -62,7 +61,8 @@ fn yaml(seed: u64, side: usize, agents: usize, density: f64, on_target: OnGoal) 
 fn same_as_slow(yaml: &str, network: &Linear, params: MatsLpParams, steps: usize) -> Result<(), Error> {
     let mut episode = common::start(yaml)?;
     let (map, on_goal) = (episode.instance()?.map().clone(), episode.config().on_goal);
-    let mut ahead = Ahead { streams: episode.instance()?.goals().to_vec(), restarts: on_goal == OnGoal::Restart };
+    let mut ahead =
+        Ahead { streams: episode.instance()?.goals().to_vec(), restarts: on_goal == OnGoal::Restart };
     let radius = network.radius();
     let mut slow = Slow { network: network.clone(), params, radius, map: &map, on_goal, best: Vec::new() };
     let mut policy = MatsLp::new(network, params, 2)?;
@@ -255,17 +255,18 @@ fn faulty(flag: Option<&Arc<AtomicBool>>) -> Faulty {
 fn logits_that_are_not_numbers_name_agent_and_step() -> Result<(), Error> {
     let rows = [".....", ".....", "....."];
     for threads in [1, 2, 8] {
-        let made = instance(&rows, &[[0, 0], [1, 0], [2, 2]], &[[0, 1], [1, 1], [2, 4]])?;
-        let mut episode = start(made, OnGoal::Finish)?;
+        let made = instance(&rows, &[[0, 0], [1, 0], [2, 1]], &[[0, 1], [1, 1], [2, 4]])?;
+        let mut episode = start(made, OnGoal::Restart)?;
         let params = MatsLpParams { expansions: 1, merging_range: 1, ..MatsLpParams::default() };
         let mut policy = MatsLp::new(&faulty(None), params, threads)?;
-        policy.begin(episode.instance()?, OnGoal::Finish);
-        policy.act(episode.state())?;
-        episode.step(&[Action::Stay, Action::Stay, Action::Right])?;
-        policy.act(episode.state())?;
-        episode.step(&[Action::Stay, Action::Stay, Action::Right])?;
-        // Agent 2 has reached the last column and its goal, so it is inactive.
-        policy.act(episode.state())?;
+        policy.begin(episode.instance()?, OnGoal::Restart);
+        for _ in 0..2 {
+            policy.act(episode.state())?;
+            episode.step(&[Action::Stay, Action::Stay, Action::Right])?;
+        }
+        // The search of agent 2 moves it to the last column.
+        let error = policy.act(episode.state()).map_err(|error| error.to_string());
+        assert_eq!(error, Err("network: its outputs for agent 2 in step 2 are not finite".into()));
         let made = instance(&rows, &[[0, 0], [1, 4], [2, 4]], &[[0, 1], [1, 1], [2, 1]])?;
         let episode = start(made, OnGoal::Finish)?;
         policy.begin(episode.instance()?, OnGoal::Finish);

@@ -106,7 +106,8 @@ impl Slow<'_> {
         *bounds = (bounds.0.min(seen), bounds.1.max(seen));
         node.value_sum += gain;
         node.num_visits += 1;
-        let up = if self.params.faithful { f64::from(node.reward) + discount * f64::from(value) } else { gain };
+        let up =
+            if self.params.faithful { f64::from(node.reward) + discount * f64::from(value) } else { gain };
         (up as f32, leaf_reward)
     }
 
@@ -230,7 +231,8 @@ impl Slow<'_> {
     /// Returns the agents that are planned together with one, itself first.
     fn group(&self, own: usize, now: State<'_>) -> Vec<usize> {
         let start = place(now.cells[own]);
-        let (mut steps, mut queue, mut group) = (BTreeMap::from([(start, 0)]), VecDeque::from([start]), vec![own]);
+        let (mut steps, mut queue, mut group) =
+            (BTreeMap::from([(start, 0)]), VecDeque::from([start]), vec![own]);
         while let Some(at) = queue.pop_front() {
             for (down, right) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
                 let next = (at.0 + down, at.1 + right);
@@ -239,7 +241,8 @@ impl Slow<'_> {
                 }
                 steps.insert(next, steps[&at] + 1);
                 queue.push_back(next);
-                let met = (0..now.cells.len()).find(|&agent| now.active[agent] && place(now.cells[agent]) == next);
+                let met =
+                    (0..now.cells.len()).find(|&agent| now.active[agent] && place(now.cells[agent]) == next);
                 let is_near = steps[&next] < self.params.merging_range
                     && start.0.abs_diff(next.0).max(start.1.abs_diff(next.1)) <= self.params.radius;
                 group.extend(met.filter(|_| is_near));
@@ -249,7 +252,8 @@ impl Slow<'_> {
     }
 
     fn is_open(&self, (row, col): Place) -> bool {
-        let inside = (0..self.map.height() as i32).contains(&row) && (0..self.map.width() as i32).contains(&col);
+        let inside =
+            (0..self.map.height() as i32).contains(&row) && (0..self.map.width() as i32).contains(&col);
         inside && !self.map.is_obstacle(Cell::new(row as u16, col as u16))
     }
 
@@ -278,8 +282,7 @@ fn place(cell: Cell) -> Place {
 }
 
 fn softmax(logits: &[f32]) -> Vec<f32> {
-    let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let weights: Vec<f32> = logits.iter().map(|logit| (logit - largest).exp()).collect();
-    let sum: f32 = weights.iter().sum();
-    weights.iter().map(|weight| weight / sum).collect()
+    let mut probabilities = logits.to_vec();
+    pogema_policies::softmax(&mut probabilities);
+    probabilities
 }
