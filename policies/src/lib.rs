@@ -8,7 +8,7 @@ mod network;
 mod simd;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Feature};
-pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, NetworkPrior, Prior};
+pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, MatsLpStats, NetworkPrior, Prior};
 pub use network::{
     Architecture, Channel as NetworkChannel, EncoderConfig, ForwardError, Inputs, Layer, Network,
     NetworkConfig, Outputs, RecurrentState, Sampling, SamplingConfig, Scalars, Workspace, softmax,

@@ -1,5 +1,7 @@
 //! Batched calls of the network for the leaves of several searches.
 
+use std::time::{Duration, Instant};
+
 use pogema_core::Error;
 use rustc_hash::FxHashMap;
 
@@ -24,6 +26,26 @@ pub(super) struct Evaluator {
     rows: FxHashMap<Key, u32>,
     outputs: Vec<Evaluation>,
     outlooks: Vec<Outlook>,
+    stats: MatsLpStats,
+}
+
+/// The work of a policy since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MatsLpStats {
+    /// Number of states of an agent whose evaluation a search requested.
+    pub num_requests: u64,
+    /// Number of states that the network evaluated; the others were known.
+    pub num_evaluated: u64,
+    /// Time in the network, added up over threads.
+    pub network_time: Duration,
+}
+
+impl std::ops::AddAssign for MatsLpStats {
+    fn add_assign(&mut self, other: Self) {
+        self.num_requests += other.num_requests;
+        self.num_evaluated += other.num_evaluated;
+        self.network_time += other.network_time;
+    }
 }
 
 impl Evaluator {
@@ -40,11 +62,13 @@ impl Evaluator {
             rows: FxHashMap::default(),
             outputs: Vec::new(),
             outlooks: Vec::new(),
+            stats: MatsLpStats::default(),
         }
     }
 
     /// Requests the outlook of a key; `write` writes its input if no earlier request has the same key.
     pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Answer {
+        self.stats.num_requests += 1;
         if let Some(&row) = self.rows.get(&key) {
             return Answer::Row(row);
         }
@@ -67,10 +91,13 @@ impl Evaluator {
     pub fn run(&mut self, cache: &Cache) -> Result<(), Error> {
         self.outputs.clear();
         self.outputs.resize(self.keys.len(), Evaluation::default());
+        let started = Instant::now();
         let inputs = self.inputs.chunks(Self::MAX_ROWS * self.input_len);
         for (inputs, outputs) in inputs.zip(self.outputs.chunks_mut(Self::MAX_ROWS)) {
             self.network.evaluate(inputs, outputs)?;
         }
+        self.stats.num_evaluated += self.keys.len() as u64;
+        self.stats.network_time += started.elapsed();
         self.outlooks.clear();
         for (&key, output) in self.keys.iter().zip(&self.outputs) {
             let outlook = outlook(output);
@@ -79,10 +106,20 @@ impl Evaluator {
             }
             self.outlooks.push(outlook);
         }
+        self.clear();
+        Ok(())
+    }
+
+    /// Forgets the requests of a batch that was not run.
+    pub fn clear(&mut self) {
         self.inputs.clear();
         self.keys.clear();
         self.rows.clear();
-        Ok(())
+    }
+
+    /// Returns the work since the evaluator was made.
+    pub fn stats(&self) -> MatsLpStats {
+        self.stats
     }
 
     /// Returns the outlook of a request of the batch that was run last; `None` if the network's outputs are not finite.

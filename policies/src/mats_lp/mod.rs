@@ -28,6 +28,7 @@ mod tree;
 mod workers;
 mod world;
 
+pub use evaluator::MatsLpStats;
 pub use network_prior::NetworkPrior;
 pub use params::MatsLpParams;
 pub use policy::MatsLp;

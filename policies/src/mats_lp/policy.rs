@@ -7,7 +7,7 @@ use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads};
 use pogema_planners::GoalForecast;
 
 use crate::mats_lp::cache::{Cache, Key};
-use crate::mats_lp::evaluator::Evaluator;
+use crate::mats_lp::evaluator::{Evaluator, MatsLpStats};
 use crate::mats_lp::group::Groups;
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::prior::Prior;
@@ -67,6 +67,15 @@ impl MatsLp {
     #[must_use]
     pub fn with_cancellation(self, cancelled: Option<Arc<AtomicBool>>) -> Self {
         Self { cancelled, ..self }
+    }
+
+    /// Returns the work since the policy was made.
+    pub fn stats(&self) -> MatsLpStats {
+        let mut stats = MatsLpStats::default();
+        for evaluator in &self.evaluators {
+            stats += evaluator.stats();
+        }
+        stats
     }
 
     /// Begins an episode, of which it reads the map and all goals.

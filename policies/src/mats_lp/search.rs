@@ -6,19 +6,22 @@ use crate::mats_lp::cache::{Cache, Outlook};
 use crate::mats_lp::evaluator::{Answer, Evaluator};
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::simulation::Simulation;
-use crate::mats_lp::tree::{Choices, NodeId, Tree};
+use crate::mats_lp::tree::{Choices, NodeId, ROOT, Tree};
 
-/// The search of one agent, which advances by one expansion at a time.
+/// The search of one agent.
 ///
-/// Between [`Search::select`] and [`Search::expand`], the batch of the evaluator is run.
+/// It advances until it needs the network, so that one batch serves many searches. The published program runs the
+/// network at each new leaf. With `faithful`, the value of a leaf is 0, and its priors matter only when it is visited
+/// again. The network therefore runs at the second visit. That gives the same tree, and most leaves are visited once.
 pub(super) struct Search<'a> {
     params: MatsLpParams,
     simulation: Simulation<'a>,
     tree: Tree,
-    /// The nodes from the root to the leaf's parent, and the child that is the leaf.
+    /// The node that the current expansion has reached, and those above it from the root on.
+    node: NodeId,
     path: Vec<NodeId>,
-    leaf: u32,
-    reward: f32,
+    num_expansions: u32,
+    is_waiting: bool,
     answers: Vec<Answer>,
     outlooks: Vec<Outlook>,
     choices: Vec<Choices>,
@@ -29,13 +32,16 @@ impl<'a> Search<'a> {
     /// Creates the search of a group. Its own agent comes first.
     pub fn new(params: MatsLpParams, simulation: Simulation<'a>) -> Self {
         let actions = vec![Action::Stay; simulation.agents().len()];
+        let mut tree = Tree::new(params);
+        let node = tree.add(None, 0.0);
         Self {
             params,
             simulation,
-            tree: Tree::new(params),
+            tree,
+            node,
             path: Vec::new(),
-            leaf: 0,
-            reward: 0.0,
+            num_expansions: 0,
+            is_waiting: false,
             answers: Vec::new(),
             outlooks: Vec::new(),
             choices: Vec::new(),
@@ -43,31 +49,56 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Requests the evaluation of the root.
-    pub fn begin(&mut self, evaluator: &mut Evaluator, cache: &Cache, radius: usize) {
-        self.path.clear();
-        self.request(evaluator, cache, radius);
-    }
-
-    /// Follows the best children from the root to a new leaf, and requests its evaluation.
-    pub fn select(&mut self, evaluator: &mut Evaluator, cache: &Cache, radius: usize) {
-        self.simulation.restart();
-        self.path.clear();
-        let mut node = 0;
-        loop {
-            let child = self.tree.best_child(node);
-            self.tree.write_actions(node, child, &mut self.actions);
-            self.reward = self.simulation.step(&self.actions);
-            self.path.push(node);
-            match self.tree.child(node, child) {
-                Some(visited) => node = visited,
-                None => {
-                    self.leaf = child;
-                    break;
+    /// Advances until the evaluator has to be run, or to the end. Returns whether it is at the end.
+    ///
+    /// # Errors
+    /// The position in the group of the first agent for which the network's outputs are not finite.
+    pub fn advance(
+        &mut self,
+        evaluator: &mut Evaluator,
+        cache: &Cache,
+        radius: usize,
+    ) -> Result<bool, usize> {
+        while self.num_expansions < self.params.expansions {
+            if self.is_waiting {
+                self.is_waiting = false;
+                self.expand(evaluator)?;
+            } else if self.tree.is_expanded(self.node) {
+                self.descend();
+            } else {
+                self.request(evaluator, cache, radius);
+                self.is_waiting = true;
+                if self.answers.iter().any(|answer| matches!(answer, Answer::Row(_))) {
+                    return Ok(false);
                 }
             }
         }
-        self.request(evaluator, cache, radius);
+        Ok(true)
+    }
+
+    /// Moves to the best child.
+    fn descend(&mut self) {
+        let index = self.tree.best_child(self.node);
+        self.tree.write_actions(self.node, index, &mut self.actions);
+        let reward = self.simulation.step(&self.actions);
+        self.path.push(self.node);
+        if let Some(visited) = self.tree.child(self.node, index) {
+            self.node = visited;
+            return;
+        }
+        self.node = self.tree.add(Some((self.node, index)), reward);
+        if self.params.faithful {
+            self.back_up(0.0);
+        }
+    }
+
+    /// Adds the value of a new leaf to all nodes above, and returns to the root.
+    fn back_up(&mut self, value: f32) {
+        self.tree.back_up(&self.path, self.node, value);
+        self.simulation.restart();
+        self.path.clear();
+        self.node = ROOT;
+        self.num_expansions += 1;
     }
 
     fn request(&mut self, evaluator: &mut Evaluator, cache: &Cache, radius: usize) {
@@ -80,11 +111,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Adds the evaluated leaf to the tree and its value to all nodes above.
-    ///
-    /// # Errors
-    /// The position in the group of the first agent for which the network's outputs are not finite.
-    pub fn expand(&mut self, evaluator: &Evaluator) -> Result<(), usize> {
+    /// Adds the children of the node that was evaluated.
+    fn expand(&mut self, evaluator: &Evaluator) -> Result<(), usize> {
         self.outlooks.clear();
         for (position, &answer) in self.answers.iter().enumerate() {
             self.outlooks.push(evaluator.outlook(answer).ok_or(position)?);
@@ -103,30 +131,22 @@ impl<'a> Search<'a> {
             };
             self.choices.push(choice);
         }
-        let value = self.leaf_value();
-        let Some(&parent) = self.path.last() else {
-            self.tree.add(&self.choices, &self.outlooks, 0.0, value);
-            return Ok(());
-        };
-        let leaf = self.tree.add(&self.choices, &self.outlooks, self.reward, value);
-        self.tree.set_child(parent, self.leaf, leaf);
-        self.tree.back_up(&self.path, leaf, value);
-        Ok(())
-    }
-
-    /// Returns the mean of the critic's values, which the published program does not read.
-    fn leaf_value(&self) -> f32 {
-        if self.params.faithful {
-            return 0.0;
+        self.tree.expand(self.node, &self.choices, &self.outlooks);
+        if !self.params.faithful {
+            let sum: f32 = self.outlooks.iter().map(|outlook| outlook.value).sum();
+            let value = sum / self.outlooks.len() as f32;
+            self.tree.set_value(self.node, value);
+            if self.node != ROOT {
+                self.back_up(value);
+            }
         }
-        let sum: f32 = self.outlooks.iter().map(|outlook| outlook.value).sum();
-        sum / self.outlooks.len() as f32
+        Ok(())
     }
 
     /// Returns the agent's own action in the most visited joint action.
     pub fn answer(&mut self) -> Action {
         let child = self.tree.most_visited();
-        self.tree.write_actions(0, child, &mut self.actions);
+        self.tree.write_actions(ROOT, child, &mut self.actions);
         self.actions[0]
     }
 }

@@ -5,20 +5,24 @@ use pogema_core::Action;
 use crate::mats_lp::cache::Outlook;
 use crate::mats_lp::params::MatsLpParams;
 
-/// The index of a visited node. The root has 0.
+/// The index of a visited node.
 pub(super) type NodeId = u32;
 
-/// The entry of a child that has not been visited.
-const UNVISITED: NodeId = 0;
+/// The root.
+pub(super) const ROOT: NodeId = 0;
+
+/// The entry of a child that has not been visited. The root is no child.
+const UNVISITED: NodeId = ROOT;
 
 /// A visited node. Its children are joint actions of the group.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Node {
     num_visits: u32,
     value_sum: f64,
     /// Reward of the step that leads to this node.
     reward: f64,
     first_child: u32,
+    /// 0 until the node is expanded.
     num_children: u32,
     first_choice: u32,
 }
@@ -28,7 +32,7 @@ pub(super) type Choices = u8;
 
 /// All nodes of a search.
 ///
-/// Every visited node has been evaluated, so it has children. A child is stored as its prior alone until it is visited.
+/// A child is stored as its prior alone until it is visited.
 #[derive(Debug)]
 pub(super) struct Tree {
     params: MatsLpParams,
@@ -74,12 +78,32 @@ impl Tree {
         }
     }
 
-    /// Adds an evaluated node with one visit, whose children combine the choices of the agents.
+    /// Adds a node with one visit and the value 0, as a child of another. The root has no parent.
+    pub fn add(&mut self, parent: Option<(NodeId, u32)>, reward: f32) -> NodeId {
+        let id = self.nodes.len() as NodeId;
+        if let Some((parent, index)) = parent {
+            self.children[(self.nodes[parent as usize].first_child + index) as usize] = id;
+        }
+        let reward = f64::from(reward);
+        self.nodes.push(Node { num_visits: 1, value_sum: 0.0, reward, ..Node::default() });
+        id
+    }
+
+    /// Returns whether a node has children.
+    pub fn is_expanded(&self, node: NodeId) -> bool {
+        self.nodes[node as usize].num_children > 0
+    }
+
+    /// Sets the value of a node that has been visited once.
+    pub fn set_value(&mut self, node: NodeId, value: f32) {
+        self.nodes[node as usize].value_sum = f64::from(value);
+    }
+
+    /// Adds the children of a node, which combine the choices of the agents.
     ///
     /// The first agent's action varies fastest from child to child. An agent with a single choice adds no factor to the
-    /// priors. The first node is the root, with the uniform share of the parameters.
-    pub fn add(&mut self, choices: &[Choices], outlooks: &[Outlook], reward: f32, value: f32) -> NodeId {
-        let id = self.nodes.len() as NodeId;
+    /// priors. Those of the root get the uniform share of the parameters.
+    pub fn expand(&mut self, id: NodeId, choices: &[Choices], outlooks: &[Outlook]) {
         let first_child = self.priors.len();
         self.priors.push(1.0);
         for (&choice, outlook) in choices.iter().zip(outlooks) {
@@ -89,20 +113,15 @@ impl Tree {
         }
         let priors = &mut self.priors[first_child..];
         share_out(priors);
-        if id == 0 {
+        if id == ROOT {
             mix_with_uniform(priors, self.params.root_noise as f32);
         }
         self.children.resize(self.priors.len(), UNVISITED);
-        self.nodes.push(Node {
-            num_visits: 1,
-            value_sum: f64::from(value),
-            reward: f64::from(reward),
-            first_child: first_child as u32,
-            num_children: (self.priors.len() - first_child) as u32,
-            first_choice: self.choices.len() as u32,
-        });
+        let node = &mut self.nodes[id as usize];
+        node.first_child = first_child as u32;
+        node.num_children = (self.priors.len() - first_child) as u32;
+        node.first_choice = self.choices.len() as u32;
         self.choices.extend_from_slice(choices);
-        id
     }
 
     /// Combines the joint actions from `first` on with the choices of one more agent.
@@ -156,11 +175,6 @@ impl Tree {
         (child != UNVISITED).then_some(child)
     }
 
-    /// Records the node of a child that is visited for the first time.
-    pub fn set_child(&mut self, node: NodeId, index: u32, child: NodeId) {
-        self.children[(self.nodes[node as usize].first_child + index) as usize] = child;
-    }
-
     /// Writes the joint action of a child, one action per agent.
     pub fn write_actions(&self, node: NodeId, index: u32, actions: &mut [Action]) {
         let first = self.nodes[node as usize].first_choice as usize;
@@ -191,8 +205,8 @@ impl Tree {
 
     /// Returns the most visited child of the root; the first of equals.
     pub fn most_visited(&self) -> u32 {
-        let visits = |index| self.child(0, index).map_or(0, |child| self.nodes[child as usize].num_visits);
-        let num_children = self.nodes[0].num_children;
+        let visits = |index| self.child(ROOT, index).map_or(0, |child| self.nodes[child as usize].num_visits);
+        let num_children = self.nodes[ROOT as usize].num_children;
         (0..num_children).fold(0, |best, index| if visits(index) > visits(best) { index } else { best })
     }
 }

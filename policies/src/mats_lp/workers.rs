@@ -86,30 +86,28 @@ impl From<Error> for Failure {
     }
 }
 
-/// Searches for some groups in lockstep, on one thread.
+/// Searches for some groups on one thread. All searches that need the network share its batches.
 fn search_some(
     task: &Task<'_>,
     groups: Vec<Vec<usize>>,
     evaluator: &mut Evaluator,
 ) -> Result<Answers, Failure> {
-    let Task { params, radius, cache, .. } = *task;
     let mut searches: Vec<(&[usize], Search<'_>)> =
         groups.iter().map(|group| (group.as_slice(), new_search(task, group))).collect();
+    // An error may have left requests of another episode.
+    evaluator.clear();
+    let mut answers = Vec::new();
     let mut failed: Option<Failure> = None;
-    for round in 0..=params.expansions {
+    while !searches.is_empty() {
         if task.cancelled.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
             return Err(Error::Cancelled.into());
         }
-        for (_, search) in &mut searches {
-            if round == 0 {
-                search.begin(evaluator, cache, radius);
-            } else {
-                search.select(evaluator, cache, radius);
+        searches.retain_mut(|(group, search)| match search.advance(evaluator, task.cache, task.radius) {
+            Ok(false) => true,
+            Ok(true) => {
+                answers.push((group[0], search.answer()));
+                false
             }
-        }
-        evaluator.run(cache)?;
-        searches.retain_mut(|(group, search)| match search.expand(evaluator) {
-            Ok(()) => true,
             Err(position) => {
                 let failure = not_finite(task, group, position);
                 if failed.as_ref().is_none_or(|failed| failure.agent < failed.agent) {
@@ -118,11 +116,9 @@ fn search_some(
                 false
             }
         });
+        evaluator.run(task.cache)?;
     }
-    match failed {
-        Some(failure) => Err(failure),
-        None => Ok(searches.iter_mut().map(|(group, search)| (group[0], search.answer())).collect()),
-    }
+    failed.map_or(Ok(answers), Err)
 }
 
 fn new_search<'a>(task: &Task<'a>, group: &[usize]) -> Search<'a> {

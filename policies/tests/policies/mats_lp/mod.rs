@@ -257,7 +257,7 @@ fn logits_that_are_not_numbers_name_agent_and_step() -> Result<(), Error> {
     for threads in [1, 2, 8] {
         let made = instance(&rows, &[[0, 0], [1, 0], [2, 1]], &[[0, 1], [1, 1], [2, 4]])?;
         let mut episode = start(made, OnGoal::Restart)?;
-        let params = MatsLpParams { expansions: 1, merging_range: 1, ..MatsLpParams::default() };
+        let params = MatsLpParams { expansions: 3, merging_range: 1, ..MatsLpParams::default() };
         let mut policy = MatsLp::new(&faulty(None), params, threads)?;
         policy.begin(episode.instance()?, OnGoal::Restart);
         for _ in 0..2 {
