@@ -3,6 +3,7 @@
 use super::architecture::{Architecture, Layer};
 use super::gru::Gru;
 use super::layers::{Activation, Convolution, Dense, Piece};
+use super::slots;
 use super::steps::{FlatStep, Heads, PlaneStep, Steps};
 use super::tensors::Tensors;
 use crate::simd::{LANES, Plane};
@@ -31,7 +32,9 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Step
     let (dense, num_actions) =
         Dense::take_heads(builder.tensors, &architecture.actions, value, &flat.pieces)?;
     builder.tensors.check_all_taken()?;
-    Ok((builder.steps, Heads { dense, input: last, num_actions }))
+    let (mut steps, mut heads) = (builder.steps, Heads { dense, input: last, num_actions });
+    slots::share(&mut steps, &mut heads);
+    Ok((steps, heads))
 }
 
 /// Returns the widest padding of any convolution, which is the margin of all planes.
@@ -71,7 +74,7 @@ enum Value {
 }
 
 /// The values of an agent that are a list.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Flat {
     pub pieces: Vec<Piece>,
 }

@@ -2,7 +2,7 @@
 
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
-use crate::simd::Path;
+use crate::simd::{AGENTS, Path};
 
 /// A recurrent layer. Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
 #[derive(Debug)]
@@ -55,15 +55,36 @@ impl Gru {
             for (index, value) in state.iter_mut().enumerate() {
                 let gate =
                     |gate: usize| (of_input[gate * self.size + index], of_state[gate * self.size + index]);
-                let [(reset, reset_state), (update, update_state), (new, new_state)] = [0, 1, 2].map(gate);
-                let reset = sigmoid(reset + reset_state);
-                let update = sigmoid(update + update_state);
-                let new = libm::tanhf(new + reset * new_state);
-                *value = (1.0 - update) * new + update * *value;
+                *value = next([0, 1, 2].map(gate), *value);
             }
             output.values[row * output.stride..][..self.size].copy_from_slice(state);
         }
     }
+
+    /// Runs a step of 16 agents whose values lie side by side. `state` is also the output.
+    pub fn run_agents(&self, path: Path, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
+        let num_values = self.size * AGENTS;
+        let (of_input, rest) = scratch.split_at_mut(3 * num_values);
+        let of_state = &mut rest[..3 * num_values];
+        self.of_input.run_agents(path, input, false, of_input);
+        self.of_state.run_agents(path, state, false, of_state);
+        for (index, value) in state.iter_mut().enumerate() {
+            let gate =
+                |gate: usize| (of_input[gate * num_values + index], of_state[gate * num_values + index]);
+            *value = next([0, 1, 2].map(gate), *value);
+        }
+    }
+}
+
+/// Returns the next value of a state from what the input and the state add to each gate.
+fn next(
+    [(reset, reset_state), (update, update_state), (new, new_state)]: [(f32, f32); 3],
+    value: f32,
+) -> f32 {
+    let reset = sigmoid(reset + reset_state);
+    let update = sigmoid(update + update_state);
+    let new = libm::tanhf(new + reset * new_state);
+    (1.0 - update) * new + update * value
 }
 
 /// The states of some rows, each `stride` after the one before.

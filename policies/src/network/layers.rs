@@ -1,7 +1,9 @@
 //! Layers with their weights, packed for the kernels.
 
 use super::tensors::{Tensor, Tensors};
-use crate::simd::{self, BLOCK, Convolve, LANES, Multiply, Path, Plane, Shape};
+use crate::simd::{
+    self, BLOCK, Convolve, ConvolveAgents, LANES, Multiply, MultiplyAgents, Path, Plane, Shape,
+};
 
 /// A function of each value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +60,22 @@ impl Convolution {
     pub fn run(&self, path: Path, input: &[f32], added: Option<&[f32]>, relu: bool, output: &mut [f32]) {
         let Self { shape, weights, bias } = self;
         simd::convolve(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
+    }
+
+    /// Runs the layer for 16 agents whose values lie side by side.
+    pub fn run_agents(
+        &self,
+        path: Path,
+        input: &[f32],
+        added: Option<&[f32]>,
+        relu: bool,
+        output: &mut [f32],
+    ) {
+        let Self { shape, weights, bias } = self;
+        simd::convolve_agents(
+            path,
+            ConvolveAgents { input, output, added, weights, bias, shape: *shape, relu },
+        );
     }
 }
 
@@ -171,6 +189,12 @@ impl Dense {
             path,
             Multiply { input, output, weights, bias, num_inputs, input_stride, num_rows, relu },
         );
+    }
+
+    /// Runs the layer for 16 agents whose values lie side by side.
+    pub fn run_agents(&self, path: Path, input: &[f32], relu: bool, output: &mut [f32]) {
+        let Self { weights, bias, .. } = self;
+        simd::multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu });
     }
 }
 

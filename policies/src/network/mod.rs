@@ -3,6 +3,7 @@
 //! A [`Network`] is read from a file of weights and a JSON that names its layers. Its results have the same bits for any
 //! size of a batch, on any machine and with any vector instructions: each output is a sum whose order is fixed.
 
+mod agents;
 mod architecture;
 mod build;
 mod config;
@@ -10,6 +11,7 @@ mod error;
 mod file;
 mod gru;
 mod layers;
+mod slots;
 mod softmax;
 mod steps;
 mod tensors;
@@ -26,7 +28,8 @@ pub use config::{Channel, EncoderConfig, NetworkConfig, Sampling, SamplingConfig
 pub use error::ForwardError;
 pub use softmax::softmax;
 
-use crate::simd::Path;
+use crate::simd::{AGENTS, Path};
+use agents::AgentBuffers;
 use steps::{Buffers, GROUP, Group, Heads, Steps};
 use tensors::Tensors;
 
@@ -69,6 +72,7 @@ pub struct Outputs<'a> {
 #[derive(Clone, Debug)]
 pub struct Workspace {
     buffers: Buffers,
+    agents: AgentBuffers,
     heads: Vec<f32>,
     logits: Vec<f32>,
     values: Vec<f32>,
@@ -165,8 +169,14 @@ impl Network {
 
     /// Creates the buffers that a thread needs to run this network.
     pub fn workspace(&self) -> Workspace {
-        let heads = vec![0.0; GROUP * self.0.heads.dense.stride()];
-        Workspace { buffers: Buffers::new(&self.0.steps), heads, logits: Vec::new(), values: Vec::new() }
+        let (steps, heads) = (&self.0.steps, &self.0.heads);
+        Workspace {
+            buffers: Buffers::new(steps),
+            agents: AgentBuffers::new(steps, heads),
+            heads: vec![0.0; GROUP * heads.dense.stride()],
+            logits: Vec::new(),
+            values: Vec::new(),
+        }
     }
 
     /// Computes the logits of a batch and updates the state of its agents.
@@ -193,17 +203,14 @@ impl Network {
         check("the recurrent state", state.values.len(), size)?;
         workspace.logits.clear();
         workspace.values.clear();
-        for first in (0..inputs.batch).step_by(GROUP) {
-            let num_agents = GROUP.min(inputs.batch - first);
-            let windows = &inputs.windows[first * window..][..num_agents * window];
+        for first in (0..inputs.batch).step_by(AGENTS) {
+            let num_agents = AGENTS.min(inputs.batch - first);
             let group = Group {
                 num_agents,
-                windows,
+                windows: &inputs.windows[first * window..][..num_agents * window],
                 scalars: &inputs.scalars[first * scalars..][..num_agents * scalars],
             };
-            let states = &mut state.values[first * size..][..num_agents * size];
-            self.0.steps.run(self.0.path, group, states, &mut workspace.buffers);
-            self.run_heads(num_agents, workspace);
+            self.run(group, &mut state.values[first * size..][..num_agents * size], workspace);
         }
         let actions = self.num_actions();
         let logits =
@@ -215,13 +222,25 @@ impl Network {
         }
     }
 
-    fn run_heads(&self, num_agents: usize, workspace: &mut Workspace) {
-        let Heads { dense, input, num_actions } = &self.0.heads;
-        let rows = self.0.steps.rows(*input, &workspace.buffers.flats);
-        dense.run(self.0.path, num_agents, rows, false, &mut workspace.heads);
-        for row in workspace.heads.chunks_exact(dense.stride()).take(num_agents) {
-            workspace.logits.extend(&row[..*num_actions]);
-            workspace.values.extend(&row[*num_actions..dense.num_outputs]);
+    /// Computes the outputs of up to 16 agents.
+    fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
+        let Inner { steps, heads, path, .. } = &*self.0;
+        let Workspace { buffers, agents, heads: outputs, logits, values } = workspace;
+        let num_outputs = heads.dense.num_outputs;
+        if group.num_agents > steps.most_apart() {
+            steps.run_agents(*path, group, heads, states, agents);
+            for agent in 0..group.num_agents {
+                logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
+                values.extend((heads.num_actions..num_outputs).map(|output| agents.output(agent, output)));
+            }
+            return;
+        }
+        steps.run(*path, group, states, buffers);
+        let rows = steps.rows(heads.input, &buffers.flats);
+        heads.dense.run(*path, group.num_agents, rows, false, outputs);
+        for row in outputs.chunks_exact(heads.dense.stride()).take(group.num_agents) {
+            logits.extend(&row[..heads.num_actions]);
+            values.extend(&row[heads.num_actions..num_outputs]);
         }
     }
 }

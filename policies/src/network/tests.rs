@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 use proptest::prelude::*;
+use proptest::sample::select;
 
 use super::tensors::Tensors;
 use super::*;
@@ -70,7 +71,7 @@ proptest! {
     #[test]
     fn a_convolution_equals_its_definition(
         seed: u64, channels in 1..20usize, outputs in 1..40usize, rows in 1..9usize, cols in 1..16usize,
-        kernel in [1..4usize, 1..4usize], padding in 0..3usize, batch in 1..4usize,
+        kernel in [1..4usize, 1..4usize], padding in 0..3usize, batch in select(vec![1usize, 2, 5, 16, 23]),
     ) {
         prop_assume!(padding < kernel[0].min(kernel[1]));
         prop_assume!(rows + 2 * padding >= kernel[0] && cols + 2 * padding >= kernel[1]);

@@ -5,6 +5,7 @@ use std::arch::x86_64::{
     _mm256_setzero_ps, _mm256_storeu_ps,
 };
 
+use super::agents::{self, ConvolveAgents, MultiplyAgents};
 use super::kernels::{self, Convolve, Multiply};
 use super::lanes::Lanes;
 
@@ -63,4 +64,20 @@ pub unsafe fn convolve(job: &mut Convolve<'_>) {
 pub unsafe fn multiply(job: &mut Multiply<'_>) {
     // SAFETY: as above.
     unsafe { kernels::multiply::<Avx2>(job) }
+}
+
+/// # Safety
+/// The machine supports AVX2 and FMA, and the job was checked.
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn convolve_agents(job: &mut ConvolveAgents<'_>) {
+    // SAFETY: as above.
+    unsafe { agents::convolve::<Avx2, 2, 4>(job) }
+}
+
+/// # Safety
+/// The machine supports AVX2 and FMA, and the job was checked.
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn multiply_agents(job: &mut MultiplyAgents<'_>) {
+    // SAFETY: as above.
+    unsafe { agents::multiply::<Avx2, 2, 1>(job) }
 }

@@ -1,7 +1,7 @@
 //! The loops of convolutions and dense layers, for vectors of any kind.
 //!
 //! Vectors hold adjacent output channels. Each output is a sum of its own, whose terms are added in a fixed order. It
-//! therefore depends neither on the width of the vectors, nor on the size of a batch.
+//! therefore depends neither on the width of the vectors, nor on the size of a batch. `agents` has the same sums.
 
 use super::lanes::Lanes;
 use super::{BLOCK, CHAINS, LANES, Shape};
@@ -146,6 +146,7 @@ impl Part {
             for (index, sums) in sums.into_iter().enumerate() {
                 for (vector, mut sum) in sums.into_iter().enumerate() {
                     let at = index * shape.output.stride + vector * V::COUNT;
+                    sum = sum.add(V::splat(0.0));
                     if self.is_added {
                         sum = sum.add(V::load(row.added.add(at)));
                     }

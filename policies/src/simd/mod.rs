@@ -3,14 +3,20 @@
 //! All paths return the same bits. They fuse each multiplication with its addition, which IEEE 754 defines exactly, and
 //! add in the same order. The tests compare all paths that the machine supports.
 
+#[allow(unsafe_code, reason = "pointers that the jobs' checks cover")]
+mod agents;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "256-bit intrinsics")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "512-bit intrinsics")]
+mod avx512;
 #[allow(unsafe_code, reason = "pointers that the jobs' checks cover")]
 mod kernels;
 #[allow(unsafe_code, reason = "vectors read and write through pointers")]
 mod lanes;
 
+pub use agents::{ConvolveAgents, MultiplyAgents};
 pub use kernels::{Convolve, Multiply};
 
 /// Number of floats in a vector. The channels of activations are padded to a multiple of it.
@@ -18,6 +24,9 @@ pub const LANES: usize = 8;
 
 /// Number of output channels that are computed together.
 pub const BLOCK: usize = 2 * LANES;
+
+/// Number of agents whose values lie side by side in the kernels for many agents.
+pub const AGENTS: usize = 16;
 
 /// Number of partial sums of each output of a dense layer.
 const CHAINS: usize = 4;
@@ -30,15 +39,22 @@ pub enum Path {
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// AVX2, FMA and AVX-512 F.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl Path {
     /// Returns all paths that this machine supports, the fastest last.
     pub fn available() -> impl Iterator<Item = Self> {
+        #[cfg(target_arch = "x86_64")]
+        let has_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         let all = [
             Some(Self::Portable),
             #[cfg(target_arch = "x86_64")]
-            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(Self::Avx2),
+            has_avx2.then_some(Self::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            (has_avx2 && is_x86_feature_detected!("avx512f")).then_some(Self::Avx512),
         ];
         all.into_iter().flatten()
     }
@@ -70,6 +86,11 @@ impl Plane {
     /// Returns the number of floats.
     pub fn len(&self) -> usize {
         self.rows * self.row_len()
+    }
+
+    /// Returns the number of values, without margins and padding.
+    pub fn num_values(&self) -> usize {
+        self.rows * self.cols * self.channels
     }
 
     /// Returns the index of a pixel.
@@ -107,22 +128,52 @@ pub fn relu(value: f32) -> f32 {
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
 pub fn convolve(path: Path, mut job: Convolve<'_>) {
-    let Shape { input, output, kernel: [rows, cols], padding } = job.shape;
-    assert_eq!(output.rows + rows, input.rows + 2 * padding + 1);
-    assert_eq!(output.cols + cols, input.cols + 2 * padding + 1);
-    assert!(padding <= input.margin && padding < rows && padding < cols && input.channels <= input.stride);
-    assert_eq!(output.stride % LANES, 0);
+    let Shape { input, output, .. } = job.shape;
+    check(&job.shape, job.weights, job.bias);
     assert_eq!((job.input.len(), job.output.len()), (input.len(), output.len()));
     assert!(job.added.is_none_or(|added| added.len() == output.len()));
-    assert_eq!(job.weights.len(), rows * cols * input.channels * output.stride);
-    assert_eq!(job.bias.len(), output.stride);
     // SAFETY: the asserts above: with `padding` inside the margins, each tap lies inside its row, and the kernels skip
     // the rows outside the input. `Path` only exists for what the machine supports.
     match path {
         Path::Portable => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::convolve(&mut job) },
+        Path::Avx2 | Path::Avx512 => unsafe { avx2::convolve(&mut job) },
     }
+}
+
+/// Runs a convolution of 16 agents.
+///
+/// # Panics
+/// If a slice does not fit the shape.
+#[allow(unsafe_code, reason = "the kernels read through pointers")]
+pub fn convolve_agents(path: Path, mut job: ConvolveAgents<'_>) {
+    let Shape { input, output, .. } = job.shape;
+    check(&job.shape, job.weights, job.bias);
+    assert_eq!(
+        (job.input.len(), job.output.len()),
+        (input.num_values() * AGENTS, output.num_values() * AGENTS)
+    );
+    assert!(job.added.is_none_or(|added| added.len() == job.output.len()));
+    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Path` only exists for what the machine
+    // supports.
+    match path {
+        Path::Portable => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx2 => unsafe { avx2::convolve_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx512 => unsafe { avx512::convolve_agents(&mut job) },
+    }
+}
+
+/// Checks that weights and planes fit together.
+fn check(shape: &Shape, weights: &[f32], bias: &[f32]) {
+    let Shape { input, output, kernel: [rows, cols], padding } = *shape;
+    assert_eq!(output.rows + rows, input.rows + 2 * padding + 1);
+    assert_eq!(output.cols + cols, input.cols + 2 * padding + 1);
+    assert!(padding <= input.margin && padding < rows && padding < cols && input.channels <= input.stride);
+    assert_eq!(output.stride, output.channels.next_multiple_of(LANES));
+    assert_eq!(weights.len(), rows * cols * input.channels * output.stride);
+    assert_eq!(bias.len(), output.stride);
 }
 
 /// Runs a dense layer.
@@ -141,6 +192,25 @@ pub fn multiply(path: Path, mut job: Multiply<'_>) {
     match path {
         Path::Portable => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::multiply(&mut job) },
+        Path::Avx2 | Path::Avx512 => unsafe { avx2::multiply(&mut job) },
+    }
+}
+
+/// Runs a dense layer of 16 agents.
+///
+/// # Panics
+/// If a slice does not fit the numbers of inputs and outputs.
+#[allow(unsafe_code, reason = "the kernels read through pointers")]
+pub fn multiply_agents(path: Path, mut job: MultiplyAgents<'_>) {
+    assert_eq!((job.input.len() % AGENTS, job.output.len() % AGENTS), (0, 0));
+    assert_eq!(job.bias.len(), (job.output.len() / AGENTS).next_multiple_of(LANES));
+    assert_eq!(job.weights.len(), job.bias.len() * (job.input.len() / AGENTS));
+    // SAFETY: the asserts above, and `Path` only exists for what the machine supports.
+    match path {
+        Path::Portable => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx2 => unsafe { avx2::multiply_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx512 => unsafe { avx512::multiply_agents(&mut job) },
     }
 }

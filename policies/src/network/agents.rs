@@ -1,0 +1,114 @@
+//! Runs the steps for 16 agents whose values lie side by side: each list holds, for each value, that of every agent.
+
+use super::steps::{FlatStep, Group, Heads, PlaneStep, Steps, add, write};
+use crate::simd::{AGENTS, Path};
+
+/// The buffers of 16 agents.
+#[derive(Clone, Debug)]
+pub struct AgentBuffers {
+    planes: Vec<Vec<f32>>,
+    flats: Vec<Vec<f32>>,
+    states: Vec<f32>,
+    scratch: Vec<f32>,
+    heads: Vec<f32>,
+}
+
+impl AgentBuffers {
+    pub fn new(steps: &Steps, heads: &Heads) -> Self {
+        let zeros = |num_values: usize| vec![0.0; AGENTS * num_values];
+        Self {
+            planes: steps.planes.iter().map(|plane| zeros(plane.num_values())).collect(),
+            flats: steps.flats.iter().map(|flat| zeros(flat.len())).collect(),
+            states: zeros(steps.state_size),
+            scratch: zeros(steps.scratch()),
+            heads: zeros(heads.dense.num_outputs),
+        }
+    }
+
+    /// Returns an output of an agent.
+    pub fn output(&self, agent: usize, output: usize) -> f32 {
+        self.heads[output * AGENTS + agent]
+    }
+}
+
+impl Steps {
+    /// Computes the outputs of up to 16 agents. The values of the agents that are missing are those of an earlier call.
+    pub fn run_agents(
+        &self,
+        path: Path,
+        group: Group<'_>,
+        heads: &Heads,
+        states: &mut [f32],
+        buffers: &mut AgentBuffers,
+    ) {
+        let [rows, cols, channels] = [self.planes[0].rows, self.planes[0].cols, self.planes[0].channels];
+        for (agent, window) in group.windows.chunks_exact(rows * cols * channels).enumerate() {
+            for (channel, values) in window.chunks_exact(rows * cols).enumerate() {
+                let to = buffers.planes[0].chunks_exact_mut(channels * AGENTS);
+                to.zip(values).for_each(|(pixel, value)| pixel[channel * AGENTS + agent] = *value);
+            }
+        }
+        interleave(states, self.state_size, &mut buffers.states);
+        for step in &self.of_planes {
+            run_planes(path, step, buffers);
+        }
+        for step in &self.of_flats {
+            self.run_flats_of_agents(path, step, group, buffers);
+        }
+        for (agent, state) in states.chunks_exact_mut(self.state_size.max(1)).enumerate() {
+            let from = buffers.states.chunks_exact(AGENTS);
+            state.iter_mut().zip(from).for_each(|(value, agents)| *value = agents[agent]);
+        }
+        heads.dense.run_agents(path, &buffers.flats[heads.input], false, &mut buffers.heads);
+    }
+
+    fn run_flats_of_agents(&self, path: Path, step: &FlatStep, group: Group<'_>, buffers: &mut AgentBuffers) {
+        let AgentBuffers { flats, states, scratch, .. } = buffers;
+        match step {
+            FlatStep::Dense { dense, input, relu, output } => {
+                write(flats, *output, |flats, to| dense.run_agents(path, &flats[*input], *relu, to));
+            }
+            FlatStep::Activate { activation, input, output } => write(flats, *output, |flats, to| {
+                to.copy_from_slice(&flats[*input]);
+                activation.apply(to);
+            }),
+            FlatStep::Add { inputs, output } => write(flats, *output, |flats, to| add(flats, *inputs, to)),
+            FlatStep::Gru { gru, input, offset, output } => write(flats, *output, |flats, to| {
+                let state = &mut states[offset * AGENTS..][..gru.size * AGENTS];
+                gru.run_agents(path, &flats[*input], state, scratch);
+                to.copy_from_slice(state);
+            }),
+            FlatStep::Scalars { output } => interleave(group.scalars, self.num_scalars, &mut flats[*output]),
+            FlatStep::Join { inputs, output } => write(flats, *output, |flats, to| {
+                let (one, other) = to.split_at_mut(flats[inputs[0]].len());
+                one.copy_from_slice(&flats[inputs[0]]);
+                other.copy_from_slice(&flats[inputs[1]]);
+            }),
+        }
+    }
+}
+
+fn run_planes(path: Path, step: &PlaneStep, buffers: &mut AgentBuffers) {
+    let AgentBuffers { planes, flats, .. } = buffers;
+    match step {
+        PlaneStep::Convolve { convolution, input, added, relu, output } => {
+            write(planes, *output, |planes, to| {
+                let added = added.map(|slot| &*planes[slot]);
+                convolution.run_agents(path, &planes[*input], added, *relu, to);
+            });
+        }
+        PlaneStep::Activate { activation, input, output } => write(planes, *output, |planes, to| {
+            to.copy_from_slice(&planes[*input]);
+            activation.apply(to);
+        }),
+        PlaneStep::Add { inputs, output } => write(planes, *output, |planes, to| add(planes, *inputs, to)),
+        PlaneStep::Flatten { input, output } => flats[*output].copy_from_slice(&planes[*input]),
+    }
+}
+
+/// Writes lists of agents as agents of values.
+fn interleave(lists: &[f32], len: usize, to: &mut [f32]) {
+    for (agent, list) in lists.chunks_exact(len.max(1)).enumerate() {
+        to.chunks_exact_mut(AGENTS).zip(list).for_each(|(agents, value)| agents[agent] = *value);
+    }
+}

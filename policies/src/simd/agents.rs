@@ -1,0 +1,156 @@
+//! The loops for 16 agents, whose values lie side by side: each vector holds one value of every agent.
+//!
+//! The sums have the terms and the order of `kernels`, without the zeros of the margins. Those change at most the sign of
+//! a sum that is 0, and `+ 0.0` at its end removes that sign.
+
+use super::lanes::Lanes;
+use super::{AGENTS, BLOCK, CHAINS, LANES, Shape};
+
+/// A convolution of the windows of 16 agents. All slices hold rows of pixels of channels of agents, without margins.
+pub struct ConvolveAgents<'a> {
+    pub input: &'a [f32],
+    pub output: &'a mut [f32],
+    /// Added to the sums before the activation; laid out as the output.
+    pub added: Option<&'a [f32]>,
+    /// As those of `Convolve`.
+    pub weights: &'a [f32],
+    pub bias: &'a [f32],
+    pub shape: Shape,
+    pub relu: bool,
+}
+
+/// Output channels that are computed together, at all pixels: `V` holds some of the agents, `N` of them all 16.
+///
+/// # Safety
+/// `super::convolve_agents` checked the job, and the instruction set of `V` is enabled.
+#[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
+#[inline(always)]
+pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut ConvolveAgents<'_>) {
+    let Shape { output, input, kernel, .. } = job.shape;
+    let taps = kernel[0] * kernel[1] * input.channels;
+    for first in (0..output.channels).step_by(C) {
+        let block = first - first % BLOCK;
+        let width = BLOCK.min(output.stride - block);
+        for row in 0..output.rows {
+            for col in 0..output.cols {
+                // SAFETY: the block of `width` channels begins after `block * taps` weights.
+                unsafe {
+                    let weights = job.weights.as_ptr().add(block * taps + first - block);
+                    convolve_pixel::<V, N, C>(job, weights, width, first, [row, col]);
+                }
+            }
+        }
+    }
+}
+
+/// # Safety
+/// As for `convolve`.
+#[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
+#[inline(always)]
+unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
+    job: &mut ConvolveAgents<'_>,
+    weights: *const f32,
+    width: usize,
+    first: usize,
+    [row, col]: [usize; 2],
+) {
+    let Shape { output, input, kernel, padding } = job.shape;
+    let inside =
+        |at: usize, size: usize, kernel: usize| padding.saturating_sub(at)..kernel.min(size + padding - at);
+    let (down, right) = (inside(row, input.rows, kernel[0]), inside(col, input.cols, kernel[1]));
+    let channels = input.channels;
+    // SAFETY: the job was checked, and `inside` skips what lies outside the input.
+    unsafe {
+        let mut sums: [[V; N]; C] =
+            std::array::from_fn(|channel| [V::splat(*job.bias.as_ptr().add(first + channel)); N]);
+        for tap_row in down {
+            let pixel = (row + tap_row - padding) * input.cols + col + right.start - padding;
+            let mut values = job.input.as_ptr().add(pixel * channels * AGENTS);
+            let mut factors = weights.add((tap_row * kernel[1] + right.start) * channels * width);
+            // The pixels of a row adjoin, and so do their weights.
+            for _ in 0..right.len() * channels {
+                let value: [V; N] = std::array::from_fn(|vector| V::load(values.add(vector * V::COUNT)));
+                for (channel, sums) in sums.iter_mut().enumerate() {
+                    let factor = V::splat(*factors.add(channel));
+                    for (sum, value) in sums.iter_mut().zip(value) {
+                        *sum = value.mul_add(factor, *sum);
+                    }
+                }
+                values = values.add(AGENTS);
+                factors = factors.add(width);
+            }
+        }
+        let at = ((row * output.cols + col) * output.channels + first) * AGENTS;
+        for (channel, sums) in sums.into_iter().enumerate().take(output.channels - first) {
+            for (vector, sum) in sums.into_iter().enumerate() {
+                let at = at + channel * AGENTS + vector * V::COUNT;
+                let mut sum = sum.add(V::splat(0.0));
+                if let Some(added) = job.added {
+                    sum = sum.add(V::load(added.as_ptr().add(at)));
+                }
+                if job.relu {
+                    sum = sum.relu();
+                }
+                sum.store(job.output.as_mut_ptr().add(at));
+            }
+        }
+    }
+}
+
+/// A dense layer of 16 agents. Both lists hold values of agents.
+pub struct MultiplyAgents<'a> {
+    pub input: &'a [f32],
+    pub output: &'a mut [f32],
+    /// As those of `Multiply`.
+    pub weights: &'a [f32],
+    pub bias: &'a [f32],
+    pub relu: bool,
+}
+
+/// # Safety
+/// `super::multiply_agents` checked the job, and the instruction set of `V` is enabled.
+#[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
+#[inline(always)]
+pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut MultiplyAgents<'_>) {
+    let (num_inputs, num_outputs) = (job.input.len() / AGENTS, job.output.len() / AGENTS);
+    for first in (0..num_outputs).step_by(C) {
+        // SAFETY: the job was checked.
+        unsafe {
+            let block = first - first % LANES;
+            let weights = job.weights.as_ptr().add(block * num_inputs + first - block);
+            let mut sums = [[[V::splat(0.0); N]; C]; CHAINS];
+            let mut add = |chain: usize, index: usize| {
+                let value: [V; N] = std::array::from_fn(|vector| {
+                    V::load(job.input.as_ptr().add(index * AGENTS + vector * V::COUNT))
+                });
+                for (output, sums) in sums[chain].iter_mut().enumerate() {
+                    let factor = V::splat(*weights.add(index * LANES + output));
+                    for (sum, value) in sums.iter_mut().zip(value) {
+                        *sum = value.mul_add(factor, *sum);
+                    }
+                }
+            };
+            let whole = num_inputs - num_inputs % CHAINS;
+            for index in (0..whole).step_by(CHAINS) {
+                for chain in 0..CHAINS {
+                    add(chain, index + chain);
+                }
+            }
+            for index in whole..num_inputs {
+                add(index - whole, index);
+            }
+            for output in 0..C.min(num_outputs - first) {
+                let bias = V::splat(*job.bias.as_ptr().add(first + output));
+                for vector in 0..N {
+                    let [a, b, c, d] = std::array::from_fn(|chain| sums[chain][output][vector]);
+                    let mut sum = a.add(b).add(c.add(d)).add(bias);
+                    if job.relu {
+                        sum = sum.relu();
+                    }
+                    let at = (first + output) * AGENTS + vector * V::COUNT;
+                    sum.store(job.output.as_mut_ptr().add(at));
+                }
+            }
+        }
+    }
+}
