@@ -1,5 +1,6 @@
 //! `pogema run`: plays one episode.
 
+mod learned_args;
 mod policy;
 mod settings;
 
@@ -16,6 +17,7 @@ use crate::input::Input;
 use crate::output::{check_writable, in_one_line, print_json, print_line, tell, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
+use learned_args::LearnedArgs;
 use policy::ActionSource;
 pub use settings::Settings;
 
@@ -33,6 +35,8 @@ pub struct Run {
     input: Input,
     #[command(flatten)]
     planner_args: PlannerArgs,
+    #[command(flatten)]
+    learned_args: LearnedArgs,
     /// Provide future goals to `--policy rhcr`
     #[arg(long)]
     future_goals: bool,
@@ -54,7 +58,8 @@ impl Run {
         let config = self.settings.config()?;
         self.trace.as_deref().map_or(Ok(()), check_writable)?;
         self.pictures.check(config.num_agents)?;
-        let settings = self.planner_args.policy_settings(self.future_goals)?;
+        let mut settings = self.planner_args.policy_settings(self.future_goals)?;
+        settings.learned = self.learned_args.read(&self.policy)?;
         let generated = self.settings.generate(&config)?;
         for warning in &generated.warnings {
             tell(&format!("warning: {warning}"));

@@ -35,6 +35,7 @@
 //! | feature | adds |
 //! | --- | --- |
 //! | `planners` | [`planners`]: LaCAM*, CBS, RHCR, PIBT and POGEMA's own policies |
+//! | `policies` | [`policies`]: encoders, networks and learned policies |
 //! | `render` | [`render`]: SVG, PNG, GIF, video and replay pages |
 //! | `reference` | [`reference`](mod@reference): the rules as plain code, for comparison with other engines |
 //! | `toolbox` | [`toolbox`]: evaluations of many algorithms on many episodes |
@@ -56,6 +57,8 @@ pub use pogema_fast::{Autoreset, Batch, Engine, Instances, Observations, words_p
 pub use pogema_maps::{GridConfig, InstanceSource};
 #[cfg(feature = "planners")]
 pub use pogema_planners as planners;
+#[cfg(feature = "policies")]
+pub use pogema_policies as policies;
 #[cfg(feature = "reference")]
 pub use pogema_reference as reference;
 #[cfg(feature = "render")]

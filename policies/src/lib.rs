@@ -1,17 +1,24 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 //!
-//! An [`Encoder`] turns the states of an environment into what a policy sees. [`MatsLp`] searches with a network.
+//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] turns that into
+//! logits of its actions. [`MatsLp`] searches with a network.
 
 mod encode;
+mod follower;
 mod mats_lp;
 mod network;
+mod policy;
 mod simd;
 
-pub use encode::{Channel, Encoder, EncoderSettings, Feature};
+pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
+pub use follower::FollowerVersion;
 pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, MatsLpStats, NetworkPrior, Prior};
 pub use network::{
-    Architecture, Channel as NetworkChannel, EncoderConfig, ForwardError, Inputs, Layer, Network,
-    NetworkConfig, Outputs, RecurrentState, Sampling, SamplingConfig, Scalars, Workspace, softmax,
+    Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
+    SamplingConfig, Workspace, softmax,
+};
+pub use policy::{
+    Learned, LearnedName, LearnedPolicy, NamedPolicy, NetworkPolicy, PolicySettings, SimplePolicy,
 };
 
 /// The README, whose example the tests compile and run.

@@ -234,7 +234,7 @@ impl Evaluation {
 
     fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
         let Some((algorithm, built_in)) =
-            self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it)?)))
+            self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it, self.suite.folder())?)))
         else {
             return Ok(None);
         };

@@ -1,18 +1,35 @@
 //! The built-in algorithms: planners, and POGEMA's own policies.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use pogema_core::{Error, MAX_THREADS};
+use pogema_core::{Error, MAX_THREADS, Words};
 use pogema_maps::nearest;
-use pogema_planners::{Budget, NamedPolicy, PolicySettings};
+use pogema_planners::Budget;
+use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling};
 
 use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
 
 /// The parameters of every built-in algorithm.
-const PARAMETERS: [&str; 6] = ["seed", "seconds", "nodes", "threads", "future_goals", "single_attempt"];
+const PARAMETERS: [&str; 11] = [
+    "seed",
+    "seconds",
+    "nodes",
+    "threads",
+    "future_goals",
+    "single_attempt",
+    "weights",
+    "sampling",
+    "mask_actions",
+    "expansions",
+    "faithful",
+];
+
+/// The parameters of learned policies alone.
+const OF_NETWORKS: [&str; 5] = ["weights", "sampling", "mask_actions", "expansions", "faithful"];
 
 /// Parameters of pogema-toolbox's algorithms that built-in algorithms accept and ignore.
 const IGNORED: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
@@ -30,14 +47,15 @@ impl BuiltIn {
     /// Returns the built-in algorithm with the name of `algorithm`, ignoring case; `None` if there is none.
     ///
     /// # Errors
-    /// One line about an unknown parameter or an invalid value.
-    pub fn of(algorithm: &Algorithm) -> Option<Result<Self, Error>> {
+    /// One line about an unknown parameter or an invalid value, or about weights that cannot be read. Their path is
+    /// relative to `folder`, that of the suite.
+    pub fn of(algorithm: &Algorithm, folder: &Path) -> Option<Result<Self, Error>> {
         let name = match algorithm.name.to_lowercase().replace('_', "-").as_str() {
             "a*" => "astar".to_owned(),
             name => name.to_owned(),
         };
         let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
-        is_known.then(|| Self::read(name, algorithm))
+        is_known.then(|| Self::read(name, algorithm, folder))
     }
 
     /// Makes its policies stop soon after any thread sets a flag.
@@ -47,16 +65,60 @@ impl BuiltIn {
         self
     }
 
-    fn read(name: String, algorithm: &Algorithm) -> Result<Self, Error> {
+    fn read(name: String, algorithm: &Algorithm, folder: &Path) -> Result<Self, Error> {
         let mut built_in = Self { name, settings: PolicySettings::default() };
         for (key, node) in &algorithm.parameters {
-            built_in.set(&format!("{}.{key}", algorithm.key), key, node)?;
+            if !OF_NETWORKS.contains(&key.as_str()) {
+                built_in.set(&format!("{}.{key}", algorithm.key), key, node)?;
+            }
         }
+        built_in.read_network(algorithm, folder)?;
         let budget = &mut built_in.settings.budget;
         if budget.time.is_none() && budget.nodes.is_none() {
             *budget = Budget::of_time(Duration::from_secs(1));
         }
         Ok(built_in)
+    }
+
+    /// Reads the network of a learned policy, with its parameters.
+    fn read_network(&mut self, algorithm: &Algorithm, folder: &Path) -> Result<(), Error> {
+        let find = |key: &str| algorithm.parameters.iter().find(|(known, _)| known == key);
+        let Some(name) = LearnedName::of_word(&self.name) else {
+            let Some((key, node)) = OF_NETWORKS.into_iter().find_map(find) else { return Ok(()) };
+            let (line, policy) = (node.line, &self.name);
+            let reason = format!("line {line}: `{}.{key}`: `{policy}` has no network", algorithm.key);
+            return Err(Error::Syntax { reason });
+        };
+        let path_of = |key: &str| format!("{}.{key}", algorithm.key);
+        let weights = find("weights").ok_or_else(|| {
+            let (line, path) = (algorithm.line, path_of("weights"));
+            Error::Syntax {
+                reason: format!("line {line}: `{path}` is missing, expected the path of a network"),
+            }
+        })?;
+        let file = weights
+            .1
+            .text()
+            .ok_or_else(|| wrong(&weights.1, &path_of("weights"), "the path of a network"))?;
+        let mut learned = name.read(&folder.join(file))?;
+        let in_line = |key: &str, node: &Node, error: Error| {
+            let (line, path) = (node.line, path_of(key));
+            Error::Syntax { reason: format!("line {line}: `{path}`: {error}") }
+        };
+        if let Some((key, node)) = find("sampling") {
+            let rule = node.text().and_then(Sampling::of_word);
+            let rule = rule.ok_or_else(|| wrong(node, &path_of(key), &Sampling::expected()))?;
+            learned = learned.with_sampling(rule).map_err(|error| in_line(key, node, error))?;
+        }
+        if let Some((key, node)) = find("mask_actions") {
+            let flag = node.value().as_bool().ok_or_else(|| wrong(node, &path_of(key), "true or false"))?;
+            learned = learned.with_masks(flag).map_err(|error| in_line(key, node, error))?;
+        }
+        for (key, node) in ["expansions", "faithful"].into_iter().filter_map(find) {
+            set_search(&mut learned, key, node).map_err(|error| in_line(key, node, error))?;
+        }
+        self.settings.learned = Some(learned);
+        Ok(())
     }
 
     fn set(&mut self, path: &str, key: &str, node: &Node) -> Result<(), Error> {
@@ -87,4 +149,20 @@ impl BuiltIn {
         }
         Ok(())
     }
+}
+
+/// Sets a parameter of a search.
+fn set_search(learned: &mut Learned, key: &str, node: &Node) -> Result<(), Error> {
+    let Learned::MatsLp(_, params) = learned else {
+        return Err(Error::request("the policy does not search; only `mats-lp` does"));
+    };
+    let value = node.value();
+    if key == "faithful" {
+        let flag = value.as_bool();
+        params.faithful = flag.ok_or_else(|| Error::argument(key, value, "true or false"))?;
+    } else {
+        let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+        params.expansions = number.ok_or_else(|| Error::argument(key, value, "a number"))?;
+    }
+    params.check()
 }

@@ -6,7 +6,8 @@ use pogema_core::{Episode, Error, Metrics, Trace};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
-use pogema_planners::{NamedPolicy, Outcome};
+use pogema_planners::Outcome;
+use pogema_policies::NamedPolicy;
 
 use crate::built_in::BuiltIn;
 use crate::results::Proof;

@@ -57,7 +57,7 @@ impl Suite {
             Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
         let (played, trace) =
-            record(&environments.at(index)?.config, &built_in(algorithm)?.cancelled_by(stop))?;
+            record(&environments.at(index)?.config, &self.built_in(algorithm)?.cancelled_by(stop))?;
         Ok((measured(&played), trace))
     }
 
@@ -68,16 +68,18 @@ impl Suite {
     pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<(Pairs, Duration), Error> {
         let algorithm = self.algorithms.first();
         let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
-        let played = play(&environments.at(0)?.config, &built_in(algorithm)?)?;
+        let played = play(&environments.at(0)?.config, &self.built_in(algorithm)?)?;
         Ok((measured(&played), played.runtime))
     }
-}
 
-fn built_in(algorithm: &Algorithm) -> Result<BuiltIn, Error> {
-    BuiltIn::of(algorithm).unwrap_or_else(|| {
-        let key = &algorithm.key;
-        Err(Error::request(format!("`{key}` is not a built-in algorithm; play it with `pogema_rs.toolbox`")))
-    })
+    fn built_in(&self, algorithm: &Algorithm) -> Result<BuiltIn, Error> {
+        BuiltIn::of(algorithm, self.folder()).unwrap_or_else(|| {
+            let key = &algorithm.key;
+            Err(Error::request(format!(
+                "`{key}` is not a built-in algorithm; play it with `pogema_rs.toolbox`"
+            )))
+        })
+    }
 }
 
 /// Returns the metrics in which a replayed episode differs from its row, each with both values.

@@ -88,14 +88,14 @@ pub fn run(
 /// One line about the first algorithm that is not built in or has an invalid parameter.
 pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
     let all = suite.algorithms.iter().map(|algorithm| {
-        let built_in = BuiltIn::of(algorithm).unwrap_or_else(|| Err(unknown(algorithm)));
+        let built_in = BuiltIn::of(algorithm, suite.folder()).unwrap_or_else(|| Err(unknown(algorithm)));
         Ok((algorithm, built_in.map_err(|error| suite.in_algorithms_file(error))?))
     });
     all.collect()
 }
 
 fn unknown(algorithm: &Algorithm) -> Error {
-    let all: Vec<&str> = pogema_planners::NamedPolicy::all().into_iter().map(|(name, _)| name).collect();
+    let all: Vec<&str> = pogema_policies::NamedPolicy::all().into_iter().map(|(name, _)| name).collect();
     let (line, key, name) = (algorithm.line, &algorithm.key, &algorithm.name);
     let known = all.join(", ");
     let reason = format!(

@@ -134,6 +134,11 @@ impl Suite {
         self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
     }
 
+    /// Returns the folder of its file. Paths in the suite are relative to it, those of its replaced algorithms, too.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
     /// Adds the path of the suite to an error.
     pub fn in_file(&self, error: Error) -> Error {
         in_file(&self.path, error)

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use clap::Args;
 use pogema_core::Error;
-use pogema_planners::{Budget, PlannerSettings, PolicySettings};
+use pogema_planners::{Budget, PlannerSettings};
+use pogema_policies::PolicySettings;
 
 use crate::threads::{note_threads, number_of_threads};
 
@@ -21,7 +22,7 @@ pub struct PlannerArgs {
     /// Maximum number of threads of the planner; LaCAM refines plans on that many
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = number_of_threads())]
     threads: usize,
-    /// Seed of the planner
+    /// Seed of the planner, or of the actions that a network draws
     #[arg(long, value_name = "S", default_value_t = 0)]
     planner_seed: u64,
 }

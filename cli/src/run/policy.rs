@@ -8,7 +8,7 @@ use pogema_conformance::files;
 use pogema_core::{Action, Environment, Episode, Error, InputLimit, Instance, Trace, shorten};
 use pogema_maps::GridConfig;
 use pogema_numpy::{Generator, SeedSequence};
-use pogema_planners::{NamedPolicy, PolicySettings};
+use pogema_policies::{NamedPolicy, PolicySettings};
 
 /// The name of the policy that reads actions from a file.
 pub const FILE: &str = "file";

@@ -15,13 +15,15 @@ mod words;
 use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
 
 use costs::{Costs, write_plain, write_tracer};
-use layout::Layout;
-use marks::Marks;
+pub(crate) use layout::Layout;
+pub(crate) use marks::Marks;
 use memory::Memory;
-use offsets::{feature, offset, write_goal};
+use offsets::{offset, scalars, write_goal};
 use path::{draw_path, shortest_path};
 pub use settings::EncoderSettings;
-pub use words::{Channel, Feature};
+pub use words::{Channel, Scalars};
+
+use crate::follower::{FollowerPlanner, FollowerVersion};
 
 /// An encoder for one environment.
 ///
@@ -58,6 +60,7 @@ struct Episode {
     marks: Option<Marks>,
     all: Option<Marks>,
     costs: Option<Costs>,
+    follower: Option<FollowerPlanner>,
     memories: Vec<Memory>,
 }
 
@@ -85,6 +88,15 @@ impl Encoder {
         let layout = Layout::new(map, self.settings.radius.max(self.settings.sight));
         let remembers = has(&[Channel::SeenObstacles]);
         let needs_costs = has(&[Channel::CostToGo, Channel::CostTracer, Channel::Path]);
+        let follower = has(&[Channel::FollowerPath]).then(|| {
+            let EncoderSettings { sight, follower: version, .. } = self.settings;
+            let seen = match version {
+                FollowerVersion::Cpp => Occupancy::Exact,
+                FollowerVersion::Python => occupancy,
+            };
+            let present = Marks::new(layout, seen);
+            FollowerPlanner::new(layout, map, starts.len(), sight, version, present)
+        });
         self.episode = Some(Episode {
             layout,
             starts: starts.to_vec(),
@@ -92,13 +104,14 @@ impl Encoder {
             marks: has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
             all: has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             costs: needs_costs.then(|| Costs::new(layout, map)),
+            follower,
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
         });
     }
 
     /// Writes the windows and the numbers of all agents; those of an inactive agent are 0.
     ///
-    /// Shape: `windows` is `[agents, channels, side, side]`, `features` is `[agents, features, 2]`.
+    /// Shape: `windows` is `[agents, channels, side, side]`, `scalars` is `[agents, scalars, 2]`.
     ///
     /// # Errors
     /// [`Error::NotReset`] before [`Encoder::begin`]; [`Error::Length`] for a buffer or a list of the wrong length;
@@ -107,7 +120,7 @@ impl Encoder {
         &mut self,
         state: State<'_>,
         windows: &mut [f32],
-        features: &mut [f32],
+        scalars: &mut [f32],
     ) -> Result<(), Error> {
         let Self { settings, episode } = self;
         let episode = episode.as_mut().ok_or(Error::NotReset)?;
@@ -116,7 +129,7 @@ impl Encoder {
         Error::check_length("goals", num_agents, state.goals.len())?;
         Error::check_length("active", num_agents, state.active.len())?;
         Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
-        Error::check_length("features", num_agents * settings.features_len(), features.len())?;
+        Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())?;
         episode.layout.check_inside("cell", state.cells)?;
         episode.layout.check_inside("goal", state.goals)?;
         episode.follow(state, settings);
@@ -125,9 +138,9 @@ impl Encoder {
                 episode.write_windows(agent, state, settings, out);
             }
         }
-        if settings.features_len() > 0 {
-            for (agent, out) in features.chunks_exact_mut(settings.features_len()).enumerate() {
-                episode.write_features(agent, state, settings, out);
+        if settings.scalars_len() > 0 {
+            for (agent, out) in scalars.chunks_exact_mut(settings.scalars_len()).enumerate() {
+                episode.write_scalars(agent, state, settings, out);
             }
         }
         Ok(())
@@ -141,6 +154,9 @@ impl Episode {
         }
         if let Some(costs) = &mut self.costs {
             costs.follow(state);
+        }
+        if let Some(follower) = &mut self.follower {
+            follower.plan(state);
         }
         for (agent, memory) in self.memories.iter_mut().enumerate().filter(|(agent, _)| state.active[*agent])
         {
@@ -179,6 +195,7 @@ impl Episode {
                 let radius = window.len().isqrt() / 2;
                 draw_path(layout, shortest_path(layout, costs.of(agent), place), radius, window);
             }
+            (Channel::FollowerPath, ..) => self.write_follower_path(agent, place, window),
             (Channel::SeenObstacles, ..) => {
                 let at = offset(self.starts[agent], cell);
                 self.memories[agent].copy_window(at, window);
@@ -188,10 +205,22 @@ impl Episode {
         }
     }
 
-    fn write_features(&self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
+    fn write_follower_path(&self, agent: usize, place: usize, window: &mut [f32]) {
+        self.layout.copy_window(&self.obstacles, place, window);
+        for value in &mut *window {
+            // Not `-*value`, which would be -0 for a free cell.
+            *value = 0.0 - *value;
+        }
+        if let Some(follower) = &self.follower {
+            let cut = follower.cut(window.len().isqrt() / 2);
+            draw_path(self.layout, follower.path(agent, place), cut, window);
+        }
+    }
+
+    fn write_scalars(&self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
         let (start, cell, goal) = (self.starts[agent], state.cells[agent], state.goals[agent]);
-        for (&known, out) in settings.features.iter().zip(out.chunks_exact_mut(Feature::LEN)) {
-            let values = if state.active[agent] { feature(known, start, cell, goal) } else { [0.0; 2] };
+        for (&known, out) in settings.scalars.iter().zip(out.chunks_exact_mut(Scalars::LEN)) {
+            let values = if state.active[agent] { scalars(known, start, cell, goal) } else { [0.0; 2] };
             out.copy_from_slice(&values);
         }
     }

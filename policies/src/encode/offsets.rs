@@ -2,21 +2,21 @@
 
 use pogema_core::Cell;
 
-use crate::encode::words::Feature;
+use crate::encode::words::Scalars;
 
 /// Returns the distance from one cell to another, in (rows, columns).
 pub(crate) fn offset(from: Cell, to: Cell) -> (isize, isize) {
     (to.row as isize - from.row as isize, to.col as isize - from.col as isize)
 }
 
-/// Returns the two values of a feature.
-pub(crate) fn feature(feature: Feature, start: Cell, cell: Cell, goal: Cell) -> [f32; Feature::LEN] {
+/// Returns the two numbers of one kind.
+pub(crate) fn scalars(kind: Scalars, start: Cell, cell: Cell, goal: Cell) -> [f32; Scalars::LEN] {
     let scaled = |(rows, cols)| [rows, cols].map(|x: isize| x as f32 / x.unsigned_abs().max(64) as f32);
-    match feature {
-        Feature::Position => scaled(offset(start, cell)),
-        Feature::GoalPosition => scaled(offset(start, goal)),
-        Feature::GoalOffset => scaled(offset(cell, goal)),
-        Feature::GoalDirection => {
+    match kind {
+        Scalars::Position => scaled(offset(start, cell)),
+        Scalars::GoalPosition => scaled(offset(start, goal)),
+        Scalars::GoalOffset => scaled(offset(cell, goal)),
+        Scalars::GoalDirection => {
             let (rows, cols) = offset(cell, goal);
             let length = ((rows * rows + cols * cols) as f32).sqrt().max(1.0);
             [rows as f32 / length, cols as f32 / length]

@@ -3,7 +3,8 @@
 use pogema_core::{Config, Error};
 use serde::{Deserialize, Serialize};
 
-use crate::encode::words::{Channel, Feature};
+use crate::encode::words::{Channel, Scalars};
+use crate::follower::FollowerVersion;
 
 /// What a policy sees, as data: the windows and numbers of each agent.
 ///
@@ -24,10 +25,14 @@ pub struct EncoderSettings {
     pub channels: Vec<Channel>,
     /// The numbers of each agent, in this order.
     #[serde(default)]
-    pub features: Vec<Feature>,
-    /// Number of cells that an agent sees in each direction, 1 to 128, for channels that remember.
+    pub scalars: Vec<Scalars>,
+    /// Number of cells that an agent sees in each direction, 1 to 128, for `seen_obstacles` and
+    /// `follower_path`.
     #[serde(default = "EncoderSettings::default_sight")]
     pub sight: usize,
+    /// The version of Follower whose path `follower_path` shows.
+    #[serde(default)]
+    pub follower: FollowerVersion,
 }
 
 impl EncoderSettings {
@@ -37,7 +42,19 @@ impl EncoderSettings {
 
     /// Creates settings with these windows, no numbers, and POGEMA's default radius as sight.
     pub fn new(radius: usize, channels: impl Into<Vec<Channel>>) -> Self {
-        Self { radius, channels: channels.into(), features: Vec::new(), sight: Self::default_sight() }
+        Self {
+            radius,
+            channels: channels.into(),
+            scalars: Vec::new(),
+            sight: Self::default_sight(),
+            follower: FollowerVersion::default(),
+        }
+    }
+
+    /// Creates the settings of Follower: its path and the agents. The authors' networks have radius 5 (Follower) and 3
+    /// (Follower-lite).
+    pub fn follower(radius: usize, version: FollowerVersion) -> Self {
+        Self { follower: version, ..Self::new(radius, [Channel::FollowerPath, Channel::Agents]) }
     }
 
     /// Returns the side of a window. Units: cells.
@@ -56,8 +73,8 @@ impl EncoderSettings {
     }
 
     /// Returns the number of values in the numbers of one agent.
-    pub fn features_len(&self) -> usize {
-        self.features.len() * Feature::LEN
+    pub fn scalars_len(&self) -> usize {
+        self.scalars.len() * Scalars::LEN
     }
 
     /// Checks the radii and the number of windows.
@@ -70,8 +87,7 @@ impl EncoderSettings {
                 return Err(Error::config(field, value, format!("1 to {}", Config::LARGEST_RADIUS)));
             }
         }
-        for (field, len, most) in
-            [("channels", self.channels.len(), 64), ("features", self.features.len(), 64)]
+        for (field, len, most) in [("channels", self.channels.len(), 64), ("scalars", self.scalars.len(), 64)]
         {
             if len > most {
                 return Err(Error::config(field, format!("a list of {len}"), format!("at most {most}")));

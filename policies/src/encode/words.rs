@@ -32,6 +32,13 @@ words! {
         ///
         /// At each cell, the path takes the first action of up, down, left, right that leads nearer to the goal.
         Path = "path",
+        /// -1 for an obstacle, 1 for the cells of Follower's path, else 0.
+        ///
+        /// The path is that of Follower's planner, which is searched anew in every state. It is drawn from the own cell
+        /// up to its first cell outside the window; `follower` tells the versions apart.
+        ///
+        /// Source: Follower, `follower_cpp/follower.cpp`
+        FollowerPath = "follower_path",
         /// 1 for an obstacle that the agent has seen in this episode; else 0.
         ///
         /// The agent sees the cells within `sight` in every state that is encoded.
@@ -42,8 +49,8 @@ words! {
 }
 
 words! {
-    /// Numbers of each agent beside its windows.
-    pub enum Feature {
+    /// Numbers beside the windows of an agent, two of each kind.
+    pub enum Scalars {
         /// The cell relative to the start: rows and columns, each `x / max(|x|, 64)`.
         Position = "position",
         /// The goal relative to the start: rows and columns, each `x / max(|x|, 64)`.
@@ -55,7 +62,7 @@ words! {
     }
 }
 
-impl Feature {
-    /// The number of values of each feature.
+impl Scalars {
+    /// The number of numbers of each kind.
     pub const LEN: usize = 2;
 }

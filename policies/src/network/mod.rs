@@ -24,7 +24,7 @@ use std::sync::Arc;
 use pogema_core::Error;
 
 pub use architecture::{Architecture, Layer};
-pub use config::{Channel, EncoderConfig, NetworkConfig, Sampling, SamplingConfig, Scalars};
+pub use config::{NetworkConfig, Sampling, SamplingConfig};
 pub use error::ForwardError;
 pub use softmax::softmax;
 

@@ -34,14 +34,14 @@ fn wrong_calls_change_nothing() -> Result<(), Error> {
     let (mut out, mut expected) = ([7.0; 36], [0.0; 36]);
     assert_eq!(encoder.encode(state(&CELLS, &CELLS), &mut out, &mut []), Err(Error::NotReset));
     encoder.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
-    let mut message = |cells: &[Cell], goals: &[Cell], len: usize, features: usize| {
-        let error = encoder.encode(state(cells, goals), &mut out[..len], &mut [0.0; 4][..features]);
+    let mut message = |cells: &[Cell], goals: &[Cell], len: usize, scalars: usize| {
+        let error = encoder.encode(state(cells, goals), &mut out[..len], &mut [0.0; 4][..scalars]);
         error.unwrap_err().to_string()
     };
     let beyond = [Cell::new(0, 0), Cell::new(0, 2)];
     assert_eq!(message(&CELLS[..1], &CELLS, 36, 0), "cells has length 1, expected 2");
     assert_eq!(message(&CELLS, &CELLS, 35, 0), "windows has length 35, expected 36");
-    assert_eq!(message(&CELLS, &CELLS, 36, 1), "features has length 1, expected 0");
+    assert_eq!(message(&CELLS, &CELLS, 36, 1), "scalars has length 1, expected 0");
     let outside = "instance: agent 1: goal (0, 2) is outside the map of 2 rows and 2 columns";
     assert_eq!(message(&CELLS, &beyond, 36, 0), outside);
     assert_eq!(message(&beyond, &CELLS, 36, 0), outside.replace("goal", "cell"));

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashSet, VecDeque};
 use pogema_core::{Cell, Config, Environment, Episode, Error, Map, State};
 use pogema_fast::Engine;
 use pogema_numpy::Generator;
-use pogema_policies::{Channel, Encoder, EncoderSettings, Feature};
+use pogema_policies::{Channel, Encoder, EncoderSettings, Scalars};
 use proptest::prelude::*;
 
 use crate::common;
@@ -91,7 +91,7 @@ impl Plain {
                     flags(&places, |place| path.contains(&place))
                 }
                 Channel::SeenObstacles => flags(&places, |place| self.seen[agent].contains(&place)),
-                Channel::Obstacles | Channel::Agents | Channel::Goal => Vec::new(),
+                Channel::Obstacles | Channel::Agents | Channel::Goal | Channel::FollowerPath => Vec::new(),
             };
             out.extend(values);
         }
@@ -183,7 +183,7 @@ fn begin(settings: EncoderSettings, episode: &Episode<Engine>) -> Result<Encoder
     Ok(encoder)
 }
 
-fn features(state: State<'_>, starts: &[Cell]) -> Vec<f32> {
+fn scalars(state: State<'_>, starts: &[Cell]) -> Vec<f32> {
     let of_agent = |agent: usize| {
         let (start, cell, goal) =
             (place(starts[agent]), place(state.cells[agent]), place(state.goals[agent]));
@@ -208,7 +208,7 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
     let num_agents = episode.config().num_agents;
     let observed = EncoderSettings::new(episode.config().radius, OBSERVED);
     let computed = EncoderSettings {
-        features: vec![Feature::Position, Feature::GoalPosition, Feature::GoalOffset, Feature::GoalDirection],
+        scalars: vec![Scalars::Position, Scalars::GoalPosition, Scalars::GoalOffset, Scalars::GoalDirection],
         sight: episode.config().radius,
         ..EncoderSettings::new(radius, COMPUTED)
     };
@@ -229,9 +229,9 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
             prop_assert_eq!(seen, expected, "agent {} in step {}", agent, episode.num_steps());
         }
         let mut windows = vec![f32::NAN; num_agents * computed.window_len()];
-        let mut numbers = vec![f32::NAN; num_agents * computed.features_len()];
+        let mut numbers = vec![f32::NAN; num_agents * computed.scalars_len()];
         encoders[1].encode(episode.state(), &mut windows, &mut numbers).unwrap();
-        prop_assert_eq!(numbers, features(episode.state(), episode.instance().unwrap().starts()));
+        prop_assert_eq!(numbers, scalars(episode.state(), episode.instance().unwrap().starts()));
         for (agent, windows) in windows.chunks(computed.window_len()).enumerate() {
             let expected = plain.windows(agent, &episode, &computed).unwrap();
             prop_assert_eq!(windows, expected, "agent {} in step {}", agent, episode.num_steps());

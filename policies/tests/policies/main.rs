@@ -3,4 +3,5 @@
 mod common;
 mod encode_errors;
 mod encoders;
+mod follower_recorded;
 mod mats_lp;

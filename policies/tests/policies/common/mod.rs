@@ -1,5 +1,8 @@
 //! Episodes for tests.
 
+pub mod recorded;
+pub mod weights;
+
 use pogema_core::{Action, Episode, Error, Instance};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};

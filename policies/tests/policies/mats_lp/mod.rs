@@ -255,16 +255,18 @@ fn faulty(flag: Option<&Arc<AtomicBool>>) -> Faulty {
 fn logits_that_are_not_numbers_name_agent_and_step() -> Result<(), Error> {
     let rows = [".....", ".....", "....."];
     for threads in [1, 2, 8] {
-        let made = instance(&rows, &[[0, 0], [1, 0], [2, 1]], &[[0, 1], [1, 1], [2, 4]])?;
+        let made = instance(&rows, &[[0, 0], [1, 0], [2, 2]], &[[0, 1], [1, 1], [2, 4]])?;
         let mut episode = start(made, OnGoal::Restart)?;
-        let params = MatsLpParams { expansions: 3, merging_range: 1, ..MatsLpParams::default() };
+        // With one expansion, a search evaluates its root alone.
+        let params = MatsLpParams { expansions: 1, merging_range: 1, ..MatsLpParams::default() };
         let mut policy = MatsLp::new(&faulty(None), params, threads)?;
         policy.begin(episode.instance()?, OnGoal::Restart);
-        policy.act(episode.state())?;
-        episode.step(&[Action::Stay, Action::Stay, Action::Right])?;
-        // The search of agent 2 moves it to the last column.
+        for _ in 0..2 {
+            policy.act(episode.state())?;
+            episode.step(&[Action::Stay, Action::Stay, Action::Right])?;
+        }
         let error = policy.act(episode.state()).map_err(|error| error.to_string());
-        assert_eq!(error, Err("network: its outputs for agent 2 in step 1 are not finite".into()));
+        assert_eq!(error, Err("network: its outputs for agent 2 in step 2 are not finite".into()));
         let made = instance(&rows, &[[0, 0], [1, 4], [2, 4]], &[[0, 1], [1, 1], [2, 1]])?;
         let episode = start(made, OnGoal::Finish)?;
         policy.begin(episode.instance()?, OnGoal::Finish);

@@ -2,15 +2,14 @@
 
 use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
+use pogema_planners::{
+    AStarTeam, Budget, LifelongName, LifelongPolicy, Outcome, PlannerName, PlannerPolicy, PlannerSettings,
+    PomapfObservations, pogema_team, sample,
+};
 
-use crate::budget::Budget;
-use crate::outcome::Outcome;
-use crate::policies::astar::{AStarTeam, pogema_team};
-use crate::policies::lifelong_policy::LifelongPolicy;
-use crate::policies::observations::PomapfObservations;
-use crate::policies::planner_policy::PlannerPolicy;
-use crate::policies::pogema::sample;
-use crate::registry::{LifelongName, PlannerName, PlannerSettings};
+use crate::mats_lp::MatsLp;
+use crate::policy::learned::LearnedPolicy;
+use crate::policy::method::{Learned, LearnedName};
 
 words! {
     /// The policies without a joint plan.
@@ -29,12 +28,14 @@ words! {
 pub struct PolicySettings {
     /// The budget of one plan.
     pub budget: Budget,
-    /// Settings of the planner.
+    /// Settings of the planner. A network draws its actions from the same seed.
     pub planner: PlannerSettings,
     /// Whether a lifelong planner knows future goals.
     pub future_goals: bool,
     /// Whether a one-shot planner that finds no plan is not called again in that episode.
     pub single_attempt: bool,
+    /// The network of a learned policy, as [`LearnedName::read`] returns it.
+    pub learned: Option<Learned>,
 }
 
 /// A policy for all agents of one episode, made by name.
@@ -46,6 +47,8 @@ enum Kind {
     Stay,
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
+    Learned(Box<LearnedPolicy>),
+    MatsLp(Box<MatsLp>),
 }
 
 impl NamedPolicy {
@@ -55,9 +58,8 @@ impl NamedPolicy {
             T::WORDS.iter().map(|known| (known.word, known.help()))
         }
         let mut all: Vec<(&str, &str)> = Vec::new();
-        for (name, help) in
-            listed::<SimplePolicy>().chain(listed::<PlannerName>()).chain(listed::<LifelongName>())
-        {
+        let planners = listed::<PlannerName>().chain(listed::<LifelongName>());
+        for (name, help) in listed::<SimplePolicy>().chain(planners).chain(listed::<LearnedName>()) {
             if !all.iter().any(|(known, _)| *known == name) {
                 all.push((name, help));
             }
@@ -78,7 +80,7 @@ impl NamedPolicy {
         instance: &Instance,
         generator: Generator,
     ) -> Result<Self, Error> {
-        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt } =
+        let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt, learned } =
             settings.clone();
         let one_shot = PlannerName::of_word(name);
         let lifelong = LifelongName::of_word(name);
@@ -90,6 +92,24 @@ impl NamedPolicy {
         if single_attempt && (lifelong.is_some() || one_shot.is_none()) {
             let reason = format!("`{name}` does not support a single attempt; only one-shot planners do");
             return Err(Error::Request { reason });
+        }
+        let name_of_learned = LearnedName::of_word(name);
+        if name_of_learned.is_none() && learned.is_some() {
+            return Err(Error::Request { reason: format!("`{name}` does not use weights") });
+        }
+        if name_of_learned.is_some() {
+            let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
+            return Ok(Self(match learned.ok_or_else(missing)? {
+                Learned::Network(policy) => {
+                    Kind::Learned(Box::new(policy.begin(instance, config, planner_settings.seed)?))
+                }
+                Learned::MatsLp(prior, params) => {
+                    let policy = MatsLp::new(&prior, params, planner_settings.threads)?;
+                    let mut policy = policy.with_cancellation(budget.cancelled);
+                    policy.begin(instance, config.on_goal);
+                    Kind::MatsLp(Box::new(policy))
+                }
+            }));
         }
         if let Some(planner) = lifelong {
             let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
@@ -133,6 +153,8 @@ impl NamedPolicy {
             Kind::Stay => Ok(vec![Action::Stay; num_agents]),
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),
+            Kind::Learned(policy) => policy.act(episode.state()),
+            Kind::MatsLp(policy) => policy.act(episode.state()),
         }
     }
 }

@@ -1,0 +1,54 @@
+//! Flags of learned policies.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use pogema_core::{Error, Words};
+use pogema_policies::{Learned, LearnedName, Sampling};
+
+/// The network of a learned policy.
+#[derive(Args, Clone, Debug)]
+pub struct LearnedArgs {
+    /// Weights of the network, for `--policy follower`, `--policy mats-lp` or `--policy network`
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Rule that chooses actions from the logits of the network [default: that of its JSON file]
+    #[arg(long, value_parser = rules())]
+    sampling: Option<String>,
+    /// Forbid actions of the network that lead into an obstacle or off the map
+    #[arg(long)]
+    mask_actions: bool,
+}
+
+fn rules() -> PossibleValuesParser {
+    PossibleValuesParser::new(
+        Sampling::WORDS.iter().map(|known| PossibleValue::new(known.word).help(known.help())),
+    )
+}
+
+impl LearnedArgs {
+    /// Reads the network, if the policy has one.
+    pub fn read(&self, policy: &str) -> Result<Option<Learned>, Error> {
+        let Some(name) = LearnedName::of_word(policy) else {
+            let flags = [
+                ("--weights", self.weights.is_some()),
+                ("--sampling", self.sampling.is_some()),
+                ("--mask-actions", self.mask_actions),
+            ];
+            return match flags.into_iter().find(|(_, is_given)| *is_given) {
+                Some((flag, _)) => {
+                    let learned = LearnedName::NAMES.join("` or `--policy ");
+                    Err(Error::request(format!("`{flag}` needs `--policy {learned}`")))
+                }
+                None => Ok(None),
+            };
+        };
+        let missing = || Error::request(format!("`--policy {policy}` needs `--weights FILE`"));
+        let mut learned = name.read(self.weights.as_deref().ok_or_else(missing)?)?;
+        if let Some(rule) = self.sampling.as_deref().and_then(Sampling::of_word) {
+            learned = learned.with_sampling(rule)?;
+        }
+        learned.with_masks(self.mask_actions).map(Some)
+    }
+}

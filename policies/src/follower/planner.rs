@@ -1,0 +1,168 @@
+//! Follower's planner: one path for each agent, searched anew in every step.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use pogema_core::{Cell, Map, State, words};
+use pogema_planners::Graph;
+
+use crate::encode::{Layout, Marks};
+use crate::follower::search::{OBSTACLE, Search, heuristic};
+use crate::follower::static_costs::static_costs;
+
+words! {
+    /// The two versions of Follower that its authors released.
+    ///
+    /// | | `cpp` | `python` |
+    /// | --- | --- | --- |
+    /// | agents that raise the cost of their cells | all within sight | those that the occupancy grid marks |
+    /// | end of the drawn path | its first cell outside the window | its first cell outside of sight |
+    /// | agent on its goal | no path | keeps its last path |
+    #[derive(Default)]
+    pub enum FollowerVersion {
+        /// The C++ version, which plays Follower-lite.
+        #[default]
+        Cpp = "cpp",
+        /// The Python version, which plays Follower.
+        Python = "python",
+    }
+}
+
+/// The planner of all agents of an environment.
+///
+/// Source: Follower, `follower_cpp/planner.h`
+#[derive(Debug)]
+pub(crate) struct FollowerPlanner {
+    layout: Layout,
+    sight: usize,
+    version: FollowerVersion,
+    /// The static cost of each place, and the same plus the dynamic cost of the agent that plans.
+    static_costs: Vec<f32>,
+    costs: Vec<f32>,
+    /// For each place, the index of its entry in the dynamic costs of the agent that plans, plus 1; 0 without one.
+    entries: Vec<u32>,
+    /// Where other agents are.
+    present: Marks,
+    heuristics: HashMap<Cell, Arc<[f32]>>,
+    max_heuristics: usize,
+    agents: Vec<Agent>,
+    search: Search,
+}
+
+/// The memory of an agent.
+#[derive(Clone, Debug)]
+struct Agent {
+    goal: Option<Cell>,
+    heuristic: Arc<[f32]>,
+    /// How often each place was seen occupied since the goal is known.
+    dynamic: Vec<(u32, f32)>,
+    path: Vec<u32>,
+}
+
+impl FollowerPlanner {
+    /// Byte budget of the heuristics that no agent uses at present.
+    const MAX_BYTES: usize = 64 << 20;
+
+    /// Prepares the planner for an episode on a map. `present` follows the agents that raise costs.
+    pub fn new(
+        layout: Layout,
+        map: &Map,
+        num_agents: usize,
+        sight: usize,
+        version: FollowerVersion,
+        present: Marks,
+    ) -> Self {
+        let graph = Graph::new(map);
+        let mut costs = vec![OBSTACLE; layout.len()];
+        for (vertex, cost) in (0..).zip(static_costs(&graph)) {
+            costs[layout.place(graph.cell(vertex))] = cost;
+        }
+        let agent = Agent { goal: None, heuristic: Arc::new([]), dynamic: Vec::new(), path: Vec::new() };
+        Self {
+            layout,
+            sight,
+            version,
+            costs: costs.clone(),
+            static_costs: costs,
+            entries: vec![0; layout.len()],
+            present,
+            heuristics: HashMap::new(),
+            max_heuristics: (Self::MAX_BYTES / (size_of::<f32>() * layout.len())).max(1),
+            agents: vec![agent; num_agents],
+            search: Search::new(layout.len(), layout.stride()),
+        }
+    }
+
+    /// Plans for all active agents.
+    pub fn plan(&mut self, state: State<'_>) {
+        self.present.follow(state);
+        for (agent, (&cell, &goal)) in state.cells.iter().zip(state.goals).enumerate() {
+            let keeps = self.version == FollowerVersion::Python && cell == goal;
+            if state.active[agent] && !keeps {
+                self.plan_one(agent, cell, goal);
+            }
+        }
+    }
+
+    /// Returns the path of an agent from its place on.
+    pub fn path(&self, agent: usize, place: usize) -> impl Iterator<Item = usize> + '_ {
+        // A path that was kept begins where the agent was.
+        self.agents[agent].path.iter().map(|&place| place as usize).skip_while(move |&known| known != place)
+    }
+
+    /// Returns the number of cells from the agent's up to which its path is drawn.
+    pub fn cut(&self, radius: usize) -> usize {
+        match self.version {
+            FollowerVersion::Cpp => radius,
+            FollowerVersion::Python => self.sight,
+        }
+    }
+
+    fn plan_one(&mut self, agent: usize, cell: Cell, goal: Cell) {
+        let (start, end) = (self.layout.place(cell), self.layout.place(goal));
+        if self.agents[agent].goal != Some(goal) {
+            let heuristic = self.heuristic(goal);
+            let known = &mut self.agents[agent];
+            (known.goal, known.heuristic) = (Some(goal), heuristic);
+            known.dynamic.clear();
+        }
+        let Self { layout, agents, entries, costs, static_costs, search, .. } = self;
+        let Agent { dynamic, heuristic, path, .. } = &mut agents[agent];
+        for (index, &(place, _)) in (1..).zip(dynamic.iter()) {
+            entries[place as usize] = index;
+        }
+        let side = 2 * self.sight + 1;
+        for first in layout.window_rows(start, self.sight) {
+            let row = &self.present.grid()[first..first + side];
+            for place in (first..).zip(row).filter(|&(place, &mark)| mark != 0.0 && place != start) {
+                let entry = &mut entries[place.0];
+                if *entry == 0 {
+                    dynamic.push((place.0 as u32, 0.0));
+                    *entry = dynamic.len() as u32;
+                }
+                dynamic[*entry as usize - 1].1 += 1.0;
+            }
+        }
+        for &(place, cost) in dynamic.iter() {
+            costs[place as usize] = static_costs[place as usize] + cost;
+            entries[place as usize] = 0;
+        }
+        search.find(start, end, costs, heuristic, path);
+        for &(place, _) in dynamic.iter() {
+            costs[place as usize] = static_costs[place as usize];
+        }
+    }
+
+    fn heuristic(&mut self, goal: Cell) -> Arc<[f32]> {
+        if let Some(known) = self.heuristics.get(&goal) {
+            return known.clone();
+        }
+        if self.heuristics.len() >= self.max_heuristics {
+            self.heuristics.retain(|_, known| Arc::strong_count(known) > 1);
+        }
+        let made: Arc<[f32]> =
+            heuristic(self.layout.place(goal), &self.static_costs, self.layout.stride()).into();
+        self.heuristics.insert(goal, made.clone());
+        made
+    }
+}
