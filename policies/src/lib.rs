@@ -7,6 +7,7 @@ mod encode;
 mod follower;
 mod mats_lp;
 mod network;
+mod onnx;
 mod policy;
 mod simd;
 

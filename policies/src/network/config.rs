@@ -28,6 +28,13 @@ impl NetworkConfig {
     pub const VERSION: u32 = 1;
 }
 
+impl Default for NetworkConfig {
+    fn default() -> Self {
+        let (version, sampling) = (Self::VERSION, SamplingConfig::default());
+        Self { version, architecture: None, encoder: None, sampling }
+    }
+}
+
 /// The choice of an action from the logits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

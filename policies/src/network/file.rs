@@ -4,18 +4,61 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use pogema_core::{Error, InputLimit};
-use safetensors::{Dtype, SafeTensors};
+use pogema_core::{Error, InputLimit, files};
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensorError, SafeTensors};
 
 use super::config::NetworkConfig;
 use super::tensors::Tensors;
+use crate::onnx;
 
-/// Reads a file of weights and its JSON.
+/// Reads a file of weights and its JSON, which an ONNX file may lack. The config that is returned has an architecture.
 pub fn read(path: &Path) -> Result<(NetworkConfig, Tensors), Error> {
     let json = path.with_extension("json");
-    let config = parse_config(&read_bytes(&json)?).map_err(|reason| Error::io(&json, reason))?;
-    let tensors = parse_tensors(&read_bytes(path)?).map_err(|reason| Error::io(path, reason))?;
+    let bytes = read_bytes(path)?;
+    if path.extension().is_some_and(|extension| extension == "onnx") {
+        let config = if json.exists() { read_config(&json)? } else { NetworkConfig::default() };
+        if config.architecture.is_some() {
+            return Err(Error::io(&json, "`architecture` is given, expected none beside an ONNX file"));
+        }
+        let (architecture, tensors) = onnx::read(&bytes).map_err(|reason| Error::io(path, reason))?;
+        return Ok((NetworkConfig { architecture: Some(architecture), ..config }, tensors));
+    }
+    let config = read_config(&json)?;
+    if config.architecture.is_none() {
+        return Err(Error::io(
+            &json,
+            "`architecture` is missing, which names the layers of a safetensors file",
+        ));
+    }
+    let tensors = parse_tensors(&bytes).map_err(|reason| Error::io(path, reason))?;
     Ok((config, tensors))
+}
+
+fn read_config(path: &Path) -> Result<NetworkConfig, Error> {
+    parse_config(&read_bytes(path)?).map_err(|reason| Error::io(path, reason))
+}
+
+/// Writes a network as a `.safetensors` file and the JSON beside it.
+pub fn write(path: &Path, config: &NetworkConfig, tensors: &Tensors) -> Result<(), Error> {
+    let bytes: Vec<(&String, &[usize], Vec<u8>)> = tensors
+        .iter()
+        .map(|(name, tensor)| {
+            let bytes = tensor.values.iter().flat_map(|value| value.to_le_bytes()).collect();
+            (name, &*tensor.shape, bytes)
+        })
+        .collect();
+    let views: Result<Vec<_>, _> = bytes
+        .iter()
+        .map(|(name, shape, bytes)| {
+            TensorView::new(Dtype::F32, shape.to_vec(), bytes).map(|view| (name, view))
+        })
+        .collect();
+    let failed = |error: SafeTensorError| Error::io(path, error.to_string());
+    let file = safetensors::serialize(views.map_err(failed)?, None).map_err(failed)?;
+    let json = serde_json::to_string_pretty(config).map_err(|error| Error::io(path, error))?;
+    files::write_whole(path, &file)?;
+    files::write_whole(&path.with_extension("json"), (json + "\n").as_bytes())
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {

@@ -31,7 +31,7 @@ pub use softmax::softmax;
 use crate::simd::{AGENTS, Path};
 use agents::AgentBuffers;
 use steps::{Buffers, GROUP, Group, Heads, Steps};
-use tensors::Tensors;
+pub(crate) use tensors::Tensors;
 
 /// A network with its weights, which any number of threads can share.
 #[derive(Clone, Debug)]
@@ -117,20 +117,35 @@ impl RecurrentState {
 }
 
 impl Network {
-    /// Reads a network from a `.safetensors` file and the JSON file beside it, which has the same name but the extension
+    /// Reads a network from a file of weights and the JSON file beside it, which has the same name but the extension
     /// `json`. Its content is a [`NetworkConfig`].
     ///
+    /// A `.safetensors` file holds the tensors of the layers that the JSON names. An `.onnx` file holds its own layers, and
+    /// its JSON may be absent. Its logits are the output `action_logits` or `logits`, or the only output; operators that
+    /// follow them are ignored. The output `values` or `value` is used if it stands on the same layers.
+    ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor or layer.
+    /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator.
     pub fn read(path: impl AsRef<FilePath>) -> Result<Self, Error> {
         let path = path.as_ref();
         let (config, mut tensors) = file::read(path)?;
         Self::new(config, &mut tensors, Path::best()).map_err(|reason| Error::io(path, reason))
     }
 
+    /// Writes the network of a file as a `.safetensors` file and the JSON beside it.
+    ///
+    /// # Errors
+    /// Those of [`Network::read`], and [`Error::Io`] if a file cannot be written.
+    pub fn convert(from: impl AsRef<FilePath>, to: impl AsRef<FilePath>) -> Result<(), Error> {
+        let (config, tensors) = file::read(from.as_ref())?;
+        let network = Self::new(config, &mut tensors.clone(), Path::best());
+        let network = network.map_err(|reason| Error::io(from.as_ref(), reason))?;
+        file::write(to.as_ref(), network.config(), &tensors)
+    }
+
     fn new(config: NetworkConfig, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
         let Some(architecture) = &config.architecture else {
-            return Err("the JSON has no `architecture`, which weights without a graph need".into());
+            return Err("`architecture` is missing".into());
         };
         let window = architecture.window;
         let (steps, heads) = build::build(architecture, tensors)?;

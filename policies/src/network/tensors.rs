@@ -17,19 +17,27 @@ impl Tensors {
     /// Adds a tensor whose bytes are floats in little-endian order.
     pub fn insert(&mut self, name: &str, shape: &[usize], bytes: &[u8]) -> Result<(), String> {
         let (floats, rest) = bytes.as_chunks::<4>();
+        if !rest.is_empty() {
+            return Err(format!("tensor `{name}` has {} bytes, expected floats of 4 bytes", bytes.len()));
+        }
+        let values = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        self.insert_values(name, shape.into(), values)
+    }
+
+    /// Adds a tensor.
+    pub fn insert_values(&mut self, name: &str, shape: Vec<usize>, values: Vec<f32>) -> Result<(), String> {
         let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
-        if expected != Some(floats.len()) || !rest.is_empty() {
+        if expected != Some(values.len()) {
             return Err(format!(
-                "tensor `{name}` has {} bytes, expected a float for each value of {shape:?}",
-                bytes.len()
+                "tensor `{name}` has {} values, expected those of shape {shape:?}",
+                values.len()
             ));
         }
-        let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         if let Some(index) = values.iter().position(|value| !value.is_finite()) {
             let value = values[index];
             return Err(format!("tensor `{name}`: value {index} is `{value}`, expected a finite number"));
         }
-        match self.0.insert(name.into(), Tensor { shape: shape.into(), values }) {
+        match self.0.insert(name.into(), Tensor { shape, values }) {
             None => Ok(()),
             Some(_) => Err(format!("tensor `{name}` occurs twice")),
         }

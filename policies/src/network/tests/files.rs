@@ -1,0 +1,148 @@
+//! Files that are truncated, foreign or hostile.
+
+use std::path::Path as FilePath;
+
+use serde_json::{Value, json};
+
+use super::{Network, Path};
+use crate::network::file;
+
+const SIZES: [(&str, &[usize]); 6] = [
+    ("conv.weight", &[2, 1, 3, 3]),
+    ("conv.bias", &[2]),
+    ("core.weight", &[4, 18]),
+    ("core.bias", &[4]),
+    ("actions.weight", &[5, 4]),
+    ("actions.bias", &[5]),
+];
+
+fn config() -> Value {
+    json!({
+        "version": 1,
+        "architecture": {
+            "window": [1, 3, 3],
+            "layers": [{"convolution": {"name": "conv", "padding": 1}}, "relu", "flatten", {"dense": "core"}, "relu"],
+            "actions": "actions",
+        },
+    })
+}
+
+/// Returns the bytes of a safetensors file, after a change of its header.
+fn weights(change: impl FnOnce(&mut Value), value: f32) -> Vec<u8> {
+    let (mut header, mut data) = (json!({}), Vec::new());
+    for (name, shape) in SIZES {
+        let start = data.len();
+        data.extend(value.to_le_bytes().repeat(shape.iter().product()));
+        header[name] = json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
+    }
+    change(&mut header);
+    let header = header.to_string();
+    [&(header.len() as u64).to_le_bytes(), header.as_bytes(), &data].concat()
+}
+
+fn read(config: &Value, weights: &[u8]) -> Result<Network, String> {
+    let config = file::parse_config(config.to_string().as_bytes())?;
+    let mut tensors = file::parse_tensors(weights)?;
+    Network::new(config, &mut tensors, Path::best())
+}
+
+#[track_caller]
+fn refuses(config: &Value, weights: &[u8], expected: &str) {
+    let error = read(config, weights).unwrap_err();
+    assert!(error.contains(expected) && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn a_right_file_is_read() {
+    let network = read(&config(), &weights(|_| {}, 0.5)).unwrap();
+    assert_eq!((network.input_shape(), network.num_actions(), network.has_value()), ([1, 3, 3], 5, false));
+}
+
+#[test]
+fn wrong_tensors_are_refused_by_name() {
+    let rename = |header: &mut Value, name: &str| {
+        let tensor = header.as_object_mut().unwrap().remove("core.bias").unwrap();
+        header[name] = tensor;
+    };
+    refuses(&config(), &weights(|header| rename(header, "other"), 0.5), "tensor `core.bias` is missing");
+    refuses(&config(), &weights(|_| {}, f32::NAN), "value 0 is `NaN`, expected a finite number");
+    refuses(&config(), &weights(|_| {}, f32::INFINITY), "value 0 is `inf`, expected a finite number");
+    let reshape = |header: &mut Value| header["core.weight"]["shape"] = json!([18, 4]);
+    let expected = "tensor `core.weight` has shape [18, 4], expected [any size, 18]";
+    refuses(&config(), &weights(reshape, 0.5), expected);
+    let retype = |header: &mut Value| header["core.weight"]["dtype"] = json!("I32");
+    refuses(&config(), &weights(retype, 0.5), "tensor `core.weight` has type I32, expected F32");
+    let mut shorter = config();
+    shorter["architecture"]["layers"].as_array_mut().unwrap().truncate(3);
+    refuses(
+        &shorter,
+        &weights(|_| {}, 0.5),
+        "tensor `actions.weight` has shape [5, 4], expected [any size, 18]",
+    );
+    let mut twice = config();
+    twice["architecture"]["layers"].as_array_mut().unwrap().push(json!({"dense": "core"}));
+    refuses(&twice, &weights(|_| {}, 0.5), "tensor `core.weight` is missing or used by two layers");
+    let mut without = config();
+    without["architecture"]["layers"] = json!(["flatten"]);
+    without["architecture"]["window"] = json!([1, 2, 2]);
+    refuses(&without, &weights(|_| {}, 0.5), "belongs to no layer");
+}
+
+#[test]
+fn truncated_and_foreign_files_are_refused() {
+    let whole = weights(|_| {}, 0.5);
+    for len in 0..whole.len() {
+        refuses(&config(), &whole[..len], "no safetensors file: ");
+    }
+    refuses(&config(), b"PK\x03\x04 an archive of another program", "no safetensors file: ");
+    // A header of an exabyte.
+    refuses(&config(), &[&u64::MAX.to_le_bytes()[..], b"{}"].concat(), "no safetensors file: ");
+    let claim = |header: &mut Value| header["core.weight"]["shape"] = json!([u64::MAX, 18]);
+    refuses(&config(), &weights(claim, 0.5), "no safetensors file: ");
+}
+
+#[test]
+fn wrong_configs_are_refused() {
+    let cases = [
+        (json!({"version": 2}), "`version` is `2`, expected 1"),
+        (json!({"architecture": {"window": [1, 3]}}), "invalid length 2"),
+        (json!({"architecture": null}), "`architecture` is missing"),
+        (json!({"encode": {}}), "unknown field `encode`"),
+        (json!({"sampling": {"rule": "best"}}), "unknown variant `best`"),
+    ];
+    for (change, expected) in cases {
+        let mut config = config();
+        config.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
+        refuses(&config, &weights(|_| {}, 0.5), expected);
+    }
+    let window = |window: Value, expected: &str| {
+        let mut config = config();
+        config["architecture"]["window"] = window;
+        refuses(&config, &weights(|_| {}, 0.5), expected);
+    };
+    window(json!([1, 1_000_000, 1_000_000]), "the window has 1 channels, 1000000 rows and 1000000 columns");
+    window(json!([u64::MAX, u64::MAX, u64::MAX]), "the window has");
+    window(json!([0, 3, 3]), "the window has 0 channels");
+    window(json!([1, 1000, 1000]), "tensor `core.weight` has shape [4, 18], expected [any size, 2000000]");
+    let layers = |layers: Value, expected: &str| {
+        let mut config = config();
+        config["architecture"]["layers"] = layers;
+        refuses(&config, &weights(|_| {}, 0.5), expected);
+    };
+    layers(
+        json!([{"convolution": {"name": "conv", "padding": 3}}]),
+        "layer `conv`: padding 3 and a kernel of 3 × 3",
+    );
+    layers(json!([{"convolution": {"name": "conv", "padding": u64::MAX}}]), "expected 1 to");
+    layers(json!([{"dense": "core"}]), "layer `core` has a window as input, expected `flatten` before it");
+    layers(json!(["flatten", {"scalars": []}]), "layer `scalars` has no input");
+    layers(json!([]), "the layers end with a window");
+    let deep = (0..40).fold(json!(["relu"]), |layers, _| json!([{"residual": layers}]));
+    layers(deep, "nested more than 16 deep");
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = Network::read(FilePath::new("none/weights.safetensors")).unwrap_err().to_string();
+    assert!(error.starts_with("none/weights.safetensors: "), "{error}");
+}

@@ -1,0 +1,196 @@
+//! Follows the values of a graph from its inputs to its logits, as chains of layers.
+
+use std::collections::HashMap;
+
+use super::proto::{Graph, Node, TensorProto, ValueInfo};
+use crate::network::{Architecture, Layer, Tensors};
+
+/// The largest number of operators of a graph.
+const MOST_NODES: usize = 2000;
+
+/// What is known of a value.
+#[derive(Clone, Debug)]
+pub enum Value<'a> {
+    /// A constant.
+    Constant(&'a TensorProto),
+    /// The output of a step.
+    Step(usize),
+    /// The output of a product without a bias yet: its input and its weights, one row for each input.
+    Product { input: usize, weights: &'a TensorProto },
+    /// Depends on something that is no layer; the text says on what.
+    Unknown(String),
+}
+
+/// The shape of a value of an agent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    Window([usize; 3]),
+    List(usize),
+}
+
+/// A layer and the step before it.
+#[derive(Debug)]
+pub struct Step {
+    /// `None` for an input of the graph.
+    pub before: Option<usize>,
+    pub layer: Option<Layer>,
+    pub shape: Shape,
+}
+
+/// Reads a graph node by node. Nodes of a graph are in topological order.
+pub struct Reader<'a> {
+    pub values: HashMap<&'a str, Value<'a>>,
+    pub steps: Vec<Step>,
+    /// The tensors of each layer, by its name and theirs.
+    pub tensors: HashMap<String, Vec<(String, Vec<usize>, Vec<f32>)>>,
+    window: usize,
+    /// The step of the numbers beside the window.
+    pub scalars: Option<usize>,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(graph: &'a Graph) -> Result<Self, String> {
+        if graph.node.len() > MOST_NODES {
+            return Err(format!("{} operators, expected at most {MOST_NODES}", graph.node.len()));
+        }
+        let constants = graph.initializer.iter().map(|tensor| (&*tensor.name, Value::Constant(tensor)));
+        let mut reader = Self {
+            values: constants.collect(),
+            steps: Vec::new(),
+            tensors: HashMap::new(),
+            window: 0,
+            scalars: None,
+        };
+        let mut windows = 0;
+        for input in &graph.input {
+            // Old files list their tensors among the inputs.
+            if reader.values.contains_key(&*input.name) {
+                continue;
+            }
+            let shape = match sizes(input).as_deref() {
+                Some([_, channels, rows, cols]) => Shape::Window([*channels, *rows, *cols]),
+                Some([_, len]) => Shape::List(*len),
+                _ => {
+                    let reason = format!("input `{}`, which has an unknown shape", input.name);
+                    reader.values.insert(&input.name, Value::Unknown(reason));
+                    continue;
+                }
+            };
+            let step = reader.push(Step { before: None, layer: None, shape });
+            reader.values.insert(&input.name, Value::Step(step));
+            if let Shape::Window(_) = shape {
+                windows += 1;
+                reader.window = step;
+            }
+        }
+        if windows == 1 {
+            return Ok(reader);
+        }
+        Err(format!("{windows} inputs of shape (batch, channels, rows, columns), expected one"))
+    }
+
+    pub fn push(&mut self, step: Step) -> usize {
+        self.steps.push(step);
+        self.steps.len() - 1
+    }
+
+    /// Appends a layer to a step.
+    pub fn append(&mut self, before: usize, layer: Layer, shape: Shape) -> Value<'a> {
+        Value::Step(self.push(Step { before: Some(before), layer: Some(layer), shape }))
+    }
+
+    /// Reads a node: its first output is a layer, or unknown; all others are unknown.
+    pub fn add(&mut self, node: &'a Node) {
+        let value = self.operator(node).unwrap_or_else(|reason| {
+            let operator = &node.op_type;
+            Value::Unknown(if reason.is_empty() { format!("operator `{operator}`") } else { reason })
+        });
+        for (index, name) in node.output.iter().enumerate() {
+            let value = if index == 0 {
+                value.clone()
+            } else {
+                Value::Unknown(format!("output {index} of operator `{}`", node.op_type))
+            };
+            self.values.insert(name, value);
+        }
+    }
+
+    /// Returns the layers from one step to another, or `None` if the second does not follow the first.
+    pub fn layers_between(&self, first: usize, last: usize) -> Option<Vec<Layer>> {
+        let mut layers = Vec::new();
+        let mut at = last;
+        while at != first {
+            layers.extend(self.steps[at].layer.clone());
+            at = self.steps[at].before?;
+        }
+        layers.reverse();
+        Some(layers)
+    }
+
+    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if it stands on
+    /// other layers than the logits.
+    pub fn finish(&mut self, logits: &str, value: Option<&str>) -> Result<(Architecture, Tensors), String> {
+        let (last, actions) = self.head(logits)?;
+        let value = value.and_then(|value| self.head(value).ok()).filter(|(step, _)| *step == last);
+        let value = value.map(|(_, name)| name);
+        let layers =
+            self.layers_between(self.window, last).ok_or("the logits do not depend on the window")?;
+        let Shape::Window(window) = self.steps[self.window].shape else { return Err("no window".into()) };
+        let scalars = match self.scalars.map(|step| self.steps[step].shape) {
+            Some(Shape::List(len)) if has_scalars(&layers) => len,
+            _ => 0,
+        };
+        let mut tensors = Tensors::default();
+        let heads = [Some(&actions), value.as_ref()];
+        let mut names: Vec<String> = heads.into_iter().flatten().cloned().collect();
+        collect_names(&layers, &mut names);
+        for name in names {
+            for (name, shape, values) in self.tensors.remove(&name).into_iter().flatten() {
+                tensors.insert_values(&name, shape, values)?;
+            }
+        }
+        Ok((Architecture { window, scalars, layers, actions, value }, tensors))
+    }
+
+    /// Returns the step before a dense layer, and its name.
+    fn head(&self, output: &str) -> Result<(usize, String), String> {
+        match self.values.get(output) {
+            Some(Value::Step(step)) => match &self.steps[*step] {
+                Step { before: Some(before), layer: Some(Layer::Dense(name)), .. } => {
+                    Ok((*before, name.clone()))
+                }
+                _ => Err(format!("output `{output}` does not come from a dense layer")),
+            },
+            Some(Value::Unknown(reason)) => {
+                Err(format!("output `{output}` depends on {reason}, which is no layer of this program"))
+            }
+            _ => Err(format!("output `{output}` depends on no input")),
+        }
+    }
+}
+
+/// Returns the sizes of an input, 0 for the free ones.
+fn sizes(input: &ValueInfo) -> Option<Vec<usize>> {
+    let shape = input.r#type.as_ref()?.tensor_type.as_ref()?.shape.as_ref()?;
+    shape.dim.iter().map(|size| usize::try_from(size.dim_value).ok()).collect()
+}
+
+fn has_scalars(layers: &[Layer]) -> bool {
+    layers.iter().any(|layer| match layer {
+        Layer::Scalars(_) => true,
+        Layer::Residual(layers) => has_scalars(layers),
+        _ => false,
+    })
+}
+
+fn collect_names(layers: &[Layer], names: &mut Vec<String>) {
+    for layer in layers {
+        match layer {
+            Layer::Convolution { name, .. } | Layer::Dense(name) | Layer::Gru(name) => {
+                names.push(name.clone())
+            }
+            Layer::Residual(layers) | Layer::Scalars(layers) => collect_names(layers, names),
+            Layer::Relu | Layer::Elu | Layer::Flatten => {}
+        }
+    }
+}

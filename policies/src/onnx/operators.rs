@@ -1,0 +1,292 @@
+//! The operators that are layers. An error is a text that says what is no layer; an empty text stands for the operator.
+
+use super::graph::{Reader, Shape, Value};
+use super::proto::{Node, TensorProto};
+use crate::network::Layer;
+
+impl<'a> Reader<'a> {
+    /// Returns the first output of a node.
+    pub fn operator(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        if !matches!(&*node.domain, "" | "ai.onnx") {
+            return Err(String::new());
+        }
+        match &*node.op_type {
+            "Constant" => node.tensor("value").map(Value::Constant).ok_or_else(String::new),
+            "Identity" | "Dropout" => self.value(node, 0),
+            "Relu" => self.activation(node, Layer::Relu),
+            "Elu" if node.float("alpha", 1.0) == 1.0 => self.activation(node, Layer::Elu),
+            "Conv" => self.convolution(node),
+            "Add" => self.add_values(node),
+            "Flatten" if node.int("axis", 1) == 1 => self.flatten(node, None),
+            "Reshape" => self.reshape(node),
+            "Gemm" => self.gemm(node),
+            "MatMul" => self.product(node),
+            "Concat" => self.concat(node),
+            "Squeeze" | "Unsqueeze" => self.squeeze(node),
+            "GRU" => self.gru(node),
+            _ => Err(String::new()),
+        }
+    }
+
+    /// Returns an input of a node.
+    fn value(&self, node: &Node, index: usize) -> Result<Value<'a>, String> {
+        let name = node.input.get(index).ok_or_else(String::new)?;
+        match self.values.get(&**name) {
+            Some(Value::Unknown(reason)) => Err(reason.clone()),
+            Some(value) => Ok(value.clone()),
+            None => Err(format!("value `{name}`, which no earlier operator returns")),
+        }
+    }
+
+    /// Returns an input of a node that is a step. A product without a bias gets one of zeros.
+    fn step(&mut self, node: &'a Node, index: usize) -> Result<(usize, Shape), String> {
+        let mut value = self.value(node, index)?;
+        if let Value::Product { input, weights } = value {
+            let (sizes, values) = weights.floats()?;
+            let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
+            let values = transposed(&values, [inputs, outputs]);
+            value = self.dense(input, weights, [outputs, inputs], (values, vec![0.0; outputs]));
+            self.values.insert(&node.input[index], value.clone());
+        }
+        match value {
+            Value::Step(step) => Ok((step, self.steps[step].shape)),
+            _ => Err(String::new()),
+        }
+    }
+
+    fn constant(&self, node: &Node, index: usize) -> Result<&'a TensorProto, String> {
+        match self.value(node, index)? {
+            Value::Constant(tensor) => Ok(tensor),
+            _ => Err(format!("operator `{}` whose input {index} is no constant", node.op_type)),
+        }
+    }
+
+    fn activation(&mut self, node: &'a Node, layer: Layer) -> Result<Value<'a>, String> {
+        let (input, shape) = self.step(node, 0)?;
+        Ok(self.append(input, layer, shape))
+    }
+
+    /// Stores the tensors of a layer. Its name is that of its weights if they have one of their own.
+    fn store(&mut self, weights: &TensorProto, tensors: Vec<(&str, Vec<usize>, Vec<f32>)>) -> String {
+        let number = self.tensors.len();
+        let own = weights.name.strip_suffix(".weight").filter(|name| !self.tensors.contains_key(*name));
+        let name = own.map_or_else(|| format!("layer-{number}"), str::to_owned);
+        let named = tensors.into_iter().map(|(end, shape, values)| (format!("{name}.{end}"), shape, values));
+        self.tensors.insert(name.clone(), named.collect());
+        name
+    }
+
+    fn convolution(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let (input, shape) = self.step(node, 0)?;
+        let weights = self.constant(node, 1)?;
+        let (sizes, values) = weights.floats()?;
+        let ([outputs, _, height, width], Shape::Window([_, rows, cols])) = (&*sizes, shape) else {
+            return Err(String::new());
+        };
+        let all = |name: &str, value: i64| node.ints(name).iter().all(|size| *size == value);
+        let padding = node.ints("pads").first().copied().unwrap_or(0);
+        if !all("pads", padding)
+            || !all("strides", 1)
+            || !all("dilations", 1)
+            || node.int("group", 1) != 1
+            || !node.is_text("auto_pad", "NOTSET")
+        {
+            return Err("operator `Conv` with strides, dilations, groups or unequal padding".into());
+        }
+        let padding = usize::try_from(padding).map_err(|_| "operator `Conv` with negative padding")?;
+        let size = |input: usize, kernel: &usize| {
+            padding.checked_mul(2)?.checked_add(input)?.checked_add(1)?.checked_sub(*kernel)
+        };
+        let (Some(rows), Some(cols)) = (size(rows, height), size(cols, width)) else {
+            return Err(String::new());
+        };
+        let bias = self.bias(node, *outputs)?;
+        let outputs = *outputs;
+        let name = self.store(weights, vec![("weight", sizes, values), ("bias", vec![outputs], bias)]);
+        Ok(self.append(input, Layer::Convolution { name, padding }, Shape::Window([outputs, rows, cols])))
+    }
+
+    /// Returns the bias that is the third input of a node, zeros if there is none.
+    fn bias(&self, node: &Node, outputs: usize) -> Result<Vec<f32>, String> {
+        if node.input.get(2).is_none_or(String::is_empty) {
+            return Ok(vec![0.0; outputs]);
+        }
+        Ok(self.constant(node, 2)?.floats()?.1)
+    }
+
+    fn gemm(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let (input, shape) = self.step(node, 0)?;
+        let weights = self.constant(node, 1)?;
+        let (sizes, mut values) = weights.floats()?;
+        let ([first, second], Shape::List(_)) = (&*sizes, shape) else { return Err(String::new()) };
+        if node.float("alpha", 1.0) != 1.0 || node.float("beta", 1.0) != 1.0 || node.int("transA", 0) != 0 {
+            return Err("operator `Gemm` with a factor or a transposed input".into());
+        }
+        let (mut outputs, mut inputs) = (*first, *second);
+        if node.int("transB", 0) == 0 {
+            values = transposed(&values, [*first, *second]);
+            (inputs, outputs) = (*first, *second);
+        }
+        let bias = self.bias(node, outputs)?;
+        Ok(self.dense(input, weights, [outputs, inputs], (values, bias)))
+    }
+
+    fn dense(
+        &mut self,
+        input: usize,
+        weights: &TensorProto,
+        sizes: [usize; 2],
+        (values, bias): (Vec<f32>, Vec<f32>),
+    ) -> Value<'a> {
+        let name =
+            self.store(weights, vec![("weight", sizes.into(), values), ("bias", vec![sizes[0]], bias)]);
+        self.append(input, Layer::Dense(name), Shape::List(sizes[0]))
+    }
+
+    fn product(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let (input, shape) = self.step(node, 0)?;
+        let weights = self.constant(node, 1)?;
+        match (shape, &*weights.dims) {
+            (Shape::List(_), [_, _]) => Ok(Value::Product { input, weights }),
+            _ => Err(String::new()),
+        }
+    }
+
+    /// Reads the sum of a product and its bias, or of a value and what layers make of it.
+    fn add_values(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        match [self.value(node, 0)?, self.value(node, 1)?] {
+            [Value::Product { input, weights }, Value::Constant(bias)]
+            | [Value::Constant(bias), Value::Product { input, weights }] => {
+                let ((sizes, values), bias) = (weights.floats()?, bias.floats()?.1);
+                let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
+                Ok(self.dense(
+                    input,
+                    weights,
+                    [outputs, inputs],
+                    (transposed(&values, [inputs, outputs]), bias),
+                ))
+            }
+            [Value::Step(one), Value::Step(other)] if self.steps[one].shape == self.steps[other].shape => {
+                let shape = self.steps[one].shape;
+                // A value follows the other if it was read later.
+                let (first, last) = (one.min(other), one.max(other));
+                let layers = self.layers_between(first, last);
+                let layers =
+                    layers.ok_or("operator `Add` of two values neither of which layers make of the other")?;
+                Ok(self.append(first, Layer::Residual(layers), shape))
+            }
+            _ => Err(String::new()),
+        }
+    }
+
+    fn flatten(&mut self, node: &'a Node, len: Option<i64>) -> Result<Value<'a>, String> {
+        let (input, shape) = self.step(node, 0)?;
+        let num_values = match shape {
+            Shape::Window(sizes) => sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size)),
+            Shape::List(len) => Some(len),
+        };
+        let num_values = num_values.ok_or_else(String::new)?;
+        if len.is_some_and(|len| len != -1 && usize::try_from(len) != Ok(num_values)) {
+            return Err(String::new());
+        }
+        match shape {
+            Shape::Window(_) => Ok(self.append(input, Layer::Flatten, Shape::List(num_values))),
+            Shape::List(_) => Ok(Value::Step(input)),
+        }
+    }
+
+    fn reshape(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let shape = self.constant(node, 1)?.integers();
+        match shape.as_deref() {
+            Some([0 | 1, -1]) => self.flatten(node, None),
+            Some([-1 | 0 | 1, len]) if *len > 0 => self.flatten(node, Some(*len)),
+            _ => Err(String::new()),
+        }
+    }
+
+    /// Reads a list to which the numbers beside the window are appended.
+    fn concat(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let ((one, Shape::List(left)), (other, Shape::List(right))) =
+            (self.step(node, 0)?, self.step(node, 1)?)
+        else {
+            return Err(String::new());
+        };
+        if node.input.len() != 2 || !matches!(node.int("axis", 0), 1 | -1) {
+            return Err(String::new());
+        }
+        let mut input = other;
+        while let Some(before) = self.steps[input].before {
+            input = before;
+        }
+        let layers = self.layers_between(input, other).unwrap_or_default();
+        if matches!(self.steps[input].shape, Shape::Window(_))
+            || self.scalars.is_some_and(|known| known != input)
+        {
+            return Err(
+                "operator `Concat` whose second input does not come from the numbers beside the window"
+                    .into(),
+            );
+        }
+        self.scalars = Some(input);
+        let len = left.checked_add(right).ok_or_else(String::new)?;
+        Ok(self.append(one, Layer::Scalars(layers), Shape::List(len)))
+    }
+
+    /// Reads an axis of size 1 around a recurrent layer or after a head with one output.
+    fn squeeze(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let (step, shape) = self.step(node, 0)?;
+        let is_recurrent = matches!(self.steps[step].layer, Some(Layer::Gru(_)));
+        match (shape, &*node.op_type) {
+            (Shape::List(1), "Squeeze") => Ok(Value::Step(step)),
+            (Shape::List(_), "Squeeze") if is_recurrent => Ok(Value::Step(step)),
+            (Shape::List(_), "Unsqueeze") => Ok(Value::Step(step)),
+            _ => Err(String::new()),
+        }
+    }
+
+    /// Reads a recurrent layer with PyTorch's formula. Its gates are in the order update, reset, new.
+    fn gru(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
+        let (input, _) = self.step(node, 0)?;
+        let weights = self.constant(node, 1)?;
+        let ((of_input, input_values), (of_state, state_values)) =
+            (weights.floats()?, self.constant(node, 2)?.floats()?);
+        let ([1, rows, inputs], [1, state_rows, size]) = (&*of_input, &*of_state) else {
+            return Err(String::new());
+        };
+        if rows != state_rows
+            || Some(*rows) != size.checked_mul(3)
+            || node.int("linear_before_reset", 0) != 1
+            || node.int("layout", 0) != 0
+            || !node.is_text("direction", "forward")
+        {
+            return Err("operator `GRU` that differs from PyTorch's".into());
+        }
+        let bias = match node.input.get(3) {
+            Some(name) if !name.is_empty() => self.constant(node, 3)?.floats()?.1,
+            _ => vec![0.0; 2 * rows],
+        };
+        if bias.len() != 2 * rows {
+            return Err("operator `GRU` whose bias has another size than its weights".into());
+        }
+        let (rows, inputs, size) = (*rows, *inputs, *size);
+        let (input_bias, state_bias) = bias.split_at(rows);
+        let tensors = vec![
+            ("weight_ih_l0", vec![rows, inputs], reset_first(&input_values)),
+            ("weight_hh_l0", vec![rows, size], reset_first(&state_values)),
+            ("bias_ih_l0", vec![rows], reset_first(input_bias)),
+            ("bias_hh_l0", vec![rows], reset_first(state_bias)),
+        ];
+        let name = self.store(weights, tensors);
+        Ok(self.append(input, Layer::Gru(name), Shape::List(size)))
+    }
+}
+
+/// Swaps the first two thirds of a list.
+fn reset_first(values: &[f32]) -> Vec<f32> {
+    let third = values.len() / 3;
+    [&values[third..2 * third], &values[..third], &values[2 * third..]].concat()
+}
+
+fn transposed(values: &[f32], [rows, cols]: [usize; 2]) -> Vec<f32> {
+    (0..rows * cols).map(|index| values[index % rows * cols + index / rows]).collect()
+}
