@@ -120,9 +120,8 @@ mod tests {
             assert_eq!(cache.get(&key(0)), Some(outlook(0)), "used in every turn");
         }
         assert_eq!(cache.get(&key(1)), None);
-        let held = |shard: &Mutex<Shard>| {
-            shard.lock().map(|shard| shard.newer.len() + shard.older.len()).unwrap_or(0)
-        };
+        let held =
+            |shard: &Mutex<Shard>| shard.lock().map_or(0, |shard| shard.newer.len() + shard.older.len());
         let num_held: usize = cache.shards.iter().map(held).sum();
         assert!(num_held <= 2 * Cache::NUM_SHARDS * Cache::MAX_ENTRIES);
         assert!(

@@ -30,12 +30,12 @@ impl Ahead {
         }
         let list = |(stream, &goal): (&GoalStream, &Cell)| {
             let mut stream = stream.clone();
-            let mut list = vec![goal];
-            while list.len() < count {
-                let last = list[list.len() - 1];
-                list.push(stream.advance(last));
+            let mut known = vec![goal];
+            while known.len() < count {
+                let last = known[known.len() - 1];
+                known.push(stream.advance(last));
             }
-            list
+            known
         };
         self.streams.iter().zip(goals).map(list).collect()
     }
@@ -88,8 +88,8 @@ proptest! {
         density in prop::sample::select(vec![0.0, 0.2, 0.4]),
         on_target in prop::sample::select(vec![OnGoal::Restart, OnGoal::Restart, OnGoal::Finish, OnGoal::Nothing]),
         radius in 1_usize..6,
-        scale in prop::sample::select(vec![0.0, 0.3, 3.0]),
-        expansions in 1_u32..60,
+        scale in prop::sample::select(vec![0.0, 0.3, 1.0, 3.0]),
+        expansions in 1_u32..200,
         agents_to_plan in 1_usize..4,
         merging_range in 2_u32..7,
         faithful: bool,

@@ -1,5 +1,7 @@
 //! The search of MATS-LP in plain code: recursive, one state at a time, with the reference engine.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::collections::{BTreeMap, VecDeque};
 
 use pogema_core::{Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside};
