@@ -78,7 +78,7 @@ fn same_as_slow(yaml: &str, network: &Linear, params: MatsLpParams, steps: usize
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn the_search_equals_the_slow_one(
