@@ -63,8 +63,8 @@ pub use plan::Plan;
 pub use plan_text::{PlanText, write_plan, write_result};
 pub use planner::Planner;
 pub use policies::{
-    AStarAgent, AStarTeam, LifelongPolicy, PlannerPolicy, PomapfObservation, PomapfObservations, pogema_team,
-    sample,
+    AStarAgent, AStarTeam, GoalForecast, LifelongPolicy, PlannerPolicy, PomapfObservation,
+    PomapfObservations, pogema_team, sample,
 };
 pub use problem::Problem;
 pub use registry::{LifelongName, PlannerName, PlannerSettings};

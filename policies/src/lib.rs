@@ -1,11 +1,12 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 //!
 //! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] turns that into
-//! logits of its actions.
+//! logits of its actions. [`MatsLp`] searches with a network.
 
 mod encode;
 mod follower;
 mod grid;
+mod mats_lp;
 mod network;
 mod onnx;
 mod policy;
@@ -13,11 +14,14 @@ mod simd;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
 pub use follower::FollowerVersion;
+pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, MatsLpStats, NetworkPrior, Prior};
 pub use network::{
     Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
     SamplingConfig, Workspace, softmax,
 };
-pub use policy::{Learned, LearnedName, LearnedPolicy, NamedPolicy, PolicySettings, SimplePolicy};
+pub use policy::{
+    Learned, LearnedName, LearnedPolicy, NamedPolicy, NetworkPolicy, PolicySettings, SimplePolicy,
+};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

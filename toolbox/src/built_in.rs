@@ -8,13 +8,13 @@ use std::time::Duration;
 use pogema_core::{Error, MAX_THREADS, Words};
 use pogema_maps::nearest;
 use pogema_planners::Budget;
-use pogema_policies::{LearnedName, NamedPolicy, PolicySettings, Sampling};
+use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling};
 
 use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
 
 /// The parameters of every built-in algorithm.
-const PARAMETERS: [&str; 9] = [
+const PARAMETERS: [&str; 11] = [
     "seed",
     "seconds",
     "nodes",
@@ -24,10 +24,12 @@ const PARAMETERS: [&str; 9] = [
     "weights",
     "sampling",
     "mask_actions",
+    "expansions",
+    "faithful",
 ];
 
 /// The parameters of learned policies alone.
-const OF_NETWORKS: [&str; 3] = ["weights", "sampling", "mask_actions"];
+const OF_NETWORKS: [&str; 5] = ["weights", "sampling", "mask_actions", "expansions", "faithful"];
 
 /// Parameters of pogema-toolbox's algorithms that built-in algorithms accept and ignore.
 const IGNORED: [&str; 3] = ["device", "preprocessing", "run_episode_func"];
@@ -99,14 +101,21 @@ impl BuiltIn {
             .text()
             .ok_or_else(|| wrong(&weights.1, &path_of("weights"), "the path of a network"))?;
         let mut learned = name.read(&folder.join(file))?;
+        let in_line = |key: &str, node: &Node, error: Error| {
+            let (line, path) = (node.line, path_of(key));
+            Error::Syntax { reason: format!("line {line}: `{path}`: {error}") }
+        };
         if let Some((key, node)) = find("sampling") {
             let rule = node.text().and_then(Sampling::of_word);
             let rule = rule.ok_or_else(|| wrong(node, &path_of(key), &Sampling::expected()))?;
-            learned = learned.with_sampling(rule);
+            learned = learned.with_sampling(rule).map_err(|error| in_line(key, node, error))?;
         }
         if let Some((key, node)) = find("mask_actions") {
             let flag = node.value().as_bool().ok_or_else(|| wrong(node, &path_of(key), "true or false"))?;
-            learned = learned.with_masks(flag);
+            learned = learned.with_masks(flag).map_err(|error| in_line(key, node, error))?;
+        }
+        for (key, node) in ["expansions", "faithful"].into_iter().filter_map(find) {
+            set_search(&mut learned, key, node).map_err(|error| in_line(key, node, error))?;
         }
         self.settings.learned = Some(learned);
         Ok(())
@@ -140,4 +149,20 @@ impl BuiltIn {
         }
         Ok(())
     }
+}
+
+/// Sets a parameter of a search.
+fn set_search(learned: &mut Learned, key: &str, node: &Node) -> Result<(), Error> {
+    let Learned::MatsLp(_, params) = learned else {
+        return Err(Error::request("the policy does not search; only `mats-lp` does"));
+    };
+    let value = node.value();
+    if key == "faithful" {
+        let flag = value.as_bool();
+        params.faithful = flag.ok_or_else(|| Error::argument(key, value, "true or false"))?;
+    } else {
+        let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+        params.expansions = number.ok_or_else(|| Error::argument(key, value, "a number"))?;
+    }
+    params.check()
 }

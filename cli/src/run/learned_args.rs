@@ -10,7 +10,7 @@ use pogema_policies::{Learned, LearnedName, Sampling};
 /// The network of a learned policy.
 #[derive(Args, Clone, Debug)]
 pub struct LearnedArgs {
-    /// Weights of the network, for `--policy follower` or `--policy network`
+    /// Weights of the network, for `--policy follower`, `--policy mats-lp` or `--policy network`
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Rule that chooses actions from the logits of the network [default: that of its JSON file]
@@ -47,8 +47,8 @@ impl LearnedArgs {
         let missing = || Error::request(format!("`--policy {policy}` needs `--weights FILE`"));
         let mut learned = name.read(self.weights.as_deref().ok_or_else(missing)?)?;
         if let Some(rule) = self.sampling.as_deref().and_then(Sampling::of_word) {
-            learned = learned.with_sampling(rule);
+            learned = learned.with_sampling(rule)?;
         }
-        Ok(Some(learned.with_masks(self.mask_actions)))
+        learned.with_masks(self.mask_actions).map(Some)
     }
 }

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 use pogema_core::{Cell, Error, GoalStream, Instance, State};
 
 /// The future goals of all agents, read from their instance and advanced with the episode.
+///
+/// Only a policy that its paper gives future goals should use it, because an environment does not reveal them.
 #[derive(Debug)]
-pub(crate) struct GoalForecast {
+pub struct GoalForecast {
     streams: Vec<GoalStream>,
     /// For each agent, its current goal and later ones.
     ahead: Vec<VecDeque<Cell>>,
@@ -15,15 +17,13 @@ pub(crate) struct GoalForecast {
 }
 
 impl GoalForecast {
-    /// Number of known goals of each agent, including the current one.
-    const NUM_GOALS: usize = 24;
-
-    /// Creates the forecast at the start of an episode.
-    pub fn new(instance: &Instance) -> Self {
+    /// Creates the forecast at the start of an episode, with this many goals of each agent (at least 1), including the
+    /// current one.
+    pub fn new(instance: &Instance, num_goals: usize) -> Self {
         let mut streams = instance.goals().to_vec();
         let ahead = streams.iter_mut().map(|stream| {
             let mut goals = VecDeque::from([stream.first()]);
-            while goals.len() < Self::NUM_GOALS {
+            while goals.len() < num_goals {
                 draw(stream, &mut goals);
             }
             goals
@@ -56,13 +56,15 @@ impl GoalForecast {
                     now.goals[agent]
                 )));
             }
+            goals.make_contiguous();
         }
         Ok(())
     }
 
     /// Returns the goals of an agent, the current one first.
-    pub fn goals(&mut self, agent: usize) -> &[Cell] {
-        self.ahead[agent].make_contiguous()
+    pub fn goals(&self, agent: usize) -> &[Cell] {
+        // INVARIANT: `follow` leaves all goals in one slice, and so does `new`.
+        self.ahead[agent].as_slices().0
     }
 }
 

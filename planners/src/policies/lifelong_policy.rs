@@ -22,6 +22,9 @@ pub struct LifelongPolicy {
 }
 
 impl LifelongPolicy {
+    /// Number of goals of each agent that a planner with future goals knows, including the current one.
+    const NUM_GOALS: usize = 24;
+
     /// Creates a policy of a planner, with a budget for each step.
     pub fn new(name: LifelongName, settings: PlannerSettings, budget: Budget) -> Self {
         Self { name, settings, budget, planner: None, forecast: None }
@@ -49,7 +52,7 @@ impl LifelongPolicy {
                 "a planner that uses future goals, such as `rhcr`",
             ));
         }
-        self.forecast = Some(GoalForecast::new(instance));
+        self.forecast = Some(GoalForecast::new(instance, Self::NUM_GOALS));
         Ok(())
     }
 

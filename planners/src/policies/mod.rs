@@ -11,6 +11,7 @@ mod planner_policy;
 mod pogema;
 
 pub use astar::{AStarAgent, AStarTeam, pogema_team};
+pub use goal_forecast::GoalForecast;
 pub use lifelong_policy::LifelongPolicy;
 pub use observations::{PomapfObservation, PomapfObservations};
 pub use planner_policy::PlannerPolicy;

@@ -72,7 +72,8 @@ impl Costs {
         &self.agents[agent]
     }
 
-    fn grid(&mut self, goal: Cell) -> CostGrid {
+    /// Returns the costs to a goal.
+    pub fn grid(&mut self, goal: Cell) -> CostGrid {
         if let Some(grid) = self.grids.get(&goal) {
             return grid.clone();
         }

@@ -3,7 +3,7 @@
 //! An [`Encoder`] turns the states of one environment into windows and numbers of its agents. It needs no engine: it
 //! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
 
-mod costs;
+pub(crate) mod costs;
 mod memory;
 mod offsets;
 mod path;
@@ -130,8 +130,8 @@ impl Encoder {
         Error::check_length("active", num_agents, state.active.len())?;
         Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
         Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())?;
-        episode.check_inside("cell", state.cells)?;
-        episode.check_inside("goal", state.goals)?;
+        episode.layout.check_inside("cell", state.cells)?;
+        episode.layout.check_inside("goal", state.goals)?;
         episode.follow(state, settings);
         if settings.window_len() > 0 {
             for (agent, out) in windows.chunks_exact_mut(settings.window_len()).enumerate() {
@@ -148,15 +148,6 @@ impl Encoder {
 }
 
 impl Episode {
-    fn check_inside(&self, what: &str, cells: &[Cell]) -> Result<(), Error> {
-        let (height, width) = self.layout.map_size();
-        let is_outside = |cell: &Cell| usize::from(cell.row) >= height || usize::from(cell.col) >= width;
-        match cells.iter().position(is_outside) {
-            None => Ok(()),
-            Some(agent) => Err(Error::outside(agent, what, cells[agent], height, width)),
-        }
-    }
-
     fn follow(&mut self, state: State<'_>, settings: &EncoderSettings) {
         for marks in self.marks.iter_mut().chain(&mut self.all) {
             marks.follow(state);

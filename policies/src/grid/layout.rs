@@ -1,6 +1,6 @@
 //! A padded grid: the map with a margin on every side, so that no window needs a bounds check.
 
-use pogema_core::{Cell, Map, Outside};
+use pogema_core::{Cell, Error, Map, Outside};
 
 /// The shape of a padded grid, row-major.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,9 +17,17 @@ impl Layout {
         Self { height: map.height(), width: map.width(), margin: radius.max(1) }
     }
 
-    /// Returns the height and the width of the map.
-    pub fn map_size(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Checks that the cells of all agents lie on the map; `what` names them in the error.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for the first cell outside the map.
+    pub fn check_inside(&self, what: &str, cells: &[Cell]) -> Result<(), Error> {
+        let Self { height, width, .. } = *self;
+        let is_outside = |cell: &Cell| usize::from(cell.row) >= height || usize::from(cell.col) >= width;
+        match cells.iter().position(is_outside) {
+            None => Ok(()),
+            Some(agent) => Err(Error::outside(agent, what, cells[agent], height, width)),
+        }
     }
 
     /// Returns the number of places.

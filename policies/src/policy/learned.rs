@@ -9,14 +9,14 @@ use crate::policy::sampler::{Logits, NUM_ACTIONS, Sampler};
 
 /// A network with everything that it needs to act.
 #[derive(Clone, Debug)]
-pub struct Learned {
+pub struct NetworkPolicy {
     network: Network,
     encoder: EncoderSettings,
     sampling: Sampling,
     masks_actions: bool,
 }
 
-impl Learned {
+impl NetworkPolicy {
     /// Creates a policy of a network with its own encoder and sampling.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ impl Learned {
     /// Creates a policy of a network with an encoder in place of its own.
     ///
     /// # Errors
-    /// Those of [`Learned::new`].
+    /// Those of [`NetworkPolicy::new`].
     pub fn with_encoder(network: Network, encoder: EncoderSettings) -> Result<Self, Error> {
         encoder.check()?;
         let (input, output) = (network.input_shape(), encoder.shape());
@@ -54,7 +54,7 @@ impl Learned {
     /// Creates the policy Follower, for a network whose window has Follower's two channels.
     ///
     /// # Errors
-    /// Those of [`Learned::new`].
+    /// Those of [`NetworkPolicy::new`].
     pub fn follower(network: Network) -> Result<Self, Error> {
         let [_, side, _] = network.input_shape();
         let usual = || EncoderSettings::follower(side / 2, FollowerVersion::default());

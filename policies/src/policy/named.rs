@@ -1,7 +1,5 @@
 //! Policies by name.
 
-use std::path::Path;
-
 use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
 use pogema_planners::{
@@ -9,8 +7,9 @@ use pogema_planners::{
     PomapfObservations, pogema_team, sample,
 };
 
-use crate::network::Network;
-use crate::policy::learned::{Learned, LearnedPolicy};
+use crate::mats_lp::MatsLp;
+use crate::policy::learned::LearnedPolicy;
+use crate::policy::method::{Learned, LearnedName};
 
 words! {
     /// The policies without a joint plan.
@@ -21,31 +20,6 @@ words! {
         Astar = "astar",
         /// All agents stay.
         Stay = "stay",
-    }
-}
-
-words! {
-    /// The policies that need the weights of a network.
-    pub enum LearnedName {
-        /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
-        Follower = "follower",
-        /// Any network whose JSON file names its encoder.
-        Network = "network",
-    }
-}
-
-impl LearnedName {
-    /// Reads the policy from a file with the weights of its network.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy.
-    pub fn read(self, weights: &Path) -> Result<Learned, Error> {
-        let network = Network::read(weights)?;
-        let learned = match self {
-            Self::Follower => Learned::follower(network),
-            Self::Network => Learned::new(network),
-        };
-        learned.map_err(|error| Error::io(weights, error))
     }
 }
 
@@ -74,6 +48,7 @@ enum Kind {
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
     Learned(Box<LearnedPolicy>),
+    MatsLp(Box<MatsLp>),
 }
 
 impl NamedPolicy {
@@ -124,8 +99,17 @@ impl NamedPolicy {
         }
         if name_of_learned.is_some() {
             let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
-            let policy = learned.ok_or_else(missing)?.begin(instance, config, planner_settings.seed)?;
-            return Ok(Self(Kind::Learned(Box::new(policy))));
+            return Ok(Self(match learned.ok_or_else(missing)? {
+                Learned::Network(policy) => {
+                    Kind::Learned(Box::new(policy.begin(instance, config, planner_settings.seed)?))
+                }
+                Learned::MatsLp(prior, params) => {
+                    let policy = MatsLp::new(&prior, params, planner_settings.threads)?;
+                    let mut policy = policy.with_cancellation(budget.cancelled);
+                    policy.begin(instance, config.on_goal);
+                    Kind::MatsLp(Box::new(policy))
+                }
+            }));
         }
         if let Some(planner) = lifelong {
             let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
@@ -170,6 +154,7 @@ impl NamedPolicy {
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),
             Kind::Learned(policy) => policy.act(episode.state()),
+            Kind::MatsLp(policy) => policy.act(episode.state()),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use pogema_core::{Action, Cell, Episode};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource, Library};
-use pogema_policies::{LearnedName, Sampling};
+use pogema_policies::{Learned, LearnedName, Sampling};
 
 use crate::recorded::{read_array, weights};
 
@@ -68,7 +68,9 @@ impl Recorded {
 fn recorded_episodes_are_played_action_for_action() {
     let Some(folder) = weights("the recorded episodes of Follower-lite") else { return };
     let learned = LearnedName::Follower.read(&folder.join("follower-lite.onnx")).unwrap();
-    let learned = learned.with_sampling(Sampling::Follower);
+    let Learned::Network(learned) = learned.with_sampling(Sampling::Follower).unwrap() else {
+        panic!("Follower is a network");
+    };
     let mut different = Vec::new();
     for recorded in Recorded::all(&folder) {
         let mut episode = recorded.start();

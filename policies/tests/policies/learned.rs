@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use pogema_core::{Action, Episode};
 use pogema_fast::Engine;
-use pogema_policies::{Learned, LearnedName, Sampling};
+use pogema_policies::{Learned, LearnedName, NetworkPolicy, Sampling};
 
 use crate::common;
 
@@ -32,7 +32,12 @@ fn start(num_agents: usize) -> Episode<Engine> {
     common::start(&yaml).unwrap()
 }
 
-fn play(learned: &Learned, episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
+fn network(learned: Learned) -> NetworkPolicy {
+    let Learned::Network(policy) = learned else { panic!("MATS-LP is a search") };
+    policy
+}
+
+fn play(learned: &NetworkPolicy, episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
     let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), seed).unwrap();
     let mut all = Vec::new();
     while !episode.is_over() {
@@ -45,7 +50,7 @@ fn play(learned: &Learned, episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<
 
 #[test]
 fn the_small_network_leads_a_lone_agent_to_its_goal() {
-    let learned = LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy);
+    let learned = network(LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy).unwrap());
     let mut episode = start(1);
     play(&learned, &mut episode, 0);
     assert_eq!(episode.state().cells, episode.state().goals);
@@ -53,7 +58,7 @@ fn the_small_network_leads_a_lone_agent_to_its_goal() {
 
 #[test]
 fn actions_depend_on_the_seed_alone() {
-    let learned = LearnedName::Network.read(&descent()).unwrap();
+    let learned = network(LearnedName::Network.read(&descent()).unwrap());
     let first = play(&learned, &mut start(12), 1);
     assert_eq!(first, play(&learned, &mut start(12), 1));
     assert_ne!(first, play(&learned, &mut start(12), 2));
@@ -71,7 +76,7 @@ fn masks_forbid_moves_into_obstacles() {
     let folder = tempfile::tempdir().unwrap();
     let blocked = |is_masked| {
         // Weights of 0 choose all actions with the same probability.
-        let learned = filled(0.0, folder.path()).with_masks(is_masked);
+        let learned = network(filled(0.0, folder.path()).with_masks(is_masked).unwrap());
         let mut episode = start(12);
         let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
         let mut num_blocked = 0;
@@ -96,7 +101,7 @@ fn masks_forbid_moves_into_obstacles() {
 #[test]
 fn logits_that_are_not_finite_name_agent_and_step() {
     let folder = tempfile::tempdir().unwrap();
-    let learned = filled(3e38, folder.path());
+    let learned = network(filled(3e38, folder.path()));
     let episode = start(3);
     let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
     let error = policy.act(episode.state()).unwrap_err();

@@ -9,3 +9,4 @@ mod follower_recorded;
 mod learned;
 #[path = "../common/mod.rs"]
 mod recorded;
+mod mats_lp;

@@ -1,0 +1,148 @@
+//! Batched calls of the network for the leaves of several searches.
+
+use std::time::{Duration, Instant};
+
+use pogema_core::Error;
+use rustc_hash::FxHashMap;
+
+use crate::mats_lp::cache::{Cache, Key, Outlook};
+use crate::mats_lp::prior::{Evaluate, Evaluation, Prior};
+use crate::network::softmax;
+
+/// An outlook that is known, or the row of the batch that will give it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Answer {
+    Known(Outlook),
+    Row(u32),
+}
+
+/// The network and the batch of one thread.
+pub(super) struct Evaluator {
+    network: Box<dyn Evaluate>,
+    input_len: usize,
+    inputs: Vec<f32>,
+    /// The keys of the batch, and the row of each.
+    keys: Vec<Key>,
+    rows: FxHashMap<Key, u32>,
+    outputs: Vec<Evaluation>,
+    outlooks: Vec<Outlook>,
+    stats: MatsLpStats,
+}
+
+/// The work of a policy since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MatsLpStats {
+    /// Number of states of an agent whose evaluation a search requested.
+    pub num_requests: u64,
+    /// Number of states that the network evaluated; the others were known.
+    pub num_evaluated: u64,
+    /// Time in the network, added up over threads.
+    pub network_time: Duration,
+}
+
+impl std::ops::AddAssign for MatsLpStats {
+    fn add_assign(&mut self, other: Self) {
+        self.num_requests += other.num_requests;
+        self.num_evaluated += other.num_evaluated;
+        self.network_time += other.network_time;
+    }
+}
+
+impl Evaluator {
+    /// Largest number of rows in one call of the network.
+    const MAX_ROWS: usize = 64;
+
+    pub fn new(prior: &dyn Prior) -> Self {
+        let side = 2 * prior.radius() + 1;
+        Self {
+            network: prior.evaluator(),
+            input_len: 2 * side * side,
+            inputs: Vec::new(),
+            keys: Vec::new(),
+            rows: FxHashMap::default(),
+            outputs: Vec::new(),
+            outlooks: Vec::new(),
+            stats: MatsLpStats::default(),
+        }
+    }
+
+    /// Requests the outlook of a key; `write` writes its input if no earlier request has the same key.
+    pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Answer {
+        self.stats.num_requests += 1;
+        if let Some(&row) = self.rows.get(&key) {
+            return Answer::Row(row);
+        }
+        if let Some(known) = cache.get(&key) {
+            return Answer::Known(known);
+        }
+        let row = self.keys.len() as u32;
+        let first = self.inputs.len();
+        self.inputs.resize(first + self.input_len, 0.0);
+        write(&key, &mut self.inputs[first..]);
+        self.keys.push(key);
+        self.rows.insert(key, row);
+        Answer::Row(row)
+    }
+
+    /// Evaluates the batch and adds its outlooks to the cache.
+    ///
+    /// # Errors
+    /// Those of the network.
+    pub fn run(&mut self, cache: &Cache) -> Result<(), Error> {
+        self.outputs.clear();
+        self.outputs.resize(self.keys.len(), Evaluation::default());
+        let started = Instant::now();
+        let inputs = self.inputs.chunks(Self::MAX_ROWS * self.input_len);
+        for (inputs, outputs) in inputs.zip(self.outputs.chunks_mut(Self::MAX_ROWS)) {
+            self.network.evaluate(inputs, outputs)?;
+        }
+        self.stats.num_evaluated += self.keys.len() as u64;
+        self.stats.network_time += started.elapsed();
+        self.outlooks.clear();
+        for (&key, output) in self.keys.iter().zip(&self.outputs) {
+            let outlook = outlook(output);
+            if is_finite(&outlook) {
+                cache.insert(key, outlook);
+            }
+            self.outlooks.push(outlook);
+        }
+        self.clear();
+        Ok(())
+    }
+
+    /// Forgets the requests of a batch that was not run.
+    pub fn clear(&mut self) {
+        self.inputs.clear();
+        self.keys.clear();
+        self.rows.clear();
+    }
+
+    /// Returns the work since the evaluator was made.
+    pub fn stats(&self) -> MatsLpStats {
+        self.stats
+    }
+
+    /// Returns the outlook of a request of the batch that was run last; `None` if the network's outputs are not finite.
+    pub fn outlook(&self, answer: Answer) -> Option<Outlook> {
+        let outlook = match answer {
+            Answer::Known(outlook) => outlook,
+            Answer::Row(row) => self.outlooks[row as usize],
+        };
+        is_finite(&outlook).then_some(outlook)
+    }
+}
+
+/// Turns logits into probabilities. Logits that are not finite give probabilities that are not.
+fn outlook(output: &Evaluation) -> Outlook {
+    let mut probabilities = output.logits;
+    if probabilities.iter().all(|logit| logit.is_finite()) {
+        softmax(&mut probabilities);
+    } else {
+        probabilities.fill(f32::NAN);
+    }
+    Outlook { probabilities, value: output.value }
+}
+
+fn is_finite(outlook: &Outlook) -> bool {
+    outlook.value.is_finite() && outlook.probabilities.iter().all(|value| value.is_finite())
+}

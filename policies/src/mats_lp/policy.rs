@@ -1,0 +1,155 @@
+//! MATS-LP as a policy for all agents of an environment.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads};
+use pogema_planners::GoalForecast;
+
+use crate::mats_lp::cache::{Cache, Key};
+use crate::mats_lp::evaluator::{Evaluator, MatsLpStats};
+use crate::mats_lp::group::Groups;
+use crate::mats_lp::params::MatsLpParams;
+use crate::mats_lp::prior::Prior;
+use crate::mats_lp::simulation::Goals;
+use crate::mats_lp::workers::{Task, search_all};
+use crate::mats_lp::world::World;
+
+/// MATS-LP, which chooses the actions of all agents of an environment.
+///
+/// It knows the map, the cells of all agents and their future goals. It expects the collision system `soft`, whose moves
+/// its searches simulate. Inactive agents stay and belong to no group.
+///
+/// Source: Skrynnik, Andreychuk, Yakovlev, Panov: Decentralized Monte Carlo Tree Search for Partially Observable
+/// Multi-Agent Pathfinding, AAAI 2024
+pub struct MatsLp {
+    params: MatsLpParams,
+    radius: usize,
+    /// One for each thread.
+    evaluators: Vec<Evaluator>,
+    cancelled: Option<Arc<AtomicBool>>,
+    episode: Option<Episode>,
+}
+
+/// What is known of an episode.
+struct Episode {
+    world: World,
+    cache: Cache,
+    on_goal: OnGoal,
+    forecast: Option<GoalForecast>,
+    /// The smallest cost that each agent has had to its current goal.
+    best: Vec<i32>,
+    next_step: u64,
+}
+
+impl MatsLp {
+    /// Creates a policy that searches on `threads` threads. Their number does not change the actions.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a parameter or a number of threads out of range, for a network that sees more than 7
+    /// cells in each direction, or for a network without a critic if the parameters are not `faithful`.
+    pub fn new(prior: &dyn Prior, params: MatsLpParams, threads: usize) -> Result<Self, Error> {
+        params.check()?;
+        check_threads("threads", threads)?;
+        let radius = prior.radius();
+        if !(1..=Key::LARGEST_RADIUS).contains(&radius) {
+            let expected = format!("1 to {}", Key::LARGEST_RADIUS);
+            return Err(Error::argument("radius of the network", radius, expected));
+        }
+        if !params.faithful && !prior.has_critic() {
+            return Err(Error::argument("faithful", false, "true, because the network has no critic"));
+        }
+        let evaluators = (0..threads).map(|_| Evaluator::new(prior)).collect();
+        Ok(Self { params, radius, evaluators, cancelled: None, episode: None })
+    }
+
+    /// Lets any thread stop [`MatsLp::act`] by setting a flag.
+    #[must_use]
+    pub fn with_cancellation(self, cancelled: Option<Arc<AtomicBool>>) -> Self {
+        Self { cancelled, ..self }
+    }
+
+    /// Returns the work since the policy was made.
+    pub fn stats(&self) -> MatsLpStats {
+        let mut stats = MatsLpStats::default();
+        for evaluator in &self.evaluators {
+            stats += evaluator.stats();
+        }
+        stats
+    }
+
+    /// Begins an episode, of which it reads the map and all goals.
+    pub fn begin(&mut self, instance: &Instance, on_goal: OnGoal) {
+        // A simulation reaches at most one goal per step, and no leaf is deeper than the number of expansions.
+        let num_goals = self.params.expansions as usize + 1;
+        let forecast = (on_goal == OnGoal::Restart).then(|| GoalForecast::new(instance, num_goals));
+        self.episode = Some(Episode {
+            world: World::new(instance.map(), self.radius),
+            cache: Cache::new(),
+            on_goal,
+            forecast,
+            best: Vec::new(),
+            next_step: 0,
+        });
+    }
+
+    /// Returns the actions of all agents; inactive agents stay. It must be called in every step of the episode.
+    ///
+    /// # Errors
+    /// [`Error::NotReset`] before [`MatsLp::begin`]; [`Error::OutOfStep`] for a state that is not the next one of the
+    /// episode; [`Error::Agent`] for a cell or goal outside the map; [`Error::Cancelled`] if the work is cancelled;
+    /// [`Error::Corrupt`] if the network's outputs are not finite; those of the network. After an error, begin a new
+    /// episode.
+    pub fn act(&mut self, now: State<'_>) -> Result<Vec<Action>, Error> {
+        let episode = self.episode.as_mut().ok_or(Error::NotReset)?;
+        episode.follow(now)?;
+        let Episode { world, cache, on_goal, forecast, best, .. } = episode;
+        let mut groups = Groups::new(world, now.cells, now.active);
+        let active = (0..now.cells.len()).filter(|&agent| now.active[agent]);
+        let groups: Vec<Vec<usize>> = active.map(|agent| groups.of(agent, &self.params)).collect();
+        let repeats_last = *on_goal != OnGoal::Finish;
+        let list = |agent| forecast.as_ref().map_or(&now.goals[agent..=agent], |all| all.goals(agent));
+        let goals: Vec<Goals<'_>> =
+            (0..now.cells.len()).map(|agent| Goals { list: list(agent), repeats_last }).collect();
+        let task = Task {
+            params: self.params,
+            radius: self.radius,
+            world,
+            cache,
+            cells: now.cells,
+            goals: &goals,
+            best,
+            step: now.step,
+            cancelled: self.cancelled.as_deref(),
+        };
+        let mut actions = vec![Action::Stay; now.cells.len()];
+        for (agent, action) in search_all(&task, groups, &mut self.evaluators)? {
+            actions[agent] = action;
+        }
+        Ok(actions)
+    }
+}
+
+impl Episode {
+    /// Advances to the next state.
+    fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
+        let is_first = self.next_step == 0;
+        if now.step != self.next_step || (!is_first && now.cells.len() != self.best.len()) {
+            let reason = format!(
+                "found the state of step {}, expected step {} of the same episode",
+                now.step, self.next_step
+            );
+            return Err(Error::OutOfStep { reason });
+        }
+        Error::check_length("goals", now.cells.len(), now.goals.len())?;
+        Error::check_length("active", now.cells.len(), now.active.len())?;
+        self.world.check_inside("cell", now.cells)?;
+        self.world.check_inside("goal", now.goals)?;
+        if let Some(forecast) = &mut self.forecast {
+            forecast.follow(now)?;
+        }
+        self.world.follow(now, &mut self.best);
+        self.next_step += 1;
+        Ok(())
+    }
+}
