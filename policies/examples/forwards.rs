@@ -35,13 +35,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut best = f64::MAX;
     for _ in 0..TIMES {
         let (start, mut count) = (now(), 0);
-        while now() - start < TIME {
+        while now().saturating_sub(start) < TIME {
             for _ in 0..repeats {
                 network.forward(inputs, &mut state, &mut workspace)?;
             }
             count += repeats * batch;
         }
-        best = best.min((now() - start).as_secs_f64() / count as f64);
+        best = best.min(now().saturating_sub(start).as_secs_f64() / count as f64);
     }
     println!("{}", 1.0 / best);
     Ok(())

@@ -8,8 +8,66 @@ use pogema_planners::{Bfs, Graph, UNREACHABLE};
 
 use crate::grid::Layout;
 
-/// Steps from each place to one goal, or [`NO_COST`].
-pub(crate) type CostGrid = Arc<[i32]>;
+/// Steps from each place to one goal.
+///
+/// Windows of many agents read many grids, so the time depends on the size of an entry. The largest number of an entry
+/// stands for [`NO_COST`].
+#[derive(Clone, Debug)]
+pub(crate) enum CostGrid {
+    /// The costs of maps with few free cells.
+    Small(Arc<[u16]>),
+    Large(Arc<[u32]>),
+}
+
+impl CostGrid {
+    /// Returns the grid of these costs, `u32::MAX` where there is none.
+    fn new(costs: Vec<u32>, num_free: usize) -> Self {
+        if num_free < usize::from(u16::MAX) {
+            // A path is shorter than the number of free cells; only the entry of a missing cost is cut.
+            Self::Small(costs.into_iter().map(|cost| cost as u16).collect())
+        } else {
+            Self::Large(costs.into())
+        }
+    }
+
+    /// Returns the cost of a place, or [`NO_COST`].
+    pub fn at(&self, place: usize) -> i32 {
+        match self {
+            Self::Small(costs) => widened(costs[place]),
+            Self::Large(costs) => costs[place] as i32,
+        }
+    }
+
+    /// Copies the costs of the window around a place.
+    fn copy_window(&self, layout: Layout, place: usize, window: &mut [i32]) {
+        let side = window.len().isqrt();
+        for (row, first) in window.chunks_exact_mut(side).zip(layout.window_rows(place, side / 2)) {
+            match self {
+                Self::Small(costs) => {
+                    for (value, &cost) in row.iter_mut().zip(&costs[first..first + side]) {
+                        *value = widened(cost);
+                    }
+                }
+                Self::Large(costs) => {
+                    for (value, &cost) in row.iter_mut().zip(&costs[first..first + side]) {
+                        *value = cost as i32;
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_shared(&self) -> bool {
+        match self {
+            Self::Small(costs) => Arc::strong_count(costs) > 1,
+            Self::Large(costs) => Arc::strong_count(costs) > 1,
+        }
+    }
+}
+
+fn widened(cost: u16) -> i32 {
+    if cost == u16::MAX { NO_COST } else { i32::from(cost) }
+}
 
 /// The entry of a place from which no path leads to the goal.
 pub(crate) const NO_COST: i32 = -1;
@@ -41,7 +99,7 @@ impl Costs {
 
     pub fn new(layout: Layout, map: &Map) -> Self {
         let graph = Graph::new(map);
-        let max_grids = (Self::MAX_BYTES / (size_of::<i32>() * layout.len())).max(1);
+        let max_grids = (Self::MAX_BYTES / (size_of::<u32>() * layout.len())).max(1);
         Self { layout, bfs: Bfs::new(&graph), graph, grids: HashMap::new(), max_grids, agents: Vec::new() }
     }
 
@@ -51,12 +109,12 @@ impl Costs {
             let place = self.layout.place(cell);
             match self.agents.get_mut(agent) {
                 Some(known) if known.goal == goal => {
-                    known.now = known.grid[place];
+                    known.now = known.grid.at(place);
                     known.best = known.best.min(known.now);
                 }
                 _ => {
                     let grid = self.grid(goal);
-                    let now = grid[place];
+                    let now = grid.at(place);
                     let entry = ToGoal { goal, grid, now, best: now };
                     match self.agents.get_mut(agent) {
                         Some(known) => *known = entry,
@@ -78,16 +136,15 @@ impl Costs {
             return grid.clone();
         }
         if self.grids.len() >= self.max_grids {
-            self.grids.retain(|_, grid| Arc::strong_count(grid) > 1);
+            self.grids.retain(|_, grid| grid.is_shared());
         }
-        let mut grid = vec![NO_COST; self.layout.len()];
+        let mut costs = vec![UNREACHABLE; self.layout.len()];
         if let Some(vertex) = self.graph.vertex(goal) {
-            let costs = self.bfs.costs_to_go(vertex).enumerate();
-            for (vertex, cost) in costs.filter(|&(_, cost)| cost != UNREACHABLE) {
-                grid[self.layout.place(self.graph.cell(vertex as u32))] = cost as i32;
+            for (vertex, cost) in self.bfs.costs_to_go(vertex).enumerate() {
+                costs[self.layout.place(self.graph.cell(vertex as u32))] = cost;
             }
         }
-        let grid: CostGrid = grid.into();
+        let grid = CostGrid::new(costs, self.graph.num_vertices());
         self.grids.insert(goal, grid.clone());
         grid
     }
@@ -100,7 +157,7 @@ pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, window: 
     if costs.now == NO_COST {
         return out.fill(-1.0);
     }
-    layout.copy_window(&costs.grid, place, window);
+    costs.grid.copy_window(layout, place, window);
     let most = out.len().isqrt() as i32 - 1;
     for (value, &cost) in out.iter_mut().zip(&*window) {
         let nearer = if cost == NO_COST { -most } else { (costs.now - cost).clamp(-most, most) };
@@ -124,7 +181,7 @@ pub(crate) fn write_tracer(
         out[centre] = -1.0;
         return;
     }
-    layout.copy_window(&costs.grid, place, window);
+    costs.grid.copy_window(layout, place, window);
     let (mut largest, mut smallest, mut is_missing) = (NO_COST, i32::MAX, false);
     for &cost in &*window {
         largest = largest.max(cost);
@@ -140,4 +197,27 @@ pub(crate) fn write_tracer(
     }
     let behind = (costs.now - costs.best + 1) as f32 / 64.0;
     out[centre] = -behind.min(1.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_sizes_of_entries_hold_the_same_costs() {
+        let map = Map::new(5, 5, vec![false; 25]).unwrap_or_else(|error| panic!("{error}"));
+        let layout = Layout::new(&map, 1);
+        let costs: Vec<u32> =
+            (0..layout.len() as u32).map(|x| if x % 3 == 0 { UNREACHABLE } else { x }).collect();
+        let (small, large) = (CostGrid::new(costs.clone(), 65_534), CostGrid::new(costs, 65_535));
+        assert!(matches!((&small, &large), (CostGrid::Small(_), CostGrid::Large(_))));
+        let windows = [&small, &large].map(|grid| {
+            let mut window = [0; 9];
+            grid.copy_window(layout, layout.place(Cell::new(2, 3)), &mut window);
+            window
+        });
+        assert_eq!(windows[0], windows[1]);
+        assert!((0..layout.len()).all(|place| small.at(place) == large.at(place)));
+        assert_eq!([small.at(0), large.at(3), small.at(4)], [NO_COST, NO_COST, 4]);
+    }
 }

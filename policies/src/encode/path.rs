@@ -42,11 +42,11 @@ pub(crate) fn shortest_path(
     costs: &ToGoal,
     place: usize,
 ) -> impl Iterator<Item = usize> + '_ {
-    let start = (costs.grid[place] != NO_COST).then_some(place);
+    let start = (costs.grid.at(place) != NO_COST).then_some(place);
     std::iter::successors(start, move |&place| {
-        let nearer = costs.grid[place] - 1;
+        let nearer = costs.grid.at(place) - 1;
         let neighbours = [place - layout.stride(), place + layout.stride(), place - 1, place + 1];
         // On the goal, `nearer` equals the entry of an obstacle.
-        neighbours.into_iter().find(|&next| nearer != NO_COST && costs.grid[next] == nearer)
+        neighbours.into_iter().find(|&next| nearer != NO_COST && costs.grid.at(next) == nearer)
     })
 }

@@ -22,7 +22,7 @@ pub struct Architecture {
     pub value: Option<String>,
 }
 
-/// One layer. A name is the beginning of the names of its tensors, as in a `state_dict` of PyTorch.
+/// One layer. A name is the beginning of the names of its tensors, as in a PyTorch `state_dict`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Layer {

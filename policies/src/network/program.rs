@@ -102,6 +102,7 @@ impl Program {
     }
 
     /// Appends the outputs of up to 16 agents. An error is a text, only from a runtime.
+    #[cfg_attr(not(feature = "onnx"), allow(clippy::unnecessary_wraps, reason = "layers cannot fail"))]
     pub fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
         match self {
             Self::Layers(layers) => {

@@ -80,12 +80,17 @@ fn share_slots<S: Slots, T: Clone + PartialEq>(
     let (mut new_shapes, mut free) = (Vec::new(), Vec::<usize>::new());
     let mut allot = |slot: usize, free: &mut Vec<usize>| {
         let found = free.iter().position(|free| new_shapes[*free] == shapes[slot] && !kept.contains(&slot));
-        found.map(|index| free.swap_remove(index)).unwrap_or_else(|| {
-            new_shapes.push(shapes[slot].clone());
-            new_shapes.len() - 1
-        })
+        found.map_or_else(
+            || {
+                new_shapes.push(shapes[slot].clone());
+                new_shapes.len() - 1
+            },
+            |index| free.swap_remove(index),
+        )
     };
-    kept.iter().for_each(|slot| new[*slot] = allot(*slot, &mut free));
+    for slot in kept {
+        new[*slot] = allot(*slot, &mut free);
+    }
     for (index, step) in steps.iter_mut().enumerate() {
         if let Some(output) = step.output()
             && new[*output] == usize::MAX

@@ -95,14 +95,14 @@ impl Steps {
                 write(planes, *output, |planes, to| {
                     let added = added.map(|slot| &*planes[slot]);
                     convolution.run(path, &planes[*input], added, *relu, to);
-                })
+                });
             }
             PlaneStep::Activate { activation, input, output } => write(planes, *output, |planes, to| {
                 to.copy_from_slice(&planes[*input]);
                 activation.apply(to);
             }),
             PlaneStep::Add { inputs, output } => {
-                write(planes, *output, |planes, to| add(planes, *inputs, to))
+                write(planes, *output, |planes, to| add(planes, *inputs, to));
             }
             PlaneStep::Flatten { input, output } => {
                 let flat = &self.flats[*output];

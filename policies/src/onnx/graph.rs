@@ -28,6 +28,9 @@ pub enum Shape {
     List(usize),
 }
 
+/// The name, the shape and the values of a tensor.
+pub type NamedTensor = (String, Vec<usize>, Vec<f32>);
+
 /// A layer and the step before it.
 #[derive(Debug)]
 pub struct Step {
@@ -42,7 +45,7 @@ pub struct Reader<'a> {
     pub values: HashMap<&'a str, Value<'a>>,
     pub steps: Vec<Step>,
     /// The tensors of each layer, by its name and theirs.
-    pub tensors: HashMap<String, Vec<(String, Vec<usize>, Vec<f32>)>>,
+    pub tensors: HashMap<String, Vec<NamedTensor>>,
     window: usize,
     /// The step of the numbers beside the window.
     pub scalars: Option<usize>,
@@ -196,7 +199,7 @@ fn collect_names(layers: &[Layer], names: &mut Vec<String>) {
     for layer in layers {
         match layer {
             Layer::Convolution { name, .. } | Layer::Dense(name) | Layer::Gru(name) => {
-                names.push(name.clone())
+                names.push(name.clone());
             }
             Layer::Residual(layers) | Layer::Scalars(layers) => collect_names(layers, names),
             Layer::Relu | Layer::Elu | Layer::Flatten => {}

@@ -41,14 +41,8 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
         reader.add(node);
     }
     let named = |names: &[&str]| graph.output.iter().find(|output| names.contains(&&*output.name));
-    let logits = match (named(&LOGITS), &*graph.output) {
-        (Some(output), _) | (None, [output]) => output,
-        _ => {
-            return Err(format!(
-                "{} outputs, expected one of them to be called `logits`",
-                graph.output.len()
-            ));
-        }
+    let ((Some(logits), _) | (None, [logits])) = (named(&LOGITS), &*graph.output) else {
+        return Err(format!("{} outputs, expected one of them to be called `logits`", graph.output.len()));
     };
     match reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name)) {
         Ok((architecture, tensors)) => Ok(Graph::Layers(architecture, tensors)),

@@ -199,7 +199,7 @@ impl<'a> Reader<'a> {
         let shape = self.constant(node, 1)?.integers();
         match shape.as_deref() {
             Some([0 | 1, -1]) => self.flatten(node, None),
-            Some([-1 | 0 | 1, len]) if *len > 0 => self.flatten(node, Some(*len)),
+            Some([-1..=1, len]) if *len > 0 => self.flatten(node, Some(*len)),
             _ => Err(String::new()),
         }
     }
@@ -237,8 +237,7 @@ impl<'a> Reader<'a> {
         let (step, shape) = self.step(node, 0)?;
         let is_recurrent = matches!(self.steps[step].layer, Some(Layer::Gru(_)));
         match (shape, &*node.op_type) {
-            (Shape::List(1), "Squeeze") => Ok(Value::Step(step)),
-            (Shape::List(_), "Squeeze") if is_recurrent => Ok(Value::Step(step)),
+            (Shape::List(len), "Squeeze") if len == 1 || is_recurrent => Ok(Value::Step(step)),
             (Shape::List(_), "Unsqueeze") => Ok(Value::Step(step)),
             _ => Err(String::new()),
         }

@@ -139,17 +139,15 @@ pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut Multi
             for index in whole..num_inputs {
                 add(index - whole, index);
             }
-            for output in 0..C.min(num_outputs - first) {
+            for at in 0..C.min(num_outputs - first) * N {
+                let (output, vector) = (at / N, at % N);
+                let [a, b, c, d] = sums.map(|chain| chain[output][vector]);
                 let bias = V::splat(*job.bias.as_ptr().add(first + output));
-                for vector in 0..N {
-                    let [a, b, c, d] = std::array::from_fn(|chain| sums[chain][output][vector]);
-                    let mut sum = a.add(b).add(c.add(d)).add(bias);
-                    if job.relu {
-                        sum = sum.relu();
-                    }
-                    let at = (first + output) * AGENTS + vector * V::COUNT;
-                    sum.store(job.output.as_mut_ptr().add(at));
+                let mut sum = a.add(b).add(c.add(d)).add(bias);
+                if job.relu {
+                    sum = sum.relu();
                 }
+                sum.store(job.output.as_mut_ptr().add((first + output) * AGENTS + vector * V::COUNT));
             }
         }
     }

@@ -226,9 +226,9 @@ unsafe fn multiply_rows<V: Lanes, const P: usize>(job: &mut Multiply<'_>, row: u
             add(index - whole, index);
         }
         let bias = V::load(job.bias.as_ptr().add(first));
-        for index in 0..P {
-            let halves = [sums[0][index].add(sums[1][index]), sums[2][index].add(sums[3][index])];
-            let mut sum = halves[0].add(halves[1]).add(bias);
+        let [one, two, three, four] = sums;
+        for (index, (one, two)) in one.into_iter().zip(two).enumerate() {
+            let mut sum = one.add(two).add(three[index].add(four[index])).add(bias);
             if job.relu {
                 sum = sum.relu();
             }

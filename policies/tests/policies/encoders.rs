@@ -216,12 +216,12 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
     let mut slow = Plain { best: vec![None; num_agents], seen: vec![HashSet::new(); num_agents] };
     let mut generator = Generator::seeded(seed);
     loop {
-        let mut seen = vec![f32::NAN; episode.config().num_observed()];
-        let mut expected = seen.clone();
-        encoders[0].encode(episode.state(), &mut seen, &mut []).unwrap();
+        let mut shown = vec![f32::NAN; episode.config().num_observed()];
+        let mut expected = shown.clone();
+        encoders[0].encode(episode.state(), &mut shown, &mut []).unwrap();
         episode.engine().observe(&mut expected).unwrap();
         for (agent, (seen, expected)) in
-            seen.chunks(observed.window_len()).zip(expected.chunks(observed.window_len())).enumerate()
+            shown.chunks(observed.window_len()).zip(expected.chunks(observed.window_len())).enumerate()
         {
             // An inactive agent still observes obstacles.
             let zeros = vec![0.0; seen.len()];

@@ -146,3 +146,12 @@ fn a_missing_file_is_named() {
     let error = Network::read(FilePath::new("none/weights.safetensors")).unwrap_err().to_string();
     assert!(error.starts_with("none/weights.safetensors: "), "{error}");
 }
+
+#[test]
+fn the_example_of_the_reference_is_right() {
+    let page = FilePath::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reference/network.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let example = page.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
+    let config = file::parse_config(example.as_bytes()).unwrap();
+    assert_eq!(config.architecture.unwrap().layers.len(), 7);
+}
