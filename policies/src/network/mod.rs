@@ -136,6 +136,13 @@ impl Network {
     pub fn convert(from: impl AsRef<FilePath>, to: impl AsRef<FilePath>) -> Result<(), Error> {
         let from = from.as_ref();
         let (config, content) = file::read(from)?;
+        #[cfg_attr(
+            not(feature = "onnx"),
+            allow(
+                clippy::infallible_destructuring_match,
+                reason = "a graph for the runtime is no list of layers"
+            )
+        )]
         let tensors = match content {
             Content::Layers(tensors) => tensors,
             #[cfg(feature = "onnx")]
