@@ -1,7 +1,7 @@
 """Runs a script on pogema-toolbox or pogema_rs: run_as.py PACKAGE FOLDERS SCRIPT [ARGUMENT...]
 
-PACKAGE is `pogema`, `pogema_rs` (pogema-toolbox on our POGEMA), or `pogema_rs.toolbox` (both ours). FOLDERS, separated
-by colons, hold pogema-toolbox and what it imports.
+PACKAGE is `pogema`, `pogema_rs` (pogema-toolbox on our POGEMA), `pogema_rs.toolbox` (both ours), or `changed` for a script
+that imports `pogema_rs` itself. FOLDERS, separated by colons, hold pogema-toolbox and what it imports.
 """
 
 import importlib
@@ -13,6 +13,6 @@ if __name__ == "__main__":
     _, package, folders, *sys.argv = sys.argv
     sys.path += folders.split(":")
     warnings.simplefilter("ignore")
-    if package != "pogema":
+    if package not in ("pogema", "changed"):
         importlib.import_module("pogema_rs").install_as_pogema(toolbox=package == "pogema_rs.toolbox")
     runpy.run_path(sys.argv[0], run_name="__main__")

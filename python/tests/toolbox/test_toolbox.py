@@ -16,12 +16,14 @@ HERE = Path(__file__).resolve().parent
 FOLDERS = os.pathsep.join([os.environ["POGEMA_TOOLBOX_FOLDER"], str(HERE / "stand_ins")])
 # The last one runs beside POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
 THEIRS, OURS, OURS_ON_OLD_STACK = "pogema", "pogema_rs.toolbox", "pogema_rs.toolbox on an old stack"
+# Neither package is installed under POGEMA's name.
+MOVED = "changed imports"
 
 
 def run(package, script, folder, *arguments):
     """Runs a script in a folder and returns its output."""
     folder.mkdir(exist_ok=True)
-    python = sys.executable if package in ("pogema_rs", OURS) else os.environ["POGEMA_ORACLE_PYTHON"]
+    python = sys.executable if package in ("pogema_rs", OURS, MOVED) else os.environ["POGEMA_ORACLE_PYTHON"]
     command = [python, "-B", str(HERE / "run_as.py"), package.split()[0], FOLDERS, str(HERE / script), *arguments]
     environment = {**os.environ, "CALLS_OF_WANDB": str(folder / "calls.txt")}
     if package == OURS_ON_OLD_STACK:
@@ -87,13 +89,19 @@ def contents(folder):
 
 
 def tables(folder):
-    """Returns the lines of the tables in a log."""
+    """Returns the lines of the tables in a log, if there is one."""
+    if not (folder / "log.txt").exists():
+        return []
     text = re.sub("\x1b\\[[0-9;]*m", "", (folder / "log.txt").read_text())
     return [line for line in text.splitlines() if line[:1] in ("+", "|")]
 
 
+# A trainer, a data collector and an evaluation, each after a public repository that its first lines name.
+PROGRAMS = [("train_on_paths.py", 1), ("collect_expert_data.py", 12), ("evaluate_sets.py", 9)]
+
+
 @pytest.mark.parametrize(
-    ("script", "num_files"), [("evaluate_sets.py", 9), ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
+    ("script", "num_files"), [*PROGRAMS, ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
 )
 def test_unmodified_scripts_write_the_same_files(script, num_files, tmp_path):
     found = []
@@ -105,3 +113,45 @@ def test_unmodified_scripts_write_the_same_files(script, num_files, tmp_path):
     assert len(found[0][0]) >= num_files, found[0][0].keys()
     assert found[1] == found[0]
     assert found[2] == found[0]
+
+
+# The changes that docs/guide/moving.md lists.
+CHANGES = [
+    ("from pogema_toolbox", "from pogema_rs.toolbox"),
+    ("from pogema", "from pogema_rs"),
+    ("import gymnasium\n", "import gymnasium\nimport pogema_rs\n"),
+    ("(gymnasium.Wrapper)", "(pogema_rs.Wrapper)"),
+    ("(gymnasium.ObservationWrapper)", "(pogema_rs.Wrapper, gymnasium.ObservationWrapper)"),
+    ("eval_dir=folder)", 'eval_dir=folder, begin="replace")'),
+    ("enumerate(actions):\n            self.made", "enumerate(self.executed_actions):\n            self.made"),
+]
+
+
+# Metrics that `evaluation` adds unless it stands in for that of pogema-toolbox.
+ADDED = ("avg_agents_density", "a_collisions", "o_collisions", "runtime")
+
+
+def without_added(name, text):
+    """Returns the results in a file without the metrics that only this package adds; of other files, the text."""
+    results = json.loads(text) if Path(name).name in ("A*.json", "Random.json") else text
+    if results is not text:
+        for result in results:
+            result["metrics"] = {key: value for key, value in result["metrics"].items() if key not in ADDED}
+    return results
+
+
+@pytest.mark.parametrize(("script", "num_files"), PROGRAMS)
+def test_scripts_with_changed_imports_write_the_same_files(script, num_files, tmp_path):
+    text = (HERE / "scripts" / script).read_text()
+    for before, after in CHANGES:
+        text = re.sub(re.escape(before) + r"(?!_rs)", lambda _, after=after: after, text)
+    moved = tmp_path / script
+    moved.write_text(text)
+    found = []
+    for package, path in ((THEIRS, f"scripts/{script}"), (MOVED, moved)):
+        folder = tmp_path / package
+        shutil.copytree(HERE / "scripts" / "experiments", folder / "experiments")
+        run(package, path, folder)
+        found.append({name: without_added(name, text) for name, text in contents(folder).items()})
+    assert len(found[0]) >= num_files, found[0].keys()
+    assert found[1] == found[0]
