@@ -4,21 +4,26 @@
     python train_ppo.py --plot learning.svg --save policy.pt --replay episode.html
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
-network for every agent of every environment. Finished agents do not contribute to the loss. The policy is evaluated on
-unseen seeds, next to a random policy and POGEMA's A* agents.
+network for every agent of every environment. Finished agents do not contribute to the loss. If the time limit ends an
+episode, the value of its final observation stands in for the rewards after it. The policy is evaluated on unseen seeds,
+next to a random policy and POGEMA's A* agents.
 """
 
 import argparse
 import time
 from dataclasses import dataclass
 
+from collections.abc import Callable, Sequence
+from typing import Any, Union
+
 import numpy as np
 import torch
 from pogema_rs import BatchAStarAgent, GridConfig, VecEnv, pogema_v0
+from pogema_rs.envs import Pogema
 from torch import nn
 from torch.distributions import Categorical
 
-CONFIG = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
+CONFIG: dict[str, Any] = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
 # Training derives its 63-bit seeds from a `SeedSequence`, which practically never yields one of these.
 EVALUATION_SEEDS = range(10_000, 10_512)
 
@@ -123,7 +128,19 @@ class Trainer:
             self.seconds_in_env += time.perf_counter() - began
             self.seen = self._flat(observations)
             rollout.rewards[step] = torch.from_numpy(rewards).flatten() - params.step_cost
+            self._bootstrap(rollout.rewards[step].view(params.num_envs, -1), truncated & ~terminated)
             rollout.is_over[step] = torch.from_numpy(terminated | truncated).flatten()
+
+    def _bootstrap(self, rewards: torch.Tensor, truncated: np.ndarray) -> None:
+        """Adds the discounted value of the final observation to the last reward of each truncated agent."""
+        envs = np.flatnonzero(truncated.any(axis=1))
+        if len(envs) == 0:
+            return
+        seen = torch.from_numpy(np.stack(self.infos["final_obs"][envs])).flatten(0, 1)
+        masks = torch.from_numpy(self.infos["final_info"]["action_masks"][envs]).flatten(0, 1)
+        _, values = self.policy(seen, masks)
+        cut = torch.from_numpy(truncated[envs])
+        rewards[torch.from_numpy(envs)] += self.params.discount * values.view(cut.shape) * cut
 
     @torch.no_grad()
     def advantages(self) -> torch.Tensor:

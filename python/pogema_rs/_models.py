@@ -144,9 +144,11 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
         known = type(model).model_fields
         if not all(name in known and _is_exactly(known[name].annotation, value) for name, value in fields.items()):
             return False
+        # As in `_without_none`, a default of None makes a None as good as no value.
         own = {
             name: list(value) if type(value) is list else value
-            for name, value in type(model)._without_none(fields).items()
+            for name, value in fields.items()
+            if value is not None or known[name].default is not None
         }
         model.__setstate__(type(model).model_construct(set(own), **own).__getstate__())
         return True

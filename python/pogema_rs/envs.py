@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import Any, Literal, Optional, Union, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, Optional, Union, overload
 
 import gymnasium
 import numpy as np
@@ -21,6 +21,7 @@ from pogema_rs._goal_generators import GoalGenerators
 from pogema_rs._history import Kept
 from pogema_rs._read_only import FixedAttributes, ReadOnlyList
 from pogema_rs._resets import Resettable
+from pogema_rs._types import Cell, Infos, Observation, Step
 from pogema_rs.errors import NotResetError, StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_fields
@@ -50,14 +51,14 @@ __getattr__, __dir__ = forwarded(
 )
 
 
-class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
+class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Observation]):
     """An environment; `pogema_v0` makes one with a time limit and metrics.
 
     A subclass may override `_obs`, `_get_agents_obs`, `_pomapf_obs` and `_get_infos`, which compute what `reset` and
     `step` return, and all public methods except `move_agents` and `update_was_on_goal`.
 
     Shape: the `default` observation of each agent is float32 `(3, side, side)` with the channels obstacles, agents and
-    goal; `POMAPF` and `MAPF` are dictionaries.
+    goal; `POMAPF` and `MAPF` are dictionaries. For type checkers, such an environment is a `Pogema[dict[str, Any]]`.
 
     Errors: those of `pogema_rs.errors`. A call that fails leaves the environment as it was. A subclass that overrides a
     method that is never called raises `OverrideError`, a `TypeError`, when an object of it is made.
@@ -105,21 +106,26 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
         )
         self.observation_space = _observation_space(self.grid_config)
 
+    if TYPE_CHECKING:
+
+        @property
+        def unwrapped(self) -> Pogema[Observation]: ...
+
     # Gymnasium's types describe one agent; here each value is a list with an entry for every agent.
 
     @overload  # type: ignore[override]
     def reset(
         self, seed: Optional[int] = None, return_info: Literal[True] = True, options: Optional[dict] = None
-    ) -> tuple[list, list]: ...
+    ) -> tuple[list[Observation], Infos]: ...
 
     @overload
     def reset(
         self, seed: Optional[int] = None, *, return_info: Literal[False], options: Optional[dict] = None
-    ) -> list: ...
+    ) -> list[Observation]: ...
 
     def reset(
         self, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
-    ) -> Union[tuple[list, list], list]:
+    ) -> Union[tuple[list[Observation], Infos], list[Observation]]:
         """Begins an episode and returns the lists of observations and infos.
 
         With the default semantics "1.4.0", `seed` has no effect. With "2.0" it becomes the seed of the config, for this
@@ -144,8 +150,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
         return (observations, self._get_infos()) if return_info else observations
 
     def step(  # type: ignore[override]
-        self, action: Sequence[int]
-    ) -> tuple[list, list[float], list[bool], list[bool], list[dict]]:
+        self, action: Union[Sequence[int], np.ndarray]
+    ) -> Step[Observation]:
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
         In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
@@ -200,28 +206,36 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase):
         """See `Grid.get_obstacles`."""
         return self._started().get_obstacles(ignore_borders=ignore_borders)
 
-    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list[Cell]:
         """See `Grid.get_agents_xy`."""
         return self._started().get_agents_xy(only_active=only_active, ignore_borders=ignore_borders)
 
-    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list[Cell]:
         """See `Grid.get_targets_xy`."""
         return self._started().get_targets_xy(only_active=only_active, ignore_borders=ignore_borders)
 
-    def get_agents_xy_relative(self) -> list:
+    def get_agents_xy_relative(self) -> list[tuple[int, int]]:
         """See `Grid.get_agents_xy_relative`."""
         return self._started().get_agents_xy_relative()
 
-    def get_targets_xy_relative(self) -> list:
+    def get_targets_xy_relative(self) -> list[tuple[int, int]]:
         """See `Grid.get_targets_xy_relative`."""
         return self._started().get_targets_xy_relative()
 
-    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Any:
+    @overload
+    def get_state(self, ignore_borders: bool = False, as_dict: Literal[False] = False) -> np.ndarray: ...
+
+    @overload
+    def get_state(self, ignore_borders: bool = False, *, as_dict: Literal[True]) -> dict[str, Any]: ...
+
+    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Union[np.ndarray, dict[str, Any]]:
         """See `Grid.get_state`."""
-        return self._started().get_state(ignore_borders=ignore_borders, as_dict=as_dict)
+        if as_dict:
+            return self._started().get_state(ignore_borders=ignore_borders, as_dict=True)
+        return self._started().get_state(ignore_borders=ignore_borders)
 
 
-class PogemaLifeLong(Pogema):
+class PogemaLifeLong(Pogema[Observation]):
     """An environment with `on_target="restart"`."""
 
     _grid_class = GridLifeLong
@@ -269,7 +283,7 @@ class PogemaLifeLong(Pogema):
             return ReadOnlyList([0] * self.grid_config.num_agents)
         return ReadOnlyList(count % len(sequence) for count, sequence in zip(counts, sequences))
 
-    def get_lifelong_targets_xy(self, ignore_borders: bool = False) -> list:
+    def get_lifelong_targets_xy(self, ignore_borders: bool = False) -> list[list[Cell]]:
         """Returns the goals that each agent gets if it reaches all of them, as POGEMA predicts them.
 
         Rule: goal/restart/foretold
@@ -278,7 +292,7 @@ class PogemaLifeLong(Pogema):
         return given if given is not None else foretold_goals(self._started(), ignore_borders)
 
 
-class PogemaCoopFinish(Pogema):
+class PogemaCoopFinish(Pogema[Observation]):
     """An environment with `on_target="nothing"`."""
 
     _step_gets_infos = False
@@ -293,12 +307,14 @@ class PogemaCoopFinish(Pogema):
 _CLASSES = {"restart": PogemaLifeLong, "nothing": PogemaCoopFinish, "finish": Pogema}
 
 
-def _make_pogema(grid_config: GridConfig, semantics: Union[str, Semantics] = Semantics.RELEASED) -> Pogema:
+def _make_pogema(
+    grid_config: GridConfig, semantics: Union[str, Semantics] = Semantics.RELEASED
+) -> Pogema[Observation]:
     try:
         made = _CLASSES[grid_config.on_target]
     except (KeyError, TypeError):
         raise StateError(f"on_target is {grid_config.on_target!r}, expected one of {list(_CLASSES)}") from None
-    env = made(grid_config, semantics=semantics)
+    env: Pogema[Observation] = made(grid_config, semantics=semantics)
     env._is_bare, env._has_metrics = False, not grid_config.persistent
     return env
 

@@ -9,15 +9,17 @@ from __future__ import annotations
 import operator
 import sys
 import warnings
+from collections.abc import Sequence
 from copy import deepcopy
 from functools import cached_property
-from typing import Any, NoReturn, Optional, Union
+from typing import Any, Literal, NoReturn, Optional, Union, overload
 
 import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs._forward import forwarded
 from pogema_rs._read_only import FixedAttributes, ReadOnlyDict, ReadOnlyList
+from pogema_rs._types import Cell
 from pogema_rs.errors import StateError
 from pogema_rs.generator import get_components
 from pogema_rs.grid_config import GridConfig, engine_fields
@@ -141,27 +143,27 @@ class Grid(FixedAttributes):
         inside = slice(radius, -radius)
         return self.obstacles[inside, inside].copy() if ignore_borders else self.obstacles.copy()
 
-    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+    def get_agents_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list[Cell]:
         """Returns the cell of each agent, as a tuple, or as a list with `ignore_borders`.
 
         `only_active` omits inactive agents; POGEMA's own flag drops agent 0 or raises.
         """
         return self._prepared(self._cells(), only_active, ignore_borders)
 
-    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list:
+    def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list[Cell]:
         """Returns the goal of each agent, as a tuple, or as a list with `ignore_borders`."""
         return self._prepared(self._goals(), only_active, ignore_borders)
 
-    def _prepared(self, places: list, only_active: bool, ignore_borders: bool) -> list:
+    def _prepared(self, places: Sequence[Any], only_active: bool, ignore_borders: bool) -> list[Cell]:
         if only_active:
             places = [place for place, active in zip(places, self._engine.active) if active]
         if ignore_borders:
             radius = self.config.obs_radius
             return [[row - radius, col - radius] for row, col in places]
-        return places
+        return list(places)
 
     @staticmethod
-    def to_relative(coordinates: list, offset: list) -> list:
+    def to_relative(coordinates: Sequence[Any], offset: Sequence[Any]) -> list[tuple[int, int]]:
         """Returns each cell relative to its own offset."""
         return [(row - from_row, col - from_col) for (row, col), (from_row, from_col) in zip(coordinates, offset)]
 
@@ -177,7 +179,13 @@ class Grid(FixedAttributes):
     def _initial_xy(self) -> list[tuple[int, int]]:
         return self._engine.starts(self.config.obs_radius)
 
-    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Any:
+    @overload
+    def get_state(self, ignore_borders: bool = False, as_dict: Literal[False] = False) -> np.ndarray: ...
+
+    @overload
+    def get_state(self, ignore_borders: bool = False, *, as_dict: Literal[True]) -> dict[str, Any]: ...
+
+    def get_state(self, ignore_borders: bool = False, as_dict: bool = False) -> Union[np.ndarray, dict[str, Any]]:
         """Returns agents, goals and the map, as a dictionary or as one flat array.
 
         Coordinates are divided by the map's height or width minus 1. A map of one row or column thus raises
@@ -185,7 +193,7 @@ class Grid(FixedAttributes):
         """
         radius, height, width = self.config.obs_radius, self.config.height - 1, self.config.width - 1
 
-        def normalized(places: list) -> list[tuple[float, float]]:
+        def normalized(places: Sequence[Any]) -> list[tuple[float, float]]:
             return [((row - radius) / height, (col - radius) / width) for row, col in places]
 
         agents_xy, targets_xy = normalized(self.positions_xy), normalized(self.finishes_xy)

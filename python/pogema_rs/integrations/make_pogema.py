@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Optional, Union
-
-import gymnasium
+from typing import Any, Optional, Union, cast
 
 from pogema_rs._forward import forwarded
-from pogema_rs.envs import _make_pogema
+from pogema_rs._types import Observation
+from pogema_rs.envs import Pogema, _make_pogema
 from pogema_rs.errors import AutoResetError, UnknownIntegrationError
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.integrations.sample_factory import (
@@ -37,7 +36,7 @@ class SingleAgentWrapper(Wrapper):
     With the semantics "2.0" `reset(seed=...)` also seeds the action space.
     """
 
-    def reset(
+    def reset(  # type: ignore[override]
         self, *, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
     ) -> Any:
         """Begins an episode and returns the observation and info of agent 0."""
@@ -47,10 +46,12 @@ class SingleAgentWrapper(Wrapper):
         observations, infos = self.env.reset(seed=seed, options=options)
         return (observations[0], infos[0]) if return_info else observations[0]
 
-    def step(self, action: int) -> Any:
+    def step(  # type: ignore[override]
+        self, action: int
+    ) -> Any:
         """Plays one step and returns the results of agent 0."""
         environment = self.unwrapped
-        others = [environment.action_space.sample() for _ in range(environment.get_num_agents() - 1)]
+        others = [int(environment.action_space.sample()) for _ in range(environment.get_num_agents() - 1)]
         return tuple(values[0] for values in self.env.step([action, *others]))
 
 
@@ -74,8 +75,12 @@ def make_pogema(
     *args: Any,
     semantics: Union[str, Semantics] = Semantics.RELEASED,
     **kwargs: Any,
-) -> Any:
+) -> Pogema[Observation]:
     """Makes an environment from a config, for the framework that its `integration` names.
+
+    Type checkers see the `Pogema` that configs without `integration` give. Its observations are arrays unless you
+    annotate the variable, for example with `Pogema[dict[str, Any]]` for `POMAPF`. To make an environment for PettingZoo
+    or PyMARL that is typed, call `parallel_env` or `PyMarlPogema`.
 
     `semantics` is "1.4.0" [default] or "2.0", in which every agent is seen, `reset(seed=...)` chooses the episode,
     each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.
@@ -92,20 +97,19 @@ def make_pogema(
     if name is None:
         return _make_pogema(config, semantics)
     if name == "SampleFactory":
-        env: gymnasium.Env = _make_pogema(config, semantics)
-        env = IsMultiAgentWrapper(MetricsForwardingWrapper(env))
-        return env if config.auto_reset is False else AutoResetWrapper(env)
+        env = IsMultiAgentWrapper(MetricsForwardingWrapper(_make_pogema(config, semantics)))
+        return cast(Any, env if config.auto_reset is False else AutoResetWrapper(env))
     if name == "gymnasium":
-        return make_single_agent_gym(config, semantics)
+        return cast(Any, make_single_agent_gym(config, semantics))
     if name == "PyMARL":
         from pogema_rs.integrations.pymarl import PyMarlPogema
 
         kwargs["semantics"] = semantics
-        return PyMarlPogema(config, *args, **kwargs)
+        return cast(Any, PyMarlPogema(config, *args, **kwargs))
     if name == "PettingZoo":
         from pogema_rs.integrations.pettingzoo import parallel_env
 
-        return parallel_env(config, semantics)
+        return cast(Any, parallel_env(config, semantics))
     if name == "rllib":
         raise NotImplementedError("integration is `rllib`, expected `PettingZoo`, which RLlib can wrap")
     raise UnknownIntegrationError(f"integration is {name!r}, expected one of POGEMA's")

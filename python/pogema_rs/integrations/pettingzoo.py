@@ -70,20 +70,21 @@ class PogemaParallel(ParallelEnv):
         """Returns the space of an agent's actions."""
         return self.action_spaces[agent]
 
-    def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
+    def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Begins an episode and returns observations and infos by name."""
         observations, infos = self.pogema.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
         self.num_moves, self.metrics = 0, None
         return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
 
-    def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
+    def step(
+        self, actions: dict[str, int]
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Plays one step; agents without an action stay, and unknown names are ignored."""
         result = self.pogema.step([actions.get(name, 0) for name in self.possible_agents])
         present = [(name, self.agent_name_mapping[name]) for name in self.agents]
-        observations, rewards, terminated, truncated, infos = (
-            {name: values[agent] for name, agent in present} for values in result
-        )
+        by_name: list[dict[str, Any]] = [{name: values[agent] for name, agent in present} for values in result]
+        observations, rewards, terminated, truncated, infos = by_name
         self.metrics = result[4][0].get("metrics")
         is_over = all(result[2]) or all(result[3])
         active = self.pogema._started().is_active

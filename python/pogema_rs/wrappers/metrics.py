@@ -208,7 +208,7 @@ class AgentsDensityWrapper(Wrapper):
         super().__init__(env)
         self._means: list[float] = []
 
-    def count_agents(self, observations: list[dict]) -> None:
+    def count_agents(self, observations: Any) -> None:
         """Adds the density that the agents see to the mean."""
         shares = []
         for seen in observations:

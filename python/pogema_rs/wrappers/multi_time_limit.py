@@ -12,7 +12,7 @@ from pogema_rs.wrappers.forwarding import Wrapper
 __all__ = ["MultiTimeLimit"]
 
 
-class MultiTimeLimit(Wrapper, TimeLimit):
+class MultiTimeLimit(Wrapper, TimeLimit):  # type: ignore[misc]
     """Truncates all agents after `max_episode_steps` steps.
 
     `pogema_v0` makes environments that have a time limit; only a bare `pogema_rs.envs.Pogema` needs this wrapper.

@@ -1,0 +1,28 @@
+"""Types that several modules name in their signatures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+
+__all__ = ["Cell", "Infos", "Observation", "Step"]
+
+# A position (row, col): a tuple, or a list without the border.
+Cell = Sequence[int]
+# What an agent is told besides its observation; entry 0 also holds the metrics of an episode that ended.
+Infos = list[dict[str, Any]]
+
+# What one agent observes: an array, or a dictionary with the observation types `POMAPF` and `MAPF`.
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Observation = TypeVar("Observation", bound=Union[np.ndarray, dict[str, Any]], default=np.ndarray)
+else:
+    from typing import TypeVar
+
+    Observation = TypeVar("Observation")
+
+# Observations, rewards, terminated, truncated and infos, each with one entry per agent.
+Step = tuple[list[Observation], list[float], list[bool], list[bool], Infos]

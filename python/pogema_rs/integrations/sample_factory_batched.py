@@ -1,0 +1,105 @@
+"""Environments for the batched sampling of Sample Factory."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Union
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from pogema_rs.semantics import Semantics
+from pogema_rs.vec_env import NUM_ACTIONS, VecEnv
+
+try:
+    import torch
+except ImportError as missing:
+    raise ImportError("batched sampling needs `pip install sample-factory`, 2.0 or later") from missing
+
+__all__ = ["PogemaSampleFactory"]
+
+
+class PogemaSampleFactory(gymnasium.Env):
+    """A `VecEnv` as one multi-agent environment of Sample Factory: every agent of every environment is one actor.
+
+    Row `env * agents + agent` of all arrays belongs to that agent: `obs` `(num_agents, 3, side, side)`, rewards as
+    float32, `terminated` and `truncated` as bool. All actors of an environment end together, in the step that ends its
+    episode and begins the next one. An agent that finished earlier stays, with rewards of 0, and terminates then; the
+    others are truncated if the time limit ended the episode.
+
+    Run it with `batched_sampling=True` and one environment for each worker, and pass the number of environments here.
+    Sample Factory seeds each worker differently. In a step that ends an episode, the infos hold its metrics under
+    POGEMA's names, as tensors `(num_agents,)`, from which Sample Factory makes its summaries.
+    """
+
+    is_multiagent = True
+
+    def __init__(
+        self,
+        grid_config: Any = None,
+        num_envs: Optional[int] = None,
+        *,
+        num_threads: Optional[int] = 1,
+        dtype: Union[str, np.dtype, type] = "float32",
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
+        render_mode: Optional[str] = None,
+    ) -> None:
+        """Makes the environments like `VecEnv`; each worker of Sample Factory is a process [default: one thread].
+
+        Errors: ValueError or TypeError for wrong arguments.
+        """
+        self.envs = VecEnv(
+            {} if grid_config is None else grid_config,
+            num_envs,
+            num_threads=num_threads,
+            dtype=dtype,
+            semantics=semantics,
+            double_buffer=True,
+        )
+        space = self.envs.single_observation_space
+        if not isinstance(space, spaces.Box):
+            raise ValueError("observation_type gives dictionaries, expected 'default'")
+        self.observation_space = spaces.Dict({"obs": spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)})
+        self.action_space: spaces.Discrete = spaces.Discrete(NUM_ACTIONS)
+        self.num_agents = self.envs.num_envs * self.envs.num_agents
+        self.render_mode = render_mode
+        self._by_env = (self.envs.num_envs, self.envs.num_agents)
+
+    def reset(
+        self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Begins the first episodes of a seed, or the next ones, and returns the observations and an empty dictionary."""
+        observations, _ = self.envs.reset(seed=seed, options=options)
+        return self._rows(observations), {}
+
+    def step(  # type: ignore[override]
+        self, action: Any
+    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Plays one step and returns observations, rewards, terminated, truncated and infos.
+
+        Errors: those of `VecEnv.step`; the state does not change.
+        """
+        numbers = np.asarray(action)
+        if numbers.shape != (self.num_agents,):
+            raise ValueError(f"actions have shape {numbers.shape}, expected ({self.num_agents},), one per agent")
+        observations, rewards, terminated, truncated, infos = self.envs.step(numbers.reshape(self._by_env))
+        is_over = terminated.all(axis=1, keepdims=True) | truncated.all(axis=1, keepdims=True)
+        seen, metrics = self._rows(observations), self._metrics(infos)
+        done, cut = (is_over & terminated).reshape(-1), (is_over & ~terminated).reshape(-1)
+        return seen, rewards.reshape(-1), done, cut, metrics
+
+    def close(self) -> None:
+        """Frees the environments and their threads."""
+        self.envs.close()
+
+    def _rows(self, observations: np.ndarray) -> dict[str, np.ndarray]:
+        return {"obs": observations.reshape(self.num_agents, *observations.shape[2:])}
+
+    def _metrics(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """Returns the metrics of the episodes that ended; Sample Factory reads the rows of actors that are done."""
+        metrics = infos.get("metrics", {})
+        return {
+            name: torch.from_numpy(np.repeat(values, self.envs.num_agents))
+            for name, values in metrics.items()
+            if not name.startswith("_")
+        }
