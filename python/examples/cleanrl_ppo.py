@@ -74,11 +74,12 @@ def main() -> None:
     if args.tensorboard:
         from torch.utils.tensorboard import SummaryWriter
 
-        writer = SummaryWriter(args.tensorboard)  # type: ignore[no-untyped-call]
+        writer = SummaryWriter(args.tensorboard)
 
     envs = VecEnv(CONFIG, args.num_envs, semantics="2.0", masks=True, statistics=True)
     num_rows = args.num_envs * envs.num_agents
-    obs_shape = envs.single_observation_space.shape[1:]
+    seen, infos = envs.reset(seed=args.seed)
+    obs_shape = seen.shape[2:]
     agent = Agent(int(np.prod(obs_shape)))
     optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
 
@@ -88,7 +89,6 @@ def main() -> None:
     actions, active = torch.zeros(size, dtype=torch.int64), torch.zeros(size, dtype=torch.bool)
     logprobs, rewards, dones, values = (torch.zeros(size) for _ in range(4))
 
-    seen, infos = envs.reset(seed=args.seed)
     num_updates, global_step, began = max(1, args.total_steps // (args.num_steps * num_rows)), 0, time.perf_counter()
     for update in range(num_updates):
         optimizer.param_groups[0]["lr"] = args.learning_rate * (1 - update / num_updates)
@@ -157,13 +157,13 @@ def main() -> None:
             wandb.log(charts, step=global_step)
         if args.tensorboard:
             for name, value in charts.items():
-                writer.add_scalar(name, value, global_step)  # type: ignore[no-untyped-call]
+                writer.add_scalar(name, value, global_step)
         if update % 20 == 0 or update == num_updates - 1:
             print(f"step {global_step:>9,}  ISR {charts.get('charts/ISR', float('nan')):.3f}  {charts['charts/SPS']:,.0f}/s")
 
     envs.close()
     if args.tensorboard:
-        writer.close()  # type: ignore[no-untyped-call]
+        writer.close()
     if args.wandb:
         wandb.finish()
 

@@ -3,29 +3,41 @@
     python custom_reward.py
 """
 
-import gymnasium
+from collections.abc import Sequence
+from typing import Any, Union
+
 import numpy as np
-from pogema_rs import GridConfig, pogema_v0
+from pogema_rs import GridConfig, Wrapper, pogema_v0
+from pogema_rs.envs import Pogema
+
+Infos = list[dict[str, Any]]
 
 
-class DistanceReward(gymnasium.Wrapper):
+class DistanceReward(Wrapper):
     """Adds `scale` times the decrease of the Manhattan distance between an agent and its goal."""
 
-    def __init__(self, env, scale=0.1):
+    def __init__(self, env: Pogema, scale: float = 0.1) -> None:
         super().__init__(env)
         self.scale = scale
 
-    def _distances(self):
-        grid = self.env.unwrapped.grid
-        return np.abs(np.subtract(grid.positions_xy, grid.finishes_xy)).sum(axis=1)
+    def _distances(self) -> np.ndarray:
+        places, goals = np.array(self.env.get_agents_xy()), np.array(self.env.get_targets_xy())
+        distances: np.ndarray = np.abs(places - goals).sum(axis=1)
+        return distances
 
-    def reset(self, **kwargs):
+    # Gymnasium's types describe one agent.
+
+    def reset(  # type: ignore[override]
+        self, **kwargs: Any
+    ) -> tuple[list[np.ndarray], Infos]:
         """Resets the inner environment."""
-        result = self.env.reset(**kwargs)
+        observations, infos = self.env.reset(**kwargs)
         self.before = self._distances()
-        return result
+        return observations, infos
 
-    def step(self, action):
+    def step(  # type: ignore[override]
+        self, action: Union[Sequence[int], np.ndarray]
+    ) -> tuple[list[np.ndarray], list[float], list[bool], list[bool], Infos]:
         """Plays one step of the inner environment, and changes the rewards."""
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         now = self._distances()
@@ -34,7 +46,7 @@ class DistanceReward(gymnasium.Wrapper):
         return observations, rewards, terminated, truncated, infos
 
 
-def main():
+def main() -> None:
     env = DistanceReward(pogema_v0(GridConfig(num_agents=3, seed=1)))
     env.reset()
     for step in range(5):

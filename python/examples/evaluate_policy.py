@@ -5,9 +5,24 @@
 
 import argparse
 from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from pogema_rs import BatchAStarAgent, GridConfig, pogema_v0
+from pogema_rs.envs import Pogema
+
+Seen = dict[str, Any]
+
+
+class Policy(Protocol):
+    """What an evaluation needs from a policy."""
+
+    def reset_states(self) -> None:
+        """Forgets the last episode."""
+
+    def act(self, observations: list[Seen]) -> Sequence[int]:
+        """Returns an action for each agent."""
 
 
 class Greedy:
@@ -15,30 +30,30 @@ class Greedy:
 
     MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 
-    def reset_states(self):
+    def reset_states(self) -> None:
         """Forgets the last episode; this policy has no state."""
 
-    def act(self, observations):
+    def act(self, observations: list[Seen]) -> list[int]:
         """Returns for each agent the move that brings it closest to its goal."""
         return [self._act(seen) for seen in observations]
 
-    def _act(self, seen):
+    def _act(self, seen: Seen) -> int:
         centre = seen["obstacles"].shape[0] // 2
         toward = np.subtract(seen["target_xy"], seen["xy"])
 
-        def distance(action):
+        def distance(action: int) -> float:
             row, col = self.MOVES[action]
             if seen["obstacles"][centre + row, centre + col]:
-                return np.inf
-            return np.abs(toward - (row, col)).sum()
+                return float("inf")
+            return float(np.abs(toward - (row, col)).sum())
 
         return min(range(len(self.MOVES)), key=distance)
 
 
-def evaluate(policy, config, seeds):
+def evaluate(policy: Policy, config: dict[str, Any], seeds: Iterable[int]) -> dict[str, list[float]]:
     """Returns the metrics of one episode per seed, as lists by name."""
-    metrics = defaultdict(list)
-    env = pogema_v0(GridConfig(**config), semantics="2.0")
+    metrics: dict[str, list[float]] = defaultdict(list)
+    env: Pogema[Seen] = pogema_v0(GridConfig(**config), semantics="2.0")
     for seed in seeds:
         policy.reset_states()
         observations, infos = env.reset(seed=seed)
@@ -49,7 +64,7 @@ def evaluate(policy, config, seeds):
     return metrics
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=100, help="number of episodes")
     arguments = parser.parse_args()
@@ -62,7 +77,8 @@ def main():
         "observation_type": "POMAPF",
         "max_episode_steps": 128,
     }
-    for name, policy in {"greedy": Greedy(), "A*": BatchAStarAgent()}.items():
+    policies: dict[str, Policy] = {"greedy": Greedy(), "A*": BatchAStarAgent()}
+    for name, policy in policies.items():
         metrics = evaluate(policy, config, range(arguments.seeds))
         shown = [f"{metric} {np.mean(values):.3f} ± {np.std(values):.3f}" for metric, values in metrics.items()]
         print(f"{name:8}", "  ".join(shown))

@@ -9,7 +9,6 @@ each agent, and `dones["__all__"]`. Unlike JaxMARL's environments, it keeps its 
 """
 
 import argparse
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -43,7 +42,7 @@ class ByAgent:
         joint = np.stack([actions[name] for name in self.agents], axis=1)
         observations, rewards, terminated, truncated, infos = self.envs.step(joint)
         dones = self._split(terminated | truncated)
-        dones["__all__"] = terminated.all(axis=1) | truncated.all(axis=1)
+        dones["__all__"] = np.asarray(terminated.all(axis=1) | truncated.all(axis=1))
         return self._split(observations), self._split(infos["is_active"]), self._split(rewards), dones, infos
 
     def _split(self, values: np.ndarray) -> ByName:
@@ -78,7 +77,7 @@ class Train(NamedTuple):
     params: Params
     first: Params
     second: Params
-    count: jax.Array
+    num_updates: jax.Array
 
 
 def init(key: jax.Array, sizes: list[int]) -> Train:
@@ -134,7 +133,7 @@ def loss(params: Params, batch: Transition, advantage: jax.Array, target: jax.Ar
 
 
 def adam(train: Train, gradient: Params) -> Train:
-    count = train.count + 1
+    count = train.num_updates + 1
     first = jax.tree.map(lambda mean, now: 0.9 * mean + 0.1 * now, train.first, gradient)
     second = jax.tree.map(lambda mean, now: 0.999 * mean + 0.001 * now**2, train.second, gradient)
     rate = LEARNING_RATE * jnp.sqrt(1 - 0.999**count) / (1 - 0.9**count)
@@ -142,7 +141,7 @@ def adam(train: Train, gradient: Params) -> Train:
     return Train(params, first, second, count)
 
 
-@partial(jax.jit, donate_argnums=0)
+@jax.jit
 def update(train: Train, rollout: Transition, last_obs: jax.Array, key: jax.Array) -> tuple[Train, jax.Array]:
     """Trains on a rollout: epochs of minibatches, all in one compiled program."""
     advantages = gae(rollout, forward(train.params, last_obs)[1])
@@ -184,7 +183,8 @@ def main() -> None:
             by_name, is_active, rewards, dones, infos = env.step(unbatchify(np.asarray(action), env.agents))
             obs, active = batchify(by_name, env.agents), batchify(is_active, env.agents)
             reward, done = batchify(rewards, env.agents) - STEP_COST, batchify(dones, env.agents)
-            steps.append(Transition(*before, action, log_prob, value, reward, done.astype(np.float32)))
+            parts = (*before, action, log_prob, value, reward, done.astype(np.float32))
+            steps.append(Transition(*map(jnp.asarray, parts)))
             if "_metrics" in infos:
                 shares = [*shares, *infos["metrics"]["ISR"][infos["_metrics"]].tolist()][-500:]
         key, one = jax.random.split(key)

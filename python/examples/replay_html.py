@@ -5,7 +5,10 @@
 
 import argparse
 
+from typing import Any
+
 from pogema_rs import BatchAStarAgent, GridConfig, pogema_v0
+from pogema_rs.envs import Pogema
 
 ROOMS = """
 .......#.......
@@ -18,11 +21,12 @@ ROOMS = """
 """
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="replay.html", metavar="FILE")
     arguments = parser.parse_args()
-    env = pogema_v0(GridConfig(map=ROOMS, on_target="nothing", observation_type="POMAPF"), semantics="2.0")
+    config = GridConfig(map=ROOMS, on_target="nothing", observation_type="POMAPF")
+    env: Pogema[dict[str, Any]] = pogema_v0(config, semantics="2.0")
     env.enable_animation()
     observations, infos = env.reset()
     team = BatchAStarAgent()

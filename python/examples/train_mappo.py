@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from pogema_rs import GridConfig, VecEnv
 from torch import nn
-from torch.distributions import Categorical
+from torch.distributions import Categorical, Distribution
 
 CONFIG = GridConfig(
     size=8, density=0.2, num_agents=4, obs_radius=3, on_target="nothing", collision_system="soft", max_episode_steps=64
@@ -61,15 +61,14 @@ class Trainer:
         torch.manual_seed(seed)
         self.envs = VecEnv(CONFIG, NUM_ENVS, semantics="2.0", masks=True, rewards="shared")
         self.num_rows = NUM_ENVS * self.envs.num_agents
-        self.obs_shape = self.envs.single_observation_space.shape[1:]
         self.seen, self.infos = self.envs.reset(seed=seed)
         rows, columns = self.envs.state()["obstacles"].shape[1:]
-        self.actor = network(int(np.prod(self.obs_shape)), 5, 0.01)
+        self.actor = network(int(np.prod(self.seen.shape[2:])), 5, 0.01)
         self.critic = network(5 * rows * columns, 1, 1.0)
         parameters = [*self.actor.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(parameters, LEARNING_RATE, eps=1e-5)
 
-    def policy(self, seen: torch.Tensor, masks: torch.Tensor) -> Categorical:
+    def policy(self, seen: torch.Tensor, masks: torch.Tensor) -> Distribution:
         logits = self.actor(seen).masked_fill(masks == 0, -1e9)
         return Categorical(logits=logits, validate_args=False)
 
@@ -124,7 +123,7 @@ class Trainer:
         spread, mean = torch.std_mean(advantages)
         advantages = (advantages - mean) / (spread + 1e-8)
         for _ in range(NUM_EPOCHS):
-            for part in torch.split(torch.randperm(len(returns)), BATCH_SIZE):  # type: ignore[no-untyped-call]
+            for part in torch.split(torch.randperm(len(returns)), BATCH_SIZE):
                 policy = self.policy(flat["seen"][part], flat["masks"][part])
                 ratio = (policy.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
                 gain = advantages[part]

@@ -11,9 +11,8 @@ next to a random policy and POGEMA's A* agents.
 
 import argparse
 import time
-from dataclasses import dataclass
-
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Union
 
 import numpy as np
@@ -84,11 +83,13 @@ class Rollout:
     @classmethod
     def empty(cls, params: Params, num_agents: int, seen_shape: tuple[int, ...]) -> "Rollout":
         shape = (params.num_steps, num_agents)
-        flags, numbers = (lambda: torch.zeros(shape, dtype=torch.bool)), (lambda: torch.zeros(shape))
+        flags = [torch.zeros(shape, dtype=torch.bool) for _ in range(2)]
+        numbers = [torch.zeros(shape) for _ in range(3)]
         masks = torch.zeros((*shape, 5), dtype=torch.int8)
         actions = torch.zeros(shape, dtype=torch.int64)
         seen = torch.zeros((*shape, *seen_shape), dtype=torch.float32)
-        return cls(seen, masks, flags(), actions, numbers(), numbers(), numbers(), flags())
+        odds, values, rewards = numbers
+        return cls(seen, masks, flags[0], actions, odds, values, rewards, flags[1])
 
 
 class Trainer:
@@ -170,7 +171,7 @@ class Trainer:
         advantages = (advantages - mean) / (spread + 1e-8)
         for _ in range(params.num_epochs):
             order = active[torch.randperm(len(active))]
-            for part in order.split(params.batch_size):
+            for part in torch.split(order, params.batch_size):
                 odds, values = self.policy(flat["seen"][part], flat["masks"][part])
                 gain = advantages[part]
                 ratio = (odds.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
@@ -200,14 +201,18 @@ def evaluate(policy: Policy, seeds: range) -> float:
     return float(shares.mean())
 
 
-def evaluate_agents(make_team, seeds: range) -> float:
+Act = Callable[[list[dict[str, Any]]], Union[Sequence[int], np.ndarray]]
+
+
+def evaluate_agents(make_team: Callable[[Pogema[dict[str, Any]]], Act], seeds: range) -> float:
     """Returns the mean ISR of a team that acts on POGEMA's own lists."""
     shares = []
     for seed in seeds:
-        env = pogema_v0(GridConfig(**CONFIG, seed=seed, observation_type="POMAPF"), semantics="2.0")
+        config = GridConfig(**CONFIG, seed=seed, observation_type="POMAPF")
+        env: Pogema[dict[str, Any]] = pogema_v0(config, semantics="2.0")
         act = make_team(env)
         observations, _ = env.reset()
-        infos = [{}]
+        infos: list[dict[str, Any]] = [{}]
         while "metrics" not in infos[0]:
             observations, _, _, _, infos = env.step(act(observations))
         shares.append(infos[0]["metrics"]["ISR"])

@@ -1,5 +1,8 @@
 """Tests of the batched adapter for Sample Factory, including a training with it."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -105,3 +108,11 @@ def test_wrong_actions_change_nothing(actions):
     assert np.array_equal(fresh.step(np.zeros((3, 4), dtype=np.int64))[0], after)
     with pytest.raises(ValueError, match="expected 'default'"):
         PogemaSampleFactory(CONFIG.model_copy(update={"observation_type": "MAPF"}), 1)
+
+
+def test_block_of_the_guide_runs():
+    guide = Path(__file__).resolve().parent.parent.parent / "docs" / "guide" / "python.md"
+    (block,) = re.findall(r"^<!-- framework: sample_factory -->\n```python\n(.*?)^```$", guide.read_text(), re.M | re.S)
+    names = {}
+    exec(block, names)
+    assert names["cfg"].batched_sampling and names["make"]("pogema", names["cfg"], None, None).num_agents == 512

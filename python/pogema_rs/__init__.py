@@ -28,7 +28,8 @@ Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a comm
 
 Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,
 `pogema_rs.integrations.pettingzoo`, `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`,
-`pogema_rs.integrations.rllib`, `pogema_rs.integrations.sample_factory` and `pogema_rs.integrations.torchrl`.
+`pogema_rs.integrations.rllib`, `pogema_rs.integrations.sample_factory`,
+`pogema_rs.integrations.sample_factory_batched` and `pogema_rs.integrations.torchrl`.
 """
 
 from __future__ import annotations

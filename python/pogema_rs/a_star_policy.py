@@ -141,9 +141,9 @@ class BatchAStarAgent:
     def __init__(self) -> None:
         self.astar_agents: dict[int, AStarAgent] = {}
 
-    def act(self, observations: list[dict[str, Any]]) -> list:
+    def act(self, observations: list[dict[str, Any]]) -> list[int]:
         """Returns an action for each agent."""
-        actions = []
+        actions: list[Any] = []
         for index, seen in enumerate(observations):
             if index not in self.astar_agents:
                 self.astar_agents[index] = AStarAgent()

@@ -64,6 +64,18 @@ def test_requirements_allow_the_releases_that_pogema_needs():
         assert all(specifier.contains(installed[name]) for name, specifier in specifiers.items()), specifiers
 
 
+def test_pip_resolves_pogema_toolbox_beside_the_wheel(tmp_path):
+    report = tmp_path / "report.json"
+    # The wheel that `python/run` built and installed.
+    wanted = ["pogema-toolbox==0.1.1", os.environ["POGEMA_WHEEL"]]
+    command = [sys.executable, "-m", "pip", "install", "--dry-run", "--ignore-installed", "--quiet"]
+    done = subprocess.run([*command, "--report", str(report), *wanted], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = {one["metadata"]["name"]: one["metadata"]["version"] for one in json.loads(report.read_text())["install"]}
+    expected = {"pogema": "1.4.0", "pogema-toolbox": "0.1.1", "pydantic": "1.9.1", "gymnasium": "0.28.1"}
+    assert {name: found[name] for name in expected} == expected and "pogema-rs" in found
+
+
 @pytest.mark.parametrize("order", [("pogema", "pogema_rs"), ("pogema_rs", "pogema")])
 def test_both_packages_play_in_one_process(order, tmp_path):
     (tmp_path / "pogema_rs").symlink_to(Path(pogema_rs.__file__).parent)

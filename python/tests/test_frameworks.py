@@ -89,6 +89,22 @@ def test_pymarl():
     assert isinstance(reward, float)
 
 
+def test_state_of_pymarl_is_the_global_state():
+    config = GridConfig(num_agents=3, size=9, seed=1, on_target="restart", integration="PyMARL")
+    env = pogema_v0(config)
+    env.reset()
+    seen = set()
+    for _ in range(30):
+        state = env.get_state()
+        assert state.shape == (env.get_state_size(),) == (env.get_env_info()["state_shape"],)
+        cells = [*env.env.get_agents_xy(ignore_borders=True), *env.env.get_targets_xy(ignore_borders=True)]
+        assert np.array_equal(state[:12], np.array(cells).flatten() / 8)
+        assert np.array_equal(state[12:], env.env.get_obstacles().flatten())
+        seen.add(state.tobytes())
+        env.step([int(action) for action in env.sample_actions()])
+    assert len(seen) > 10
+
+
 @pytest.mark.parametrize(
     ("fields", "error"),
     [

@@ -11,23 +11,36 @@ import pogema_rs
 CONFIG = Path(__file__).resolve().parent.parent / "pyproject.toml"
 
 RIGHT = """
+from typing import Any, assert_type
+
 import numpy as np
 
 from pogema_rs import AnimationConfig, AStarAgent, GridConfig, Semantics, VecEnv, Wrapper, pogema_v0
 from pogema_rs.envs import Pogema
 
 
-class FewerRewards(Wrapper):
+class FewerRewards(Wrapper[dict[str, Any]]):
     def agents(self) -> int:
         return self.unwrapped.get_num_agents()
 
 
 config = GridConfig(num_agents=4, size=8, seed=1, observation_type="POMAPF")
-env = pogema_v0(config, semantics=Semantics.DEVELOPED)
+env: Pogema[dict[str, Any]] = pogema_v0(config, semantics=Semantics.DEVELOPED)
 observations, infos = env.reset(seed=1)
 observations, rewards, terminated, truncated, infos = env.step(env.sample_actions())
 
-own = Pogema(config, semantics="2.0")
+assert_type(infos, list[dict[str, Any]])
+assert_type(rewards, list[float])
+assert_type(truncated, list[bool])
+
+arrays = pogema_v0(GridConfig())
+assert_type(arrays, Pogema[np.ndarray])
+assert_type(arrays.reset()[0], list[np.ndarray])
+assert_type(arrays.unwrapped.get_state(), np.ndarray)
+assert_type(arrays.get_state(as_dict=True), dict[str, Any])
+assert_type(FewerRewards(env).step([0])[0], list[dict[str, Any]])
+
+own: Pogema[dict[str, Any]] = Pogema(config, semantics="2.0")
 first, _ = own.reset()
 alone: list = own.reset(return_info=False)
 flags: list[bool] = own.step([0, 0, 0, 0])[2]
@@ -107,3 +120,16 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
     assert lines_with_errors(run.stdout) == {
         first + place: {code} for place, code in enumerate(WRONG.values())
     }, run.stdout
+
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+# Those with a framework, which `./check frameworks` installs and checks.
+WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py"}
+
+
+def test_examples_are_typed_strictly(check):
+    files = sorted(EXAMPLES.glob("*.py"))
+    assert {path.name for path in files} > WITH_FRAMEWORK
+    plain = [str(path) for path in files if path.name not in WITH_FRAMEWORK]
+    run = check("mypy", "--config-file", "", "--strict", *plain)
+    assert run.returncode == 0, run.stdout + run.stderr

@@ -1,0 +1,34 @@
+"""Tests that the examples that train run in a short mode, log, and pass `mypy --strict`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+SHORT = {
+    "cleanrl_ppo.py": (["--total-steps", "30000", "--tensorboard", "runs", "--wandb", "offline"], "step    24,576"),
+    "jaxmarl_ippo.py": (["--updates", "3"], "update    3"),
+    "train_mappo.py": (["--minutes", "0.05"], "agent steps  ISR"),
+    "train_ppo.py": (["--minutes", "0.05", "--save", "policy.pt", "--plot", "learning.svg"], "unseen seeds: PPO"),
+}
+FILES = {"cleanrl_ppo.py": ["runs/events*", "wandb/offline-run-*/*.wandb"], "train_ppo.py": ["policy.pt", "learning.svg"]}
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_example_trains(name, tmp_path):
+    arguments, shown = SHORT[name]
+    command = [sys.executable, "-B", str(EXAMPLES / name), *arguments]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert shown in run.stdout
+    for pattern in FILES.get(name, []):
+        assert list(tmp_path.glob(pattern)), pattern
+
+
+def test_examples_are_typed_strictly(tmp_path):
+    files = [str(EXAMPLES / name) for name in SHORT]
+    command = [sys.executable, "-B", "-m", "mypy", "--config-file", "", "--strict", *files]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
