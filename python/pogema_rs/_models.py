@@ -91,8 +91,8 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
             defaults = {field: None for field, kind in annotations.items() if _is_optional(kind)}
             given = {"__annotations__": annotations} if annotations else {}
             if str(namespace.get("__module__")).startswith(_PACKAGE):
-                # A validator takes a quarter of the time that an environment needs to start, and a config that
-                # `set_fields` can fill never uses it. The classes of a user show their errors when they are defined.
+                # A validator takes 16 ms of the time that an environment needs to start, and a config that `set_fields`
+                # can fill never uses it. The classes of a user show their errors when they are defined.
                 settings.setdefault("defer_build", True)
             elif "defer_build" not in namespace.get("model_config", {}):
                 settings.setdefault("defer_build", False)

@@ -63,7 +63,7 @@ impl<'a> Simulation<'a> {
     /// Adds an agent to the root, after those already in the group; `best` is its smallest cost so far.
     pub fn add(&mut self, cell: Cell, goals: Goals<'a>, best: i32) {
         let grid = self.world.costs_to(goals.list[0]);
-        let now = grid[self.world.layout.place(cell)];
+        let now = grid.at(self.world.layout.place(cell));
         let agent = GroupAgent { cell, goal: 0, now, best, is_done: false };
         self.goals.push(goals);
         self.grids.push(vec![grid]);
@@ -123,7 +123,7 @@ impl<'a> Simulation<'a> {
         let place = self.places[position] as usize;
         let goals = self.goals[position];
         let agent = &mut self.agents[position];
-        agent.now = self.grids[position][agent.goal as usize][place];
+        agent.now = self.grids[position][agent.goal as usize].at(place);
         let progresses = agent.now < agent.best;
         agent.best = agent.best.min(agent.now);
         if agent.cell == goals.list[agent.goal as usize] {
@@ -133,7 +133,7 @@ impl<'a> Simulation<'a> {
                     self.grids[position].push(self.world.costs_to(goal));
                 }
                 agent.goal = next as u32;
-                agent.now = self.grids[position][next][place];
+                agent.now = self.grids[position][next].at(place);
                 agent.best = agent.now;
             } else {
                 agent.is_done = !goals.repeats_last;
