@@ -2,11 +2,11 @@
 
 use super::architecture::{Architecture, Layer};
 use super::gru::Gru;
-use super::layers::{Activation, Convolution, Dense, Piece};
+use super::layers::{Activation, Convolution, Dense, Flat, Piece};
 use super::slots;
 use super::steps::{FlatStep, Heads, PlaneStep, Steps};
 use super::tensors::Tensors;
-use crate::simd::{LANES, Plane};
+use crate::simd::Plane;
 
 /// The largest number of values that a layer may return for an agent.
 const MOST_VALUES: usize = 1 << 24;
@@ -71,23 +71,6 @@ fn check_size(plane: &Plane, what: &str) -> Result<(), String> {
 enum Value {
     Plane(usize),
     Flat(usize),
-}
-
-/// The values of an agent that are a list.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Flat {
-    pub pieces: Vec<Piece>,
-}
-
-impl Flat {
-    pub fn len(&self) -> usize {
-        self.pieces.iter().map(Piece::len).sum()
-    }
-
-    /// Returns the number of floats between two agents.
-    pub fn stride(&self) -> usize {
-        self.len().next_multiple_of(LANES)
-    }
 }
 
 struct Builder<'a> {

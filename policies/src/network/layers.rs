@@ -115,6 +115,23 @@ impl Piece {
     }
 }
 
+/// The values of an agent that are a list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flat {
+    pub pieces: Vec<Piece>,
+}
+
+impl Flat {
+    pub fn len(&self) -> usize {
+        self.pieces.iter().map(Piece::len).sum()
+    }
+
+    /// Returns the number of floats between two agents.
+    pub fn stride(&self) -> usize {
+        self.len().next_multiple_of(LANES)
+    }
+}
+
 /// A dense layer.
 #[derive(Debug)]
 pub struct Dense {

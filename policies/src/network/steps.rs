@@ -1,8 +1,7 @@
 //! The steps of a network and their execution.
 
-use super::build::Flat;
 use super::gru::{Gru, Output, States};
-use super::layers::{Activation, Convolution, Dense, Rows};
+use super::layers::{Activation, Convolution, Dense, Flat, Rows};
 use crate::simd::{BLOCK, Path, Plane};
 
 /// Room for agents that are computed one after the other.

@@ -50,7 +50,8 @@ fn play(learned: &NetworkPolicy, episode: &mut Episode<Engine>, seed: u64) -> Ve
 
 #[test]
 fn the_small_network_leads_a_lone_agent_to_its_goal() {
-    let learned = network(LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy).unwrap());
+    let learned =
+        network(LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy).unwrap());
     let mut episode = start(1);
     play(&learned, &mut episode, 0);
     assert_eq!(episode.state().cells, episode.state().goals);

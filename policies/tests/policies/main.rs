@@ -7,6 +7,6 @@ mod encode_errors;
 mod encoders;
 mod follower_recorded;
 mod learned;
+mod mats_lp;
 #[path = "../common/mod.rs"]
 mod recorded;
-mod mats_lp;
