@@ -62,9 +62,12 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "follower"], "`--policy follower` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs `--policy follower` or `--policy network`",
+            "`--weights` needs a learned policy: `--policy` with one of follower, mats-lp, network",
         ),
-        (&["--mask-actions"], "`--mask-actions` needs `--policy follower` or `--policy network`"),
+        (
+            &["--mask-actions"],
+            "`--mask-actions` needs a learned policy: `--policy` with one of follower, mats-lp, network",
+        ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],
             "none.safetensors: No such file or directory (os error 2)",

@@ -38,8 +38,10 @@ impl LearnedArgs {
             ];
             return match flags.into_iter().find(|(_, is_given)| *is_given) {
                 Some((flag, _)) => {
-                    let learned = LearnedName::NAMES.join("` or `--policy ");
-                    Err(Error::request(format!("`{flag}` needs `--policy {learned}`")))
+                    let learned = LearnedName::NAMES.join(", ");
+                    Err(Error::request(format!(
+                        "`{flag}` needs a learned policy: `--policy` with one of {learned}"
+                    )))
                 }
                 None => Ok(None),
             };

@@ -17,7 +17,8 @@ mod avx512_layout;
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512_windows;
 // Miri supports no guard pages, and needs none.
-#[cfg(all(test, not(miri)))]
+#[cfg(test)]
+#[cfg(not(miri))]
 #[allow(unsafe_code, reason = "slices next to pages without access")]
 mod guard_pages;
 #[cfg(target_arch = "x86_64")]

@@ -33,7 +33,7 @@ fn start(num_agents: usize) -> Episode<Engine> {
 }
 
 fn network(learned: Learned) -> NetworkPolicy {
-    let Learned::Network(policy) = learned else { panic!("MATS-LP is a search") };
+    let Learned::Network(policy) = learned else { unreachable!("MATS-LP is a search") };
     policy
 }
 

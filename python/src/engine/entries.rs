@@ -192,9 +192,10 @@ impl Engine {
         let Ok(instance) = inner.episode.instance() else { return Ok(None) };
         let foretell = || foretold_from(config, instance, state.cells, state.goals, &stop);
         let num_goals = usize::try_from(config.max_episode_steps).unwrap_or(0).saturating_mul(state.cells.len());
-        let goals = match num_goals < interrupt::LONG {
-            true => foretell(),
-            false => interrupt::detach_scoped(py, &stop, foretell)?,
+        let goals = if num_goals < interrupt::LONG {
+            foretell()
+        } else {
+            interrupt::detach_scoped(py, &stop, foretell)?
         };
         Ok(goals.map(|goals| goals.iter().map(|goals| pairs(goals, 0)).collect()))
     }
