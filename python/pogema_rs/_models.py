@@ -8,15 +8,14 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Optional, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, Optional, Union, get_args, get_origin
 
 import pydantic
 from pydantic import BaseModel, ValidationError
 
-__all__ = ["IS_PYDANTIC_1", "Model", "set_fields", "validation_error"]
+__all__ = ["IS_PYDANTIC_1", "Model", "validation_error"]
 
 IS_PYDANTIC_1 = pydantic.VERSION.startswith("1.")
-_PACKAGE = __name__.rpartition(".")[0] + "."
 _OPTIONAL_TEXT = re.compile(r"(typing\.)?(Optional\[|Union\[.*\bNone\b)|.*\|\s*None\s*$|None\s*\|")
 
 
@@ -59,16 +58,6 @@ def _is_optional(annotation: Any) -> bool:
     return is_union and type(None) in get_args(annotation)
 
 
-def _is_exactly(annotation: Any, value: Any) -> bool:
-    """Returns whether a value has an annotated type, and not a subclass of it."""
-    origin = get_origin(annotation)
-    if origin is Literal:
-        return any(type(value) is type(choice) and value == choice for choice in get_args(annotation))
-    if origin is Union:
-        return any(_is_exactly(part, value) for part in get_args(annotation))
-    return type(value) is annotation
-
-
 if TYPE_CHECKING or not IS_PYDANTIC_1:
     from pydantic import ConfigDict, model_validator
     from pydantic.fields import FieldInfo
@@ -90,12 +79,6 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
                     annotations[field] = _inherited(field, bases) or _type_of(value)
             defaults = {field: None for field, kind in annotations.items() if _is_optional(kind)}
             given = {"__annotations__": annotations} if annotations else {}
-            if str(namespace.get("__module__")).startswith(_PACKAGE):
-                # A validator takes 16 ms of the time that an environment needs to start, and a config that `set_fields`
-                # can fill never uses it. The classes of a user show their errors when they are defined.
-                settings.setdefault("defer_build", True)
-            elif "defer_build" not in namespace.get("model_config", {}):
-                settings.setdefault("defer_build", False)
             return super().__new__(mcs, name, bases, {**defaults, **namespace, **given}, **settings)
 
     class Model(BaseModel, metaclass=_Lenient):
@@ -135,23 +118,6 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
         @classmethod
         def _defaults(cls) -> Mapping[str, Any]:
             return {name: field.default for name, field in cls.model_fields.items() if not field.is_required()}
-
-    def set_fields(model: Model, fields: Mapping[str, Any]) -> bool:
-        """Sets the fields of a new model without pydantic's validator, and returns whether it did.
-
-        It does so if each value has exactly the type of its field, so that the validator would keep all of them.
-        """
-        known = type(model).model_fields
-        if not all(name in known and _is_exactly(known[name].annotation, value) for name, value in fields.items()):
-            return False
-        # As in `_without_none`, a default of None makes a None as good as no value.
-        own = {
-            name: list(value) if type(value) is list else value
-            for name, value in fields.items()
-            if value is not None or known[name].default is not None
-        }
-        model.__setstate__(type(model).model_construct(set(own), **own).__getstate__())
-        return True
 
     def validation_error(
         model: type[BaseModel], reason: str, field: Optional[str], fields: Mapping[str, Any]
@@ -200,10 +166,6 @@ else:
         @classmethod
         def _defaults(cls) -> Mapping[str, Any]:
             return {name: field.default for name, field in cls.__fields__.items() if not field.required}
-
-    def set_fields(model: Model, fields: Mapping[str, Any]) -> bool:
-        """Returns False: the validator of pydantic 1 is made with the class."""
-        return False
 
     def validation_error(
         model: type[BaseModel], reason: str, field: Optional[str], fields: Mapping[str, Any]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Optional, Union
 
 from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
-from pogema_rs._models import set_fields, validation_error
+from pogema_rs._models import validation_error
 from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
 from pogema_rs.utils import CommonSettings
 
@@ -68,8 +68,7 @@ class GridConfig(CommonSettings):
             field = refused.field if refused.field in GridConfig.model_fields else None
             raise validation_error(type(self), refused.reason, field, fields) from None
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
-        if type(self) is not GridConfig or not set_fields(self, {**kept, **own}):
-            super().__init__(**{**kept, **own})
+        super().__init__(**{**kept, **own})
 
     @classmethod
     def _changed_defaults(cls) -> Mapping[str, Any]:

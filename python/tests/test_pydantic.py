@@ -7,7 +7,6 @@ import subprocess
 import sys
 import warnings
 
-import pydantic
 import pytest
 from pydantic import ValidationError
 
@@ -183,49 +182,3 @@ def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
     done = subprocess.run([sys.executable, "-B", str(script)], capture_output=True, text=True, check=False)
     assert f"line {SUPPORTED.count(chr(10)) + 1}, in Left" in done.stderr, done.stderr
     assert LEFT[line] in done.stderr
-
-
-FIELDS = [
-    {},
-    {"size": 9, "num_agents": 3, "seed": 4, "density": 0.1, "on_target": "restart", "integration": "PettingZoo"},
-    {"map": "..a\nA#.", "obs_radius": 2, "map_name": "hall", "auto_reset": False},
-    {"map": [[0, 1], [0, 0]], "agents_xy": [[0, 0]], "targets_xy": [(1, 1)], "possible_agents_xy": None},
-    {"size": "8", "density": 1, "persistent": "yes", "seed": 3.0, "MOVES": GridConfig().MOVES, "FREE": 0, "OBSTACLE": 1},
-    {"observation_type": "MAPF", "collision_system": "soft", "empty_outside": 0, "max_episode_steps": 7},
-]
-
-
-@pytest.mark.parametrize("fields", FIELDS)
-def test_config_without_the_validator_equals_one_with_it(fields):
-    class Validated(GridConfig):
-        """A subclass, whose fields pydantic's validator sets."""
-
-    own, validated = GridConfig(**fields), Validated(**fields)
-    assert repr(own)[len("GridConfig") :] == repr(validated)[len("Validated") :]
-    assert own.dict() == validated.dict() and list(own.dict()) == list(validated.dict())
-    assert own.dict(exclude_unset=True) == validated.dict(exclude_unset=True)
-    assert own.MOVES is not fields.get("MOVES") and own.map is not fields.get("map", "none")
-    for twin in (copy.deepcopy(own), pickle.loads(pickle.dumps(own)), own.copy(), GridConfig(**own.dict())):
-        assert twin == own and type(twin) is GridConfig
-
-
-def test_values_of_other_types_reach_the_validator():
-    for wrong in ({"integration": "x"}, {"FREE": 1}, {"MOVES": 3}, {"OBSTACLE": True}):
-        with pytest.raises(ValidationError) as raised:
-            GridConfig(**wrong)
-        assert next(iter(wrong)) in str(raised.value)
-
-
-@pytest.mark.skipif(IS_PYDANTIC_1, reason="pydantic 1 makes the validator with the class")
-def test_making_an_environment_does_not_build_a_validator():
-    code = """
-import sys
-from pogema_rs import GridConfig, pogema_v0
-pogema_v0(GridConfig(num_agents=2, seed=1)).reset()
-print("pydantic.plugin._loader" in sys.modules)
-GridConfig.model_validate({"seed": 1})
-print("pydantic.plugin._loader" in sys.modules)
-"""
-    shown = subprocess.check_output([sys.executable, "-c", code], text=True)
-    # Pydantic imports its plugins when it builds the first validator; releases before 2.5 imported them with the class.
-    assert shown.split()[0] == "False" or tuple(map(int, pydantic.VERSION.split(".")[:2])) < (2, 5), shown
