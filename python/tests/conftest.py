@@ -8,7 +8,7 @@ _SOURCE = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "oracle: the module reads POGEMA_ORACLE_PYTHON, the interpreter with POGEMA 1.4.0")
+    config.addinivalue_line("markers", "oracle: the test needs POGEMA 1.4.0 in POGEMA_ORACLE_PYTHON, or pogema-toolbox in POGEMA_TOOLBOX_FOLDER")
     where = Path(pogema_rs.__file__).resolve()
     if where.is_relative_to(_SOURCE):
         raise SystemExit(f"the package under test is {where}, expected an installed wheel")

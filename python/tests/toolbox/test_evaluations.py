@@ -116,6 +116,7 @@ def test_policy_that_replaces_another_one_is_played(tmp_path, begin, backend):
     assert seen[0] != seen[1]
 
 
+@pytest.mark.oracle
 def test_maps_of_the_toolbox_are_read_from_its_installation():
     code = """
 import sys
@@ -141,6 +142,7 @@ print(before, sorted(ToolboxRegistry.get_maps()))
     assert outputs == [[missing, "{} []"], ["{} ['four-rooms', 'pogema-logo']"]]
 
 
+@pytest.mark.oracle
 def test_toolbox_that_was_imported_before_is_reported():
     code = "import pogema_toolbox, pogema_rs; pogema_rs.install_as_pogema(toolbox=True)"
     done = subprocess.run(
