@@ -9,6 +9,7 @@ import os
 import pickle
 import signal
 import sys
+import tempfile
 import threading
 import time
 import traceback
@@ -22,7 +23,7 @@ from pogema_rs.planners import PlannerAgents, plan
 from pogema_rs.toolbox.evaluator import evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
-from pogema_rs.vec_env import VecEnv
+from pogema_rs.vec_env import Film, VecEnv
 
 EMPTY = np.zeros((48, 48), int)
 #: Every cell of the first rows, and of the last rows in reverse: no planner solves this in seconds.
@@ -42,14 +43,16 @@ SHORT = {
         "Engine.step_back", "derive_config",
     },
     "they play or observe at most one step": {
-        "AStarAgent.act", "Batch.ended", "Batch.global_state", "Batch.mask_actions", "Engine.step",
+        "AStarAgent.act", "Batch.ended", "Batch.global_state", "Batch.mask_actions", "Batch.mask_agents",
+        "Engine.step",
     },
-    "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.metrics"},
+    "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.films", "Batch.metrics"},
     "they read or write the files of one algorithm once": {
         "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note", "Evaluation.picks",
     },
     "they read or set a few values": {
-        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
+        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
+        "Batch.take_film_failures",
         "Engine.clear_metrics", "Engine.elapsed", "Engine.film", "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure",
         "Engine.num_steps", "Engine.size", "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask",
         "Evaluation.environment", "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
@@ -123,6 +126,10 @@ def planner_agents():
         assert agents.act(one) == [2], planner
 
 
+#: Every step ends an episode.
+SMALL = {"size": 8, "num_agents": 1, "seed": 5, "obs_radius": 1, "max_episode_steps": 1}
+
+
 def batch(num_envs, **config):
     return VecEnv({"size": 64, "num_agents": 16, "seed": 5, "on_target": "restart", **config}, num_envs, dtype="uint8")
 
@@ -168,6 +175,32 @@ def batch_step():
     interrupt("Batch.step", lambda: env.step(np.zeros((8000, 16), int)), 0.1)
     twin.reset()
     check_equal(env, twin)
+
+
+@interrupts("Batch.set_configs")
+def batch_configs():
+    def ended():
+        env = VecEnv(dict(SMALL), 4000, autoreset_mode="next_step", map_size=256)
+        env.reset()
+        env.step(np.zeros((4000, 1), int))
+        return env
+
+    env, twin = ended(), ended()
+    # The next step begins all next episodes, so their instances are needed now.
+    interrupt("Batch.set_configs", lambda: env.set_configs({**SMALL, "size": 256}))
+    check_equal(env, twin)
+
+
+@interrupts("Batch.finish_films")
+def films():
+    with tempfile.TemporaryDirectory() as folder:
+        config = {"size": 128, "num_agents": 2000, "density": 0.1, "seed": 5, "max_episode_steps": 300, "on_target": "restart"}
+        env = VecEnv(config, 1, film=Film(folder))
+        env.reset()
+        for _ in range(4 * 300):
+            env.step(env.sample_actions())
+        interrupt("Batch.finish_films", env.close, 0.05)
+        assert env.closed
 
 
 @interrupts("Engine.reset")
