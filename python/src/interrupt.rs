@@ -92,7 +92,8 @@ fn wait<T: Send>(py: Python<'_>, receiver: &mut Receiver<T>) -> PyResult<Option<
 }
 
 fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
-    let threading = py.import("threading")?;
+    // While Python shuts down, it imports nothing and runs no signal handlers.
+    let Ok(threading) = py.import("threading") else { return Ok(false) };
     let main = threading.call_method0("main_thread")?.getattr("ident")?;
     threading.call_method0("get_ident")?.eq(main)
 }
