@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, Optional, Union, cast
@@ -154,6 +155,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if curriculum is not None:
             self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
         self._films = None if film is None else Films(self._batch, film, self.num_envs)
+        # Runs at the exit of a program that does not close the environment: later, Python imports nothing.
+        self._finish_films = None if self._films is None else weakref.finalize(self, self._films.finish)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
@@ -346,8 +349,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if self.closed:
             return
         try:
-            if self._films is not None:
-                self._films.finish()
+            if self._finish_films is not None:
+                self._finish_films()
         finally:
             self._batch.close()
             self.closed = True
