@@ -29,7 +29,7 @@ struct Drawn {
     numbers: Vec<usize>,
     seed: u64,
     num_steps: usize,
-    /// Every so many steps, some lanes get another source.
+    /// Number of steps after which some lanes get another source.
     replaced_every: usize,
 }
 

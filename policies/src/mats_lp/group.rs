@@ -10,7 +10,7 @@ use crate::mats_lp::world::World;
 pub(super) struct Groups<'a> {
     world: &'a World,
     cells: &'a [Cell],
-    /// The agent on each place, or `NOBODY`.
+    /// The agent on each place, or `NO_AGENT`.
     occupants: Vec<u32>,
     /// For each place, the last search that has reached it, counted from 1.
     reached: Vec<u32>,
@@ -19,12 +19,12 @@ pub(super) struct Groups<'a> {
     next: Vec<u32>,
 }
 
-const NOBODY: u32 = u32::MAX;
+const NO_AGENT: u32 = u32::MAX;
 
 impl<'a> Groups<'a> {
     /// Prepares a state. Inactive agents belong to no group.
     pub fn new(world: &'a World, cells: &'a [Cell], active: &[bool]) -> Self {
-        let mut occupants = vec![NOBODY; world.layout.len()];
+        let mut occupants = vec![NO_AGENT; world.layout.len()];
         for (agent, &cell) in cells.iter().enumerate().filter(|&(agent, _)| active[agent]) {
             occupants[world.layout.place(cell)] = agent as u32;
         }
@@ -53,7 +53,7 @@ impl<'a> Groups<'a> {
                     *reached = self.num_searches;
                     self.next.push(target);
                     let other = self.occupants[target as usize];
-                    if other != NOBODY
+                    if other != NO_AGENT
                         && is_within(self.cells[agent], self.cells[other as usize], params.radius)
                     {
                         group.push(other as usize);

@@ -17,7 +17,7 @@ use proto::Model;
 #[cfg(feature = "onnx")]
 pub use runtime::Runtime;
 
-/// Names of the output that holds the logits. If there is none of them, it is the only output.
+/// Names of the output that holds the logits. Without such an output, the only output holds them.
 const LOGITS: [&str; 2] = ["action_logits", "logits"];
 
 /// Names of the output that holds the value.
@@ -27,7 +27,7 @@ const VALUES: [&str; 2] = ["values", "value"];
 pub enum Graph {
     /// All operators are layers.
     Layers(Architecture, Tensors),
-    /// Some operator is none.
+    /// At least one operator has no layer.
     #[cfg(feature = "onnx")]
     Runtime(Box<Runtime>),
 }
