@@ -1,4 +1,4 @@
-"""Times one package: each line of JSON on stdin names the work, and the reply on stdout is the speed per second.
+"""Times one package: each line of JSON on stdin names the work, and the reply on stdout is its rate per second.
 
 python worker.py pogema|pogema_rs
 """

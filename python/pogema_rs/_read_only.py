@@ -43,7 +43,7 @@ class ReadOnlyDict(dict[Key, Item]):
 class FixedAttributes:
     """An object with attributes that only the package sets, through `__dict__`."""
 
-    # What a user does instead of setting an attribute, by its name.
+    # For each fixed attribute, what to do instead of setting it.
     _FIXED: ClassVar[dict[str, str]] = {}
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -41,13 +41,13 @@ assert type(gymnasium.make("pogema_rs/Pogema-v0").unwrapped).__module__ == "poge
 
 
 def run(python, code, path):
-    """Runs a program with a folder on the path of its modules."""
+    """Runs a program that also imports modules from a folder."""
     environment = {**os.environ, "PYTHONPATH": str(path)}
     return subprocess.run([python, "-B", "-c", code], env=environment, capture_output=True, text=True, check=False)
 
 
 def requirements(texts):
-    """Returns the accepted releases of the packages that both need."""
+    """Returns the accepted releases of each shared package."""
     found = [Requirement(text) for text in texts]
     return {one.name: one.specifier for one in found if one.name in SHARED and one.marker is None}
 

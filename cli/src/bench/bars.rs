@@ -1,4 +1,4 @@
-//! Speed targets of the engine, most as a ratio of two figures of one run.
+//! Speed targets of the engine. Most are ratios of two figures of one run.
 
 use serde::Serialize;
 

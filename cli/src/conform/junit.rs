@@ -56,8 +56,8 @@ fn status(report: &PortReport, rule: &str, standing: Standing, causes: &[&Cause]
         Standing::Passed | Standing::Blank => TestCaseStatus::success(),
         Standing::Failed => not_passed(NonSuccessKind::Failure, "divergence"),
         Standing::Error => not_passed(NonSuccessKind::Error, "misbehaviour"),
-        // Skipped, not passed: the rule does not hold, and dashboards count skipped tests and show their message, but
-        // not the output of passed tests.
+        // Skipped, not passed: the rule does not hold. Dashboards count skipped tests and show their messages, but they
+        // do not show the output of passed tests.
         Standing::Known => {
             let reasons: Vec<&str> = causes.iter().filter_map(|cause| cause.known.as_deref()).collect();
             skipped.set_type("known").set_message(format!("known {}", reasons.join("; known ")));

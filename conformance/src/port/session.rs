@@ -191,7 +191,7 @@ impl<'l> Port<'l> {
         Err(self.misbehaved(Misbehaviour::new(FaultKind::WrongLength { key }, &details)))
     }
 
-    /// Returns an error if an answer consistently has a wrong number of agents. Its form is valid, but it is wrong.
+    /// Returns an error if `cells` and `goals` have the same wrong length: the form is valid, but the answer is wrong.
     fn check_num_agents(&self, reply: &Reply) -> Result<(), Error> {
         let lengths = [reply.cells.as_ref().map(Vec::len), reply.goals.as_ref().map(Vec::len)];
         let expected = self.config.num_agents;

@@ -33,7 +33,7 @@ __getattr__, __dir__ = forwarded(
 class SingleAgentWrapper(Wrapper):
     """An environment with agent 0 alone; the other agents take random actions from the action space.
 
-    With the semantics "2.0" `reset(seed=...)` also seeds the action space.
+    With the semantics "2.0", `reset(seed=...)` also seeds the action space.
     """
 
     def reset(  # type: ignore[override]
@@ -82,7 +82,7 @@ def make_pogema(
     annotate the variable, for example with `Pogema[dict[str, Any]]` for `POMAPF`. To make an environment for PettingZoo
     or PyMARL that is typed, call `parallel_env` or `PyMarlPogema`.
 
-    `semantics` is "1.4.0" [default] or "2.0", in which every agent is seen, `reset(seed=...)` chooses the episode,
+    `semantics` is "1.4.0" [default] or "2.0". With "2.0", every agent is seen, `reset(seed=...)` chooses the episode,
     each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.
 
     Errors: `KeyError` for `auto_reset` without Sample Factory, and for an unknown integration; `NotImplementedError`
