@@ -20,6 +20,8 @@ ROOT = HERE.parent.parent
 OURS = ROOT / "target/python/new/bin/python"
 PROGRAM = ROOT / "target/release/pogema"
 BATCH = "64 lanes of 64 agents"
+# Agent steps per second with windows of obstacles, costs to go and agents that a trainer needs at least.
+ENCODED_BAR = 5e6
 # Rows whose observations are compared with writing zeros.
 WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]
 
@@ -86,6 +88,7 @@ def measure(peer, ours, pogema):
         ("VecEnv of 64, 64 agents, 2 threads", step_64, 64 * vector),
         ("the same, packed into bits", step_64, 64 * ours.time("vector", 64, 64, 2, "bits")),
         ("the same as f32, against the Rust batch", rust_batch(), vector),
+        ("agent steps with an encoder, against 5 million", ENCODED_BAR, 64 * 64 * ours.time("encoded", 64, 64, 2)),
         *(row for part in WRITTEN for row in against_zeros(part)),
         ("import", imports_per_second(pogema, "import pogema"), imports_per_second(OURS, "import pogema_rs")),
         (

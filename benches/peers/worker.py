@@ -89,7 +89,23 @@ def vector(num_envs, num_agents, num_threads, dtype="float32"):
     return fastest(work)
 
 
-WORKS = {"step": step, "reset": reset, "vector": vector}
+def encoded(num_envs, num_agents, num_threads):
+    """Returns steps of the whole VecEnv per second, with windows of an encoder and new goals and episodes."""
+    encoder = {"radius": 5, "channels": ["obstacles", "cost_to_go", "agents"]}
+    lifelong = {**config(num_agents).model_dump(), "on_target": "restart", "max_episode_steps": 256}
+    env = package.VecEnv(lifelong, num_envs, num_threads=num_threads, encoder=encoder)
+    env.reset(seed=0)
+    actions, at = random_actions(num_envs, num_agents), 0
+
+    def work():
+        nonlocal at
+        env.step(actions[at % ACTIONS])
+        at += 1
+
+    return fastest(work)
+
+
+WORKS = {"step": step, "reset": reset, "vector": vector, "encoded": encoded}
 for line in sys.stdin:
     name, *sizes = json.loads(line)
     print(json.dumps(WORKS[name](*sizes)), flush=True)

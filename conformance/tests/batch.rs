@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::sync::atomic::AtomicBool;
+
 use pogema_core::{
     Action, Collision, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut,
 };
@@ -217,4 +219,40 @@ fn a_panic_of_the_source_becomes_an_error() {
     let mut batch = Batch::new(config(OnGoal::Finish), 1, 1, source).unwrap();
     batch.reset().unwrap();
     assert_eq!(error_of(batch.reset()), "instance: the source panicked at lane 0, episode 1");
+}
+
+#[test]
+fn work_of_a_caller_is_shared_and_episodes_are_counted() {
+    for num_threads in [1, 3] {
+        let mut batch = new_batch(OnGoal::Restart, num_threads).with_autoreset(Autoreset::NextStep);
+        assert_eq!(batch.num_begun(0), Ok(0));
+        batch.fetch(&[true; NUM_LANES], &AtomicBool::new(false)).unwrap();
+        let first = batch.next_instance(2).unwrap().unwrap().starts().to_vec();
+        batch.reset().unwrap();
+        assert_eq!(batch.lane(2).unwrap().starts(), first);
+        assert!(batch.next_instance(2).unwrap().is_none());
+        let parts = (0..NUM_LANES).collect();
+        let starts = batch.share(parts, |batch, lane| batch.lane(lane).unwrap().starts().to_vec());
+        let expected: Vec<_> = (0..NUM_LANES)
+            .map(|lane| instance(OnGoal::Restart, lane, 0).unwrap().starts().to_vec())
+            .collect();
+        assert_eq!(starts, expected);
+        let (mut rewards, mut terminated) = ([0.0; 108], [false; 108]);
+        let mut truncated = terminated;
+        let mut step = |batch: &mut Batch| {
+            let out =
+                StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+            batch.step(&[Action::Stay; 108], out, Observations::None).unwrap();
+        };
+        (0..11).for_each(|_| step(&mut batch));
+        assert_eq!((batch.num_begun(2), batch.is_over(2)), (Ok(1), Ok(true)));
+        step(&mut batch);
+        assert_eq!((batch.num_begun(2), batch.is_over(2)), (Ok(2), Ok(false)));
+        // Unlike the number of an episode, the count continues.
+        batch
+            .reset_with(|lane, episode| instance(OnGoal::Restart, lane, episode), &[true; NUM_LANES])
+            .unwrap();
+        assert_eq!((batch.num_begun(2), batch.episode(2)), (Ok(3), Ok(Some(0))));
+        assert!(batch.num_begun(NUM_LANES).is_err() && batch.is_over(NUM_LANES).is_err());
+    }
 }

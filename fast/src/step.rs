@@ -116,6 +116,11 @@ impl Engine {
         (self.height, self.width)
     }
 
+    /// Returns the cell on which each agent began the episode.
+    pub fn starts(&self) -> &[Cell] {
+        &self.starts
+    }
+
     /// Returns the cell of each agent; a finished agent stays where it finished.
     pub fn cells(&self) -> &[Cell] {
         &self.cells

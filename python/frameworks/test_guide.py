@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "guide" / "python.md"
+GUIDE = Path(__file__).resolve().parent.parent.parent / "docs" / "guide"
 BLOCK = re.compile(r"^<!-- framework: (\w+) -->\n```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-BLOCKS = dict(BLOCK.findall(GUIDE.read_text()))
+PAGES = ["python.md", "train_to_table.md"]
+BLOCKS = {name: code for page in PAGES for name, code in BLOCK.findall((GUIDE / page).read_text())}
 
 
 def test_guide_has_a_block_for_each_framework():
-    assert set(BLOCKS) == {"pufferlib", "sample_factory", "tensorboard", "torchrl", "wandb"}
+    assert set(BLOCKS) == {"pufferlib", "sample_factory", "tensorboard", "torch", "torchrl", "wandb"}
 
 
 # Sample Factory is in a virtual environment of its own.

@@ -14,6 +14,7 @@ __all__ = [
     "Evaluation",
     "MAX_THREADS",
     "PlanFollower",
+    "Policy",
     "WORDS",
     "__version__",
     "_panic",
@@ -32,6 +33,7 @@ __all__ = [
     "show_views",
     "warehouse",
     "warehouse_cells",
+    "write_network",
 ]
 
 MAX_THREADS: int
@@ -108,6 +110,7 @@ class Batch:
         rules: tuple[str, bool],
         threads: tuple[Optional[int], int],
         room: tuple[Optional[int], Optional[tuple[int, int]]],
+        encoder: Optional[str] = None,
     ) -> Batch: ...
     def film(self, /, env: int, every: int, prefix: str, format: str) -> None: ...
     def films(self, /) -> list[PurePath]: ...
@@ -162,6 +165,34 @@ class PlanFollower:
         lifelong: bool,
     ) -> PlanFollower: ...
     def act(self, /, obstacles: Any, positions: Any, goals: Any) -> list[int]: ...
+    def reset(self, /) -> None: ...
+
+@final
+class Policy:
+    def __new__(
+        cls,
+        name: str,
+        weights: str,
+        sampling: Optional[str],
+        mask_actions: bool,
+        seed: int,
+        threads: int,
+        search: tuple[Optional[int], Optional[bool]],
+    ) -> Policy: ...
+    def encoder(self, /) -> Optional[str]: ...
+    def sampling(self, /) -> Optional[str]: ...
+    def logits(self, /, windows: NDArray[np.float32], scalars: NDArray[np.float32]) -> NDArray[np.float32]: ...
+    def act_batch(self, /, batch: Batch, actions: NDArray[np.int64]) -> None: ...
+    def act(
+        self,
+        /,
+        obstacles: NDArray[np.uint8],
+        border: int,
+        cells: _Pairs,
+        goals: _Pairs,
+        active: list[bool],
+        exact: bool,
+    ) -> list[int]: ...
     def reset(self, /) -> None: ...
 
 @final
@@ -227,6 +258,7 @@ def show_views(
     out: Optional[str],
     six: Optional[str],
 ) -> tuple[list[str], list[tuple[str, list[str], list[str], list[str], Optional[str]]]]: ...
+def write_network(path: str, config: str, tensors: list[tuple[str, NDArray[np.float32]]]) -> None: ...
 def _panic(text: str) -> None: ...
 def num_cores() -> int: ...
 def restore_engine(saved: bytes) -> Engine: ...

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, Union
+from collections.abc import Mapping
+from typing import Any, Optional, Union
 
 import numpy as np
 from gymnasium import spaces
 
+from pogema_rs._encoder import Encoder, read_encoder
 from pogema_rs.packed import words_per_agent
 
 Arrays = Union[np.ndarray, dict[str, np.ndarray]]
@@ -26,15 +28,30 @@ def read_dtype(dtype: Any) -> str:
     raise ValueError(f"dtype is {dtype!r}, expected 'float32', 'uint8' or 'bits'")
 
 
+def read_encoder_for(encoder: Union[Encoder, Mapping[str, Any]], dtype: str) -> Encoder:
+    """Returns the encoder of a `VecEnv`, given as such or as a dict.
+
+    Errors: TypeError or ValueError for wrong values; ValueError without channels, or for another type than float32.
+    """
+    encoder = read_encoder(encoder)
+    if not encoder.channels:
+        raise ValueError("encoder has no channels, expected at least one")
+    if dtype != "float32":
+        raise ValueError(f"dtype is {dtype!r}, expected 'float32' with an encoder")
+    return encoder
+
+
 def observation_space(
-    kind: str, dtype: str, num_agents: int, radius: int, size: tuple[int, int]
+    kind: str, dtype: str, num_agents: int, radius: int, size: tuple[int, int], encoder: Optional[Encoder]
 ) -> Union[spaces.Box, spaces.Dict]:
     """Returns the space of one environment's observations of a type: `default`, `POMAPF` or `MAPF`.
 
     `size` holds the rows and columns of the largest map.
 
-    Errors: ValueError if the type has no packed form.
+    Errors: ValueError if the type has no packed form, or is not `default` with an encoder.
     """
+    if encoder is not None:
+        return _encoded_space(kind, num_agents, encoder)
     side = 2 * radius + 1
     if kind == "default":
         if dtype == "bits":
@@ -56,6 +73,16 @@ def observation_space(
         parts["global_xy"] = _cells(num_agents, 0, radius + max(size) - 1)
         parts["global_target_xy"] = _cells(num_agents, 0, radius + max(size) - 1)
     return spaces.Dict(parts)
+
+
+def _encoded_space(kind: str, num_agents: int, encoder: Encoder) -> Union[spaces.Box, spaces.Dict]:
+    if kind != "default":
+        raise ValueError(f"observation_type is {kind!r}, expected 'default' with an encoder")
+    windows = spaces.Box(-1, 1, (num_agents, *encoder.shape), np.float32)
+    if not encoder.scalars:
+        return windows
+    scalars = spaces.Box(-1, 1, (num_agents, 2 * len(encoder.scalars)), np.float32)
+    return spaces.Dict({"windows": windows, "scalars": scalars})
 
 
 def state_space(num_agents: int, size: tuple[int, int]) -> spaces.Dict:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, Optional, Union, cast
 
@@ -13,6 +14,7 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, _vec_spaces
+from pogema_rs._encoder import Encoder
 from pogema_rs._vec_configs import read_changes, read_configs, read_room, read_threads
 from pogema_rs._vec_curriculum import Curriculum, NextEpisodes
 from pogema_rs._vec_film import Film, Films
@@ -50,6 +52,11 @@ class VecEnv(VectorEnv, Generic[Observations]):
     `global_obstacles` `(num_envs, rows, columns)` as uint8, one map per environment with its border, and `global_xy`
     and `global_target_xy` `(num_envs, agents, 2)` as int64. Smaller maps are padded below and on the right with
     obstacles. For type checkers, such an environment is a `VecEnv[dict[str, np.ndarray]]`.
+
+    Encoders: with `encoder`, an `Encoder` or the same as a dict, the observations are its windows, float32 of shape
+    `(num_envs, agents, channels, side, side)`, as a network that plays in Rust sees them. If it has scalars, they are a
+    dictionary of `windows` and `scalars` `(num_envs, agents, 2 * len(encoder.scalars))`. Channels that remember begin
+    anew with each episode. An encoder requires the `dtype` `float32` and the config's `observation_type` `default`.
 
     Rewards: `rewards="own"` are POGEMA's. With `"shared"`, every agent gets the number of agents that are on their
     goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is the
@@ -118,13 +125,14 @@ class VecEnv(VectorEnv, Generic[Observations]):
         map_size: Union[None, int, tuple[int, int]] = None,
         curriculum: Optional[Curriculum] = None,
         film: Optional[Film] = None,
+        encoder: Union[None, Encoder, Mapping[str, Any]] = None,
     ) -> None:
         """Makes one environment for each config of a list, or `num_envs` of a single config.
 
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
         or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
-        N-th episode of one environment. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line.
+        N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line.
         `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
         core and environment]. A step uses fewer while measured times show that more do not make it faster.
 
@@ -137,6 +145,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
             raise ValueError(f"semantics is {semantics!r}, expected {expected}")
         self.semantics = Semantics(semantics)
         dtype = _vec_spaces.read_dtype(dtype)
+        self.encoder = None if encoder is None else _vec_spaces.read_encoder_for(encoder, dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
         reward, self._change_rewards = read_rewards(rewards)
         self._reward = reward
@@ -150,6 +159,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
             (mode.value, self.semantics.occupancy_is_exact),
             (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
             read_room(num_agents, map_size),
+            None if self.encoder is None else json.dumps(self.encoder.to_dict()),
         )
         self._next_episodes: Optional[NextEpisodes] = None
         if curriculum is not None:
@@ -161,9 +171,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self.num_agents, radius, size = self._batch.sizes()
         self.metadata = {"autoreset_mode": self.autoreset_mode}
         single_space = _vec_spaces.observation_space(
-            self._batch.observation_type(), dtype, self.num_agents, radius, size
+            self._batch.observation_type(), dtype, self.num_agents, radius, size, self.encoder
         )
-        # A Dict with `POMAPF` and `MAPF`; type checkers see the Box of all other environments.
+        # A Dict with `POMAPF`, `MAPF` and scalars; type checkers see the Box of all other environments.
         self.single_observation_space = cast(spaces.Box, single_space)
         self.single_state_space = _vec_spaces.state_space(self.num_agents, size)
         self.single_action_space = spaces.MultiDiscrete([NUM_ACTIONS] * self.num_agents)

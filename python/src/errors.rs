@@ -85,6 +85,14 @@ pub fn batch(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
+/// Converts an error of a learned policy that plays a batch.
+pub fn policy(py: Python<'_>, error: &Error) -> PyErr {
+    match error {
+        Error::Memory { .. } => memory(error),
+        _ => call(py, error),
+    }
+}
+
 /// Returns the error for an invalid action in a batch.
 pub fn action(py: Python<'_>, text: String) -> PyErr {
     of_class(py, "ActionError", text)

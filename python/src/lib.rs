@@ -12,11 +12,13 @@ mod lists;
 mod maps;
 mod memory;
 mod planners;
+mod policies;
 mod vec;
 mod views;
 
 use pogema_core::{Collision, Observation, OnGoal, Words};
 use pogema_maps::Integration;
+use pogema_policies::{Channel, FollowerVersion, Sampling, Scalars};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -26,6 +28,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<vec::Batch>()?;
     module.add_class::<astar::AStarAgent>()?;
     module.add_class::<planners::PlanFollower>()?;
+    module.add_class::<policies::Policy>()?;
     module.add_class::<evaluation::Evaluation>()?;
     module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
@@ -36,6 +39,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("WORDS", words(module.py())?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
     module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
+    module.add_function(wrap_pyfunction!(policies::write_network, module)?)?;
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
@@ -55,5 +59,9 @@ fn words(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     words.set_item("collision_system", Collision::NAMES)?;
     words.set_item("observation_type", Observation::NAMES)?;
     words.set_item("integration", Integration::NAMES)?;
+    words.set_item("channel", Channel::NAMES)?;
+    words.set_item("scalars", Scalars::NAMES)?;
+    words.set_item("follower", FollowerVersion::NAMES)?;
+    words.set_item("sampling", Sampling::NAMES)?;
     Ok(words)
 }

@@ -20,6 +20,7 @@ from pogema_rs import AnimationMonitor, GridConfig, _engine, pogema_v0
 from pogema_rs._engine import restore_engine
 from pogema_rs.errors import NotResetError
 from pogema_rs.planners import PlannerAgents, plan
+from pogema_rs.policies import Encoder, load, save
 from pogema_rs.toolbox.evaluator import evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
@@ -43,20 +44,23 @@ SHORT = {
         "Engine.step_back", "derive_config",
     },
     "they play or observe at most one step": {
-        "AStarAgent.act", "Batch.ended", "Batch.global_state", "Batch.mask_actions", "Batch.mask_agents",
+        "AStarAgent.act", "Batch.ended", "Policy.logits", "Batch.global_state", "Batch.mask_actions", "Batch.mask_agents",
         "Engine.step",
     },
     "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.films", "Batch.metrics"},
     "they read or write the files of one algorithm once": {
         "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note", "Evaluation.picks",
     },
+    "they read or write the files of one network once": {"Policy.__new__", "write_network"},
+    "they forward at most one step of one environment": {"Policy.act"},
     "they read or set a few values": {
         "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
         "Batch.take_film_failures",
         "Engine.clear_metrics", "Engine.elapsed", "Engine.film", "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure",
         "Engine.num_steps", "Engine.size", "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask",
         "Evaluation.environment", "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
-        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset", "_panic",
+        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset", "Policy.encoder", "Policy.reset",
+        "Policy.sampling", "_panic",
         "machine", "nearest_name", "num_cores",
     },
 }  # fmt: skip
@@ -175,6 +179,40 @@ def batch_step():
     interrupt("Batch.step", lambda: env.step(np.zeros((8000, 16), int)), 0.1)
     twin.reset()
     check_equal(env, twin)
+
+
+def encoded():
+    config = {"size": 400, "num_agents": 400, "density": 0.1, "seed": 5, "on_target": "restart", "max_episode_steps": 1}
+    return VecEnv(config, 2, encoder=Encoder(1, ["cost_to_go", "seen_obstacles"]))
+
+
+@interrupts("Batch.reset", "Batch.step")
+def batch_encoders():
+    # The costs of all goals take seconds.
+    env, twin = encoded(), encoded()
+    interrupt("Batch.reset", env.reset, 0.6)
+    env.reset(seed=1)
+    twin.reset(seed=1)
+    interrupt("Batch.reset", lambda: env.reset(seed=2), 0.6)
+    interrupt("Batch.step", lambda: env.step(np.zeros((2, 400), int)), 0.6)
+    check_equal(env, twin)
+
+
+@interrupts("Policy.act_batch")
+def policy_actions():
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "large.safetensors"
+        rng = np.random.default_rng(0)
+        tensors = {"a.weight": rng.normal(size=(2000, 121)), "b.weight": rng.normal(size=(2000, 2000)), "policy.weight": rng.normal(size=(5, 2000))}
+        biases = {name.replace("weight", "bias"): np.zeros(len(weight)) for name, weight in tensors.items()}
+        save(path, Encoder(5, ["obstacles"]), ["flatten", {"dense": "a"}, "elu", {"dense": "b"}, "elu"], {**tensors, **biases})
+        env, policy, twin = batch(400), load(path), load(path)
+        env.reset()
+        interrupt("Policy.act_batch", lambda: policy.act(env))
+        small = VecEnv({"size": 64, "num_agents": 16, "seed": 5}, 3)
+        small.reset()
+        policy.reset_states()
+        np.testing.assert_array_equal(policy.act(small), twin.act(small))
 
 
 @interrupts("Batch.set_configs")

@@ -17,6 +17,7 @@ import numpy as np
 
 from pogema_rs import AnimationConfig, AStarAgent, GridConfig, Semantics, VecEnv, Wrapper, pogema_v0
 from pogema_rs.envs import Pogema
+from pogema_rs.policies import Encoder, load
 
 
 class FewerRewards(Wrapper[dict[str, Any]]):
@@ -54,6 +55,11 @@ buffer: np.ndarray = np.zeros(envs.observation_space.shape, dtype=np.uint8)
 batch, about = envs.reset(seed=[1, 2], out=buffer)
 batch, sums, ended, cut, about = envs.step(envs.sample_actions())
 solved = float(about["metrics"]["ISR"][0]) + float(sums.sum())
+
+seen: VecEnv[np.ndarray] = VecEnv(config, 2, encoder=Encoder(5, ["cost_to_go"], scalars=["goal_offset"]))
+policy = load("weights.safetensors", sampling="greedy")
+assert_type(policy.act(seen), np.ndarray)
+assert_type(policy.act(env.reset()[0]), list[int])
 """
 
 WRONG = {
@@ -71,6 +77,9 @@ WRONG = {
     'envs.step(envs.sample_actions(), out="here")': "arg-type",
     "envs.num_agents.size": "attr-defined",
     "AnimationConfig(static=None)": "arg-type",
+    'Encoder(5, channels=["goal"], scalar=[])': "call-arg",
+    'load("weights.safetensors", seed="one")': "arg-type",
+    "policy.act(3)": "call-overload",
 }
 
 

@@ -16,6 +16,8 @@ pub struct Lane {
     meter: EpisodeMeter,
     /// The number of the current episode.
     pub episode: Option<u64>,
+    /// How many episodes the lane has begun.
+    pub num_begun: u64,
     /// The number of the episode that is requested from the preparer.
     pub requested: u64,
     /// The instance of the episode before the requested one, if that episode has not begun.
@@ -26,7 +28,7 @@ pub struct Lane {
     /// Whether an episode ended in the last step.
     pub has_just_ended: bool,
     /// Whether the current episode has ended.
-    is_over: bool,
+    pub is_over: bool,
     /// Whether `ended` holds the next episode. This is only possible after the current episode has ended.
     is_next_ready: bool,
     /// The reason why the lane has no next episode.
@@ -41,6 +43,7 @@ impl Lane {
             engine: Engine::with_path(config, path)?,
             meter: EpisodeMeter::new(&config),
             episode: None,
+            num_begun: 0,
             requested: 0,
             pending: None,
             ended: Engine::with_path(config, path)?,
@@ -143,6 +146,7 @@ impl Lane {
 
     fn mark_begun(&mut self) {
         self.episode = self.requested.checked_sub(1);
+        self.num_begun += 1;
         self.is_over = false;
         if self.meter.num_agents() != self.engine.config.num_agents {
             self.meter = EpisodeMeter::new(&self.engine.config);

@@ -8,6 +8,7 @@ mod team;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::Instant;
 
 use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
@@ -55,6 +56,8 @@ pub struct Batch {
     lanes: Vec<Lane>,
     team: Team,
     pace: Pace,
+    /// The pace of [`Batch::share`].
+    shared_pace: Pace,
     preparer: Preparer,
     is_started: bool,
 }
@@ -83,8 +86,8 @@ impl Batch {
         let lanes = (0..num_lanes).map(lane).collect::<Result<_, _>>()?;
         let team = Team::new(num_threads)?;
         let preparer = Preparer::new(Arc::new(source), num_lanes)?;
-        let (autoreset, pace) = (Autoreset::default(), Pace::default());
-        Ok(Self { config, autoreset, lanes, team, pace, preparer, is_started: false })
+        let (autoreset, pace, shared_pace) = (Autoreset::default(), Pace::default(), Pace::default());
+        Ok(Self { config, autoreset, lanes, team, pace, shared_pace, preparer, is_started: false })
     }
 
     /// Sets the autoreset mode. Call this before the first reset.
@@ -344,6 +347,50 @@ impl Batch {
         self.check_lane(lane).map(|lane| lane.episode)
     }
 
+    /// Returns whether the current episode of a lane has ended, so that the next step does not play it.
+    ///
+    /// # Errors
+    /// If the lane does not exist.
+    pub fn is_over(&self, lane: usize) -> Result<bool, Error> {
+        self.check_lane(lane).map(|lane| lane.is_over)
+    }
+
+    /// Returns how many episodes a lane has begun. Unlike [`Batch::episode`], the number grows with every episode.
+    ///
+    /// # Errors
+    /// If the lane does not exist.
+    pub fn num_begun(&self, lane: usize) -> Result<u64, Error> {
+        self.check_lane(lane).map(|lane| lane.num_begun)
+    }
+
+    /// Returns the instance of a lane's next episode, if it is fetched and no engine has started it.
+    ///
+    /// # Errors
+    /// If the lane does not exist.
+    pub fn next_instance(&self, lane: usize) -> Result<Option<&Instance>, Error> {
+        self.check_lane(lane).map(|lane| lane.pending.as_ref())
+    }
+
+    /// Does all parts of a caller's work on the threads of the batch, and returns the results in the order of the parts.
+    ///
+    /// As a step does, it uses the calling thread alone while further threads do not make the work faster. A part can
+    /// run on any thread.
+    pub fn share<P: Send, T: Send + Sync>(
+        &mut self,
+        parts: Vec<P>,
+        work: impl Fn(&Self, P) -> T + Sync,
+    ) -> Vec<T> {
+        let start = Instant::now();
+        let batch = &*self;
+        let done = if batch.team.num_threads() == 1 || batch.shared_pace.is_alone() {
+            parts.into_iter().map(|part| work(batch, part)).collect()
+        } else {
+            batch.team.share(parts, |part| work(batch, part))
+        };
+        self.shared_pace.record(start.elapsed());
+        done
+    }
+
     /// Returns whether an episode of a lane ended in the last step.
     ///
     /// # Errors
@@ -385,6 +432,13 @@ impl Batch {
 pub struct Firsts {
     preparer: Preparer,
     instances: Vec<Option<Instance>>,
+}
+
+impl Firsts {
+    /// Returns the instance of a lane, if the lane was chosen.
+    pub fn instance(&self, lane: usize) -> Option<&Instance> {
+        self.instances.get(lane)?.as_ref()
+    }
 }
 
 /// Calls a function for the chosen lanes, until another thread sets `stop`.

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pogema_core::{Cell, Map, State};
+use pogema_core::{Cell, Config, Error, Map, State};
 use pogema_planners::{Bfs, Graph, UNREACHABLE};
 
 use crate::grid::Layout;
@@ -22,7 +23,7 @@ pub(crate) enum CostGrid {
 impl CostGrid {
     /// Returns the grid of these costs, `u32::MAX` where there is none.
     fn new(costs: Vec<u32>, num_free: usize) -> Self {
-        if num_free < usize::from(u16::MAX) {
+        if num_free < usize::from(u16::MAX) - FARTHEST {
             // A path is shorter than the number of free cells; only the entry of a missing cost is cut.
             Self::Small(costs.into_iter().map(|cost| cost as u16).collect())
         } else {
@@ -40,20 +41,9 @@ impl CostGrid {
 
     /// Copies the costs of the window around a place.
     fn copy_window(&self, layout: Layout, place: usize, window: &mut [i32]) {
-        let side = window.len().isqrt();
-        for (row, first) in window.chunks_exact_mut(side).zip(layout.window_rows(place, side / 2)) {
-            match self {
-                Self::Small(costs) => {
-                    for (value, &cost) in row.iter_mut().zip(&costs[first..first + side]) {
-                        *value = widened(cost);
-                    }
-                }
-                Self::Large(costs) => {
-                    for (value, &cost) in row.iter_mut().zip(&costs[first..first + side]) {
-                        *value = cost as i32;
-                    }
-                }
-            }
+        match self {
+            Self::Small(costs) => layout.map_window(costs, place, window, widened),
+            Self::Large(costs) => layout.map_window(costs, place, window, |cost| cost as i32),
         }
     }
 
@@ -68,6 +58,9 @@ impl CostGrid {
 fn widened(cost: u16) -> i32 {
     if cost == u16::MAX { NO_COST } else { i32::from(cost) }
 }
+
+/// The largest difference of costs that a window shows: twice the largest radius.
+const FARTHEST: usize = 2 * Config::LARGEST_RADIUS;
 
 /// The entry of a place from which no path leads to the goal.
 pub(crate) const NO_COST: i32 = -1;
@@ -94,17 +87,35 @@ pub(crate) struct ToGoal {
 }
 
 impl Costs {
-    /// Byte budget of the grids that no agent uses at present.
-    const MAX_BYTES: usize = 64 << 20;
+    /// Default byte budget of the grids that no agent uses at present.
+    pub const MAX_BYTES: usize = 64 << 20;
 
     pub fn new(layout: Layout, map: &Map) -> Self {
+        Self::with_budget(layout, map, Self::MAX_BYTES)
+    }
+
+    pub fn with_budget(layout: Layout, map: &Map, max_bytes: usize) -> Self {
         let graph = Graph::new(map);
-        let max_grids = (Self::MAX_BYTES / (size_of::<u32>() * layout.len())).max(1);
+        let max_grids = (max_bytes / (size_of::<u32>() * layout.len())).max(1);
         Self { layout, bfs: Bfs::new(&graph), graph, grids: HashMap::new(), max_grids, agents: Vec::new() }
+    }
+
+    /// Begins an episode on the same map.
+    pub fn begin(&mut self) {
+        self.agents.clear();
     }
 
     /// Advances to a state: a new goal gets its grid, and the smallest cost begins anew.
     pub fn follow(&mut self, state: State<'_>) {
+        // INVARIANT: nothing sets this flag.
+        let _ = self.follow_until(state, &AtomicBool::new(false));
+    }
+
+    /// Advances to a state like [`Costs::follow`].
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if another thread sets `stop`.
+    pub fn follow_until(&mut self, state: State<'_>, stop: &AtomicBool) -> Result<(), Error> {
         for (agent, (&cell, &goal)) in state.cells.iter().zip(state.goals).enumerate() {
             let place = self.layout.place(cell);
             match self.agents.get_mut(agent) {
@@ -112,6 +123,7 @@ impl Costs {
                     known.now = known.grid.at(place);
                     known.best = known.best.min(known.now);
                 }
+                _ if stop.load(Relaxed) => return Err(Error::Cancelled),
                 _ => {
                     let grid = self.grid(goal);
                     let now = grid.at(place);
@@ -123,6 +135,7 @@ impl Costs {
                 }
             }
         }
+        Ok(())
     }
 
     /// Returns the costs of an agent to its goal.
@@ -151,17 +164,26 @@ impl Costs {
 }
 
 /// Writes the window of `cost_to_go`: `(cost of the own cell - cost) / (2 * radius)`, limited to -1 to 1.
-///
-/// `window` is memory for the costs of the window.
-pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, window: &mut [i32], out: &mut [f32]) {
+pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, radius: usize, out: &mut [f32]) {
     if costs.now == NO_COST {
         return out.fill(-1.0);
     }
-    costs.grid.copy_window(layout, place, window);
-    let most = out.len().isqrt() as i32 - 1;
-    for (value, &cost) in out.iter_mut().zip(&*window) {
-        let nearer = if cost == NO_COST { -most } else { (costs.now - cost).clamp(-most, most) };
-        *value = nearer as f32 / most as f32;
+    let most = (2 * radius) as f32;
+    match &costs.grid {
+        // Floats, because all processors have vector instructions for their limits. They are exact up to 2^24. The
+        // entry without a cost is so large that it gives the lower limit.
+        CostGrid::Small(grid) => {
+            let now = costs.now as f32;
+            layout.map_window(grid, place, out, |cost| (now - f32::from(cost)).clamp(-most, most) / most);
+        }
+        CostGrid::Large(grid) => {
+            let limit = 2 * radius as i32;
+            layout.map_window(grid, place, out, |cost| {
+                let nearer =
+                    if cost == u32::MAX { -limit } else { (costs.now - cost as i32).clamp(-limit, limit) };
+                nearer as f32 / most
+            });
+        }
     }
 }
 
@@ -209,7 +231,7 @@ mod tests {
         let layout = Layout::new(&map, 1);
         let costs: Vec<u32> =
             (0..layout.len() as u32).map(|x| if x % 3 == 0 { UNREACHABLE } else { x }).collect();
-        let (small, large) = (CostGrid::new(costs.clone(), 65_534), CostGrid::new(costs, 65_535));
+        let (small, large) = (CostGrid::new(costs.clone(), 65_278), CostGrid::new(costs, 65_279));
         assert!(matches!((&small, &large), (CostGrid::Small(_), CostGrid::Large(_))));
         let windows = [&small, &large].map(|grid| {
             let mut window = [0; 9];

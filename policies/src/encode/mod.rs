@@ -10,6 +10,8 @@ mod path;
 mod settings;
 mod words;
 
+use std::sync::atomic::AtomicBool;
+
 use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
 
 use costs::{Costs, write_plain, write_tracer};
@@ -45,22 +47,31 @@ use crate::grid::{Layout, Marks};
 #[derive(Debug)]
 pub struct Encoder {
     settings: EncoderSettings,
+    cache_bytes: usize,
     episode: Option<Episode>,
 }
 
 /// The memory of an episode.
 #[derive(Debug)]
 struct Episode {
-    layout: Layout,
+    terrain: Terrain,
     starts: Vec<Cell>,
-    obstacles: Vec<f32>,
     marks: Option<Marks>,
     all: Option<Marks>,
-    costs: Option<Costs>,
-    follower: Option<FollowerPlanner>,
     memories: Vec<Memory>,
     /// Memory for the costs of one window.
     window: Vec<i32>,
+}
+
+/// What depends on the map alone, so that episodes on the same map share it.
+#[derive(Debug)]
+struct Terrain {
+    map: Map,
+    outside: Outside,
+    layout: Layout,
+    obstacles: Vec<f32>,
+    costs: Option<Costs>,
+    follower: Option<FollowerPlanner>,
 }
 
 impl Encoder {
@@ -70,7 +81,14 @@ impl Encoder {
     /// [`Error::Config`] naming the first setting that is out of range.
     pub fn new(settings: EncoderSettings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, episode: None })
+        Ok(Self { settings, cache_bytes: Costs::MAX_BYTES, episode: None })
+    }
+
+    /// Limits the memory for costs to goals that no agent has at present [default: 64 MiB]. The windows do not depend
+    /// on it.
+    #[must_use]
+    pub fn with_cache_bytes(self, cache_bytes: usize) -> Self {
+        Self { cache_bytes, ..self }
     }
 
     /// Returns the settings.
@@ -83,33 +101,35 @@ impl Encoder {
     /// `starts` holds the cell of each agent after the reset. For [`Outside::Noise`], an engine's map with its border
     /// is suitable, too: the encoder draws the wall and reads only the cells beyond it.
     pub fn begin(&mut self, map: &Map, outside: &Outside, occupancy: Occupancy, starts: &[Cell]) {
-        let has = |channels: &[Channel]| self.settings.channels.iter().any(|known| channels.contains(known));
-        let layout = Layout::new(map, self.settings.radius.max(self.settings.sight));
-        let remembers = has(&[Channel::SeenObstacles]);
-        let needs_costs = has(&[Channel::CostToGo, Channel::CostTracer, Channel::Path]);
-        let follower = has(&[Channel::FollowerPath]).then(|| {
-            let EncoderSettings { sight, follower: version, .. } = self.settings;
-            let seen = match version {
+        let settings = &self.settings;
+        let last = self.episode.take().map(|episode| episode.terrain);
+        let last = last.filter(|last| last.map == *map && last.outside == *outside);
+        let mut terrain = last.unwrap_or_else(|| Terrain::new(settings, self.cache_bytes, map, outside));
+        let layout = terrain.layout;
+        if let Some(costs) = &mut terrain.costs {
+            costs.begin();
+        }
+        if let Some(follower) = &mut terrain.follower {
+            let seen = match settings.follower {
                 FollowerVersion::Cpp => Occupancy::Exact,
                 FollowerVersion::Python => occupancy,
             };
-            let present = Marks::new(layout, seen);
-            FollowerPlanner::new(layout, map, starts.len(), sight, version, present)
-        });
+            follower.begin(starts.len(), Marks::new(layout, seen));
+        }
+        let remembers = settings.has(&[Channel::SeenObstacles]);
         self.episode = Some(Episode {
-            layout,
+            terrain,
             starts: starts.to_vec(),
-            obstacles: layout.obstacles(map, outside),
-            marks: has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
-            all: has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
-            costs: needs_costs.then(|| Costs::new(layout, map)),
-            follower,
+            marks: settings.has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
+            all: settings.has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
-            window: vec![0; self.settings.side() * self.settings.side()],
+            window: vec![0; settings.side() * settings.side()],
         });
     }
 
     /// Writes the windows and the numbers of all agents; those of an inactive agent are 0.
+    ///
+    /// This is [`Encoder::follow`] and then [`Encoder::write`].
     ///
     /// Shape: `windows` is `[agents, channels, side, side]`, `scalars` is `[agents, scalars, 2]`.
     ///
@@ -122,17 +142,58 @@ impl Encoder {
         windows: &mut [f32],
         scalars: &mut [f32],
     ) -> Result<(), Error> {
-        let Self { settings, episode } = self;
+        let num_agents = self.check(state)?;
+        self.check_buffers(num_agents, windows, scalars)?;
+        self.follow(state)?;
+        self.write(state, windows, scalars)
+    }
+
+    /// Advances to a state and writes nothing.
+    ///
+    /// # Errors
+    /// Those of [`Encoder::encode`].
+    pub fn follow(&mut self, state: State<'_>) -> Result<(), Error> {
+        self.follow_until(state, &AtomicBool::new(false))
+    }
+
+    /// Advances to a state, unless another thread sets `stop`. Many new goals on a large map take seconds.
+    ///
+    /// # Errors
+    /// Those of [`Encoder::encode`]; [`Error::Cancelled`] if the work was stopped. Then begin the episode again.
+    pub fn follow_until(&mut self, state: State<'_>, stop: &AtomicBool) -> Result<(), Error> {
+        self.check(state)?;
+        let Self { settings, episode, .. } = self;
         let episode = episode.as_mut().ok_or(Error::NotReset)?;
+        episode.follow(state, settings, stop)
+    }
+
+    /// Checks that a state fits the episode, and returns the number of agents.
+    fn check(&self, state: State<'_>) -> Result<usize, Error> {
+        let episode = self.episode.as_ref().ok_or(Error::NotReset)?;
         let num_agents = episode.starts.len();
         Error::check_length("cells", num_agents, state.cells.len())?;
         Error::check_length("goals", num_agents, state.goals.len())?;
         Error::check_length("active", num_agents, state.active.len())?;
+        episode.terrain.layout.check_inside("cell", state.cells)?;
+        episode.terrain.layout.check_inside("goal", state.goals)?;
+        Ok(num_agents)
+    }
+
+    fn check_buffers(&self, num_agents: usize, windows: &[f32], scalars: &[f32]) -> Result<(), Error> {
+        let settings = &self.settings;
         Error::check_length("windows", num_agents * settings.window_len(), windows.len())?;
-        Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())?;
-        episode.layout.check_inside("cell", state.cells)?;
-        episode.layout.check_inside("goal", state.goals)?;
-        episode.follow(state, settings);
+        Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())
+    }
+
+    /// Writes the windows and the numbers of the state that the encoder followed last, as often as wanted.
+    ///
+    /// # Errors
+    /// Those of [`Encoder::encode`].
+    pub fn write(&mut self, state: State<'_>, windows: &mut [f32], scalars: &mut [f32]) -> Result<(), Error> {
+        let num_agents = self.check(state)?;
+        self.check_buffers(num_agents, windows, scalars)?;
+        let Self { settings, episode, .. } = self;
+        let episode = episode.as_mut().ok_or(Error::NotReset)?;
         if settings.window_len() > 0 {
             for (agent, out) in windows.chunks_exact_mut(settings.window_len()).enumerate() {
                 episode.write_windows(agent, state, settings, out);
@@ -147,23 +208,48 @@ impl Encoder {
     }
 }
 
+impl Terrain {
+    fn new(settings: &EncoderSettings, cache_bytes: usize, map: &Map, outside: &Outside) -> Self {
+        let layout = Layout::new(map, settings.radius.max(settings.sight));
+        let needs_costs = settings.has(&[Channel::CostToGo, Channel::CostTracer, Channel::Path]);
+        let follower = settings
+            .has(&[Channel::FollowerPath])
+            .then(|| FollowerPlanner::new(layout, map, settings.sight, settings.follower, cache_bytes));
+        Self {
+            map: map.clone(),
+            outside: outside.clone(),
+            layout,
+            obstacles: layout.obstacles(map, outside),
+            costs: needs_costs.then(|| Costs::with_budget(layout, map, cache_bytes)),
+            follower,
+        }
+    }
+}
+
 impl Episode {
-    fn follow(&mut self, state: State<'_>, settings: &EncoderSettings) {
+    fn follow(
+        &mut self,
+        state: State<'_>,
+        settings: &EncoderSettings,
+        stop: &AtomicBool,
+    ) -> Result<(), Error> {
+        let Terrain { layout, obstacles, costs, follower, .. } = &mut self.terrain;
         for marks in self.marks.iter_mut().chain(&mut self.all) {
             marks.follow(state);
         }
-        if let Some(costs) = &mut self.costs {
-            costs.follow(state);
+        if let Some(costs) = costs {
+            costs.follow_until(state, stop)?;
         }
-        if let Some(follower) = &mut self.follower {
-            follower.plan(state);
+        if let Some(follower) = follower {
+            follower.plan(state, stop)?;
         }
         for (agent, memory) in self.memories.iter_mut().enumerate().filter(|(agent, _)| state.active[*agent])
         {
             let cell = state.cells[agent];
             let at = offset(self.starts[agent], cell);
-            memory.see(self.layout, &self.obstacles, self.layout.place(cell), at, settings.sight);
+            memory.see(*layout, obstacles, layout.place(cell), at, settings.sight);
         }
+        Ok(())
     }
 
     fn write_windows(&mut self, agent: usize, state: State<'_>, settings: &EncoderSettings, out: &mut [f32]) {
@@ -172,15 +258,23 @@ impl Episode {
         }
         let area = settings.side() * settings.side();
         for (&channel, window) in settings.channels.iter().zip(out.chunks_exact_mut(area)) {
-            self.write_window(channel, agent, state, window);
+            self.write_window(channel, agent, state, settings.radius, window);
         }
     }
 
-    fn write_window(&mut self, channel: Channel, agent: usize, state: State<'_>, window: &mut [f32]) {
-        let (cell, goal, layout) = (state.cells[agent], state.goals[agent], self.layout);
+    fn write_window(
+        &mut self,
+        channel: Channel,
+        agent: usize,
+        state: State<'_>,
+        radius: usize,
+        window: &mut [f32],
+    ) {
+        let Terrain { layout, obstacles, costs, .. } = &self.terrain;
+        let (cell, goal, layout) = (state.cells[agent], state.goals[agent], *layout);
         let place = layout.place(cell);
-        match (channel, &self.marks, &self.all, &self.costs) {
-            (Channel::Obstacles, ..) => layout.copy_window(&self.obstacles, place, window),
+        match (channel, &self.marks, &self.all, costs) {
+            (Channel::Obstacles, ..) => layout.copy_window(obstacles, place, window),
             (Channel::Agents, Some(marks), ..) | (Channel::AllAgents, _, Some(marks), _) => {
                 layout.copy_window(marks.grid(), place, window);
             }
@@ -189,14 +283,13 @@ impl Episode {
                 write_goal(cell, goal, window);
             }
             (Channel::CostToGo, .., Some(costs)) => {
-                write_plain(layout, costs.of(agent), place, &mut self.window, window);
+                write_plain(layout, costs.of(agent), place, radius, window);
             }
             (Channel::CostTracer, .., Some(costs)) => {
                 write_tracer(layout, costs.of(agent), place, &mut self.window, window);
             }
             (Channel::Path, .., Some(costs)) => {
                 window.fill(0.0);
-                let radius = window.len().isqrt() / 2;
                 draw_path(layout, shortest_path(layout, costs.of(agent), place), radius, window);
             }
             (Channel::FollowerPath, ..) => self.write_follower_path(agent, place, window),
@@ -210,14 +303,15 @@ impl Episode {
     }
 
     fn write_follower_path(&self, agent: usize, place: usize, window: &mut [f32]) {
-        self.layout.copy_window(&self.obstacles, place, window);
+        let Terrain { layout, obstacles, follower, .. } = &self.terrain;
+        layout.copy_window(obstacles, place, window);
         for value in &mut *window {
             // Not `-*value`, which would be -0 for a free cell.
             *value = 0.0 - *value;
         }
-        if let Some(follower) = &self.follower {
+        if let Some(follower) = follower {
             let cut = follower.cut(window.len().isqrt() / 2);
-            draw_path(self.layout, follower.path(agent, place), cut, window);
+            draw_path(*layout, follower.path(agent, place), cut, window);
         }
     }
 

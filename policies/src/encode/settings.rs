@@ -57,6 +57,11 @@ impl EncoderSettings {
         Self { follower: version, ..Self::new(radius, [Channel::FollowerPath, Channel::Agents]) }
     }
 
+    /// Returns whether any of some channels is among the windows.
+    pub(crate) fn has(&self, channels: &[Channel]) -> bool {
+        self.channels.iter().any(|known| channels.contains(known))
+    }
+
     /// Returns the side of a window. Units: cells.
     pub fn side(&self) -> usize {
         2 * self.radius + 1

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pogema_core::{Cell, Map, State, words};
+use pogema_core::{Cell, Error, Map, Occupancy, State, words};
 use pogema_planners::Graph;
 
 use crate::follower::search::{OBSTACLE, Search, heuristic};
@@ -60,24 +61,14 @@ struct Agent {
 }
 
 impl FollowerPlanner {
-    /// Byte budget of the heuristics that no agent uses at present.
-    const MAX_BYTES: usize = 64 << 20;
-
-    /// Prepares the planner for an episode on a map. `present` follows the agents that raise costs.
-    pub fn new(
-        layout: Layout,
-        map: &Map,
-        num_agents: usize,
-        sight: usize,
-        version: FollowerVersion,
-        present: Marks,
-    ) -> Self {
+    /// Prepares the planner for episodes on a map. `max_bytes` is the budget of the heuristics that no agent uses at
+    /// present.
+    pub fn new(layout: Layout, map: &Map, sight: usize, version: FollowerVersion, max_bytes: usize) -> Self {
         let graph = Graph::new(map);
         let mut costs = vec![OBSTACLE; layout.len()];
         for (vertex, cost) in (0..).zip(static_costs(&graph)) {
             costs[layout.place(graph.cell(vertex))] = cost;
         }
-        let agent = Agent { goal: None, heuristic: Arc::new([]), dynamic: Vec::new(), path: Vec::new() };
         Self {
             layout,
             sight,
@@ -85,23 +76,38 @@ impl FollowerPlanner {
             costs: costs.clone(),
             static_costs: costs,
             entries: vec![0; layout.len()],
-            present,
+            present: Marks::new(layout, Occupancy::Exact),
             heuristics: HashMap::new(),
-            max_heuristics: (Self::MAX_BYTES / (size_of::<f32>() * layout.len())).max(1),
-            agents: vec![agent; num_agents],
+            max_heuristics: (max_bytes / (size_of::<f32>() * layout.len())).max(1),
+            agents: Vec::new(),
             search: Search::new(layout.len(), layout.stride()),
         }
     }
 
+    /// Begins an episode. `present` follows the agents that raise costs.
+    pub fn begin(&mut self, num_agents: usize, present: Marks) {
+        let agent = Agent { goal: None, heuristic: Arc::new([]), dynamic: Vec::new(), path: Vec::new() };
+        self.agents.clear();
+        self.agents.resize(num_agents, agent);
+        self.present = present;
+    }
+
     /// Plans for all active agents.
-    pub fn plan(&mut self, state: State<'_>) {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if another thread sets `stop`.
+    pub fn plan(&mut self, state: State<'_>, stop: &AtomicBool) -> Result<(), Error> {
         self.present.follow(state);
         for (agent, (&cell, &goal)) in state.cells.iter().zip(state.goals).enumerate() {
+            if stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
             let keeps = self.version == FollowerVersion::Python && cell == goal;
             if state.active[agent] && !keeps {
                 self.plan_one(agent, cell, goal);
             }
         }
+        Ok(())
     }
 
     /// Returns the path of an agent from its place on.

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::AtomicBool;
 
 use pogema_core::{Action, Cell, Map, Occupancy, State};
 use pogema_numpy::Generator;
@@ -234,10 +235,13 @@ proptest! {
         goals.truncate(num_agents);
         let layout = Layout::new(&map, sight);
         let present = Marks::new(layout, Occupancy::Exact);
-        let mut planner = FollowerPlanner::new(layout, &map, num_agents, sight, FollowerVersion::Cpp, present);
+        let mut planner = FollowerPlanner::new(layout, &map, sight, FollowerVersion::Cpp, 1 << 20);
+        planner.begin(num_agents, present);
         let (active, on_goal) = (vec![true; num_agents], vec![false; num_agents]);
+        let stop = AtomicBool::new(false);
         for step in 0..12 {
-            planner.plan(State { step, cells: &cells, goals: &goals, active: &active, on_goal: &on_goal });
+            let state = State { step, cells: &cells, goals: &goals, active: &active, on_goal: &on_goal };
+            prop_assert_eq!(planner.plan(state, &stop), Ok(()));
             for agent in 0..num_agents {
                 let found: Vec<usize> = planner.path(agent, layout.place(cells[agent])).collect();
                 let expected = plain.path(agent, &cells, goals[agent], sight as i32);
@@ -256,11 +260,13 @@ fn a_kept_path_begins_at_the_agent() {
     let (active, on_goal) = ([true], [false]);
     for (version, expected) in [(FollowerVersion::Cpp, 0), (FollowerVersion::Python, 1)] {
         let present = Marks::new(layout, Occupancy::Exact);
-        let mut planner = FollowerPlanner::new(layout, &map, 1, 5, version, present);
+        let mut planner = FollowerPlanner::new(layout, &map, 5, version, 1 << 20);
+        planner.begin(1, present);
         for (step, col) in [(0, 3), (1, 4)] {
             let cells = [Cell::new(0, col)];
             let goals = [Cell::new(0, 4)];
-            planner.plan(State { step, cells: &cells, goals: &goals, active: &active, on_goal: &on_goal });
+            let state = State { step, cells: &cells, goals: &goals, active: &active, on_goal: &on_goal };
+            planner.plan(state, &AtomicBool::new(false)).unwrap();
         }
         assert_eq!(planner.path(0, layout.place(Cell::new(0, 4))).count(), expected, "{version:?}");
     }

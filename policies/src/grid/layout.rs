@@ -53,9 +53,47 @@ impl Layout {
 
     /// Copies the window around a place.
     pub fn copy_window<T: Copy>(&self, grid: &[T], place: usize, out: &mut [T]) {
-        let side = out.len().isqrt();
-        for (row, first) in out.chunks_exact_mut(side).zip(self.window_rows(place, side / 2)) {
-            row.copy_from_slice(&grid[first..first + side]);
+        self.map_window(grid, place, out, |value| value);
+    }
+
+    /// Writes the window around a place, each value converted by a function.
+    pub fn map_window<T: Copy, V: Copy>(
+        &self,
+        grid: &[T],
+        place: usize,
+        out: &mut [V],
+        convert: impl Fn(T) -> V + Copy,
+    ) {
+        // Loops over rows of a constant length take half the time. These are the usual radii: 2 to 5 and 7.
+        match out.len() {
+            25 => self.map_rows::<5, _, _>(grid, place, out, convert),
+            49 => self.map_rows::<7, _, _>(grid, place, out, convert),
+            81 => self.map_rows::<9, _, _>(grid, place, out, convert),
+            121 => self.map_rows::<11, _, _>(grid, place, out, convert),
+            225 => self.map_rows::<15, _, _>(grid, place, out, convert),
+            len => {
+                let side = len.isqrt();
+                for (row, first) in out.chunks_exact_mut(side).zip(self.window_rows(place, side / 2)) {
+                    row.iter_mut()
+                        .zip(&grid[first..first + side])
+                        .for_each(|(out, &value)| *out = convert(value));
+                }
+            }
+        }
+    }
+
+    fn map_rows<const SIDE: usize, T: Copy, V: Copy>(
+        &self,
+        grid: &[T],
+        place: usize,
+        out: &mut [V],
+        convert: impl Fn(T) -> V,
+    ) {
+        let (rows, _) = out.as_chunks_mut::<SIDE>();
+        for (row, first) in rows.iter_mut().zip(self.window_rows(place, SIDE / 2)) {
+            if let Some(values) = grid[first..].first_chunk::<SIDE>() {
+                *row = values.map(&convert);
+            }
         }
     }
 

@@ -153,6 +153,34 @@ impl Network {
         file::write(to.as_ref(), network.config(), &tensors)
     }
 
+    /// Creates a network of layers from its config and its tensors: name, shape and values of each.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] with the name of the tensor or layer that is wrong.
+    pub fn from_tensors(
+        config: NetworkConfig,
+        tensors: impl IntoIterator<Item = (String, Vec<usize>, Vec<f32>)>,
+    ) -> Result<Self, Error> {
+        let network = collect(tensors).and_then(|mut tensors| Self::new(config, &mut tensors, Path::best()));
+        network.map_err(|reason| Error::Corrupt { what: "network".into(), reason })
+    }
+
+    /// Writes a `.safetensors` file and the JSON beside it, after checking them as [`Network::from_tensors`] does.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the network is wrong or a file cannot be written.
+    pub fn write(
+        path: impl AsRef<FilePath>,
+        config: NetworkConfig,
+        tensors: impl IntoIterator<Item = (String, Vec<usize>, Vec<f32>)>,
+    ) -> Result<(), Error> {
+        let path = path.as_ref();
+        let wrong = |reason| Error::io(path, reason);
+        let tensors = collect(tensors).map_err(wrong)?;
+        let network = Self::new(config, &mut tensors.clone(), Path::best()).map_err(wrong)?;
+        file::write(path, network.config(), &tensors)
+    }
+
     fn new(config: NetworkConfig, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
         let Some(architecture) = &config.architecture else {
             return Err("`architecture` is missing".into());
@@ -241,4 +269,10 @@ impl Network {
             None => Ok(Outputs { logits: &workspace.logits, values: &workspace.values }),
         }
     }
+}
+
+fn collect(tensors: impl IntoIterator<Item = (String, Vec<usize>, Vec<f32>)>) -> Result<Tensors, String> {
+    let mut all = Tensors::default();
+    tensors.into_iter().try_for_each(|(name, shape, values)| all.insert_values(&name, shape, values))?;
+    Ok(all)
 }

@@ -62,6 +62,21 @@ impl NetworkPolicy {
         Self::with_encoder(network, encoder)
     }
 
+    /// Returns the network.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// Returns what the network sees.
+    pub fn encoder(&self) -> &EncoderSettings {
+        &self.encoder
+    }
+
+    /// Returns the rule that chooses actions.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
     /// Replaces the rule that chooses actions.
     #[must_use]
     pub fn with_sampling(mut self, sampling: Sampling) -> Self {

@@ -1,6 +1,7 @@
 //! Encoders against engines, and against plain code, in drawn episodes.
 
 use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::sync::atomic::AtomicBool;
 
 use pogema_core::{Cell, Config, Environment, Episode, Error, Map, State};
 use pogema_fast::Engine;
@@ -319,4 +320,60 @@ fn a_gap_and_a_new_episode_start_anew() {
     encoder.encode(other.state(), &mut first, &mut []).unwrap();
     fresh.encode(other.state(), &mut again, &mut []).unwrap();
     assert_eq!(first, again);
+}
+
+/// Every channel.
+const ALL: [Channel; 9] = [
+    Channel::Obstacles,
+    Channel::Agents,
+    Channel::AllAgents,
+    Channel::Goal,
+    Channel::CostToGo,
+    Channel::CostTracer,
+    Channel::Path,
+    Channel::FollowerPath,
+    Channel::SeenObstacles,
+];
+
+#[test]
+fn a_new_episode_on_the_same_map_forgets_the_last_one() {
+    let yaml = "{size: 7, density: 0.2, num_agents: 8, seed: 3, collision_system: soft, on_target: restart}";
+    let mut episode = common::start(yaml).unwrap();
+    let settings = EncoderSettings { sight: 2, ..EncoderSettings::new(3, ALL) };
+    let mut used = begin(settings.clone(), &episode).unwrap().with_cache_bytes(1 << 10);
+    let mut generator = Generator::seeded(0);
+    let mut windows = [(); 2].map(|()| vec![f32::NAN; 8 * settings.window_len()]);
+    for _ in 0..3 {
+        episode = common::start(yaml).unwrap();
+        let mut fresh = begin(settings.clone(), &episode).unwrap();
+        let instance = episode.instance().unwrap();
+        used.begin(instance.map(), instance.outside(), episode.config().occupancy, instance.starts());
+        for _ in 0..20 {
+            used.follow(episode.state()).unwrap();
+            fresh.encode(episode.state(), &mut windows[1], &mut []).unwrap();
+            // As often as wanted.
+            for _ in 0..2 {
+                windows[0].fill(f32::NAN);
+                used.write(episode.state(), &mut windows[0], &mut []).unwrap();
+                assert_eq!(windows[0], windows[1], "step {}", episode.num_steps());
+            }
+            episode.step(&common::actions(&mut generator, 8)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn following_can_be_stopped() {
+    let episode = common::start("{size: 7, num_agents: 4, seed: 3}").unwrap();
+    for channel in [Channel::CostToGo, Channel::FollowerPath] {
+        let settings = EncoderSettings::new(3, [channel]);
+        let mut encoder = begin(settings.clone(), &episode).unwrap();
+        let stopped = encoder.follow_until(episode.state(), &AtomicBool::new(true));
+        assert_eq!(stopped, Err(Error::Cancelled));
+        let instance = episode.instance().unwrap();
+        encoder.begin(instance.map(), instance.outside(), episode.config().occupancy, instance.starts());
+        let mut windows = vec![f32::NAN; 4 * settings.window_len()];
+        encoder.encode(episode.state(), &mut windows, &mut []).unwrap();
+        assert!(windows.iter().all(|value| value.is_finite()));
+    }
 }

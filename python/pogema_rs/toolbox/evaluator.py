@@ -140,7 +140,7 @@ def evaluation(
     num_failed = 0
     results: list[dict[str, Any]] = []
     for key, settings in _algorithms(suite).items():
-        num_failed += _run(suite, key, settings, address)
+        num_failed += _run(suite, key, settings, address, path.parent)
         results += _results(Path(eval_dir), key)
     if results and suite.has_views():
         for shown in show(eval_dir):
@@ -186,8 +186,13 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
     suite.write_report(os.fspath(path), again)
 
 
-def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str]) -> int:
-    """Plays the missing episodes of an algorithm and returns the number of failed ones."""
+def _run(
+    suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str], folder: Path
+) -> int:
+    """Plays the missing episodes of an algorithm and returns the number of failed ones.
+
+    `folder` is that of the suite.
+    """
     progress = _Progress(key, suite.num_episodes())
     is_remote = settings["parallel_backend"].endswith("dask") and address is not None
     if not _is_registered(settings) and not is_remote:
@@ -196,6 +201,9 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
         if summary is not None:
             return summary[1]
     is_built_in = not _is_registered(settings) and suite.is_built_in(key)
+    if is_built_in and "weights" in settings:
+        # Other processes do not know the folder of the suite.
+        settings = {**settings, "weights": os.path.abspath(folder / settings["weights"])}
     make = AlgoBase if is_built_in else partial(ToolboxRegistry.create_algorithm_config, settings["name"])
     config = make(**settings)
     to_do = suite.begin(key)

@@ -1,5 +1,6 @@
 //! The caller's arrays that a batch writes.
 
+use super::encoders::Encoded;
 use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadwriteArray2, PyReadwriteArray3, PyReadwriteArrayDyn,
     PyUntypedArrayMethods,
@@ -18,6 +19,8 @@ pub enum Buffer<'py> {
     U8(Array<'py, u8>),
     Bits(Array<'py, u64>),
     Apart(Box<Apart<'py>>),
+    /// The windows of encoders, and scalars if there are any.
+    Encoded(Array<'py, f32>, Option<Array<'py, f32>>),
 }
 
 /// The arrays of `POMAPF` observations, and of `MAPF` observations if there is a global state.
@@ -37,6 +40,12 @@ pub struct Global<'py> {
 }
 
 impl<'py> Buffer<'py> {
+    /// Takes the buffers for the windows and scalars of encoders.
+    pub fn encoded(arrays: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let Ok(dict) = arrays.cast::<PyDict>() else { return Ok(Self::Encoded(cast(arrays)?, None)) };
+        Ok(Self::Encoded(cast(&value(dict, "windows")?)?, Some(cast(&value(dict, "scalars")?)?)))
+    }
+
     pub fn new(arrays: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(dict) = arrays.cast::<PyDict>() {
             return Apart::new(dict).map(|apart| Self::Apart(Box::new(apart)));
@@ -50,9 +59,21 @@ impl<'py> Buffer<'py> {
         cast(arrays).map(Self::U8)
     }
 
+    /// Returns the buffers for the engine, and those for encoders if there are any.
+    ///
     /// `radius` is the width of the border in `MAPF` observations.
-    pub fn observations_mut(&mut self, radius: usize) -> PyResult<Observations<'_>> {
+    pub fn parts_mut(&mut self, radius: usize) -> PyResult<(Observations<'_>, Option<Encoded<'_>>)> {
+        if let Self::Encoded(windows, scalars) = self {
+            let scalars = scalars.as_mut().map(|scalars| scalars.as_slice_mut()).transpose()?;
+            let (windows, scalars) = (windows.as_slice_mut()?, scalars.unwrap_or_default());
+            return Ok((Observations::None, Some(Encoded { windows, scalars })));
+        }
+        Ok((self.observations_mut(radius)?, None))
+    }
+
+    fn observations_mut(&mut self, radius: usize) -> PyResult<Observations<'_>> {
         Ok(match self {
+            Self::Encoded(..) => Observations::None,
             Self::F32(array) => Observations::F32(array.as_slice_mut()?),
             Self::U8(array) => Observations::U8(array.as_slice_mut()?),
             Self::Bits(array) => Observations::Bits(array.as_slice_mut()?),

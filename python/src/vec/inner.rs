@@ -3,13 +3,20 @@
 use std::sync::atomic::AtomicBool;
 
 use pogema::{EnvSource, Named, Seed};
-use pogema_core::{Action, Config, Error, Occupancy, StepOut};
-use pogema_fast::{Autoreset, Firsts, ObservationBuffers, suited_threads};
+use pogema_core::{Action, Config, Error, Instance, Occupancy, StepOut};
+use pogema_fast::{Autoreset, Batch, Firsts, ObservationBuffers, suited_threads};
 use pogema_maps::GridConfig;
+use pogema_policies::EncoderSettings;
+use pyo3::prelude::*;
 
+use super::buffers::Buffer;
+use super::encoders::{Encoded, Encoders};
 use super::film::Film;
 use crate::fields::Fields;
 use crate::{config, interrupt, memory};
+
+/// Bytes of the engine's observations that take as long as one number of an encoder.
+const ENCODED_BYTES: usize = 16;
 
 /// The environments, their source of instances, and a list for actions.
 pub struct Inner {
@@ -19,6 +26,7 @@ pub struct Inner {
     /// The numbers of rows and columns for which the arrays have room.
     pub map_size: (usize, usize),
     pub film: Option<Film>,
+    pub encoders: Option<Encoders>,
 }
 
 /// Configs, each with the text of the map that its `map_name` names, and the index of each environment's config.
@@ -43,18 +51,23 @@ impl Inner {
         num_envs: usize,
         exact: bool,
         (num_threads, cell_bits): (Option<usize>, usize),
+        encoder: Option<EncoderSettings>,
     ) -> Result<Self, Error> {
         let (configs, of_env) = read_configs(configs, num_envs, room)?;
         let source = EnvSource::new(configs, of_env)?;
         let (rules, map_size) = with_room(&source, room)?;
         let occupancy = if exact { Occupancy::Exact } else { rules.occupancy };
         let rules = Config { occupancy, ..rules };
-        let bytes_per_agent = rules.num_observed() / rules.num_agents * cell_bits / 8;
+        let bytes_per_agent = match &encoder {
+            Some(settings) => ENCODED_BYTES * (settings.window_len() + settings.scalars_len()),
+            None => rules.num_observed() / rules.num_agents * cell_bits / 8,
+        };
         let num_threads =
             num_threads.unwrap_or_else(|| suited_threads(num_envs, rules.num_agents, bytes_per_agent));
         let batch = pogema_fast::Batch::new(rules, num_envs, num_threads, source.clone())?;
         let actions = Vec::with_capacity(num_envs * rules.num_agents);
-        Ok(Self { batch, source, actions, map_size, film: None })
+        let encoders = encoder.map(|settings| Encoders::new(settings, num_envs, rules.num_agents));
+        Ok(Self { batch, source, actions, map_size, film: None, encoders: encoders.transpose()? })
     }
 
     /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
@@ -97,6 +110,8 @@ impl Inner {
             (None, Some(seeds)) => seeds.into_iter().map(Seed::Own).collect(),
             (None, None) => {
                 self.batch.fetch(&chosen, stop)?;
+                let next = |batch: &Batch, env: usize| batch.next_instance(env).ok()?.cloned();
+                self.prepare(next, stop)?;
                 return Ok(Next { chosen, seeded: None });
             }
         };
@@ -106,7 +121,26 @@ impl Inner {
             *seed = if *chosen { given } else { *seed };
         }
         let firsts = self.batch.fetch_with(source.clone(), &chosen, stop)?;
+        self.prepare(|_, env| firsts.instance(env).cloned(), stop)?;
         Ok(Next { chosen, seeded: Some((source, firsts)) })
+    }
+
+    /// Prepares the encoders of next episodes, if there are encoders and their work may take long.
+    fn prepare(
+        &mut self,
+        next: impl Fn(&Batch, usize) -> Option<Instance> + Sync,
+        stop: &AtomicBool,
+    ) -> Result<(), Error> {
+        let Self { batch, encoders, map_size, .. } = self;
+        let Some(encoders) = encoders else { return Ok(()) };
+        let is_long = encoders.work_to_begin(map_size.0 * map_size.1, batch.num_lanes()) >= interrupt::LONG;
+        if is_long { encoders.prepare(batch, next, stop) } else { Ok(()) }
+    }
+
+    /// Fetches what the ends of episodes in the next step need, and changes no episode.
+    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+        self.batch.fetch_truncated(stop)?;
+        self.prepare(|batch, env| batch.next_instance(env).ok()?.cloned(), stop)
     }
 
     pub fn begin(&mut self, next: Next) -> Result<(), Error> {
@@ -122,20 +156,65 @@ impl Inner {
         film.as_mut().map_or(Ok(()), |film| film.follow_reset(&chosen, batch, source))
     }
 
+    /// Writes the current states of all environments.
+    pub fn observe(
+        &mut self,
+        buffers: ObservationBuffers<'_>,
+        encoded: Option<Encoded<'_>>,
+    ) -> Result<(), Error> {
+        self.batch.observe(buffers)?;
+        self.encode(encoded)
+    }
+
+    /// Writes the final states of the last episodes of some environments.
+    pub fn observe_ended(
+        &self,
+        envs: &[usize],
+        buffers: ObservationBuffers<'_>,
+        encoded: Option<Encoded<'_>>,
+    ) -> Result<(), Error> {
+        self.batch.observe_ended(envs, buffers)?;
+        match (&self.encoders, encoded) {
+            (Some(encoders), Some(out)) => encoders.write_ended(envs, out),
+            _ => Ok(()),
+        }
+    }
+
+    fn encode(&mut self, encoded: Option<Encoded<'_>>) -> Result<(), Error> {
+        match (&mut self.encoders, encoded) {
+            (Some(encoders), Some(out)) => encoders.encode(&mut self.batch, out),
+            _ => Ok(()),
+        }
+    }
+
     /// Plays a step with the stored actions.
-    pub fn step(&mut self, out: StepOut<'_>, buffers: ObservationBuffers<'_>) -> Result<(), Error> {
+    pub fn step(
+        &mut self,
+        out: StepOut<'_>,
+        buffers: ObservationBuffers<'_>,
+        encoded: Option<Encoded<'_>>,
+    ) -> Result<(), Error> {
+        self.batch.step(&self.actions, out, buffers)?;
+        self.encode(encoded)?;
         let Self { batch, source, actions, film, .. } = self;
-        batch.step(actions, out, buffers)?;
         film.as_mut().map_or(Ok(()), |film| film.follow_step(actions, batch, source))
     }
 
-    /// Returns whether the next step ends episodes whose next instances may take long.
+    /// Returns whether the next step ends episodes whose next instances or encoders may take long.
     pub fn ends_take_long(&self) -> bool {
-        let config = self.source.config(0);
-        let num_cells = config.height.saturating_mul(config.width);
+        let num_cells = self.map_size.0.saturating_mul(self.map_size.1);
         let num_ends = || self.batch.num_truncated();
+        if let Some(encoders) = &self.encoders {
+            let work = |num_envs| encoders.work_to_begin(num_cells, num_envs);
+            return work(self.batch.num_lanes()) >= interrupt::LONG && work(num_ends()) >= interrupt::LONG;
+        }
         num_cells.saturating_mul(self.batch.num_lanes()) >= interrupt::LONG
             && num_ends().saturating_mul(num_cells) >= interrupt::LONG
+    }
+
+    /// Takes the caller's buffer for observations.
+    pub fn buffer<'py>(&self, arrays: &Bound<'py, PyAny>) -> PyResult<Buffer<'py>> {
+        if self.encoders.is_some() { Buffer::encoded(arrays) } else { Buffer::new(arrays) }
     }
 
     /// Stores actions, or returns the index and the number of the first invalid one.

@@ -1,25 +1,28 @@
 //! The batch of environments behind `VecEnv`.
 
 mod buffers;
+mod encoders;
 mod film;
 mod inner;
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pogema::Seed;
 use pogema_core::{Error, StepOut, Words};
 use pogema_fast::{ObservationBuffers, Observations};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::guard::guarded;
 use crate::{errors, interrupt};
 
-use buffers::{Buffer, Global, masks_mut, write_active, write_agents};
+pub use encoders::{surroundings, surroundings_of};
+
+use buffers::{Global, masks_mut, write_active, write_agents};
 use film::{Film, Format, Plan};
 use inner::{Configs, Inner, Room, read_autoreset};
 
@@ -33,6 +36,9 @@ type Ends<'py> = (PyReadwriteArray2<'py, f32>, PyReadwriteArray2<'py, bool>, PyR
 /// Shape: `(envs, agents, ...)`, `(envs, agents)`, `(envs, agents, 5)`
 type State<'py> = (Bound<'py, PyAny>, PyReadwriteArray2<'py, bool>, Option<PyReadwriteArray3<'py, i8>>);
 
+/// The number of the batch that was made last.
+static LAST_NUMBER: AtomicU64 = AtomicU64::new(0);
+
 /// A batch of environments that writes into buffers of the caller.
 ///
 /// No thread waits for the lock: a call during a call of another thread raises an error.
@@ -43,6 +49,8 @@ pub struct Batch {
     stop: AtomicBool,
     /// Id of the process that owns the threads.
     process: u32,
+    /// A number that no other batch of the process has.
+    number: u64,
 }
 
 guarded! {
@@ -53,7 +61,9 @@ impl Batch {
     /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode and whether
     /// the occupancy is exact. `threads` are the number of threads and the bits of an observed cell, which determine the
     /// default number. `room` are the numbers of agents, and of rows and columns, for which the arrays have room.
+    /// `encoder` is the JSON of an encoder, whose windows are then the observations.
     #[new]
+    #[pyo3(signature = (configs, num_envs, rules, threads, room, encoder=None))]
     fn new(
         py: Python<'_>,
         configs: Configs,
@@ -61,13 +71,17 @@ impl Batch {
         rules: (String, bool),
         threads: (Option<usize>, usize),
         room: Room,
+        encoder: Option<String>,
     ) -> PyResult<Self> {
         let (autoreset, exact) = rules;
         let autoreset = read_autoreset(&autoreset).map_err(|error| errors::config(py, &error))?;
-        let make = move || Inner::new(&configs, room, num_envs, exact, threads);
+        let encoder = encoder.map(|json| serde_json::from_str(&json)).transpose();
+        let encoder = encoder.map_err(|error| PyValueError::new_err(format!("encoder: {error}")))?;
+        let make = move || Inner::new(&configs, room, num_envs, exact, threads, encoder);
         let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
-        Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process: std::process::id() })
+        let (process, number) = (std::process::id(), LAST_NUMBER.fetch_add(1, Relaxed) + 1);
+        Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process, number })
     }
 
     /// Films every N-th episode of an environment, from the next reset on.
@@ -137,12 +151,11 @@ impl Batch {
         let reset = fetched.and_then(|next| py.detach(|| inner.begin(next)));
         reset.map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
-        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
-        let view =
-            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
-        let batch = &mut inner.batch;
-        py.detach(|| batch.observe(view)).map_err(|error| errors::batch(py, &error))?;
-        write_active(batch, None, active).map_err(|error| errors::batch(py, &error))
+        let (mut buffer, radius) = (inner.buffer(&observations)?, inner.batch.config().radius);
+        let (observations, encoded) = buffer.parts_mut(radius)?;
+        let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
+        py.detach(|| inner.observe(view, encoded)).map_err(|error| errors::batch(py, &error))?;
+        write_active(&inner.batch, None, active).map_err(|error| errors::batch(py, &error))
     }
 
     /// Plays one step and returns the indices of the environments whose episode ended.
@@ -166,17 +179,17 @@ impl Batch {
         })?;
         let (mut rewards, mut terminated, mut truncated) = ends;
         let (observations, active, mut masks) = state;
-        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
-        let view =
-            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
+        let (mut buffer, radius) = (inner.buffer(&observations)?, inner.batch.config().radius);
+        let (observations, encoded) = buffer.parts_mut(radius)?;
+        let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
         if inner.ends_take_long() {
             let fetched =
-                interrupt::detach_scoped(py, &self.stop, || inner.batch.fetch_truncated(&self.stop))?;
+                interrupt::detach_scoped(py, &self.stop, || inner.fetch_truncated(&self.stop))?;
             fetched.map_err(|error| errors::batch(py, &error))?;
         }
-        let played = py.detach(|| inner.step(out, view));
+        let played = py.detach(|| inner.step(out, view, encoded));
         let batch = &inner.batch;
         let shown = played.and_then(|()| write_active(batch, None, active));
         shown.map_err(|error| errors::batch(py, &error))?;
@@ -189,12 +202,11 @@ impl Batch {
         let mut guard = self.lock()?;
         let inner = Self::open(&mut guard)?;
         let (observations, active, mut masks) = state;
-        let (mut buffer, radius) = (Buffer::new(&observations)?, inner.batch.config().radius);
-        let view =
-            ObservationBuffers { observations: buffer.observations_mut(radius)?, masks: masks_mut(&mut masks)? };
-        let batch = &inner.batch;
-        let written = py.detach(|| batch.observe_ended(&envs, view));
-        let written = written.and_then(|()| write_active(batch, Some(&envs), active));
+        let (mut buffer, radius) = (inner.buffer(&observations)?, inner.batch.config().radius);
+        let (observations, encoded) = buffer.parts_mut(radius)?;
+        let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
+        let written = py.detach(|| inner.observe_ended(&envs, view, encoded));
+        let written = written.and_then(|()| write_active(&inner.batch, Some(&envs), active));
         written.map_err(|error| errors::batch(py, &error))
     }
 
@@ -299,6 +311,11 @@ impl Batch {
 }
 
 impl Batch {
+    /// Returns a number from 1 that no other batch of the process has.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
     fn is_inherited(&self) -> bool {
         std::process::id() != self.process
     }
@@ -306,7 +323,7 @@ impl Batch {
     /// Locks the environments.
     ///
     /// Errors: `RuntimeError` in a forked child, and while another thread is inside a call.
-    fn lock(&self) -> PyResult<MutexGuard<'_, Option<Inner>>> {
+    pub fn lock(&self) -> PyResult<MutexGuard<'_, Option<Inner>>> {
         if self.is_inherited() {
             return Err(PyRuntimeError::new_err(
                 "this VecEnv was made before the process forked, and its threads stayed in the parent: make a new \
@@ -323,7 +340,7 @@ impl Batch {
         })
     }
 
-    fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Inner>>) -> PyResult<&'a mut Inner> {
+    pub fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Inner>>) -> PyResult<&'a mut Inner> {
         guard.as_mut().ok_or_else(|| PyRuntimeError::new_err("this VecEnv is closed: make a new one"))
     }
 }

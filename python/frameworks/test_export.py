@@ -1,0 +1,148 @@
+"""Tests that exported PyTorch modules return the logits of PyTorch, and that others are refused."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from pogema_rs import VecEnv
+from pogema_rs.policies import Encoder, export, load
+from torch import nn
+
+WINDOWS = Encoder(3, ["obstacles", "agents"])
+BOTH = Encoder(2, ["obstacles", "cost_to_go"], ["goal_direction", "position"])
+
+
+class Residual(nn.Module):
+    def __init__(self, *layers):
+        super().__init__()
+        self.residual = nn.Sequential(*layers)
+
+    def forward(self, values):
+        return values + self.residual(values)
+
+
+class Network(nn.Module):
+    """A network with scalars, a value, and a recurrent layer on request."""
+
+    def __init__(self, has_gru):
+        super().__init__()
+        self.body = nn.Sequential(nn.Conv2d(2, 4, 3, padding="same", bias=False), nn.ELU(), nn.Flatten())
+        self.scalars = nn.Sequential(nn.Linear(4, 6), nn.ReLU())
+        self.core = nn.Sequential(nn.Linear(106, 16), nn.ReLU(), *([nn.GRU(16, 8)] if has_gru else []))
+        self.policy, self.value = nn.Linear(8 if has_gru else 16, 5), nn.Linear(8 if has_gru else 16, 1)
+
+    def forward(self, windows, scalars, state=None):
+        features = torch.cat([self.body(windows), self.scalars(scalars)], dim=1)
+        for layer in self.core:
+            if isinstance(layer, nn.GRU):
+                features, state = layer(features[None], state)
+                features = features[0]
+            else:
+                features = layer(features)
+        return self.policy(features), state
+
+
+def sequential(in_place):
+    block = Residual(nn.ReLU(inplace=in_place), nn.Conv2d(4, 4, 3, padding=1), nn.ReLU(), nn.Conv2d(4, 4, 3, padding=1))
+    return nn.Sequential(
+        nn.Conv2d(2, 4, 3, padding=1), block, nn.ReLU(), nn.Dropout(0.5), nn.Flatten(), nn.Sequential(nn.Linear(196, 8), nn.ELU()),
+        nn.Linear(8, 5),
+    )  # fmt: skip
+
+
+def drawn(encoder, count=40):
+    rng = np.random.default_rng(0)
+    windows = rng.uniform(-1, 1, (count, *encoder.shape)).astype(np.float32)
+    return windows, rng.uniform(-1, 1, (count, 2 * len(encoder.scalars))).astype(np.float32)
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+@pytest.mark.parametrize("suffix", [".safetensors", ".onnx"])
+def test_a_sequential_returns_the_logits_of_pytorch(in_place, suffix, tmp_path):
+    torch.manual_seed(1)
+    module, path, (windows, _) = sequential(in_place), tmp_path / f"network{suffix}", drawn(WINDOWS)
+    module.train()
+    export(module, WINDOWS, path, sampling="greedy")
+    assert module.training and all(child.training for child in module.modules())
+    module.eval()
+    with torch.no_grad():
+        expected = module(torch.from_numpy(windows.copy())).numpy()
+    policy = load(path)
+    assert policy.encoder == WINDOWS and policy.sampling == "greedy"
+    np.testing.assert_allclose(policy.logits(windows), expected, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("has_gru", [False, True])
+def test_a_module_with_scalars_and_a_value(has_gru, tmp_path):
+    torch.manual_seed(2)
+    module, path, (windows, scalars) = Network(has_gru), tmp_path / "network.safetensors", drawn(BOTH)
+    export(module, BOTH, path)
+    architecture = json.loads(path.with_suffix(".json").read_text())["architecture"]
+    assert architecture["value"] == "value"
+    with torch.no_grad():
+        expected, _ = module(torch.from_numpy(windows), torch.from_numpy(scalars))
+    np.testing.assert_allclose(load(path).logits(windows, scalars), expected.numpy(), rtol=1e-4, atol=1e-5)
+
+
+def test_a_recurrent_module_plays_as_in_pytorch(tmp_path):
+    torch.manual_seed(3)
+    module, path = Network(has_gru=True), tmp_path / "network.safetensors"
+    export(module, BOTH, path, sampling="greedy")
+    policy = load(path)
+    config = {"num_agents": 6, "size": 10, "on_target": "restart", "max_episode_steps": 8, "seed": 1}
+    envs = VecEnv(config, 3, encoder=BOTH)
+    observations, _ = envs.reset(seed=1)
+    state = torch.zeros(1, 18, 8)
+    for step in range(24):
+        windows = torch.from_numpy(observations["windows"].copy()).flatten(0, 1)
+        with torch.no_grad():
+            logits, state = module(windows, torch.from_numpy(observations["scalars"].copy()).flatten(0, 1), state)
+        actions, ordered = policy.act(envs), logits.sort(dim=1).values
+        is_clear = (ordered[:, -1] - ordered[:, -2] > 1e-4).numpy()
+        np.testing.assert_array_equal(actions.reshape(-1)[is_clear], logits.argmax(dim=1).numpy()[is_clear])
+        observations, *_ = envs.step(actions)
+        if step % 8 == 7:
+            state.zero_()
+
+
+class Scaled(Residual):
+    def forward(self, values):
+        return values + 0.5 * self.residual(values)
+
+
+def with_layer(layer):
+    return nn.Sequential(layer, nn.Flatten(), nn.LazyLinear(5))
+
+
+@pytest.mark.parametrize(
+    ("module", "error", "text"),
+    [
+        (with_layer(nn.MaxPool2d(2)), TypeError, "layer `0` cannot be exported: MaxPool2d"),
+        (with_layer(nn.Sequential(nn.ReLU(), nn.BatchNorm2d(2))), TypeError, "layer `0.1` cannot be exported: BatchNorm2d"),
+        (with_layer(nn.Conv2d(2, 2, 3, stride=2)), TypeError, "layer `0` cannot be exported: Conv2d"),
+        (with_layer(nn.Conv2d(2, 2, (3, 1), padding=(1, 0))), TypeError, "layer `0` cannot be exported: Conv2d"),
+        (with_layer(nn.ELU(alpha=2)), TypeError, "layer `0` cannot be exported: ELU"),
+        (nn.Sequential(nn.Flatten(), nn.GRU(98, 4, num_layers=2), nn.Linear(4, 5)), TypeError, "layer `1` cannot be exported: GRU"),
+        (nn.Sequential(nn.Linear(2, 5), nn.ReLU()), TypeError, "`1` is a ReLU, expected an nn.Linear"),
+        (nn.Sequential(), TypeError, "empty nn.Sequential"),
+        (nn.Linear(2, 5), TypeError, "module is a Linear, expected an nn.Sequential, or a module with `body` and `policy`"),
+        (3, TypeError, "module is a int"),
+        (nn.Sequential(nn.Flatten(), nn.Linear(98, 4)), ValueError, "the network has 4 logits, expected 5"),
+        (nn.Sequential(nn.Flatten(), nn.Linear(50, 5)), ValueError, "tensor `1.weight` has shape"),
+        (nn.Sequential(nn.Linear(7, 5)), ValueError, "expected `flatten`"),
+        (nn.Sequential(Scaled(nn.ReLU()), nn.Flatten(), nn.Linear(98, 5)), ValueError, "differs from the module: a logit by"),
+    ],
+)
+def test_other_modules_are_refused(module, error, text, tmp_path):
+    with pytest.raises(error, match=text) as caught:
+        export(module, WINDOWS, tmp_path / "network.safetensors")
+    assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
+
+
+def test_parameters_that_are_not_finite_are_refused(tmp_path):
+    module = nn.Sequential(nn.Flatten(), nn.Linear(98, 5))
+    with torch.no_grad():
+        module[1].bias[2] = float("nan")
+    with pytest.raises(ValueError, match="tensor `1.bias`: value 2 is `NaN`"):
+        export(module, WINDOWS, tmp_path / "network.safetensors")

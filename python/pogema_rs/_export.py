@@ -1,0 +1,115 @@
+"""Writes networks for play in Rust: from layers as data and NumPy arrays, or from PyTorch modules."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from pogema_rs import _engine
+from pogema_rs._encoder import Encoder, read_encoder
+from pogema_rs._policy import load
+
+_Path = Union[str, "os.PathLike[str]"]
+_Encoder = Union[Encoder, Mapping[str, Any]]
+_NUM_ACTIONS = 5
+
+
+def save(
+    path: _Path,
+    encoder: _Encoder,
+    layers: Sequence[Any],
+    tensors: Mapping[str, Any],
+    *,
+    actions: str = "policy",
+    value: Optional[str] = None,
+    sampling: str = "softmax",
+) -> None:
+    """Writes a network as a `.safetensors` file and the JSON file beside it.
+
+    `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by the names that the layers
+    use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
+    chooses an action: `softmax`, `greedy` or `follower`.
+
+    Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not
+    fit; OSError if a file cannot be written. The files are unchanged then.
+    """
+    encoder, target = read_encoder(encoder), _target(path, ".safetensors")
+    if encoder.scalars and not any(isinstance(layer, dict) and "scalars" in layer for layer in layers):
+        raise ValueError("layers ignore the scalars of the encoder, expected a layer `scalars`")
+    architecture: dict[str, Any] = {
+        "window": list(encoder.shape),
+        "scalars": 2 * len(encoder.scalars),
+        "layers": list(layers),
+        "actions": actions,
+    }
+    if value is not None:
+        architecture["value"] = value
+    arrays = [(name, np.ascontiguousarray(array, dtype=np.float32)) for name, array in tensors.items()]
+    config = _config(encoder, sampling, architecture=architecture)
+    _engine.write_network(target, json.dumps(config), arrays)
+
+
+def export(module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "softmax") -> None:
+    """Writes a PyTorch module, so that it plays in Rust: as `.safetensors` or `.onnx`, with a JSON file beside it.
+
+    `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
+
+    For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
+    attributes: `body`, the layers from the windows on; `policy`, the `nn.Linear` of the logits; optionally `value`, the
+    `nn.Linear` of the value, `scalars`, layers of the scalars, and `core`, layers after both are joined. Layers are
+    `Conv2d` with stride 1, `Linear`, `ReLU`, `ELU`, `Flatten`, `GRU` of one layer, `Sequential` of these, and residual
+    blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`. `Dropout` and `Identity`
+    do nothing. The function compares the logits of the written network with those of the module.
+
+    For `.onnx`, `torch.onnx.export` writes any module that maps windows, and scalars if the encoder has any, to logits
+    or to logits and values.
+
+    Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for shapes that do not
+    fit the encoder, for parameters that are not finite, and if the logits differ; OSError if a file cannot be written.
+    """
+    encoder = read_encoder(encoder)
+    if os.fspath(path).endswith(".onnx"):
+        _export_onnx(module, encoder, _target(path, ".onnx"), sampling)
+        return
+    target = _target(path, ".safetensors")
+    from pogema_rs import _torch_layers
+
+    parts = _torch_layers.parts_of(module, encoder)
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial.safetensors"
+        save(trial, encoder, parts.layers, parts.tensors, actions=parts.actions, value=parts.value, sampling=sampling)
+        _torch_layers.compare(parts, load(trial), encoder)
+    save(target, encoder, parts.layers, parts.tensors, actions=parts.actions, value=parts.value, sampling=sampling)
+
+
+def _export_onnx(module: Any, encoder: Encoder, target: str, sampling: str) -> None:
+    from pogema_rs import _torch_layers
+
+    config = json.dumps(_config(encoder, sampling), indent=2) + "\n"
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / "trial.onnx"
+        _torch_layers.write_onnx(module, encoder, str(trial))
+        trial.with_suffix(".json").write_text(config)
+        load(trial)
+        Path(target).write_bytes(trial.read_bytes())
+    Path(target).with_suffix(".json").write_text(config)
+
+
+def _config(encoder: Encoder, sampling: str, **other: Any) -> dict[str, Any]:
+    if sampling not in _engine.WORDS["sampling"]:
+        expected = ", ".join(map(repr, _engine.WORDS["sampling"]))
+        raise ValueError(f"sampling is {sampling!r}, expected one of {expected}")
+    return {"version": 1, **other, "encoder": encoder.to_dict(), "sampling": {"rule": sampling}}
+
+
+def _target(path: _Path, suffix: str) -> str:
+    name = os.fspath(path)
+    if not name.endswith(suffix):
+        raise ValueError(f"path is {name!r}, expected the name of a file that ends in {suffix}")
+    return name

@@ -1,0 +1,220 @@
+"""PyTorch modules as layers and arrays. No other module of the package imports PyTorch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Optional
+
+import numpy as np
+import torch
+from torch import nn
+
+from pogema_rs._encoder import Encoder
+
+if TYPE_CHECKING:
+    from pogema_rs._policy import Policy
+
+#: Largest difference of a logit, as a share of the largest logit, or of 1 if that is larger.
+_TOLERANCE = 1e-4
+_NUM_ROWS = 8
+
+
+@dataclass
+class Parts:
+    """A module as layers and arrays, and its parts."""
+
+    body: nn.Module
+    policy: nn.Linear
+    scalars: Optional[nn.Module] = None
+    core: Optional[nn.Module] = None
+    actions: str = "policy"
+    value: Optional[str] = None
+    layers: list[Any] = field(default_factory=list)
+    tensors: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def logits(self, windows: Any, scalars: Any) -> Any:
+        """Returns the logits that the parts compute, each by its own `forward`."""
+        features = _run(self.body, windows)
+        if scalars is not None:
+            beside = scalars if self.scalars is None else _run(self.scalars, scalars)
+            features = torch.cat([features, beside], dim=1)
+        return self.policy(features if self.core is None else _run(self.core, features))
+
+
+def parts_of(module: Any, encoder: Encoder) -> Parts:
+    """Returns the layers and arrays of a module.
+
+    Errors: TypeError for a module or layer that cannot be exported.
+    """
+    if isinstance(module, nn.Sequential):
+        parts = _of_sequential(module)
+    elif isinstance(module, nn.Module) and hasattr(module, "body") and hasattr(module, "policy"):
+        parts = Parts(
+            body=module.body,
+            policy=_linear("policy", module.policy),
+            scalars=getattr(module, "scalars", None),
+            core=getattr(module, "core", None),
+        )
+        if getattr(module, "value", None) is not None:
+            parts.value = "value"
+            _add_weights(parts, "value", _linear("value", module.value))
+    else:
+        kind = type(module).__name__
+        raise TypeError(f"module is a {kind}, expected an nn.Sequential, or a module with `body` and `policy`")
+    prefix = "" if isinstance(module, nn.Sequential) else "body"
+    parts.layers += _layers(parts, prefix, parts.body)
+    if encoder.scalars:
+        parts.layers.append({"scalars": [] if parts.scalars is None else _layers(parts, "scalars", parts.scalars)})
+    if parts.core is not None:
+        parts.layers += _layers(parts, "core", parts.core)
+    _add_weights(parts, parts.actions, parts.policy)
+    return parts
+
+
+def compare(parts: Parts, policy: Policy, encoder: Encoder) -> None:
+    """Checks that a policy returns the same logits as the parts, for drawn inputs.
+
+    Errors: ValueError if they differ, for example because a residual block does something else.
+    """
+    rng = np.random.default_rng(0)
+    windows = rng.uniform(-1, 1, (_NUM_ROWS, *encoder.shape)).astype(np.float32)
+    scalars = None
+    if encoder.scalars:
+        scalars = rng.uniform(-1, 1, (_NUM_ROWS, 2 * len(encoder.scalars))).astype(np.float32)
+    ours = policy.logits(windows, scalars)
+    modules = [part for part in (parts.body, parts.scalars, parts.core, parts.policy) if part is not None]
+    were_training = [(one, one.training) for part in modules for one in part.modules()]
+    try:
+        for one, _ in were_training:
+            one.training = False
+        with torch.no_grad():
+            like = parts.policy.weight
+            inputs = [None if array is None else torch.from_numpy(array).to(like) for array in (windows, scalars)]
+            theirs = parts.logits(*inputs).float().cpu().numpy()
+    finally:
+        for one, was_training in were_training:
+            one.training = was_training
+    largest = np.abs(ours - theirs).max()
+    if not largest <= _TOLERANCE * max(1.0, float(np.abs(theirs).max())):
+        raise ValueError(f"the written network differs from the module: a logit by {largest:.3g}")
+
+
+def write_onnx(module: Any, encoder: Encoder, path: str) -> None:
+    """Writes a module with `torch.onnx.export`."""
+    if not isinstance(module, nn.Module):
+        raise TypeError(f"module is a {type(module).__name__}, expected an nn.Module")
+    parameter = next(module.parameters(), torch.zeros(1))
+    names, inputs = ["windows"], [torch.zeros(1, *encoder.shape).to(parameter)]
+    if encoder.scalars:
+        names.append("scalars")
+        inputs.append(torch.zeros(1, 2 * len(encoder.scalars)).to(parameter))
+    was_training = module.training
+    module.eval()
+    try:
+        with torch.no_grad():
+            outputs = module(*inputs)
+        has_value = isinstance(outputs, (tuple, list)) and len(outputs) > 1
+        shown = ["logits", "value"] if has_value else ["logits"]
+        axes = {name: {0: "batch"} for name in [*names, *shown]}
+        torch.onnx.export(
+            module, tuple(inputs), path, input_names=names, output_names=shown, dynamic_axes=axes, dynamo=False
+        )
+    finally:
+        module.train(was_training)
+
+
+def _of_sequential(module: nn.Sequential) -> Parts:
+    children = list(module)
+    if not children:
+        raise TypeError("module is an empty nn.Sequential, expected one that ends in an nn.Linear")
+    name = str(len(children) - 1)
+    return Parts(body=module[:-1], policy=_linear(name, children[-1]), actions=name)
+
+
+def _linear(name: str, layer: Any) -> nn.Linear:
+    if not isinstance(layer, nn.Linear):
+        expected = "an nn.Linear, whose outputs are the logits or the value"
+        raise TypeError(f"`{name}` is a {type(layer).__name__}, expected {expected}")
+    return layer
+
+
+def _layers(parts: Parts, name: str, layer: Any) -> list[Any]:
+    """Returns the entries of a layer in the JSON file, and adds its arrays."""
+    if isinstance(layer, nn.Sequential):
+        prefix = f"{name}." if name else ""
+        return [entry for key, child in layer.named_children() for entry in _layers(parts, prefix + key, child)]
+    if isinstance(layer, (nn.Identity, nn.Dropout, nn.Dropout2d)):
+        return []
+    if isinstance(layer, nn.Conv2d):
+        padding = _padding(name, layer)
+        _add_weights(parts, name, layer)
+        return [{"convolution": {"name": name, "padding": padding}}]
+    if isinstance(layer, nn.Linear):
+        _add_weights(parts, name, layer)
+        return [{"dense": name}]
+    if isinstance(layer, nn.ReLU):
+        return ["relu"]
+    if isinstance(layer, nn.ELU) and layer.alpha == 1:
+        return ["elu"]
+    if isinstance(layer, nn.Flatten) and (layer.start_dim, layer.end_dim) == (1, -1):
+        return ["flatten"]
+    if isinstance(layer, nn.GRU) and layer.num_layers == 1 and not layer.bidirectional:
+        return [_gru(parts, name, layer)]
+    if hasattr(layer, "residual"):
+        return _residual(parts, name, layer.residual)
+    raise TypeError(f"layer `{name}` cannot be exported: {layer}".splitlines()[0])
+
+
+def _residual(parts: Parts, name: str, residual: Any) -> list[Any]:
+    entries = _layers(parts, f"{name}.residual", residual)
+    first = residual[0] if isinstance(residual, nn.Sequential) and len(residual) else residual
+    # An activation in place changes the input of the block before the block adds it.
+    if getattr(first, "inplace", False):
+        return [entries[0], {"residual": entries[1:]}]
+    return [{"residual": entries}]
+
+
+def _padding(name: str, layer: nn.Conv2d) -> int:
+    rows, columns = layer.kernel_size
+    padding = layer.padding
+    if padding == "valid":
+        padding = (0, 0)
+    elif padding == "same" and rows % 2 == columns % 2 == 1:
+        padding = (rows // 2, columns // 2)
+    is_plain = layer.stride == (1, 1) and layer.dilation == (1, 1) and layer.groups == 1
+    if not is_plain or layer.padding_mode != "zeros" or isinstance(padding, str) or padding[0] != padding[1]:
+        raise TypeError(f"layer `{name}` cannot be exported: {layer}; expected stride 1 and equal padding with zeros")
+    return int(padding[0])
+
+
+def _gru(parts: Parts, name: str, layer: nn.GRU) -> Any:
+    for kind in ("ih", "hh"):
+        weight = getattr(layer, f"weight_{kind}_l0")
+        bias = getattr(layer, f"bias_{kind}_l0", None)
+        parts.tensors[f"{name}.weight_{kind}_l0"] = _array(weight)
+        parts.tensors[f"{name}.bias_{kind}_l0"] = np.zeros(len(weight), np.float32) if bias is None else _array(bias)
+    return {"gru": name}
+
+
+def _add_weights(parts: Parts, name: str, layer: Any) -> None:
+    parts.tensors[f"{name}.weight"] = _array(layer.weight)
+    bias = layer.bias
+    parts.tensors[f"{name}.bias"] = np.zeros(len(layer.weight), np.float32) if bias is None else _array(bias)
+
+
+def _array(tensor: Any) -> np.ndarray:
+    array: np.ndarray = tensor.detach().float().cpu().numpy()
+    return array
+
+
+def _run(layer: Any, values: Any) -> Any:
+    """Runs a layer on a batch; a GRU begins with a state of zeros."""
+    if isinstance(layer, nn.Sequential):
+        for child in layer:
+            values = _run(child, values)
+        return values
+    if isinstance(layer, nn.GRU):
+        steps = values.unsqueeze(1) if layer.batch_first else values.unsqueeze(0)
+        return layer(steps)[1][0]
+    # A layer in place would change the caller's values.
+    return layer(values.clone())

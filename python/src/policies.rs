@@ -1,0 +1,393 @@
+//! Learned policies that play environments of Python.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
+
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyReadwriteArray2,
+    PyUntypedArrayMethods,
+};
+use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Occupancy, State, Words};
+use pogema_fast::Engine;
+use pogema_policies::{
+    Inputs, Learned, LearnedName, LearnedPolicy, MatsLp, Network, NetworkConfig, NetworkPolicy,
+    RecurrentState, Sampling,
+};
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::guard::guarded;
+use crate::vec::{Batch, surroundings, surroundings_of};
+use crate::{errors, interrupt};
+
+/// A learned policy, which plays one `VecEnv` or one environment at a time.
+///
+/// No thread waits for the lock: a call during a call of another thread raises an error.
+#[pyclass(frozen, module = "pogema_rs._engine")]
+pub struct Policy {
+    learned: Learned,
+    seed: u64,
+    threads: usize,
+    /// Stops the work of a call.
+    stop: Arc<AtomicBool>,
+    players: Mutex<Players>,
+}
+
+/// The players of one environment, or of all environments of a batch.
+#[derive(Default)]
+struct Players {
+    /// The number of the batch, or 0.
+    batch: u64,
+    lanes: Vec<Option<Player>>,
+    /// The number of steps that one environment has played.
+    step: u64,
+}
+
+/// A policy in one episode.
+struct Player {
+    /// Which episode of its environment it plays, counted from 1.
+    begun: u64,
+    kind: Kind,
+    /// The last step for which it chose actions, and these actions.
+    step: Option<u64>,
+    actions: Vec<Action>,
+}
+
+enum Kind {
+    Network(Box<LearnedPolicy>),
+    MatsLp(Box<MatsLp>),
+}
+
+guarded! {
+#[pymethods]
+impl Policy {
+    /// Reads a policy: its name, the file of its weights, and the settings of a suite.
+    ///
+    /// `search` are the number of expansions and whether the search is faithful, both of MATS-LP.
+    #[new]
+    fn new(
+        name: &str,
+        weights: PathBuf,
+        sampling: Option<&str>,
+        mask_actions: bool,
+        seed: u64,
+        threads: usize,
+        search: (Option<u32>, Option<bool>),
+    ) -> PyResult<Self> {
+        let read = || {
+            let name = <LearnedName as Words>::read("name", name)?;
+            let mut learned = name.read(&weights)?;
+            if let Some(sampling) = sampling {
+                learned = learned.with_sampling(Sampling::read("sampling", sampling)?)?;
+            }
+            set_search(&mut learned, search)?;
+            learned.with_masks(mask_actions)
+        };
+        let learned = read().map_err(|error| to_py_error(&error))?;
+        let policy = Self { learned, seed, threads, stop: Arc::default(), players: Mutex::default() };
+        policy.check().map_err(|error| to_py_error(&error))?;
+        Ok(policy)
+    }
+
+    /// Returns the JSON of the encoder, if the policy has one.
+    fn encoder(&self) -> PyResult<Option<String>> {
+        Ok(match &self.learned {
+            Learned::Network(policy) => serde_json::to_string(policy.encoder()).ok(),
+            Learned::MatsLp(..) => None,
+        })
+    }
+
+    /// Returns the rule that chooses actions from logits, if the policy has one.
+    fn sampling(&self) -> PyResult<Option<&'static str>> {
+        Ok(match &self.learned {
+            Learned::Network(policy) => Some(policy.sampling().word()),
+            Learned::MatsLp(..) => None,
+        })
+    }
+
+    /// Writes the actions of all agents of a batch.
+    ///
+    /// Shape: `actions` is `(envs, agents)`
+    fn act_batch(&self, py: Python<'_>, batch: &Batch, mut actions: PyReadwriteArray2<'_, i64>) -> PyResult<()> {
+        let mut players = self.players.try_lock().map_err(|_| errors::busy(py))?;
+        let mut guard = batch.lock()?;
+        if players.batch != batch.number() {
+            if !players.lanes.is_empty() {
+                return Err(other_environment());
+            }
+            *players = Players { batch: batch.number(), ..Players::default() };
+        }
+        let batch = &mut Batch::open(&mut guard)?.batch;
+        let (players, out) = (&mut *players, actions.as_slice_mut()?);
+        let act = || self.act_all(batch, players, out);
+        interrupt::detach_scoped(py, &self.stop, act)?.map_err(|error| errors::policy(py, &error))
+    }
+
+    /// Returns the actions of all agents of one environment.
+    ///
+    /// `obstacles` is its map with a border of `border` cells, in whose coordinates cells and goals are. `active` are
+    /// flags of active agents, and `exact` is the semantics of the occupancy grid.
+    #[expect(clippy::too_many_arguments, reason = "these are the parts of an observation")]
+    fn act(
+        &self,
+        py: Python<'_>,
+        obstacles: PyReadonlyArray2<'_, u8>,
+        border: usize,
+        cells: Vec<(i64, i64)>,
+        goals: Vec<(i64, i64)>,
+        active: Vec<bool>,
+        exact: bool,
+    ) -> PyResult<Vec<i64>> {
+        let mut players = self.players.try_lock().map_err(|_| errors::busy(py))?;
+        if players.batch != 0 {
+            return Err(other_environment());
+        }
+        if matches!(self.learned, Learned::MatsLp(..)) {
+            return Err(PyValueError::new_err(
+                "`mats-lp` knows future goals, which observations do not hold, expected a VecEnv",
+            ));
+        }
+        let shape = (obstacles.shape()[0], obstacles.shape()[1]);
+        let grid = Grid { padded: obstacles.as_slice()?, shape, border, exact };
+        let players = &mut *players;
+        let act = || {
+            let cells = grid.cells("global_xy", &cells)?;
+            let goals = grid.cells("global_target_xy", &goals)?;
+            self.act_in_one(players, &grid, (&cells, &goals, &active))
+        };
+        let acted = interrupt::detach_scoped(py, &self.stop, act)?;
+        acted.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Returns the logits of a batch of agents at the beginning of an episode.
+    ///
+    /// Shape: `windows` and `scalars` are `(agents, values)`, the result is `(agents, 5)`
+    fn logits<'py>(
+        &self,
+        py: Python<'py>,
+        windows: PyReadonlyArray2<'_, f32>,
+        scalars: PyReadonlyArray2<'_, f32>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let Learned::Network(policy) = &self.learned else {
+            return Err(PyValueError::new_err("`mats-lp` has no logits of single agents"));
+        };
+        let (network, batch) = (policy.network(), windows.shape()[0]);
+        let inputs = Inputs { windows: windows.as_slice()?, scalars: scalars.as_slice()?, batch };
+        let forward = || {
+            let (mut state, mut workspace) = (RecurrentState::new(network, batch), network.workspace());
+            network.forward(inputs, &mut state, &mut workspace).map(|outputs| outputs.logits.to_vec())
+        };
+        let logits = py.detach(forward).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        PyArray1::from_vec(py, logits).reshape([batch, network.num_actions()])
+    }
+
+    /// Forgets all episodes and the environment.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        *self.players.try_lock().map_err(|_| errors::busy(py))? = Players::default();
+        Ok(())
+    }
+}
+}
+
+impl Policy {
+    /// Checks that the policy can play.
+    fn check(&self) -> Result<(), Error> {
+        match &self.learned {
+            Learned::Network(_) => Ok(()),
+            Learned::MatsLp(prior, params) => MatsLp::new(prior, *params, self.threads).map(|_| ()),
+        }
+    }
+
+    fn begin(&self, instance: &Instance, config: &Config, begun: u64) -> Result<Player, Error> {
+        let kind = match &self.learned {
+            Learned::Network(policy) => Kind::Network(Box::new(policy.begin(instance, config, self.seed)?)),
+            Learned::MatsLp(prior, params) => {
+                let policy = MatsLp::new(prior, *params, self.threads)?;
+                let mut policy = policy.with_cancellation(Some(Arc::clone(&self.stop)));
+                policy.begin(instance, config.on_goal);
+                Kind::MatsLp(Box::new(policy))
+            }
+        };
+        Ok(Player { begun, kind, step: None, actions: Vec::new() })
+    }
+
+    fn act_in_one(
+        &self,
+        players: &mut Players,
+        grid: &Grid<'_>,
+        (cells, goals, active): (&[Cell], &[Cell], &[bool]),
+    ) -> Result<Vec<i64>, Error> {
+        if players.lanes.is_empty() {
+            let (instance, config) = grid.instance(cells, goals)?;
+            *players =
+                Players { lanes: vec![Some(self.begin(&instance, &config, 1)?)], ..Players::default() };
+        }
+        let on_goal = vec![false; cells.len()];
+        let Players { lanes, step, .. } = players;
+        // INVARIANT: the list has one player now.
+        let player = lanes[0].as_mut().ok_or(Error::NotReset)?;
+        let actions = player.act(State { step: *step, cells, goals, active, on_goal: &on_goal })?;
+        *step += 1;
+        Ok(actions.iter().map(|&action| i64::from(u8::from(action))).collect())
+    }
+
+    fn act_all(
+        &self,
+        batch: &mut pogema_fast::Batch,
+        players: &mut Players,
+        out: &mut [i64],
+    ) -> Result<(), Error> {
+        let num_agents = batch.config().num_agents;
+        Error::check_length("actions", batch.num_lanes() * num_agents, out.len())?;
+        players.lanes.resize_with(batch.num_lanes(), || None);
+        let lanes = players.lanes.iter_mut().zip(out.chunks_exact_mut(num_agents)).enumerate();
+        let done = batch.share(lanes.collect(), |batch, (env, (player, out))| {
+            out.fill(i64::from(u8::from(Action::Stay)));
+            if batch.is_over(env)? {
+                return Ok(());
+            }
+            if self.stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
+            let (engine, begun) = (batch.lane(env)?, batch.num_begun(env)?);
+            if player.as_ref().is_none_or(|player| player.begun != begun) {
+                *player = Some(self.begin(&instance(engine)?, engine.config(), begun)?);
+            }
+            // INVARIANT: it has begun.
+            let Some(playing) = player else { return Ok(()) };
+            match playing.act(engine.state()) {
+                Ok(actions) => {
+                    out.iter_mut().zip(actions).for_each(|(out, &action)| *out = u8::from(action).into());
+                    Ok(())
+                }
+                Err(error) => {
+                    *player = None;
+                    Err(in_environment(env, error))
+                }
+            }
+        });
+        done.into_iter().collect()
+    }
+}
+
+impl Player {
+    /// Returns the actions in a state; the same ones if it is asked again.
+    fn act(&mut self, state: State<'_>) -> Result<&[Action], Error> {
+        if self.step != Some(state.step) {
+            self.actions = match &mut self.kind {
+                Kind::Network(policy) => policy.act(state)?,
+                Kind::MatsLp(policy) => policy.act(state)?,
+            };
+            self.step = Some(state.step);
+        }
+        Ok(&self.actions)
+    }
+}
+
+/// Returns the instance of an environment's episode, as far as the episode has not changed it.
+fn instance(engine: &Engine) -> Result<Instance, Error> {
+    let (map, outside) = surroundings_of(engine)?;
+    Instance::new(map, outside, engine.starts().to_vec(), engine.streams().to_vec())
+}
+
+/// The map of an observation, with its border.
+struct Grid<'a> {
+    padded: &'a [u8],
+    shape: (usize, usize),
+    border: usize,
+    /// Whether every agent is marked in the occupancy grid.
+    exact: bool,
+}
+
+impl Grid<'_> {
+    /// Returns cells in the coordinates of the map without its border; `what` names them in the error.
+    fn cells(&self, what: &str, places: &[(i64, i64)]) -> Result<Vec<Cell>, Error> {
+        let border = self.border as i64;
+        let number = |value: i64| value.checked_sub(border).and_then(|value| u16::try_from(value).ok());
+        let cell = |(agent, &(row, col)): (usize, &(i64, i64))| {
+            let found = number(row).zip(number(col)).map(|(row, col)| Cell::new(row, col));
+            found.ok_or_else(|| {
+                Error::agent(agent, format!("cell ({row}, {col}) of `{what}` is not on the map"))
+            })
+        };
+        places.iter().enumerate().map(cell).collect()
+    }
+
+    /// Returns an instance that begins in a state, and its rules.
+    fn instance(&self, cells: &[Cell], goals: &[Cell]) -> Result<(Instance, Config), Error> {
+        let (map, outside) = surroundings(self.padded, self.shape, self.border)?;
+        let streams = goals.iter().map(|&goal| GoalStream::single(goal)).collect();
+        let occupancy = if self.exact { Occupancy::Exact } else { Occupancy::default() };
+        let config = Config { occupancy, num_agents: cells.len(), ..Config::default() };
+        Ok((Instance::new(map, outside, cells.to_vec(), streams)?, config))
+    }
+}
+
+fn set_search(
+    learned: &mut Learned,
+    (expansions, faithful): (Option<u32>, Option<bool>),
+) -> Result<(), Error> {
+    let Learned::MatsLp(_, params) = learned else {
+        let given = expansions.map(|_| "expansions").or(faithful.map(|_| "faithful"));
+        return given.map_or(Ok(()), |name| {
+            Err(Error::request(format!(
+                "`{name}` is given, but the policy does not search; only `mats-lp` does"
+            )))
+        });
+    };
+    params.expansions = expansions.unwrap_or(params.expansions);
+    params.faithful = faithful.unwrap_or(params.faithful);
+    params.check()
+}
+
+fn in_environment(env: usize, error: Error) -> Error {
+    match error {
+        Error::Corrupt { what, reason } => {
+            Error::Corrupt { what, reason: format!("environment {env}: {reason}") }
+        }
+        other => other,
+    }
+}
+
+fn other_environment() -> PyErr {
+    PyRuntimeError::new_err(
+        "this policy plays another environment: call `reset_states`, or load a policy for each",
+    )
+}
+
+guarded! {
+/// Writes a network with its encoder as a `.safetensors` file and the JSON beside it.
+///
+/// `config` is the content of the JSON. An error leaves both files as they were.
+#[pyfunction]
+pub fn write_network(
+    path: PathBuf,
+    config: &str,
+    tensors: Vec<(String, PyReadonlyArrayDyn<'_, f32>)>,
+) -> PyResult<()> {
+    let read = |(name, array): (String, PyReadonlyArrayDyn<'_, f32>)| {
+        (name, array.shape().to_vec(), array.as_array().iter().copied().collect::<Vec<f32>>())
+    };
+    let tensors: Vec<_> = tensors.into_iter().map(read).collect();
+    let write = || {
+        let wrong = |error: serde_json::Error| Error::Corrupt { what: "network".into(), reason: error.to_string() };
+        let config: NetworkConfig = serde_json::from_str(config).map_err(wrong)?;
+        let network = Network::from_tensors(config.clone(), tensors.iter().cloned())?;
+        NetworkPolicy::new(network)?;
+        Network::write(&path, config, tensors)
+    };
+    write().map_err(|error| to_py_error(&error))
+}
+}
+
+/// Converts an error from reading weights: those of the system to `OSError`, others to `ValueError`.
+fn to_py_error(error: &Error) -> PyErr {
+    let text = error.to_string();
+    let Error::Io { cause, .. } = error else { return PyValueError::new_err(text) };
+    match cause.get().downcast_ref::<std::io::Error>().map(std::io::Error::kind) {
+        None | Some(std::io::ErrorKind::InvalidData) => PyValueError::new_err(text),
+        Some(std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err(text),
+        Some(_) => PyOSError::new_err(text),
+    }
+}

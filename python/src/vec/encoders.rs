@@ -1,0 +1,228 @@
+//! The encoders of a batch, one for each environment.
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use pogema_core::{Environment, Error, Instance, Map, Outside, State};
+use pogema_fast::{Batch, Engine};
+use pogema_policies::{Encoder, EncoderSettings};
+
+/// Memory for costs to goals that no agent has at present, for all environments together. Units: bytes
+const CACHE_BYTES: usize = 256 << 20;
+
+/// Encodes the states of all environments of a batch.
+pub struct Encoders {
+    settings: EncoderSettings,
+    num_agents: usize,
+    lanes: Vec<Lane>,
+}
+
+/// The caller's buffers for some environments.
+///
+/// Shape: `windows` is `[envs, agents, channels, side, side]`, `scalars` is `[envs, agents, scalars]`.
+pub struct Encoded<'a> {
+    pub windows: &'a mut [f32],
+    pub scalars: &'a mut [f32],
+}
+
+/// The encoder of one environment.
+struct Lane {
+    encoder: Encoder,
+    /// Which episode it follows, counted from 1 among those that the environment has begun.
+    begun: u64,
+    /// The step that it followed last.
+    step: Option<u64>,
+    /// The encoder of the next episode, if it is prepared.
+    next: Option<Encoder>,
+    /// The windows and scalars at the end of the last episode.
+    ended: Option<(Vec<f32>, Vec<f32>)>,
+}
+
+impl Encoders {
+    pub fn new(settings: EncoderSettings, num_envs: usize, num_agents: usize) -> Result<Self, Error> {
+        let encoder = || Ok(Encoder::new(settings.clone())?.with_cache_bytes(CACHE_BYTES / num_envs));
+        let lane = |_| Ok(Lane { encoder: encoder()?, begun: 0, step: None, next: None, ended: None });
+        let lanes = (0..num_envs).map(lane).collect::<Result<_, Error>>()?;
+        Ok(Self { settings, num_agents, lanes })
+    }
+
+    /// Prepares the next episodes of some environments and changes nothing else.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if another thread sets `stop`.
+    pub fn prepare<'a>(
+        &mut self,
+        batch: &mut Batch,
+        next: impl Fn(&Batch, usize) -> Option<Instance> + Sync + 'a,
+        stop: &AtomicBool,
+    ) -> Result<(), Error> {
+        let cache_bytes = CACHE_BYTES / self.lanes.len();
+        let settings = &self.settings;
+        let prepared = batch.share(self.lanes.iter_mut().enumerate().collect(), |batch, (env, lane)| {
+            lane.next = None;
+            if stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
+            let Some(instance) = next(batch, env) else { return Ok(()) };
+            let mut encoder = Encoder::new(settings.clone())?.with_cache_bytes(cache_bytes);
+            let starts = instance.starts();
+            encoder.begin(instance.map(), instance.outside(), batch.config().occupancy, starts);
+            let (active, on_goal) = (vec![true; starts.len()], vec![false; starts.len()]);
+            let goals = instance.first_goals();
+            let state = State { step: 0, cells: starts, goals: &goals, active: &active, on_goal: &on_goal };
+            encoder.follow_until(state, stop)?;
+            lane.next = Some(encoder);
+            Ok(())
+        });
+        prepared.into_iter().collect()
+    }
+
+    /// Returns the approximate work to begin the episodes of some environments, in visited cells.
+    pub fn work_to_begin(&self, num_cells: usize, num_envs: usize) -> usize {
+        num_cells.saturating_mul(self.num_agents).saturating_mul(num_envs)
+    }
+
+    /// Writes the windows and scalars of the current states of all environments.
+    ///
+    /// Call it after each reset and step, since encoders remember earlier states.
+    pub fn encode(&mut self, batch: &mut Batch, out: Encoded<'_>) -> Result<(), Error> {
+        let Self { settings, num_agents, lanes } = self;
+        let (num_windows, num_scalars) =
+            (*num_agents * settings.window_len(), *num_agents * settings.scalars_len());
+        Error::check_length("windows", lanes.len() * num_windows, out.windows.len())?;
+        Error::check_length("scalars", lanes.len() * num_scalars, out.scalars.len())?;
+        let (mut windows, mut scalars) = (out.windows, out.scalars);
+        let mut parts = Vec::with_capacity(lanes.len());
+        for (env, lane) in lanes.iter_mut().enumerate() {
+            let (of_lane, others) = std::mem::take(&mut windows).split_at_mut(num_windows);
+            windows = others;
+            let (numbers, others) = std::mem::take(&mut scalars).split_at_mut(num_scalars);
+            scalars = others;
+            parts.push((env, lane, Encoded { windows: of_lane, scalars: numbers }));
+        }
+        let done = batch.share(parts, |batch, (env, lane, out)| lane.encode(batch, env, settings, out));
+        done.into_iter().collect()
+    }
+
+    /// Writes the windows and scalars at the ends of the last episodes of some environments.
+    ///
+    /// # Errors
+    /// [`Error::NotEnded`] for an environment without an ended episode; [`Error::Length`] for a buffer of the wrong
+    /// length.
+    pub fn write_ended(&self, envs: &[usize], out: Encoded<'_>) -> Result<(), Error> {
+        let Self { settings, num_agents, lanes } = self;
+        let (num_windows, num_scalars) =
+            (num_agents * settings.window_len(), num_agents * settings.scalars_len());
+        Error::check_length("windows", envs.len() * num_windows, out.windows.len())?;
+        Error::check_length("scalars", envs.len() * num_scalars, out.scalars.len())?;
+        for (place, &env) in envs.iter().enumerate() {
+            let ended = lanes.get(env).and_then(|lane| lane.ended.as_ref());
+            let (windows, scalars) = ended.ok_or(Error::NotEnded { lane: env })?;
+            out.windows[place * num_windows..][..num_windows].copy_from_slice(windows);
+            out.scalars[place * num_scalars..][..num_scalars].copy_from_slice(scalars);
+        }
+        Ok(())
+    }
+}
+
+impl Lane {
+    fn encode(
+        &mut self,
+        batch: &Batch,
+        env: usize,
+        settings: &EncoderSettings,
+        mut out: Encoded<'_>,
+    ) -> Result<(), Error> {
+        let (engine, begun) = (batch.lane(env)?, batch.num_begun(env)?);
+        let has_just_ended = batch.has_just_ended(env)?;
+        if self.begun != begun {
+            // With autoreset in the same step, the last episode ended in this step, too.
+            if let Some((ended, _)) = batch.ended(env)?.filter(|_| has_just_ended) {
+                self.write(ended, settings, &mut out)?;
+                self.keep(&out);
+            }
+            self.begin(engine, begun)?;
+        }
+        self.next = None;
+        self.write(engine, settings, &mut out)?;
+        if has_just_ended && engine.num_steps() > 0 {
+            self.keep(&out);
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, engine: &Engine, begun: u64) -> Result<(), Error> {
+        self.begun = begun;
+        if let Some(next) = self.next.take() {
+            (self.encoder, self.step) = (next, Some(0));
+            return Ok(());
+        }
+        let (map, outside) = surroundings_of(engine)?;
+        self.encoder.begin(&map, &outside, engine.config().occupancy, engine.starts());
+        self.step = None;
+        Ok(())
+    }
+
+    /// Writes the state of an environment, which the encoder follows once.
+    fn write(
+        &mut self,
+        engine: &Engine,
+        settings: &EncoderSettings,
+        out: &mut Encoded<'_>,
+    ) -> Result<(), Error> {
+        let state = engine.state();
+        if self.step != Some(state.step) {
+            self.encoder.follow(state)?;
+            self.step = Some(state.step);
+        }
+        let num_agents = state.cells.len();
+        let (windows, padding) = out.windows.split_at_mut(num_agents * settings.window_len());
+        padding.fill(0.0);
+        let (scalars, padding) = out.scalars.split_at_mut(num_agents * settings.scalars_len());
+        padding.fill(0.0);
+        self.encoder.write(state, windows, scalars)
+    }
+
+    fn keep(&mut self, out: &Encoded<'_>) {
+        let (windows, scalars) = self.ended.get_or_insert_default();
+        windows.clear();
+        windows.extend_from_slice(out.windows);
+        scalars.clear();
+        scalars.extend_from_slice(out.scalars);
+    }
+}
+
+/// Returns the map inside a map with a border, as engines show it, and the area beyond its wall.
+///
+/// `shape` is that of the whole map, row by row.
+pub fn surroundings(
+    padded: &[u8],
+    (rows, columns): (usize, usize),
+    border: usize,
+) -> Result<(Map, Outside), Error> {
+    Error::check_length("the map", rows * columns, padded.len())?;
+    let too_small = || Error::argument("obstacles", format!("{rows} x {columns}"), "a map with its border");
+    let height = rows.checked_sub(2 * border).ok_or_else(too_small)?;
+    let width = columns.checked_sub(2 * border).ok_or_else(too_small)?;
+    let at = |row: usize, column: usize| padded[row * columns + column] != 0;
+    let cells = (0..height).flat_map(|row| (0..width).map(move |column| (row + border, column + border)));
+    let map = Map::new(height, width, cells.map(|(row, column)| at(row, column)).collect())?;
+    let is_beyond = |place: usize, length: usize| place + 1 < border || place > border + length;
+    let has_noise = (0..rows).any(|row| {
+        (0..columns).any(|column| at(row, column) && (is_beyond(row, height) || is_beyond(column, width)))
+    });
+    let outside = if has_noise {
+        Outside::Noise(Map::new(rows, columns, padded.iter().map(|&value| value != 0).collect())?)
+    } else {
+        Outside::Free
+    };
+    Ok((map, outside))
+}
+
+/// Returns the map of an environment and the area beyond its wall.
+pub fn surroundings_of(engine: &Engine) -> Result<(Map, Outside), Error> {
+    let ((height, width), border) = (engine.size(), engine.config().radius);
+    let shape = (height + 2 * border, width + 2 * border);
+    let mut padded = vec![0; shape.0 * shape.1];
+    engine.observe_map(&mut padded)?;
+    surroundings(&padded, shape, border)
+}
