@@ -115,7 +115,7 @@ impl BuiltIn {
             learned = learned.with_masks(flag).map_err(|error| in_line(key, node, error))?;
         }
         for (key, node) in ["expansions", "faithful"].into_iter().filter_map(find) {
-            set_search(&mut learned, key, node).map_err(|error| in_line(key, node, error))?;
+            learned = with_search(learned, key, node).map_err(|error| in_line(key, node, error))?;
         }
         self.settings.learned = Some(learned);
         Ok(())
@@ -152,17 +152,12 @@ impl BuiltIn {
 }
 
 /// Sets a parameter of a search.
-fn set_search(learned: &mut Learned, key: &str, node: &Node) -> Result<(), Error> {
-    let Learned::MatsLp(_, params) = learned else {
-        return Err(Error::request("the policy does not search; only `mats-lp` does"));
-    };
+fn with_search(learned: Learned, key: &str, node: &Node) -> Result<Learned, Error> {
     let value = node.value();
     if key == "faithful" {
         let flag = value.as_bool();
-        params.faithful = flag.ok_or_else(|| Error::argument(key, value, "true or false"))?;
-    } else {
-        let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
-        params.expansions = number.ok_or_else(|| Error::argument(key, value, "a number"))?;
+        return learned.with_faithful(flag.ok_or_else(|| Error::argument(key, value, "true or false"))?);
     }
-    params.check()
+    let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+    learned.with_expansions(number.ok_or_else(|| Error::argument(key, value, "a number"))?)
 }

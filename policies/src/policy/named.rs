@@ -7,7 +7,6 @@ use pogema_planners::{
     PomapfObservations, pogema_team, sample,
 };
 
-use crate::mats_lp::MatsLp;
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::method::{Learned, LearnedName};
 
@@ -48,7 +47,6 @@ enum Kind {
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
     Learned(Box<LearnedPolicy>),
-    MatsLp(Box<MatsLp>),
 }
 
 impl NamedPolicy {
@@ -99,17 +97,10 @@ impl NamedPolicy {
         }
         if name_of_learned.is_some() {
             let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
-            return Ok(Self(match learned.ok_or_else(missing)? {
-                Learned::Network(policy) => {
-                    Kind::Learned(Box::new(policy.begin(instance, config, planner_settings.seed)?))
-                }
-                Learned::MatsLp(prior, params) => {
-                    let policy = MatsLp::new(&prior, params, planner_settings.threads)?;
-                    let mut policy = policy.with_cancellation(budget.cancelled);
-                    policy.begin(instance, config.on_goal);
-                    Kind::MatsLp(Box::new(policy))
-                }
-            }));
+            let learned = learned.ok_or_else(missing)?;
+            let PlannerSettings { seed, threads, .. } = planner_settings;
+            let policy = learned.begin(instance, config, seed, threads, budget.cancelled)?;
+            return Ok(Self(Kind::Learned(Box::new(policy))));
         }
         if let Some(planner) = lifelong {
             let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
@@ -154,7 +145,6 @@ impl NamedPolicy {
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),
             Kind::Learned(policy) => policy.act(episode.state()),
-            Kind::MatsLp(policy) => policy.act(episode.state()),
         }
     }
 }
