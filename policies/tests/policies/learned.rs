@@ -130,6 +130,25 @@ fn read_for_search(encoder: &str, folder: &Path) -> Result<Learned, String> {
 }
 
 #[test]
+fn the_network_of_a_search_reads_what_the_search_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |encoder: &str| read_for_search(encoder, folder.path());
+    assert!(read("").is_ok());
+    assert!(read(r#", "encoder": {"radius": 1, "channels": ["all_agents", "cost_tracer"]}"#).is_ok());
+    for (radius, channels) in
+        [(1, "cost_tracer, all_agents"), (1, "obstacles, agents"), (2, "all_agents, cost_tracer")]
+    {
+        let names = channels.replace(", ", r#"", ""#);
+        let error =
+            read(&format!(r#", "encoder": {{"radius": {radius}, "channels": ["{names}"]}}"#)).unwrap_err();
+        let expected = format!(
+            "`encoder of the network` is `{channels} with radius {radius}`, expected all_agents, cost_tracer with radius 1"
+        );
+        assert!(error.contains(&expected), "{error}");
+    }
+}
+
+#[test]
 fn only_a_search_has_expansions() {
     let folder = tempfile::tempdir().unwrap();
     let error = |learned: Result<Learned, pogema_core::Error>| learned.unwrap_err().to_string();
