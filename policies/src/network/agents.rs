@@ -1,7 +1,9 @@
 //! Runs the steps for 16 agents whose values lie side by side: each list holds, for each value, that of every agent.
 
+use pogema_core::SimdPath;
+
 use super::steps::{FlatStep, Group, Heads, PlaneStep, Steps, add, write};
-use crate::simd::{AGENTS, Path};
+use crate::simd::AGENTS;
 
 /// The buffers of 16 agents.
 #[derive(Clone, Debug)]
@@ -35,7 +37,7 @@ impl Steps {
     /// Computes the outputs of up to 16 agents. The values of the agents that are missing are those of an earlier call.
     pub fn run_agents(
         &self,
-        path: Path,
+        path: SimdPath,
         group: Group<'_>,
         heads: &Heads,
         states: &mut [f32],
@@ -62,7 +64,13 @@ impl Steps {
         heads.dense.run_agents(path, &buffers.flats[heads.input], false, &mut buffers.heads);
     }
 
-    fn run_flats_of_agents(&self, path: Path, step: &FlatStep, group: Group<'_>, buffers: &mut AgentBuffers) {
+    fn run_flats_of_agents(
+        &self,
+        path: SimdPath,
+        step: &FlatStep,
+        group: Group<'_>,
+        buffers: &mut AgentBuffers,
+    ) {
         let AgentBuffers { flats, states, scratch, .. } = buffers;
         match step {
             FlatStep::Dense { dense, input, relu, output } => {
@@ -88,7 +96,7 @@ impl Steps {
     }
 }
 
-fn run_planes(path: Path, step: &PlaneStep, buffers: &mut AgentBuffers) {
+fn run_planes(path: SimdPath, step: &PlaneStep, buffers: &mut AgentBuffers) {
     let AgentBuffers { planes, flats, .. } = buffers;
     match step {
         PlaneStep::Convolve { convolution, input, added, relu, output } => {

@@ -1,8 +1,10 @@
 //! The gated recurrent unit, with PyTorch's formula.
 
+use pogema_core::SimdPath;
+
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
-use crate::simd::{AGENTS, Path};
+use crate::simd::AGENTS;
 
 /// A recurrent layer. Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
 #[derive(Debug)]
@@ -38,7 +40,7 @@ impl Gru {
     /// also the output.
     pub fn run(
         &self,
-        path: Path,
+        path: SimdPath,
         num_rows: usize,
         input: Rows<'_>,
         states: &mut States<'_>,
@@ -62,7 +64,7 @@ impl Gru {
     }
 
     /// Runs a step of 16 agents whose values lie side by side. `state` is also the output.
-    pub fn run_agents(&self, path: Path, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
+    pub fn run_agents(&self, path: SimdPath, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
         let num_values = self.size * AGENTS;
         let (of_input, rest) = scratch.split_at_mut(3 * num_values);
         let of_state = &mut rest[..3 * num_values];

@@ -1,9 +1,9 @@
 //! Layers with their weights, packed for the kernels.
 
+use pogema_core::SimdPath;
+
 use super::tensors::{Tensor, Tensors};
-use crate::simd::{
-    self, BLOCK, Convolve, ConvolveAgents, LANES, Multiply, MultiplyAgents, Path, Plane, Shape,
-};
+use crate::simd::{self, BLOCK, Convolve, ConvolveAgents, LANES, Multiply, MultiplyAgents, Plane, Shape};
 
 /// A function of each value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl Convolution {
         Ok(Self { weights: pack_kernel(&weight, &shape), bias: pad(bias.values, stride), shape })
     }
 
-    pub fn run(&self, path: Path, input: &[f32], added: Option<&[f32]>, relu: bool, output: &mut [f32]) {
+    pub fn run(&self, path: SimdPath, input: &[f32], added: Option<&[f32]>, relu: bool, output: &mut [f32]) {
         let Self { shape, weights, bias } = self;
         simd::convolve(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
     }
@@ -65,7 +65,7 @@ impl Convolution {
     /// Runs the layer for 16 agents whose values lie side by side.
     pub fn run_agents(
         &self,
-        path: Path,
+        path: SimdPath,
         input: &[f32],
         added: Option<&[f32]>,
         relu: bool,
@@ -198,7 +198,7 @@ impl Dense {
         self.bias.len()
     }
 
-    pub fn run(&self, path: Path, num_rows: usize, input: Rows<'_>, relu: bool, output: &mut [f32]) {
+    pub fn run(&self, path: SimdPath, num_rows: usize, input: Rows<'_>, relu: bool, output: &mut [f32]) {
         let Self { num_inputs, weights, bias, .. } = self;
         let Rows { values: input, stride: input_stride } = input;
         let num_inputs = *num_inputs;
@@ -209,7 +209,7 @@ impl Dense {
     }
 
     /// Runs the layer for 16 agents whose values lie side by side.
-    pub fn run_agents(&self, path: Path, input: &[f32], relu: bool, output: &mut [f32]) {
+    pub fn run_agents(&self, path: SimdPath, input: &[f32], relu: bool, output: &mut [f32]) {
         let Self { weights, bias, .. } = self;
         simd::multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu });
     }

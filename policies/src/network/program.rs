@@ -1,5 +1,7 @@
 //! What a network runs: layers of ours, or a graph of a runtime.
 
+use pogema_core::SimdPath;
+
 use super::agents::AgentBuffers;
 use super::architecture::Architecture;
 use super::build;
@@ -7,18 +9,17 @@ use super::steps::{Buffers, GROUP, Group, Heads, Steps};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
-use crate::simd::Path;
 
 /// The layers of a network, packed for a path.
 #[derive(Debug)]
 pub struct Layers {
     pub steps: Steps,
     pub heads: Heads,
-    path: Path,
+    path: SimdPath,
 }
 
 impl Layers {
-    pub fn new(architecture: &Architecture, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
+    pub fn new(architecture: &Architecture, tensors: &mut Tensors, path: SimdPath) -> Result<Self, String> {
         let (steps, heads) = build::build(architecture, tensors)?;
         Ok(Self { steps, heads, path })
     }
@@ -56,6 +57,14 @@ pub enum Program {
 }
 
 impl Program {
+    pub fn simd_path(&self) -> Option<SimdPath> {
+        match self {
+            Self::Layers(layers) => Some(layers.path),
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => None,
+        }
+    }
+
     pub fn num_scalars(&self) -> usize {
         match self {
             Self::Layers(layers) => layers.steps.num_scalars,

@@ -16,6 +16,8 @@ mod kernels;
 #[allow(unsafe_code, reason = "vectors read and write through pointers")]
 mod lanes;
 
+use pogema_core::SimdPath;
+
 pub use agents::{ConvolveAgents, MultiplyAgents};
 pub use kernels::{Convolve, Multiply};
 
@@ -30,40 +32,6 @@ pub const AGENTS: usize = 16;
 
 /// Number of partial sums of each output of a dense layer.
 const CHAINS: usize = 4;
-
-/// The instruction set of a network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
-    /// No intrinsics; available on every machine.
-    Portable,
-    /// AVX2 and FMA.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// AVX2, FMA and AVX-512 F.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Path {
-    /// Returns all paths that this machine supports, the fastest last.
-    pub fn available() -> impl Iterator<Item = Self> {
-        #[cfg(target_arch = "x86_64")]
-        let has_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-        let all = [
-            Some(Self::Portable),
-            #[cfg(target_arch = "x86_64")]
-            has_avx2.then_some(Self::Avx2),
-            #[cfg(target_arch = "x86_64")]
-            (has_avx2 && is_x86_feature_detected!("avx512f")).then_some(Self::Avx512),
-        ];
-        all.into_iter().flatten()
-    }
-
-    /// Returns the fastest path that this machine supports.
-    pub fn best() -> Self {
-        Self::available().last().unwrap_or(Self::Portable)
-    }
-}
 
 /// Rows of pixels of channels. Each row has margins of zeros on both sides, so that a convolution needs no bounds test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,17 +95,19 @@ pub fn relu(value: f32) -> f32 {
 /// # Panics
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn convolve(path: Path, mut job: Convolve<'_>) {
+pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     let Shape { input, output, .. } = job.shape;
     check(&job.shape, job.weights, job.bias);
     assert_eq!((job.input.len(), job.output.len()), (input.len(), output.len()));
     assert!(job.added.is_none_or(|added| added.len() == output.len()));
     // SAFETY: the asserts above: with `padding` inside the margins, each tap lies inside its row, and the kernels skip
-    // the rows outside the input. `Path` only exists for what the machine supports.
+    // the rows outside the input. `Network::new` checked that the machine supports the path.
     match path {
-        Path::Portable => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 | Path::Avx512 => unsafe { avx2::convolve(&mut job) },
+        SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::convolve(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
 
@@ -146,7 +116,7 @@ pub fn convolve(path: Path, mut job: Convolve<'_>) {
 /// # Panics
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn convolve_agents(path: Path, mut job: ConvolveAgents<'_>) {
+pub fn convolve_agents(path: SimdPath, mut job: ConvolveAgents<'_>) {
     let Shape { input, output, .. } = job.shape;
     check(&job.shape, job.weights, job.bias);
     assert_eq!(
@@ -154,14 +124,16 @@ pub fn convolve_agents(path: Path, mut job: ConvolveAgents<'_>) {
         (input.num_values() * AGENTS, output.num_values() * AGENTS)
     );
     assert!(job.added.is_none_or(|added| added.len() == job.output.len()));
-    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Path` only exists for what the machine
-    // supports.
+    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Network::new` checked that the
+    // machine supports the path.
     match path {
-        Path::Portable => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
+        SimdPath::Scalar => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::convolve_agents(&mut job) },
+        SimdPath::Avx2 => unsafe { avx2::convolve_agents(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx512 => unsafe { avx512::convolve_agents(&mut job) },
+        SimdPath::Avx512 => unsafe { avx512::convolve_agents(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
 
@@ -181,18 +153,20 @@ fn check(shape: &Shape, weights: &[f32], bias: &[f32]) {
 /// # Panics
 /// If a slice does not fit the numbers of inputs, outputs and rows.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn multiply(path: Path, mut job: Multiply<'_>) {
+pub fn multiply(path: SimdPath, mut job: Multiply<'_>) {
     let num_outputs = job.bias.len();
     assert_eq!(num_outputs % LANES, 0);
     assert_eq!(job.weights.len(), num_outputs * job.num_inputs);
     assert!(job.num_inputs <= job.input_stride);
     assert!(job.num_rows == 0 || job.input.len() >= (job.num_rows - 1) * job.input_stride + job.num_inputs);
     assert!(job.output.len() >= job.num_rows * num_outputs);
-    // SAFETY: the asserts above, and `Path` only exists for what the machine supports.
+    // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
     match path {
-        Path::Portable => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 | Path::Avx512 => unsafe { avx2::multiply(&mut job) },
+        SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::multiply(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
 
@@ -201,16 +175,18 @@ pub fn multiply(path: Path, mut job: Multiply<'_>) {
 /// # Panics
 /// If a slice does not fit the numbers of inputs and outputs.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn multiply_agents(path: Path, mut job: MultiplyAgents<'_>) {
+pub fn multiply_agents(path: SimdPath, mut job: MultiplyAgents<'_>) {
     assert_eq!((job.input.len() % AGENTS, job.output.len() % AGENTS), (0, 0));
     assert_eq!(job.bias.len(), (job.output.len() / AGENTS).next_multiple_of(LANES));
     assert_eq!(job.weights.len(), job.bias.len() * (job.input.len() / AGENTS));
-    // SAFETY: the asserts above, and `Path` only exists for what the machine supports.
+    // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
     match path {
-        Path::Portable => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
+        SimdPath::Scalar => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::multiply_agents(&mut job) },
+        SimdPath::Avx2 => unsafe { avx2::multiply_agents(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx512 => unsafe { avx512::multiply_agents(&mut job) },
+        SimdPath::Avx512 => unsafe { avx512::multiply_agents(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
