@@ -19,8 +19,11 @@ mod avx512_windows;
 // Miri supports no guard pages, and needs none.
 #[cfg(test)]
 #[cfg(not(miri))]
-#[allow(unsafe_code, reason = "slices next to pages without access")]
 mod guard_pages;
+#[cfg(test)]
+#[cfg(not(miri))]
+#[allow(unsafe_code, reason = "slices next to pages without access")]
+mod guarded;
 #[cfg(target_arch = "x86_64")]
 mod positions;
 mod scalar;

@@ -11,6 +11,12 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512;
+#[cfg(test)]
+mod guard_pages;
+#[cfg(test)]
+#[allow(unsafe_code, reason = "slices next to pages without access")]
+#[path = "../../../fast/src/simd/guarded.rs"]
+mod guarded;
 #[allow(unsafe_code, reason = "pointers that the jobs' checks cover")]
 mod kernels;
 #[allow(unsafe_code, reason = "vectors read and write through pointers")]
