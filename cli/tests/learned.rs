@@ -150,3 +150,33 @@ fn wrong_suites_name_file_line_and_key() {
         assert!(!folder.path().join("out").exists());
     }
 }
+
+#[test]
+fn a_run_with_other_weights_is_not_continued() {
+    let folder = folder();
+    let evaluate = || pogema(folder.path(), &["evaluate", "descent.yaml", "--out", "out", "--resume"]);
+    assert_eq!(evaluate().2, 0);
+    let expected = "error: out: has results of `Descent` with other weights than its files hold now; choose another \
+                    folder, or delete the results with `--force`";
+    for name in ["descent.safetensors", "descent.json"] {
+        let path = folder.path().join(name);
+        let original = fs::read(&path).unwrap();
+        let mut changed = original.clone();
+        // A bit of the last weight, or the line break at the end.
+        *changed.last_mut().unwrap() ^= 2;
+        fs::write(&path, if name.ends_with("json") { [&original[..], b"\n"].concat() } else { changed })
+            .unwrap();
+        let before = fs::read(folder.path().join("out/about.json")).unwrap();
+        let (_, error, status) = evaluate();
+        assert_eq!((error.as_str(), status), (expected, 2), "{name}");
+        assert_eq!(fs::read(folder.path().join("out/about.json")).unwrap(), before);
+        fs::write(&path, original).unwrap();
+        assert_eq!(evaluate().2, 0);
+    }
+    // Results of earlier releases do not name their weights.
+    let about = folder.path().join("out/about.json");
+    let mut manifest: serde_json::Value = serde_json::from_slice(&fs::read(&about).unwrap()).unwrap();
+    assert!(manifest.as_object_mut().unwrap().remove("weights").is_some());
+    fs::write(&about, manifest.to_string()).unwrap();
+    assert_eq!(evaluate().2, 0);
+}

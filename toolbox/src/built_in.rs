@@ -1,6 +1,6 @@
 //! The built-in algorithms: planners, and POGEMA's own policies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -50,10 +50,7 @@ impl BuiltIn {
     /// One line about an unknown parameter or an invalid value, or about weights that cannot be read. Their path is
     /// relative to `folder`, that of the suite.
     pub fn of(algorithm: &Algorithm, folder: &Path) -> Option<Result<Self, Error>> {
-        let name = match algorithm.name.to_lowercase().replace('_', "-").as_str() {
-            "a*" => "astar".to_owned(),
-            name => name.to_owned(),
-        };
+        let name = name_of(algorithm);
         let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
         is_known.then(|| Self::read(name, algorithm, folder))
     }
@@ -149,6 +146,21 @@ impl BuiltIn {
         }
         Ok(())
     }
+}
+
+/// Returns the name of the policy that an algorithm names, in lower case.
+fn name_of(algorithm: &Algorithm) -> String {
+    match algorithm.name.to_lowercase().replace('_', "-").as_str() {
+        "a*" => "astar".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+/// Returns the file with the weights of an algorithm, if it is a learned policy.
+pub(crate) fn weights_of(algorithm: &Algorithm, folder: &Path) -> Option<PathBuf> {
+    LearnedName::of_word(&name_of(algorithm))?;
+    let (_, node) = algorithm.parameters.iter().find(|(key, _)| key == "weights")?;
+    node.text().map(|file| folder.join(file))
 }
 
 /// Sets a parameter of a search.
