@@ -116,7 +116,16 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     assert!(results.iter().all(|result| *result == results[0]), "{results:#?}");
     assert_ne!(results[0][0], results[0][1]);
     let (text, error, status) = pogema(folder.path(), &["views", "1"]);
-    assert!(text.contains("Descent"), "{text}");
+    assert!(text.contains("Descent") && text.contains("Network Time (seconds)"), "{text}");
+    for (name, has_network) in [("Descent", true), ("Random", false)] {
+        let path = folder.path().join("1").join(format!("{name}.episodes.json"));
+        let episodes: Vec<serde_json::Value> = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+        for episode in episodes {
+            let network = episode["network_seconds"].as_f64();
+            assert_eq!(network.is_some(), has_network);
+            assert!(network.is_none_or(|time| time > 0.0 && time < episode["seconds"].as_f64().unwrap()));
+        }
+    }
     assert_eq!(status, 0, "{error}");
     let replay = ["replay", "1", "Descent", "2", "--trace", "replay.jsonl"];
     let (_, error, status) = pogema(folder.path(), &replay);

@@ -1,5 +1,7 @@
 //! A learned policy that plays an episode.
 
+use std::time::Duration;
+
 use pogema_core::{Action, Error, State};
 
 use crate::mats_lp::MatsLp;
@@ -20,6 +22,14 @@ impl LearnedPolicy {
 
     pub(crate) fn of_search(search: MatsLp) -> Self {
         Self(Player::MatsLp(Box::new(search)))
+    }
+
+    /// Returns the time that the network has taken since the episode began, added up over threads.
+    pub fn network_time(&self) -> Duration {
+        match &self.0 {
+            Player::Network(network) => network.network_time(),
+            Player::MatsLp(search) => search.stats().network_time,
+        }
     }
 
     /// Returns the actions of all agents in the next state of the episode; inactive agents stay.

@@ -1,5 +1,7 @@
 //! Policies by name.
 
+use std::time::Duration;
+
 use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
 use pogema_planners::{
@@ -128,6 +130,14 @@ impl NamedPolicy {
     pub fn first_outcome(&self) -> Option<&Outcome> {
         match &self.0 {
             Kind::Planner(policy) => policy.outcomes().first(),
+            _ => None,
+        }
+    }
+
+    /// Returns the time that a network has taken so far, added up over threads; `None` for a policy without a network.
+    pub fn network_time(&self) -> Option<Duration> {
+        match &self.0 {
+            Kind::Learned(policy) => Some(policy.network_time()),
             _ => None,
         }
     }

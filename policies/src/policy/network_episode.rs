@@ -1,5 +1,7 @@
 //! A network that controls the agents of one episode.
 
+use std::time::{Duration, Instant};
+
 use pogema_core::{Action, Config, Error, Instance, Map, State};
 
 use crate::encode::{Encoder, EncoderSettings};
@@ -28,6 +30,7 @@ pub struct NetworkEpisode {
     mask: Option<Map>,
     windows: Vec<f32>,
     scalars: Vec<f32>,
+    network_time: Duration,
 }
 
 impl NetworkEpisode {
@@ -54,7 +57,13 @@ impl NetworkEpisode {
             network: network.clone(),
             sampler: Sampler::new(*sampling, seed, num_agents),
             mask: masks_actions.then(|| instance.map().clone()),
+            network_time: Duration::ZERO,
         })
+    }
+
+    /// Returns the time that the network has taken since the episode began.
+    pub fn network_time(&self) -> Duration {
+        self.network_time
     }
 
     /// Returns the actions of all agents in the next state of the episode; inactive agents stay.
@@ -67,7 +76,9 @@ impl NetworkEpisode {
         let (num_agents, step) = (state.cells.len(), state.step);
         let inputs = Inputs { windows: &self.windows, scalars: &self.scalars, batch: num_agents };
         let wrong = |reason| Error::Corrupt { what: "network".into(), reason };
+        let began = Instant::now();
         let outputs = self.network.forward(inputs, &mut self.state, &mut self.workspace);
+        self.network_time += began.elapsed();
         let outputs = outputs.map_err(|error| match error {
             ForwardError::Length(error) => error,
             ForwardError::NotFinite { row } => {
