@@ -4,7 +4,6 @@ use pogema_core::SimdPath;
 
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
-use crate::simd::AGENTS;
 
 /// A recurrent layer. Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
 #[derive(Debug)]
@@ -63,9 +62,9 @@ impl Gru {
         }
     }
 
-    /// Runs a step of 16 agents whose values lie side by side. `state` is also the output.
+    /// Runs a step of 8 or 16 agents whose values lie side by side. `state` is also the output.
     pub fn run_agents(&self, path: SimdPath, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
-        let num_values = self.size * AGENTS;
+        let num_values = state.len();
         let (of_input, rest) = scratch.split_at_mut(3 * num_values);
         let of_state = &mut rest[..3 * num_values];
         self.of_input.run_agents(path, input, false, of_input);

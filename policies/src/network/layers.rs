@@ -3,7 +3,7 @@
 use pogema_core::SimdPath;
 
 use super::tensors::{Tensor, Tensors};
-use crate::simd::{self, BLOCK, Convolve, ConvolveAgents, LANES, Multiply, MultiplyAgents, Plane, Shape};
+use crate::simd::{self, BLOCK, Convolve, LANES, Multiply, MultiplyAgents, Plane, Shape};
 
 /// A function of each value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ impl Convolution {
         simd::convolve(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
     }
 
-    /// Runs the layer for 16 agents whose values lie side by side.
+    /// Runs the layer for 8 or 16 agents whose values lie side by side.
     pub fn run_agents(
         &self,
         path: SimdPath,
@@ -72,10 +72,7 @@ impl Convolution {
         output: &mut [f32],
     ) {
         let Self { shape, weights, bias } = self;
-        simd::convolve_agents(
-            path,
-            ConvolveAgents { input, output, added, weights, bias, shape: *shape, relu },
-        );
+        simd::convolve_agents(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
     }
 }
 
@@ -208,7 +205,7 @@ impl Dense {
         );
     }
 
-    /// Runs the layer for 16 agents whose values lie side by side.
+    /// Runs the layer for 8 or 16 agents whose values lie side by side.
     pub fn run_agents(&self, path: SimdPath, input: &[f32], relu: bool, output: &mut [f32]) {
         let Self { weights, bias, .. } = self;
         simd::multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu });

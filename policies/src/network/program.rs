@@ -9,6 +9,7 @@ use super::steps::{Buffers, GROUP, Group, Heads, Steps};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
+use crate::simd::{AGENTS, HALF};
 
 /// The layers of a network, packed for a path.
 #[derive(Debug)]
@@ -28,9 +29,10 @@ impl Layers {
     fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
         let Self { steps, heads, path } = self;
         let Workspace { buffers, logits, values } = workspace;
-        let Some(LayerBuffers { apart, agents, heads: outputs }) = buffers else { return };
+        let Some(LayerBuffers { apart, half, agents, heads: outputs }) = buffers else { return };
         let num_outputs = heads.dense.num_outputs;
         if group.num_agents > steps.most_apart() {
+            let agents = if group.num_agents > HALF { agents } else { half };
             steps.run_agents(*path, group, heads, states, agents);
             for agent in 0..group.num_agents {
                 logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
@@ -101,7 +103,8 @@ impl Program {
         let buffers = match self {
             Self::Layers(layers) => Some(LayerBuffers {
                 apart: Buffers::new(&layers.steps),
-                agents: AgentBuffers::new(&layers.steps, &layers.heads),
+                half: AgentBuffers::new(&layers.steps, &layers.heads, HALF),
+                agents: AgentBuffers::new(&layers.steps, &layers.heads, AGENTS),
                 heads: vec![0.0; GROUP * layers.heads.dense.stride()],
             }),
             #[cfg(feature = "onnx")]
@@ -140,6 +143,7 @@ pub struct Workspace {
 #[derive(Clone, Debug)]
 struct LayerBuffers {
     apart: Buffers,
+    half: AgentBuffers,
     agents: AgentBuffers,
     heads: Vec<f32>,
 }

@@ -78,12 +78,15 @@ fn convolutions_stay_inside_their_slices() {
                 let added = is_added.then_some(&*added);
                 convolve(path, Convolve { input, output, added, weights, bias, shape, relu });
             });
-            let num_outputs = output.num_values() * AGENTS;
-            let lens = [num_outputs, input.num_values() * AGENTS, num_outputs, num_weights(&shape), bias];
-            check(lens, &mut memory, &|path, [output, input, added, weights, bias]| {
-                let added = is_added.then_some(&*added);
-                convolve_agents(path, ConvolveAgents { input, output, added, weights, bias, shape, relu });
-            });
+            for num_agents in [HALF, AGENTS] {
+                let num_outputs = output.num_values() * num_agents;
+                let lens =
+                    [num_outputs, input.num_values() * num_agents, num_outputs, num_weights(&shape), bias];
+                check(lens, &mut memory, &|path, [output, input, added, weights, bias]| {
+                    let added = is_added.then_some(&*added);
+                    convolve_agents(path, Convolve { input, output, added, weights, bias, shape, relu });
+                });
+            }
         }
     }
 }
@@ -107,10 +110,12 @@ fn dense_layers_stay_inside_their_slices() {
                     );
                 });
             }
-            let lens = [num_outputs * AGENTS, num_inputs * AGENTS, 0, weights, bias];
-            check(lens, &mut memory, &|path, [output, input, _, weights, bias]| {
-                multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu: false });
-            });
+            for num_agents in [HALF, AGENTS] {
+                let lens = [num_outputs * num_agents, num_inputs * num_agents, 0, weights, bias];
+                check(lens, &mut memory, &|path, [output, input, _, weights, bias]| {
+                    multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu: false });
+                });
+            }
         }
     }
 }

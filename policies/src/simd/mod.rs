@@ -24,7 +24,7 @@ mod lanes;
 
 use pogema_core::SimdPath;
 
-pub use agents::{ConvolveAgents, MultiplyAgents};
+pub use agents::MultiplyAgents;
 pub use kernels::{Convolve, Multiply};
 
 /// Number of floats in a vector. The channels of activations are padded to a multiple of it.
@@ -33,8 +33,11 @@ pub const LANES: usize = 8;
 /// Number of output channels that are computed together.
 pub const BLOCK: usize = 2 * LANES;
 
-/// Number of agents whose values lie side by side in the kernels for many agents.
+/// Largest number of agents whose values lie side by side in the kernels for many agents.
 pub const AGENTS: usize = 16;
+
+/// The other number of agents for which there are such kernels.
+pub const HALF: usize = AGENTS / 2;
 
 /// Number of partial sums of each output of a dense layer.
 const CHAINS: usize = 4;
@@ -117,29 +120,33 @@ pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     }
 }
 
-/// Runs a convolution of 16 agents.
+/// Runs a convolution of 8 or 16 agents, whose values lie side by side. The planes have no margins.
 ///
 /// # Panics
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn convolve_agents(path: SimdPath, mut job: ConvolveAgents<'_>) {
+pub fn convolve_agents(path: SimdPath, mut job: Convolve<'_>) {
     let Shape { input, output, .. } = job.shape;
     check(&job.shape, job.weights, job.bias);
+    let num_agents = if job.input.len() == input.num_values() * HALF { HALF } else { AGENTS };
     assert_eq!(
         (job.input.len(), job.output.len()),
-        (input.num_values() * AGENTS, output.num_values() * AGENTS)
+        (input.num_values() * num_agents, output.num_values() * num_agents)
     );
     assert!(job.added.is_none_or(|added| added.len() == job.output.len()));
-    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Network::new` checked that the
-    // machine supports the path.
-    match path {
-        SimdPath::Scalar => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
+    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Network::new` checked that the machine
+    // supports the path.
+    match (path, num_agents) {
+        (SimdPath::Scalar, HALF) => unsafe { agents::convolve::<lanes::Portable, 1, 4>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        SimdPath::Avx2 => unsafe { avx2::convolve_agents(&mut job) },
+        (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::convolve_half(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        SimdPath::Avx512 => unsafe { avx512::convolve_agents(&mut job) },
+        (SimdPath::Avx2, _) => unsafe { avx2::convolve_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        (SimdPath::Avx512, _) => unsafe { avx512::convolve_agents(&mut job) },
         #[cfg(not(target_arch = "x86_64"))]
-        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
+        (SimdPath::Avx2 | SimdPath::Avx512, _) => unreachable!("`Network::new` checks the path"),
     }
 }
 
@@ -176,23 +183,28 @@ pub fn multiply(path: SimdPath, mut job: Multiply<'_>) {
     }
 }
 
-/// Runs a dense layer of 16 agents.
+/// Runs a dense layer of 8 or 16 agents, whose values lie side by side.
 ///
 /// # Panics
 /// If a slice does not fit the numbers of inputs and outputs.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
 pub fn multiply_agents(path: SimdPath, mut job: MultiplyAgents<'_>) {
-    assert_eq!((job.input.len() % AGENTS, job.output.len() % AGENTS), (0, 0));
-    assert_eq!(job.bias.len(), (job.output.len() / AGENTS).next_multiple_of(LANES));
-    assert_eq!(job.weights.len(), job.bias.len() * (job.input.len() / AGENTS));
+    let num_inputs = job.weights.len() / job.bias.len();
+    let num_agents = if job.input.len() == num_inputs * HALF { HALF } else { AGENTS };
+    assert_eq!((job.input.len(), job.output.len() % num_agents), (num_inputs * num_agents, 0));
+    assert_eq!(job.bias.len(), (job.output.len() / num_agents).next_multiple_of(LANES));
+    assert_eq!(job.weights.len(), job.bias.len() * num_inputs);
     // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
-    match path {
-        SimdPath::Scalar => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
+    match (path, num_agents) {
+        (SimdPath::Scalar, HALF) => unsafe { agents::multiply::<lanes::Portable, 1, 1>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        SimdPath::Avx2 => unsafe { avx2::multiply_agents(&mut job) },
+        (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::multiply_half(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        SimdPath::Avx512 => unsafe { avx512::multiply_agents(&mut job) },
+        (SimdPath::Avx2, _) => unsafe { avx2::multiply_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        (SimdPath::Avx512, _) => unsafe { avx512::multiply_agents(&mut job) },
         #[cfg(not(target_arch = "x86_64"))]
-        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
+        (SimdPath::Avx2 | SimdPath::Avx512, _) => unreachable!("`Network::new` checks the path"),
     }
 }
