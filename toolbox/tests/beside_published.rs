@@ -211,10 +211,11 @@ fn intervals_and_times_of_decisions_are_shown() {
     let folder = folder(MEANS, "01-random", &[]);
     let lifelong = |seed: u64, throughput: f64, runtime: f64, network: f64| {
         let text = format!(
-            r#"{{"metrics": {{"avg_throughput": {throughput}, "ep_length": 100, "runtime": {runtime},
+            r#"{{"metrics": {{"avg_throughput": {throughput}, "runtime": {runtime},
                 "network_time": {network}}}, "env_grid_search": {{"num_agents": 2, "seed": {seed}}}, "algorithm": "RHCR"}}"#
         );
-        Row { set: "01-random".to_owned(), ..serde_json::from_str(&text).unwrap() }
+        let config = Pairs::from([("max_episode_steps".to_owned(), 100.into())]);
+        Row { set: "01-random".to_owned(), config, ..serde_json::from_str(&text).unwrap() }
     };
     let rows = vec![lifelong(0, 0.5, 0.5, 0.25), lifelong(1, 0.5, 0.75, 0.25)];
     let results = Results { rows, notes: Vec::new() };

@@ -252,11 +252,11 @@ fn interval(line: &Line<'_>, metric: &str) -> Option<Estimate> {
     Estimate::of(&values(&line.rows, metric), Spread::Bootstrap { level: 95.0 }, line.num_agents)
 }
 
-/// Returns the time that a decision of one agent took in a lifelong episode, outside and inside of the network. Units:
-/// microseconds.
+/// Returns the time that a decision of one agent took in a lifelong episode, outside and inside of the network. Such an
+/// episode has as many steps as its config says. Units: microseconds.
 fn decision_times(row: &Row) -> Option<[f64; 2]> {
     row.metric("avg_throughput")?;
-    let num_decisions = row.metric("ep_length")? * row.field(NUM_AGENTS)?.as_f64()?;
+    let num_decisions = row.field("max_episode_steps")?.as_f64()? * row.field(NUM_AGENTS)?.as_f64()?;
     let (all, network) = (row.metric(RUNTIME)?, row.metric(NETWORK_TIME).unwrap_or(0.0));
     Some([all - network, network].map(|seconds| 1e6 * seconds / num_decisions))
 }
