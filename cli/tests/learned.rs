@@ -116,7 +116,16 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     assert!(results.iter().all(|result| *result == results[0]), "{results:#?}");
     assert_ne!(results[0][0], results[0][1]);
     let (text, error, status) = pogema(folder.path(), &["views", "1"]);
-    assert!(text.contains("Descent"), "{text}");
+    assert!(text.contains("Descent") && text.contains("Network Time (seconds)"), "{text}");
+    for (name, has_network) in [("Descent", true), ("Random", false)] {
+        let path = folder.path().join("1").join(format!("{name}.episodes.json"));
+        let episodes: Vec<serde_json::Value> = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+        for episode in episodes {
+            let network = episode["network_seconds"].as_f64();
+            assert_eq!(network.is_some(), has_network);
+            assert!(network.is_none_or(|time| time > 0.0 && time < episode["seconds"].as_f64().unwrap()));
+        }
+    }
     assert_eq!(status, 0, "{error}");
     let replay = ["replay", "1", "Descent", "2", "--trace", "replay.jsonl"];
     let (_, error, status) = pogema(folder.path(), &replay);
@@ -149,4 +158,34 @@ fn wrong_suites_name_file_line_and_key() {
         assert_eq!((error, status), (format!("error: wrong.yaml: line {line}: {expected}"), 2));
         assert!(!folder.path().join("out").exists());
     }
+}
+
+#[test]
+fn a_run_with_other_weights_is_not_continued() {
+    let folder = folder();
+    let evaluate = || pogema(folder.path(), &["evaluate", "descent.yaml", "--out", "out", "--resume"]);
+    assert_eq!(evaluate().2, 0);
+    let expected = "error: out: has results of `Descent` with other weights than its files hold now; choose another \
+                    folder, or delete the results with `--force`";
+    for name in ["descent.safetensors", "descent.json"] {
+        let path = folder.path().join(name);
+        let original = fs::read(&path).unwrap();
+        let mut changed = original.clone();
+        // A bit of the last weight, or the line break at the end.
+        *changed.last_mut().unwrap() ^= 2;
+        fs::write(&path, if name.ends_with("json") { [&original[..], b"\n"].concat() } else { changed })
+            .unwrap();
+        let before = fs::read(folder.path().join("out/about.json")).unwrap();
+        let (_, error, status) = evaluate();
+        assert_eq!((error.as_str(), status), (expected, 2), "{name}");
+        assert_eq!(fs::read(folder.path().join("out/about.json")).unwrap(), before);
+        fs::write(&path, original).unwrap();
+        assert_eq!(evaluate().2, 0);
+    }
+    // Results of earlier releases do not name their weights.
+    let about = folder.path().join("out/about.json");
+    let mut manifest: serde_json::Value = serde_json::from_slice(&fs::read(&about).unwrap()).unwrap();
+    assert!(manifest.as_object_mut().unwrap().remove("weights").is_some());
+    fs::write(&about, manifest.to_string()).unwrap();
+    assert_eq!(evaluate().2, 0);
 }

@@ -17,6 +17,7 @@
 //! | [`files`] | atomic file writes |
 //! | [`picture`] | text pictures of a state |
 //! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
+//! | [`SimdPath`] | the instruction set of engines and networks |
 //! | [`Error`] | the error type |
 
 #![forbid(unsafe_code)]
@@ -36,6 +37,7 @@ pub mod metrics;
 mod observe;
 pub mod picture;
 mod printable;
+mod simd_path;
 mod threads;
 mod trace;
 mod words;
@@ -56,6 +58,7 @@ pub use map::{Map, check_row_length};
 pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, LARGEST_STEP, Metrics, Seen};
 pub use observe::{from_border, from_starts};
 pub use printable::{is_unprintable, one_line, printable_json};
+pub use simd_path::SimdPath;
 pub use threads::{MAX_THREADS, check_threads, threads_note};
 pub use trace::{
     Observed, ObservedMapf, ObservedPomapf, Padded, SPEC, Trace, TraceHeader, TraceStart, TraceStep,

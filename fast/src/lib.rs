@@ -55,7 +55,8 @@ mod step;
 pub use batch::{Autoreset, Batch, Firsts, Instances, suited_threads};
 pub use buffers::{ApartBuffers, GlobalBuffers, ObservationBuffers, Observations, Windows};
 pub use observe::words_per_agent;
-pub use simd::{SimdPath, Value};
+pub use pogema_core::SimdPath;
+pub use simd::Value;
 pub use step::Engine;
 
 /// The README, whose example the tests compile and run.

@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use pogema_core::{Error, Seen};
+use pogema_core::{Error, Seen, SimdPath};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::simd::{Channels, MOST_WORDS, SimdPath, Value, WindowSource, lead_of, pack, per_line};
+use crate::simd::{Channels, MOST_WORDS, Value, WindowSource, lead_of, pack, per_line};
 
 /// Number of words for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;

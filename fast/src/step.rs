@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance};
-use pogema_core::{Seen, Snapshot, State, StepOut};
+use pogema_core::{Seen, SimdPath, Snapshot, State, StepOut};
 use rayon::ThreadPool;
 
 use crate::grid::{Board, FREE, Strips, num_bytes};
-use crate::simd::SimdPath;
 
 /// The fast engine: one environment with the rules of POGEMA 1.4.0, on bit sets.
 ///

@@ -14,7 +14,7 @@ mod simd;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Scalars};
 pub use follower::FollowerVersion;
-pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, MatsLpStats, NetworkPrior, Prior};
+pub use mats_lp::{Evaluate, Evaluation, MatsLp, MatsLpParams, MatsLpStats, NetworkPrior, Prior, RootChild};
 pub use network::{
     Architecture, ForwardError, Inputs, Layer, Network, NetworkConfig, Outputs, RecurrentState, Sampling,
     SamplingConfig, Workspace, softmax,

@@ -11,8 +11,8 @@ use numpy::{
 use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Occupancy, State, Words};
 use pogema_fast::Engine;
 use pogema_policies::{
-    Inputs, Learned, LearnedName, LearnedPolicy, MatsLp, Network, NetworkConfig, NetworkPolicy,
-    RecurrentState, Sampling,
+    Inputs, Learned, LearnedName, LearnedPolicy, Network, NetworkConfig, NetworkPolicy, RecurrentState,
+    Sampling,
 };
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -48,15 +48,10 @@ struct Players {
 struct Player {
     /// Which episode of its environment it plays, counted from 1.
     begun: u64,
-    kind: Kind,
+    policy: LearnedPolicy,
     /// The last step for which it chose actions, and these actions.
     step: Option<u64>,
     actions: Vec<Action>,
-}
-
-enum Kind {
-    Network(Box<LearnedPolicy>),
-    MatsLp(Box<MatsLp>),
 }
 
 guarded! {
@@ -81,29 +76,21 @@ impl Policy {
             if let Some(sampling) = sampling {
                 learned = learned.with_sampling(Sampling::read("sampling", sampling)?)?;
             }
-            set_search(&mut learned, search)?;
-            learned.with_masks(mask_actions)
+            let learned = with_search(learned, search)?.with_masks(mask_actions)?;
+            learned.check_threads(threads).map(|()| learned)
         };
         let learned = read().map_err(|error| to_py_error(&error))?;
-        let policy = Self { learned, seed, threads, stop: Arc::default(), players: Mutex::default() };
-        policy.check().map_err(|error| to_py_error(&error))?;
-        Ok(policy)
+        Ok(Self { learned, seed, threads, stop: Arc::default(), players: Mutex::default() })
     }
 
     /// Returns the JSON of the encoder, if the policy has one.
     fn encoder(&self) -> PyResult<Option<String>> {
-        Ok(match &self.learned {
-            Learned::Network(policy) => serde_json::to_string(policy.encoder()).ok(),
-            Learned::MatsLp(..) => None,
-        })
+        Ok(self.learned.network().and_then(|policy| serde_json::to_string(policy.encoder()).ok()))
     }
 
     /// Returns the rule that chooses actions from logits, if the policy has one.
     fn sampling(&self) -> PyResult<Option<&'static str>> {
-        Ok(match &self.learned {
-            Learned::Network(policy) => Some(policy.sampling().word()),
-            Learned::MatsLp(..) => None,
-        })
+        Ok(self.learned.network().map(|policy| policy.sampling().word()))
     }
 
     /// Writes the actions of all agents of a batch.
@@ -143,7 +130,7 @@ impl Policy {
         if players.batch != 0 {
             return Err(other_environment());
         }
-        if matches!(self.learned, Learned::MatsLp(..)) {
+        if self.learned.network().is_none() {
             return Err(PyValueError::new_err(
                 "`mats-lp` knows future goals, which observations do not hold, expected a VecEnv",
             ));
@@ -169,7 +156,7 @@ impl Policy {
         windows: PyReadonlyArray2<'_, f32>,
         scalars: PyReadonlyArray2<'_, f32>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let Learned::Network(policy) = &self.learned else {
+        let Some(policy) = self.learned.network() else {
             return Err(PyValueError::new_err("`mats-lp` has no logits of single agents"));
         };
         let (network, batch) = (policy.network(), windows.shape()[0]);
@@ -191,25 +178,10 @@ impl Policy {
 }
 
 impl Policy {
-    /// Checks that the policy can play.
-    fn check(&self) -> Result<(), Error> {
-        match &self.learned {
-            Learned::Network(_) => Ok(()),
-            Learned::MatsLp(prior, params) => MatsLp::new(prior, *params, self.threads).map(|_| ()),
-        }
-    }
-
     fn begin(&self, instance: &Instance, config: &Config, begun: u64) -> Result<Player, Error> {
-        let kind = match &self.learned {
-            Learned::Network(policy) => Kind::Network(Box::new(policy.begin(instance, config, self.seed)?)),
-            Learned::MatsLp(prior, params) => {
-                let policy = MatsLp::new(prior, *params, self.threads)?;
-                let mut policy = policy.with_cancellation(Some(Arc::clone(&self.stop)));
-                policy.begin(instance, config.on_goal);
-                Kind::MatsLp(Box::new(policy))
-            }
-        };
-        Ok(Player { begun, kind, step: None, actions: Vec::new() })
+        let stop = Some(Arc::clone(&self.stop));
+        let policy = self.learned.begin(instance, config, self.seed, self.threads, stop)?;
+        Ok(Player { begun, policy, step: None, actions: Vec::new() })
     }
 
     fn act_in_one(
@@ -275,10 +247,7 @@ impl Player {
     /// Returns the actions in a state; the same ones if it is asked again.
     fn act(&mut self, state: State<'_>) -> Result<&[Action], Error> {
         if self.step != Some(state.step) {
-            self.actions = match &mut self.kind {
-                Kind::Network(policy) => policy.act(state)?,
-                Kind::MatsLp(policy) => policy.act(state)?,
-            };
+            self.actions = self.policy.act(state)?;
             self.step = Some(state.step);
         }
         Ok(&self.actions)
@@ -324,21 +293,23 @@ impl Grid<'_> {
     }
 }
 
-fn set_search(
-    learned: &mut Learned,
+fn with_search(
+    mut learned: Learned,
     (expansions, faithful): (Option<u32>, Option<bool>),
-) -> Result<(), Error> {
-    let Learned::MatsLp(_, params) = learned else {
-        let given = expansions.map(|_| "expansions").or(faithful.map(|_| "faithful"));
-        return given.map_or(Ok(()), |name| {
-            Err(Error::request(format!(
-                "`{name}` is given, but the policy does not search; only `mats-lp` does"
-            )))
-        });
-    };
-    params.expansions = expansions.unwrap_or(params.expansions);
-    params.faithful = faithful.unwrap_or(params.faithful);
-    params.check()
+) -> Result<Learned, Error> {
+    let given = expansions.map(|_| "expansions").or(faithful.map(|_| "faithful"));
+    if let (Some(name), Some(_)) = (given, learned.network()) {
+        return Err(Error::request(format!(
+            "`{name}` is given, but the policy does not search; only `mats-lp` does"
+        )));
+    }
+    if let Some(expansions) = expansions {
+        learned = learned.with_expansions(expansions)?;
+    }
+    match faithful {
+        Some(faithful) => learned.with_faithful(faithful),
+        None => Ok(learned),
+    }
 }
 
 fn in_environment(env: usize, error: Error) -> Error {

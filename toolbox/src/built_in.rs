@@ -1,6 +1,6 @@
 //! The built-in algorithms: planners, and POGEMA's own policies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -50,10 +50,7 @@ impl BuiltIn {
     /// One line about an unknown parameter or an invalid value, or about weights that cannot be read. Their path is
     /// relative to `folder`, that of the suite.
     pub fn of(algorithm: &Algorithm, folder: &Path) -> Option<Result<Self, Error>> {
-        let name = match algorithm.name.to_lowercase().replace('_', "-").as_str() {
-            "a*" => "astar".to_owned(),
-            name => name.to_owned(),
-        };
+        let name = name_of(algorithm);
         let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
         is_known.then(|| Self::read(name, algorithm, folder))
     }
@@ -115,7 +112,7 @@ impl BuiltIn {
             learned = learned.with_masks(flag).map_err(|error| in_line(key, node, error))?;
         }
         for (key, node) in ["expansions", "faithful"].into_iter().filter_map(find) {
-            set_search(&mut learned, key, node).map_err(|error| in_line(key, node, error))?;
+            learned = with_search(learned, key, node).map_err(|error| in_line(key, node, error))?;
         }
         self.settings.learned = Some(learned);
         Ok(())
@@ -151,18 +148,28 @@ impl BuiltIn {
     }
 }
 
+/// Returns the name of the policy that an algorithm names, in lower case.
+fn name_of(algorithm: &Algorithm) -> String {
+    match algorithm.name.to_lowercase().replace('_', "-").as_str() {
+        "a*" => "astar".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+/// Returns the file with the weights of an algorithm, if it is a learned policy.
+pub(crate) fn weights_of(algorithm: &Algorithm, folder: &Path) -> Option<PathBuf> {
+    LearnedName::of_word(&name_of(algorithm))?;
+    let (_, node) = algorithm.parameters.iter().find(|(key, _)| key == "weights")?;
+    node.text().map(|file| folder.join(file))
+}
+
 /// Sets a parameter of a search.
-fn set_search(learned: &mut Learned, key: &str, node: &Node) -> Result<(), Error> {
-    let Learned::MatsLp(_, params) = learned else {
-        return Err(Error::request("the policy does not search; only `mats-lp` does"));
-    };
+fn with_search(learned: Learned, key: &str, node: &Node) -> Result<Learned, Error> {
     let value = node.value();
     if key == "faithful" {
         let flag = value.as_bool();
-        params.faithful = flag.ok_or_else(|| Error::argument(key, value, "true or false"))?;
-    } else {
-        let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
-        params.expansions = number.ok_or_else(|| Error::argument(key, value, "a number"))?;
+        return learned.with_faithful(flag.ok_or_else(|| Error::argument(key, value, "true or false"))?);
     }
-    params.check()
+    let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+    learned.with_expansions(number.ok_or_else(|| Error::argument(key, value, "a number"))?)
 }

@@ -8,6 +8,7 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::built_in;
 use crate::suite::{Algorithm, Suite};
 
 /// Name of the manifest's file.
@@ -22,6 +23,9 @@ pub struct Manifest {
     pub environment: String,
     /// Fingerprint of each algorithm, by its name among the results.
     pub algorithms: BTreeMap<String, String>,
+    /// Fingerprint of the weights of each learned algorithm. Results of earlier releases have none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub weights: BTreeMap<String, String>,
     /// The runs that played episodes. Each episode has the index of its run.
     pub runs: Vec<RunRecord>,
 }
@@ -39,14 +43,24 @@ pub struct RunRecord {
 
 impl Manifest {
     /// Returns the manifest of a suite before any run.
-    pub fn of(suite: &Suite) -> Self {
+    ///
+    /// # Errors
+    /// If weights cannot be read.
+    pub fn of(suite: &Suite) -> Result<Self, Error> {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.fingerprint()));
-        Self {
+        let mut weights = BTreeMap::new();
+        for algorithm in &suite.algorithms {
+            if let Some(path) = built_in::weights_of(algorithm, suite.folder()) {
+                weights.insert(algorithm.key.clone(), digest_of_weights(&path)?);
+            }
+        }
+        Ok(Self {
             suite: std::path::absolute(&suite.path).unwrap_or_else(|_| suite.path.clone()),
             environment: digest(&suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
+            weights,
             runs: Vec::new(),
-        }
+        })
     }
 
     /// Reads the manifest of the results in a folder; returns `None` if there is none.
@@ -70,12 +84,14 @@ impl Manifest {
         if known.environment != self.environment {
             return Err("has results of other environments than the suite's".into());
         }
-        let is_other =
-            |(key, known): &(&String, &String)| self.algorithms.get(*key).is_some_and(|now| now != *known);
-        if let Some((key, _)) = known.algorithms.iter().find(is_other) {
+        if let Some(key) = first_difference(&known.algorithms, &self.algorithms) {
             return Err(format!("has results of `{key}` with other parameters than the suite's"));
         }
+        if let Some(key) = first_difference(&known.weights, &self.weights) {
+            return Err(format!("has results of `{key}` with other weights than its files hold now"));
+        }
         self.algorithms.extend(known.algorithms);
+        self.weights.extend(known.weights);
         self.runs = known.runs;
         Ok(())
     }
@@ -106,9 +122,26 @@ pub fn machine() -> &'static str {
     &MACHINE
 }
 
-/// Returns a short hash of a text.
-fn digest(text: &str) -> String {
-    let bytes: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+/// Returns the first key with different values in both maps.
+fn first_difference<'a>(
+    known: &'a BTreeMap<String, String>,
+    now: &BTreeMap<String, String>,
+) -> Option<&'a String> {
+    known.iter().find(|(key, known)| now.get(*key).is_some_and(|now| now != *known)).map(|(key, _)| key)
+}
+
+/// Returns a short hash of a network's file and of the JSON file beside it, which may be absent.
+fn digest_of_weights(path: &Path) -> Result<String, Error> {
+    let read = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
+    let weights = Sha256::digest(read(path)?);
+    let config = path.with_extension("json");
+    let config = if config.exists() { Sha256::digest(read(&config)?).to_vec() } else { Vec::new() };
+    Ok(digest([weights.as_slice(), &config].concat()))
+}
+
+/// Returns a short hash of bytes.
+fn digest(bytes: impl AsRef<[u8]>) -> String {
+    let bytes: [u8; 32] = Sha256::digest(bytes).into();
     let [first, ..] = bytes.as_chunks::<8>().0 else { return String::new() };
     format!("{:016x}", u64::from_be_bytes(*first))
 }

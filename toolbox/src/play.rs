@@ -21,6 +21,8 @@ pub struct Played {
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
+    /// The part of the runtime that a network took, added up over threads, if the policy has one.
+    pub network_time: Option<Duration>,
     /// What a one-shot planner proved about the episode, if anything.
     pub proof: Proof,
 }
@@ -67,7 +69,8 @@ fn run(
         episode.step(&actions)?;
     }
     let proof = policy.first_outcome().map(proof).unwrap_or_default();
-    Ok((Played { metrics: episode.metrics(), runtime, proof }, episode))
+    let network_time = policy.network_time();
+    Ok((Played { metrics: episode.metrics(), runtime, network_time, proof }, episode))
 }
 
 /// Returns what a planner proved, with or without a plan.

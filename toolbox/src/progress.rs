@@ -24,6 +24,9 @@ pub struct Done {
     pub metrics: Pairs,
     /// Time of the policy. Units: seconds.
     pub runtime: f64,
+    /// The part of it that a network took, if the policy has one. Units: seconds, added up over threads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network_time: Option<f64>,
     /// The machine, if it differs from that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub machine: Option<String>,
@@ -144,6 +147,7 @@ impl Progress {
                 seed: config.get("seed").cloned().unwrap_or_default(),
                 config,
                 seconds: Some(line.runtime),
+                network_seconds: line.network_time,
                 run: line.run,
                 machine: line.machine,
                 proof: line.proof,

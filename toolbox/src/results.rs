@@ -21,6 +21,9 @@ pub const SOLVED: &str = "CSR";
 /// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
 
+/// The part of [`RUNTIME`] that a network took, read from the same file.
+pub(crate) const NETWORK_TIME: &str = "network_time";
+
 /// The field of a config that names its map.
 const MAP_NAME: &str = "map_name";
 
@@ -61,6 +64,9 @@ pub struct Episode {
     pub config: Value,
     /// Time of the policy. Units: seconds.
     pub seconds: Option<f64>,
+    /// The part of it that a network took, if the policy has one. Units: seconds, added up over threads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network_seconds: Option<f64>,
     /// Index of the run that played it.
     pub run: usize,
     /// The machine, if it differs from that of the run.
@@ -145,7 +151,7 @@ impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
     /// Each `<algorithm>.json` holds rows. `<algorithm>.episodes.json` holds how they were played, in the same order;
-    /// its seconds become the metric `runtime` of rows that lack it. `<algorithm>.jsonl` belongs to an unfinished
+    /// its seconds become the metrics `runtime` and `network_time` of rows that lack them. `<algorithm>.jsonl` belongs to an unfinished
     /// algorithm.
     ///
     /// # Errors
@@ -259,7 +265,7 @@ fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
     }
 }
 
-/// Adds runtime, config and proof to rows if there is a file of episodes; rows with a runtime keep it.
+/// Adds times, config and proof to rows if there is a file of episodes; rows with a runtime keep it.
 fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
@@ -272,6 +278,9 @@ fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     for (row, episode) in rows.iter_mut().zip(episodes) {
         if !row.metrics.contains_key(RUNTIME) {
             row.metrics.insert(RUNTIME.to_owned(), episode.seconds.into());
+        }
+        if let Some(seconds) = episode.network_seconds {
+            row.metrics.entry(NETWORK_TIME.to_owned()).or_insert(seconds.into());
         }
         row.config = small_fields(episode.config);
         row.proof = episode.proof;

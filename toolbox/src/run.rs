@@ -172,7 +172,8 @@ fn played(index: usize, environments: &EpisodeConfigs, built_in: &BuiltIn) -> Re
 
 fn done(index: usize, played: Played) -> Done {
     let (metrics, runtime) = (measured(&played), played.runtime.as_secs_f64());
-    Done { index, metrics, runtime, proof: played.proof, ..Done::default() }
+    let network_time = played.network_time.map(|time| time.as_secs_f64());
+    Done { index, metrics, runtime, network_time, proof: played.proof, ..Done::default() }
 }
 
 /// Returns the metrics of an episode as in results: POGEMA's counts as whole numbers, means as floats.

@@ -144,7 +144,7 @@ impl Store {
 /// # Errors
 /// If the folder holds anything that `begin` does not allow.
 fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option<Manifest>), Error> {
-    let mut manifest = Manifest::of(suite);
+    let mut manifest = Manifest::of(suite)?;
     match (begin, Manifest::read(folder)?) {
         (Begin::Resume, Some(known)) => {
             manifest.continue_from(known).map_err(|what| refused(folder, &what))?;

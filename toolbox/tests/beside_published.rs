@@ -205,3 +205,25 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
         assert!(error.contains(expected), "{to}: {error}");
     }
 }
+
+#[test]
+fn intervals_and_times_of_decisions_are_shown() {
+    let folder = folder(MEANS, "01-random", &[]);
+    let lifelong = |seed: u64, throughput: f64, runtime: f64, network: f64| {
+        let text = format!(
+            r#"{{"metrics": {{"avg_throughput": {throughput}, "runtime": {runtime},
+                "network_time": {network}}}, "env_grid_search": {{"num_agents": 2, "seed": {seed}}}, "algorithm": "RHCR"}}"#
+        );
+        let config = Pairs::from([("max_episode_steps".to_owned(), 100.into())]);
+        Row { set: "01-random".to_owned(), config, ..serde_json::from_str(&text).unwrap() }
+    };
+    let rows = vec![lifelong(0, 0.5, 0.5, 0.25), lifelong(1, 0.5, 0.75, 0.25)];
+    let results = Results { rows, notes: Vec::new() };
+    let fields = "{type: published, file: means.csv, setting: LMAPF, algorithm: RHCR, metrics: [avg_throughput], \
+                  show_std: True, decision_times: True}";
+    let shown = show(folder.path(), fields, &results).unwrap();
+    // 200 decisions of one agent took 0.25 and 0.5 seconds without the network.
+    let expected = "2,2,0.5,0.5,0.5,2,0.5,1,1875,1250";
+    assert_eq!(csv(&shown)[1], expected);
+    assert!(csv(&shown)[0].ends_with(",planner µs,network µs"), "{}", csv(&shown)[0]);
+}

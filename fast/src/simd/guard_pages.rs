@@ -3,52 +3,11 @@
 //!
 //! A sanitizer does not see the stores that bypass the cache, because they are assembly.
 
-use region::{Allocation, Protection};
+use pogema_core::SimdPath;
 
+use super::guarded::{Guarded, Side};
 use super::sealed::Spread;
-use super::{SimdPath, Value, lead_of};
-
-/// Memory between two pages without access.
-struct Guarded {
-    memory: Allocation,
-    num_bytes: usize,
-}
-
-/// Where a slice touches a guard page.
-#[derive(Clone, Copy, Debug)]
-enum Side {
-    Start,
-    End,
-}
-
-impl Guarded {
-    fn new(num_pages: usize) -> Self {
-        let page = region::page::size();
-        let num_bytes = num_pages * page;
-        let mut memory = region::alloc(num_bytes + 2 * page, Protection::READ_WRITE).unwrap();
-        for guard in [0, page + num_bytes] {
-            // SAFETY: both pages lie inside the allocation, and no slice contains any of their bytes.
-            unsafe { region::protect(memory.as_mut_ptr::<u8>().add(guard), page, Protection::NONE).unwrap() };
-        }
-        Self { memory, num_bytes }
-    }
-
-    fn slice<T: Copy>(&mut self, side: Side, len: usize, value: T) -> &mut [T] {
-        assert!(len * size_of::<T>() <= self.num_bytes);
-        let skipped = match side {
-            Side::Start => 0,
-            Side::End => self.num_bytes - len * size_of::<T>(),
-        };
-        // SAFETY: the bytes lie between the guard pages, belong to this slice alone, and hold numbers, for which every
-        // bit pattern is valid. Pages are aligned for every number, and so is each multiple of its size before them.
-        let slice = unsafe {
-            let first = self.memory.as_mut_ptr::<u8>().add(region::page::size() + skipped);
-            std::slice::from_raw_parts_mut(first.cast::<T>(), len)
-        };
-        slice.fill(value);
-        slice
-    }
-}
+use super::{Value, lead_of};
 
 /// Values between a slice and its guard page. A store of a whole cache line touches them, but no guard page.
 const DISTANCES: [usize; 9] = [0, 1, 2, 5, 8, 15, 16, 33, 63];
@@ -87,7 +46,7 @@ fn check<V: Value + Spread>(path: SimdPath, canary: V) {
 
 #[test]
 fn spread_stays_inside_its_slices() {
-    for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
+    for path in SimdPath::available() {
         check::<f32>(path, 7.0);
         check::<u8>(path, 7);
     }

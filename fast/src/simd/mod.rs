@@ -19,8 +19,11 @@ mod avx512_windows;
 // Miri supports no guard pages, and needs none.
 #[cfg(test)]
 #[cfg(not(miri))]
-#[allow(unsafe_code, reason = "slices next to pages without access")]
 mod guard_pages;
+#[cfg(test)]
+#[cfg(not(miri))]
+#[allow(unsafe_code, reason = "slices next to pages without access")]
+mod guarded;
 #[cfg(target_arch = "x86_64")]
 mod positions;
 mod scalar;
@@ -28,76 +31,9 @@ mod scalar;
 use std::fmt;
 use std::ops::Range;
 
-use pogema_core::{Cell, Error};
+use pogema_core::{Cell, SimdPath};
 
 use crate::grid::Strips;
-
-/// The instruction set that computes observations. The results are the same for all paths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum SimdPath {
-    /// No intrinsics; available on every machine.
-    Scalar,
-    /// AVX2.
-    Avx2,
-    /// AVX-512 F and BW.
-    Avx512,
-}
-
-impl SimdPath {
-    /// All paths, from the narrowest vectors to the widest.
-    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
-
-    /// The environment variable that forces a path.
-    pub const VARIABLE: &'static str = "POGEMA_SIMD";
-
-    /// Returns whether this machine supports the path.
-    pub fn is_available(self) -> bool {
-        match self {
-            Self::Scalar => true,
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2"),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw"),
-            #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 | Self::Avx512 => false,
-        }
-    }
-
-    /// Returns the widest path that this machine supports.
-    pub fn best() -> Self {
-        Self::ALL.into_iter().rev().find(|path| path.is_available()).unwrap_or(Self::Scalar)
-    }
-
-    /// Returns the path named by the variable `POGEMA_SIMD` [default: the widest path of this machine].
-    ///
-    /// # Errors
-    /// [`Error::Config`] if the variable is set, but not to the name of a path that this machine supports.
-    pub fn from_environment() -> Result<Self, Error> {
-        let Some(value) = std::env::var_os(Self::VARIABLE) else { return Ok(Self::best()) };
-        let name = value.to_string_lossy();
-        let path = Self::ALL.into_iter().find(|path| path.to_string() == name);
-        let path =
-            path.ok_or_else(|| Error::config(Self::VARIABLE, &name, "`scalar`, `avx2` or `avx512`"))?;
-        path.check().map(|()| path)
-    }
-
-    pub(crate) fn check(self) -> Result<(), Error> {
-        if self.is_available() {
-            return Ok(());
-        }
-        Err(Error::config(Self::VARIABLE, self, format!("at most `{}` on this machine", Self::best())))
-    }
-}
-
-impl fmt::Display for SimdPath {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Scalar => "scalar",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        })
-    }
-}
 
 /// The requested channels of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -33,3 +33,4 @@ pub use network_prior::NetworkPrior;
 pub use params::MatsLpParams;
 pub use policy::MatsLp;
 pub use prior::{Evaluate, Evaluation, Prior};
+pub use tree::RootChild;

@@ -1,7 +1,8 @@
 //! Networks that were read from files, as priors.
 
-use pogema_core::{Action, Error};
+use pogema_core::{Action, Error, Words};
 
+use crate::encode::Channel;
 use crate::mats_lp::prior::{Evaluate, Evaluation, Prior};
 use crate::network::{ForwardError, Inputs, Network, RecurrentState, Workspace};
 
@@ -14,6 +15,9 @@ pub struct NetworkPrior {
 
 impl NetworkPrior {
     /// Accepts a network that reads two square windows and returns five logits, without recurrent layers.
+    ///
+    /// A network whose config names an encoder must read what MATS-LP writes: `all_agents` or `agents`, then
+    /// `cost_tracer`. Without an encoder, what the network was trained on is unknown.
     ///
     /// # Errors
     /// [`Error::Argument`] that says how the network differs.
@@ -45,6 +49,16 @@ impl NetworkPrior {
                 size,
                 "0, as MATS-LP evaluates states in any order",
             );
+        }
+        if let Some(encoder) = &network.config().encoder {
+            let is_known =
+                matches!(encoder.channels[..], [Channel::AllAgents | Channel::Agents, Channel::CostTracer]);
+            if !is_known || encoder.radius != height / 2 {
+                let names: Vec<&str> = encoder.channels.iter().map(|channel| channel.word()).collect();
+                let found = format!("{} with radius {}", names.join(", "), encoder.radius);
+                let expected = format!("all_agents, cost_tracer with radius {}", height / 2);
+                return Err(Error::argument("encoder of the network", found, expected));
+            }
         }
         Ok(Self { network, radius: height / 2 })
     }

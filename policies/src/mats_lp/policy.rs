@@ -12,7 +12,8 @@ use crate::mats_lp::group::Groups;
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::prior::Prior;
 use crate::mats_lp::simulation::Goals;
-use crate::mats_lp::workers::{Task, search_all};
+use crate::mats_lp::tree::RootChild;
+use crate::mats_lp::workers::{Answer, Task, search_all};
 use crate::mats_lp::world::World;
 
 /// MATS-LP, which chooses the actions of all agents of an environment.
@@ -29,6 +30,8 @@ pub struct MatsLp {
     evaluators: Vec<Evaluator>,
     cancelled: Option<Arc<AtomicBool>>,
     episode: Option<Episode>,
+    /// The children of each agent's root in the last step.
+    roots: Vec<Vec<RootChild>>,
 }
 
 /// What is known of an episode.
@@ -60,7 +63,7 @@ impl MatsLp {
             return Err(Error::argument("faithful", false, "true, because the network has no critic"));
         }
         let evaluators = (0..threads).map(|_| Evaluator::new(prior)).collect();
-        Ok(Self { params, radius, evaluators, cancelled: None, episode: None })
+        Ok(Self { params, radius, evaluators, cancelled: None, episode: None, roots: Vec::new() })
     }
 
     /// Lets any thread stop [`MatsLp::act`] by setting a flag.
@@ -123,10 +126,20 @@ impl MatsLp {
             cancelled: self.cancelled.as_deref(),
         };
         let mut actions = vec![Action::Stay; now.cells.len()];
-        for (agent, action) in search_all(&task, groups, &mut self.evaluators)? {
+        self.roots.clear();
+        self.roots.resize(now.cells.len(), Vec::new());
+        for Answer { agent, action, root } in search_all(&task, groups, &mut self.evaluators)? {
             actions[agent] = action;
+            self.roots[agent] = root;
         }
         Ok(actions)
+    }
+
+    /// Returns the children of the root of an agent's last search; none if it did not search.
+    ///
+    /// Children are joint actions of the group in ascending order; the agent's own action varies fastest.
+    pub fn root(&self, agent: usize) -> &[RootChild] {
+        self.roots.get(agent).map_or(&[], Vec::as_slice)
     }
 }
 

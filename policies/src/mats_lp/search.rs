@@ -6,7 +6,7 @@ use crate::mats_lp::cache::{Cache, Outlook};
 use crate::mats_lp::evaluator::{Answer, Evaluator};
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::simulation::Simulation;
-use crate::mats_lp::tree::{Choices, NodeId, ROOT, Tree};
+use crate::mats_lp::tree::{Choices, NodeId, ROOT, RootChild, Tree};
 
 /// The search of one agent.
 ///
@@ -148,6 +148,11 @@ impl<'a> Search<'a> {
         let child = self.tree.most_visited();
         self.tree.write_actions(ROOT, child, &mut self.actions);
         self.actions[0]
+    }
+
+    /// Returns what the search knows of each child of the root.
+    pub fn root_children(&self) -> Vec<RootChild> {
+        self.tree.root_children()
     }
 }
 

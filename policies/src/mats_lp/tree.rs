@@ -30,6 +30,15 @@ struct Node {
 /// The actions of one agent that the children of a node combine: bit `a` is set for action `a`.
 pub(super) type Choices = u8;
 
+/// What a search knows of a child of its root, which is a joint action of the group.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RootChild {
+    /// Number of expansions that passed through it.
+    pub num_visits: u32,
+    /// Sum of the values that these expansions passed on to it.
+    pub value_sum: f64,
+}
+
 /// All nodes of a search.
 ///
 /// A child is stored as its prior alone until it is visited.
@@ -208,6 +217,17 @@ impl Tree {
         let visits = |index| self.child(ROOT, index).map_or(0, |child| self.nodes[child as usize].num_visits);
         let num_children = self.nodes[ROOT as usize].num_children;
         (0..num_children).fold(0, |best, index| if visits(index) > visits(best) { index } else { best })
+    }
+
+    /// Returns the children of the root in the order of their joint actions.
+    pub fn root_children(&self) -> Vec<RootChild> {
+        let child = |index| {
+            self.child(ROOT, index).map_or_else(RootChild::default, |child| {
+                let Node { num_visits, value_sum, .. } = self.nodes[child as usize];
+                RootChild { num_visits, value_sum }
+            })
+        };
+        (0..self.nodes[ROOT as usize].num_children).map(child).collect()
     }
 }
 

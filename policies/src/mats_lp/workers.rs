@@ -9,6 +9,7 @@ use crate::mats_lp::evaluator::Evaluator;
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::search::Search;
 use crate::mats_lp::simulation::{Goals, Simulation};
+use crate::mats_lp::tree::RootChild;
 use crate::mats_lp::world::World;
 
 /// What the searches of a step read.
@@ -25,10 +26,14 @@ pub(super) struct Task<'a> {
     pub cancelled: Option<&'a AtomicBool>,
 }
 
-/// The action of each agent that searches.
-type Answers = Vec<(usize, Action)>;
+/// The result of a search: the agent, its action, and the children of the root.
+pub(super) struct Answer {
+    pub agent: usize,
+    pub action: Action,
+    pub root: Vec<RootChild>,
+}
 
-/// Searches for all groups, and returns the action of the first agent of each.
+/// Searches for all groups, and returns the result for the first agent of each.
 ///
 /// Each evaluator is used by one thread. The actions do not depend on the number of threads.
 ///
@@ -39,7 +44,7 @@ pub(super) fn search_all(
     task: &Task<'_>,
     mut groups: Vec<Vec<usize>>,
     evaluators: &mut [Evaluator],
-) -> Result<Answers, Error> {
+) -> Result<Vec<Answer>, Error> {
     // The largest groups take longest, so they are dealt out first.
     groups.sort_by_key(|group| (std::cmp::Reverse(group.len()), group[0]));
     let num_threads = evaluators.len();
@@ -49,7 +54,7 @@ pub(super) fn search_all(
     }
     let mut work = evaluators.iter_mut().zip(shares);
     let first = work.next();
-    let results: Vec<Result<Answers, Failure>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Vec<Answer>, Failure>> = std::thread::scope(|scope| {
         let others: Vec<_> = work
             .map(|(evaluator, groups)| scope.spawn(move || search_some(task, groups, evaluator)))
             .collect();
@@ -91,7 +96,7 @@ fn search_some(
     task: &Task<'_>,
     groups: Vec<Vec<usize>>,
     evaluator: &mut Evaluator,
-) -> Result<Answers, Failure> {
+) -> Result<Vec<Answer>, Failure> {
     let mut searches: Vec<(&[usize], Search<'_>)> =
         groups.iter().map(|group| (group.as_slice(), new_search(task, group))).collect();
     // An error may have left requests of another episode.
@@ -105,7 +110,8 @@ fn search_some(
         searches.retain_mut(|(group, search)| match search.advance(evaluator, task.cache, task.radius) {
             Ok(false) => true,
             Ok(true) => {
-                answers.push((group[0], search.answer()));
+                let (action, root) = (search.answer(), search.root_children());
+                answers.push(Answer { agent: group[0], action, root });
                 false
             }
             Err(position) => {

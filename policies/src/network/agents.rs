@@ -1,11 +1,13 @@
-//! Runs the steps for 16 agents whose values lie side by side: each list holds, for each value, that of every agent.
+//! Runs the steps for 8 or 16 agents whose values lie side by side: each list holds, for each value, that of every agent.
+
+use pogema_core::SimdPath;
 
 use super::steps::{FlatStep, Group, Heads, PlaneStep, Steps, add, write};
-use crate::simd::{AGENTS, Path};
 
-/// The buffers of 16 agents.
+/// The buffers of 8 or 16 agents.
 #[derive(Clone, Debug)]
 pub struct AgentBuffers {
+    num_agents: usize,
     planes: Vec<Vec<f32>>,
     flats: Vec<Vec<f32>>,
     states: Vec<f32>,
@@ -14,9 +16,10 @@ pub struct AgentBuffers {
 }
 
 impl AgentBuffers {
-    pub fn new(steps: &Steps, heads: &Heads) -> Self {
-        let zeros = |num_values: usize| vec![0.0; AGENTS * num_values];
+    pub fn new(steps: &Steps, heads: &Heads, num_agents: usize) -> Self {
+        let zeros = |num_values: usize| vec![0.0; num_agents * num_values];
         Self {
+            num_agents,
             planes: steps.planes.iter().map(|plane| zeros(plane.num_values())).collect(),
             flats: steps.flats.iter().map(|flat| zeros(flat.len())).collect(),
             states: zeros(steps.state_size),
@@ -27,28 +30,29 @@ impl AgentBuffers {
 
     /// Returns an output of an agent.
     pub fn output(&self, agent: usize, output: usize) -> f32 {
-        self.heads[output * AGENTS + agent]
+        self.heads[output * self.num_agents + agent]
     }
 }
 
 impl Steps {
-    /// Computes the outputs of up to 16 agents. The values of the agents that are missing are those of an earlier call.
+    /// Computes the outputs of at most as many agents as the buffers hold. The values of the agents that are missing are those of an earlier call.
     pub fn run_agents(
         &self,
-        path: Path,
+        path: SimdPath,
         group: Group<'_>,
         heads: &Heads,
         states: &mut [f32],
         buffers: &mut AgentBuffers,
     ) {
+        let num_agents = buffers.num_agents;
         let [rows, cols, channels] = [self.planes[0].rows, self.planes[0].cols, self.planes[0].channels];
         for (agent, window) in group.windows.chunks_exact(rows * cols * channels).enumerate() {
             for (channel, values) in window.chunks_exact(rows * cols).enumerate() {
-                let to = buffers.planes[0].chunks_exact_mut(channels * AGENTS);
-                to.zip(values).for_each(|(pixel, value)| pixel[channel * AGENTS + agent] = *value);
+                let to = buffers.planes[0].chunks_exact_mut(channels * num_agents);
+                to.zip(values).for_each(|(pixel, value)| pixel[channel * num_agents + agent] = *value);
             }
         }
-        interleave(states, self.state_size, &mut buffers.states);
+        interleave(states, self.state_size, num_agents, &mut buffers.states);
         for step in &self.of_planes {
             run_planes(path, step, buffers);
         }
@@ -56,14 +60,21 @@ impl Steps {
             self.run_flats_of_agents(path, step, group, buffers);
         }
         for (agent, state) in states.chunks_exact_mut(self.state_size.max(1)).enumerate() {
-            let from = buffers.states.chunks_exact(AGENTS);
+            let from = buffers.states.chunks_exact(num_agents);
             state.iter_mut().zip(from).for_each(|(value, agents)| *value = agents[agent]);
         }
         heads.dense.run_agents(path, &buffers.flats[heads.input], false, &mut buffers.heads);
     }
 
-    fn run_flats_of_agents(&self, path: Path, step: &FlatStep, group: Group<'_>, buffers: &mut AgentBuffers) {
-        let AgentBuffers { flats, states, scratch, .. } = buffers;
+    fn run_flats_of_agents(
+        &self,
+        path: SimdPath,
+        step: &FlatStep,
+        group: Group<'_>,
+        buffers: &mut AgentBuffers,
+    ) {
+        let AgentBuffers { num_agents, flats, states, scratch, .. } = buffers;
+        let num_agents = *num_agents;
         match step {
             FlatStep::Dense { dense, input, relu, output } => {
                 write(flats, *output, |flats, to| dense.run_agents(path, &flats[*input], *relu, to));
@@ -74,11 +85,13 @@ impl Steps {
             }),
             FlatStep::Add { inputs, output } => write(flats, *output, |flats, to| add(flats, *inputs, to)),
             FlatStep::Gru { gru, input, offset, output } => write(flats, *output, |flats, to| {
-                let state = &mut states[offset * AGENTS..][..gru.size * AGENTS];
+                let state = &mut states[offset * num_agents..][..gru.size * num_agents];
                 gru.run_agents(path, &flats[*input], state, scratch);
                 to.copy_from_slice(state);
             }),
-            FlatStep::Scalars { output } => interleave(group.scalars, self.num_scalars, &mut flats[*output]),
+            FlatStep::Scalars { output } => {
+                interleave(group.scalars, self.num_scalars, num_agents, &mut flats[*output]);
+            }
             FlatStep::Join { inputs, output } => write(flats, *output, |flats, to| {
                 let (one, other) = to.split_at_mut(flats[inputs[0]].len());
                 one.copy_from_slice(&flats[inputs[0]]);
@@ -88,7 +101,7 @@ impl Steps {
     }
 }
 
-fn run_planes(path: Path, step: &PlaneStep, buffers: &mut AgentBuffers) {
+fn run_planes(path: SimdPath, step: &PlaneStep, buffers: &mut AgentBuffers) {
     let AgentBuffers { planes, flats, .. } = buffers;
     match step {
         PlaneStep::Convolve { convolution, input, added, relu, output } => {
@@ -107,8 +120,8 @@ fn run_planes(path: Path, step: &PlaneStep, buffers: &mut AgentBuffers) {
 }
 
 /// Writes lists of agents as agents of values.
-fn interleave(lists: &[f32], len: usize, to: &mut [f32]) {
+fn interleave(lists: &[f32], len: usize, num_agents: usize, to: &mut [f32]) {
     for (agent, list) in lists.chunks_exact(len.max(1)).enumerate() {
-        to.chunks_exact_mut(AGENTS).zip(list).for_each(|(agents, value)| agents[agent] = *value);
+        to.chunks_exact_mut(num_agents).zip(list).for_each(|(agents, value)| agents[agent] = *value);
     }
 }

@@ -1,8 +1,9 @@
 //! The gated recurrent unit, with PyTorch's formula.
 
+use pogema_core::SimdPath;
+
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
-use crate::simd::{AGENTS, Path};
 
 /// A recurrent layer. Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
 #[derive(Debug)]
@@ -38,7 +39,7 @@ impl Gru {
     /// also the output.
     pub fn run(
         &self,
-        path: Path,
+        path: SimdPath,
         num_rows: usize,
         input: Rows<'_>,
         states: &mut States<'_>,
@@ -61,9 +62,9 @@ impl Gru {
         }
     }
 
-    /// Runs a step of 16 agents whose values lie side by side. `state` is also the output.
-    pub fn run_agents(&self, path: Path, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
-        let num_values = self.size * AGENTS;
+    /// Runs a step of 8 or 16 agents whose values lie side by side. `state` is also the output.
+    pub fn run_agents(&self, path: SimdPath, input: &[f32], state: &mut [f32], scratch: &mut [f32]) {
+        let num_values = state.len();
         let (of_input, rest) = scratch.split_at_mut(3 * num_values);
         let of_state = &mut rest[..3 * num_values];
         self.of_input.run_agents(path, input, false, of_input);

@@ -1,9 +1,9 @@
 //! Layers with their weights, packed for the kernels.
 
+use pogema_core::SimdPath;
+
 use super::tensors::{Tensor, Tensors};
-use crate::simd::{
-    self, BLOCK, Convolve, ConvolveAgents, LANES, Multiply, MultiplyAgents, Path, Plane, Shape,
-};
+use crate::simd::{self, BLOCK, Convolve, LANES, Multiply, MultiplyAgents, Plane, Shape};
 
 /// A function of each value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,25 +57,22 @@ impl Convolution {
         Ok(Self { weights: pack_kernel(&weight, &shape), bias: pad(bias.values, stride), shape })
     }
 
-    pub fn run(&self, path: Path, input: &[f32], added: Option<&[f32]>, relu: bool, output: &mut [f32]) {
+    pub fn run(&self, path: SimdPath, input: &[f32], added: Option<&[f32]>, relu: bool, output: &mut [f32]) {
         let Self { shape, weights, bias } = self;
         simd::convolve(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
     }
 
-    /// Runs the layer for 16 agents whose values lie side by side.
+    /// Runs the layer for 8 or 16 agents whose values lie side by side.
     pub fn run_agents(
         &self,
-        path: Path,
+        path: SimdPath,
         input: &[f32],
         added: Option<&[f32]>,
         relu: bool,
         output: &mut [f32],
     ) {
         let Self { shape, weights, bias } = self;
-        simd::convolve_agents(
-            path,
-            ConvolveAgents { input, output, added, weights, bias, shape: *shape, relu },
-        );
+        simd::convolve_agents(path, Convolve { input, output, added, weights, bias, shape: *shape, relu });
     }
 }
 
@@ -198,7 +195,7 @@ impl Dense {
         self.bias.len()
     }
 
-    pub fn run(&self, path: Path, num_rows: usize, input: Rows<'_>, relu: bool, output: &mut [f32]) {
+    pub fn run(&self, path: SimdPath, num_rows: usize, input: Rows<'_>, relu: bool, output: &mut [f32]) {
         let Self { num_inputs, weights, bias, .. } = self;
         let Rows { values: input, stride: input_stride } = input;
         let num_inputs = *num_inputs;
@@ -208,8 +205,8 @@ impl Dense {
         );
     }
 
-    /// Runs the layer for 16 agents whose values lie side by side.
-    pub fn run_agents(&self, path: Path, input: &[f32], relu: bool, output: &mut [f32]) {
+    /// Runs the layer for 8 or 16 agents whose values lie side by side.
+    pub fn run_agents(&self, path: SimdPath, input: &[f32], relu: bool, output: &mut [f32]) {
         let Self { weights, bias, .. } = self;
         simd::multiply_agents(path, MultiplyAgents { input, output, weights, bias, relu });
     }

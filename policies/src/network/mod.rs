@@ -19,10 +19,10 @@ mod tensors;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path as FilePath;
+use std::path::Path;
 use std::sync::Arc;
 
-use pogema_core::Error;
+use pogema_core::{Error, SimdPath};
 
 pub use architecture::{Architecture, Layer};
 pub use config::{NetworkConfig, Sampling, SamplingConfig};
@@ -30,7 +30,7 @@ pub use error::ForwardError;
 pub use program::Workspace;
 pub use softmax::softmax;
 
-use crate::simd::{AGENTS, Path};
+use crate::simd::AGENTS;
 use file::Content;
 use program::{Layers, Program};
 use steps::Group;
@@ -114,12 +114,14 @@ impl Network {
     /// follow them are ignored. The output `values` or `value` is used if it stands on the same layers.
     ///
     /// # Errors
-    /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator.
-    pub fn read(path: impl AsRef<FilePath>) -> Result<Self, Error> {
+    /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator;
+    /// [`Error::Config`] for a value of `POGEMA_SIMD` that [`SimdPath::from_environment`] rejects.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let (config, content) = file::read(path)?;
+        let simd_path = SimdPath::from_environment()?;
         let network = match content {
-            Content::Layers(mut tensors) => Self::new(config, &mut tensors, Path::best()),
+            Content::Layers(mut tensors) => Self::new(config, &mut tensors, simd_path),
             #[cfg(feature = "onnx")]
             Content::Runtime(runtime) => {
                 let window = runtime.window;
@@ -133,7 +135,7 @@ impl Network {
     ///
     /// # Errors
     /// Those of [`Network::read`], and [`Error::Io`] if a file cannot be written.
-    pub fn convert(from: impl AsRef<FilePath>, to: impl AsRef<FilePath>) -> Result<(), Error> {
+    pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<(), Error> {
         let from = from.as_ref();
         let (config, content) = file::read(from)?;
         #[cfg_attr(
@@ -148,7 +150,7 @@ impl Network {
             #[cfg(feature = "onnx")]
             Content::Runtime(runtime) => return Err(Error::io(from, runtime.reason)),
         };
-        let network = Self::new(config, &mut tensors.clone(), Path::best());
+        let network = Self::new(config, &mut tensors.clone(), SimdPath::best());
         let network = network.map_err(|reason| Error::io(from, reason))?;
         file::write(to.as_ref(), network.config(), &tensors)
     }
@@ -161,7 +163,8 @@ impl Network {
         config: NetworkConfig,
         tensors: impl IntoIterator<Item = (String, Vec<usize>, Vec<f32>)>,
     ) -> Result<Self, Error> {
-        let network = collect(tensors).and_then(|mut tensors| Self::new(config, &mut tensors, Path::best()));
+        let network =
+            collect(tensors).and_then(|mut tensors| Self::new(config, &mut tensors, SimdPath::best()));
         network.map_err(|reason| Error::Corrupt { what: "network".into(), reason })
     }
 
@@ -170,24 +173,30 @@ impl Network {
     /// # Errors
     /// [`Error::Io`] if the network is wrong or a file cannot be written.
     pub fn write(
-        path: impl AsRef<FilePath>,
+        path: impl AsRef<Path>,
         config: NetworkConfig,
         tensors: impl IntoIterator<Item = (String, Vec<usize>, Vec<f32>)>,
     ) -> Result<(), Error> {
         let path = path.as_ref();
         let wrong = |reason| Error::io(path, reason);
         let tensors = collect(tensors).map_err(wrong)?;
-        let network = Self::new(config, &mut tensors.clone(), Path::best()).map_err(wrong)?;
+        let network = Self::new(config, &mut tensors.clone(), SimdPath::best()).map_err(wrong)?;
         file::write(path, network.config(), &tensors)
     }
 
-    fn new(config: NetworkConfig, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
+    fn new(config: NetworkConfig, tensors: &mut Tensors, path: SimdPath) -> Result<Self, String> {
+        path.check().map_err(|error| error.to_string())?;
         let Some(architecture) = &config.architecture else {
             return Err("`architecture` is missing".into());
         };
         let window = architecture.window;
         let program = Program::Layers(Box::new(Layers::new(architecture, tensors, path)?));
         Ok(Self(Arc::new(Inner { config, window, program })))
+    }
+
+    /// Returns the instruction set that runs its layers; `None` if a runtime runs it.
+    pub fn simd_path(&self) -> Option<SimdPath> {
+        self.0.program.simd_path()
     }
 
     /// Returns the channels, rows and columns of the window.

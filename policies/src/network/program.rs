@@ -1,5 +1,7 @@
 //! What a network runs: layers of ours, or a graph of a runtime.
 
+use pogema_core::SimdPath;
+
 use super::agents::AgentBuffers;
 use super::architecture::Architecture;
 use super::build;
@@ -7,18 +9,18 @@ use super::steps::{Buffers, GROUP, Group, Heads, Steps};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
-use crate::simd::Path;
+use crate::simd::{AGENTS, HALF};
 
 /// The layers of a network, packed for a path.
 #[derive(Debug)]
 pub struct Layers {
     pub steps: Steps,
     pub heads: Heads,
-    path: Path,
+    path: SimdPath,
 }
 
 impl Layers {
-    pub fn new(architecture: &Architecture, tensors: &mut Tensors, path: Path) -> Result<Self, String> {
+    pub fn new(architecture: &Architecture, tensors: &mut Tensors, path: SimdPath) -> Result<Self, String> {
         let (steps, heads) = build::build(architecture, tensors)?;
         Ok(Self { steps, heads, path })
     }
@@ -27,9 +29,10 @@ impl Layers {
     fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
         let Self { steps, heads, path } = self;
         let Workspace { buffers, logits, values } = workspace;
-        let Some(LayerBuffers { apart, agents, heads: outputs }) = buffers else { return };
+        let Some(LayerBuffers { apart, half, agents, heads: outputs }) = buffers else { return };
         let num_outputs = heads.dense.num_outputs;
         if group.num_agents > steps.most_apart() {
+            let agents = if group.num_agents > HALF { agents } else { half };
             steps.run_agents(*path, group, heads, states, agents);
             for agent in 0..group.num_agents {
                 logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
@@ -56,6 +59,14 @@ pub enum Program {
 }
 
 impl Program {
+    pub fn simd_path(&self) -> Option<SimdPath> {
+        match self {
+            Self::Layers(layers) => Some(layers.path),
+            #[cfg(feature = "onnx")]
+            Self::Runtime(_) => None,
+        }
+    }
+
     pub fn num_scalars(&self) -> usize {
         match self {
             Self::Layers(layers) => layers.steps.num_scalars,
@@ -92,7 +103,8 @@ impl Program {
         let buffers = match self {
             Self::Layers(layers) => Some(LayerBuffers {
                 apart: Buffers::new(&layers.steps),
-                agents: AgentBuffers::new(&layers.steps, &layers.heads),
+                half: AgentBuffers::new(&layers.steps, &layers.heads, HALF),
+                agents: AgentBuffers::new(&layers.steps, &layers.heads, AGENTS),
                 heads: vec![0.0; GROUP * layers.heads.dense.stride()],
             }),
             #[cfg(feature = "onnx")]
@@ -131,6 +143,7 @@ pub struct Workspace {
 #[derive(Clone, Debug)]
 struct LayerBuffers {
     apart: Buffers,
+    half: AgentBuffers,
     agents: AgentBuffers,
     heads: Vec<f32>,
 }

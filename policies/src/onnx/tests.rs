@@ -127,6 +127,99 @@ fn hostile_files_are_refused() {
     assert!(super::read(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());
 }
 
+/// The sizes of a recurrent layer: values of its input, and of its state.
+const INPUTS: usize = 18;
+const STATE: usize = 3;
+
+/// Returns values between -1 and 1 that do not repeat.
+fn drawn(name: &str, dims: &[i64], first: usize) -> TensorProto {
+    let len = dims.iter().product::<i64>() as usize;
+    let float_data = (first..first + len).map(|index| (index as f32 * 1.7).sin()).collect();
+    TensorProto { float_data, ..tensor(name, dims) }
+}
+
+/// A recurrent layer as PyTorch exports it, between a window and a head.
+fn recurrent(linear_before_reset: i64) -> Graph {
+    let size = STATE as i64;
+    let attributes = vec![int("hidden_size", size), int("linear_before_reset", linear_before_reset)];
+    Graph {
+        node: vec![
+            node("Flatten", &["obs"], "flat", vec![]),
+            node("Unsqueeze", &["flat", "axes"], "sequence", vec![]),
+            node("GRU", &["sequence", "w", "r", "b", "", "h0"], "states", attributes),
+            node("Squeeze", &["states", "axes"], "steps", vec![]),
+            node("Squeeze", &["steps", "axes"], "state", vec![]),
+            node("Gemm", &["state", "head.weight", "bias"], "logits", vec![int("transB", 1)]),
+        ],
+        initializer: vec![
+            drawn("w", &[1, 3 * size, INPUTS as i64], 0),
+            drawn("r", &[1, 3 * size, size], 1000),
+            drawn("b", &[1, 6 * size], 2000),
+            drawn("head.weight", &[5, size], 3000),
+            drawn("bias", &[5], 4000),
+        ],
+        input: vec![value("obs", &[0, 2, 3, 3]), value("h0", &[1, 0, size])],
+        output: vec![value("logits", &[])],
+    }
+}
+
+/// The formula of ONNX for one step, with `linear_before_reset`. The gates are update, reset and new.
+///
+/// Source: <https://onnx.ai/onnx/operators/onnx__GRU.html>
+fn onnx_step(graph: &Graph, input: &[f64], state: &[f64]) -> Vec<f64> {
+    let list = |name: &str| -> Vec<f64> {
+        let tensor = graph.initializer.iter().find(|tensor| tensor.name == name).unwrap();
+        tensor.float_data.iter().map(|value| f64::from(*value)).collect()
+    };
+    let (w, r, b) = (list("w"), list("r"), list("b"));
+    let of = |weights: &[f64], values: &[f64], row: usize| -> f64 {
+        weights[row * values.len()..].iter().zip(values).map(|(weight, value)| weight * value).sum()
+    };
+    let sigmoid = |value: f64| 1.0 / (1.0 + (-value).exp());
+    let next = |index: usize| {
+        let row = |gate: usize| gate * STATE + index;
+        let of_input = |gate: usize| of(&w, input, row(gate)) + b[row(gate)];
+        let of_state = |gate: usize| of(&r, state, row(gate)) + b[3 * STATE + row(gate)];
+        let [update, reset] = [0, 1].map(|gate| sigmoid(of_input(gate) + of_state(gate)));
+        let new = (of_input(2) + reset * of_state(2)).tanh();
+        (1.0 - update) * new + update * state[index]
+    };
+    (0..STATE).map(next).collect()
+}
+
+#[test]
+fn a_recurrent_layer_follows_the_formula_of_onnx() {
+    use prost::Message;
+
+    use super::proto::Model;
+    use crate::network::{Inputs, Network, RecurrentState};
+
+    let graph = recurrent(1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recurrent.onnx");
+    std::fs::write(&path, Model { graph: Some(graph.clone()) }.encode_to_vec()).unwrap();
+    let network = Network::read(&path).unwrap();
+    assert_eq!((network.state_size(), network.num_actions()), (STATE, 5));
+    let (mut state, mut workspace) = (RecurrentState::new(&network, 1), network.workspace());
+    let mut expected = vec![0.0; STATE];
+    for step in 0..6 {
+        let window: Vec<f32> = (0..INPUTS).map(|index| ((step * INPUTS + index) as f32).cos()).collect();
+        let inputs = Inputs { windows: &window, scalars: &[], batch: 1 };
+        network.forward(inputs, &mut state, &mut workspace).unwrap();
+        let window: Vec<f64> = window.into_iter().map(f64::from).collect();
+        expected = onnx_step(&graph, &window, &expected);
+        for (got, expected) in state.values().iter().zip(&expected) {
+            assert!((f64::from(*got) - expected).abs() < 1e-5, "step {step}: {got}, expected {expected}");
+        }
+    }
+    // Without the attribute, ONNX multiplies by the reset gate before the product.
+    let graph = recurrent(0);
+    let mut reader = Reader::new(&graph).unwrap();
+    graph.node.iter().for_each(|node| reader.add(node));
+    let error = reader.finish("logits", None).err().unwrap();
+    assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
+}
+
 /// A head on a window whose values are doubled by an operator that is no layer.
 #[cfg(feature = "onnx")]
 fn other_operator(op_type: &str) -> Vec<u8> {

@@ -1,12 +1,15 @@
 //! Learned policies with their networks.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Error, words};
+use pogema_core::{Config, Error, Instance, words};
 
-use crate::mats_lp::{MatsLpParams, NetworkPrior};
+use crate::mats_lp::{MatsLp, MatsLpParams, NetworkPrior};
 use crate::network::{Network, Sampling};
-use crate::policy::learned::NetworkPolicy;
+use crate::policy::learned::LearnedPolicy;
+use crate::policy::network::NetworkPolicy;
 
 words! {
     /// The policies that need the weights of a network.
@@ -20,12 +23,13 @@ words! {
     }
 }
 
-/// A learned policy with its network.
+/// A learned policy with its network and its settings.
 #[derive(Clone, Debug)]
-pub enum Learned {
-    /// A network that chooses the action of each agent.
+pub struct Learned(Method);
+
+#[derive(Clone, Debug)]
+enum Method {
     Network(NetworkPolicy),
-    /// A search, with the network that guides it.
     MatsLp(NetworkPrior, MatsLpParams),
 }
 
@@ -36,26 +40,70 @@ impl LearnedName {
     /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy.
     pub fn read(self, weights: &Path) -> Result<Learned, Error> {
         let network = Network::read(weights)?;
-        let learned = match self {
-            Self::Follower => NetworkPolicy::follower(network).map(Learned::Network),
+        let method = match self {
+            Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
             Self::MatsLp => {
-                NetworkPrior::new(network).map(|prior| Learned::MatsLp(prior, MatsLpParams::default()))
+                NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
-            Self::Network => NetworkPolicy::new(network).map(Learned::Network),
+            Self::Network => NetworkPolicy::new(network).map(Method::Network),
         };
-        learned.map_err(|error| Error::io(weights, error))
+        method.map(Learned).map_err(|error| Error::io(weights, error))
     }
 }
 
 impl Learned {
+    /// Begins an episode. The same seed gives the same actions on any number of threads.
+    ///
+    /// Only MATS-LP uses `threads`, and only it stops if another thread sets `cancelled`. It draws no actions, so it has
+    /// no use for the seed.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a number of threads out of range, or if MATS-LP needs a critic that its network lacks.
+    pub fn begin(
+        &self,
+        instance: &Instance,
+        config: &Config,
+        seed: u64,
+        threads: usize,
+        cancelled: Option<Arc<AtomicBool>>,
+    ) -> Result<LearnedPolicy, Error> {
+        match &self.0 {
+            Method::Network(policy) => policy.begin(instance, config, seed),
+            Method::MatsLp(prior, params) => {
+                let mut search = MatsLp::new(prior, *params, threads)?.with_cancellation(cancelled);
+                search.begin(instance, config.on_goal);
+                Ok(LearnedPolicy::of_search(search))
+            }
+        }
+    }
+
+    /// Returns the network that chooses the actions; `None` for MATS-LP, whose network only guides a search.
+    pub fn network(&self) -> Option<&NetworkPolicy> {
+        match &self.0 {
+            Method::Network(policy) => Some(policy),
+            Method::MatsLp(..) => None,
+        }
+    }
+
+    /// Checks that the policy can play on a number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for MATS-LP, if the number is out of range.
+    pub fn check_threads(&self, threads: usize) -> Result<(), Error> {
+        match &self.0 {
+            Method::Network(_) => Ok(()),
+            Method::MatsLp(prior, params) => MatsLp::new(prior, *params, threads).map(|_| ()),
+        }
+    }
+
     /// Replaces the rule that chooses actions from logits.
     ///
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which plays the most visited action.
     pub fn with_sampling(self, sampling: Sampling) -> Result<Self, Error> {
-        match self {
-            Self::Network(policy) => Ok(Self::Network(policy.with_sampling(sampling))),
-            Self::MatsLp(..) => {
+        match self.0 {
+            Method::Network(policy) => Ok(Self(Method::Network(policy.with_sampling(sampling)))),
+            Method::MatsLp(..) => {
                 Err(Error::request("`mats-lp` draws no actions, so it has no rule of sampling"))
             }
         }
@@ -66,12 +114,38 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which forbids them in any case.
     pub fn with_masks(self, masks_actions: bool) -> Result<Self, Error> {
-        match self {
-            Self::Network(policy) => Ok(Self::Network(policy.with_masks(masks_actions))),
-            Self::MatsLp(..) if masks_actions => {
+        match self.0 {
+            Method::Network(policy) => Ok(Self(Method::Network(policy.with_masks(masks_actions)))),
+            Method::MatsLp(..) if masks_actions => {
                 Err(Error::request("`mats-lp` never moves into obstacles, so it has no mask of actions"))
             }
-            Self::MatsLp(..) => Ok(self),
+            Method::MatsLp(..) => Ok(self),
         }
+    }
+
+    /// Sets the number of expansions of each search.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if it is out of range; [`Error::Request`] for a policy that does not search.
+    pub fn with_expansions(self, expansions: u32) -> Result<Self, Error> {
+        self.with_params(|params| params.expansions = expansions)
+    }
+
+    /// Sets whether a search equals the published program where that deviates from the paper.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a network without a critic that `false` needs; [`Error::Request`] for a policy that does
+    /// not search.
+    pub fn with_faithful(self, faithful: bool) -> Result<Self, Error> {
+        self.with_params(|params| params.faithful = faithful)
+    }
+
+    fn with_params(mut self, change: impl FnOnce(&mut MatsLpParams)) -> Result<Self, Error> {
+        let Method::MatsLp(prior, params) = &mut self.0 else {
+            return Err(Error::request("the policy does not search; only `mats-lp` does"));
+        };
+        change(params);
+        MatsLp::new(prior, *params, 1)?;
+        Ok(self)
     }
 }

@@ -3,8 +3,11 @@
 mod learned;
 mod method;
 mod named;
+mod network;
+mod network_episode;
 mod sampler;
 
-pub use learned::{LearnedPolicy, NetworkPolicy};
+pub use learned::LearnedPolicy;
 pub use method::{Learned, LearnedName};
 pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
+pub use network::NetworkPolicy;

@@ -1,5 +1,7 @@
 //! Policies by name.
 
+use std::time::Duration;
+
 use pogema_core::{Action, Environment, Episode, Error, Instance, OnGoal, Words, words};
 use pogema_numpy::Generator;
 use pogema_planners::{
@@ -7,7 +9,6 @@ use pogema_planners::{
     PomapfObservations, pogema_team, sample,
 };
 
-use crate::mats_lp::MatsLp;
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::method::{Learned, LearnedName};
 
@@ -48,7 +49,6 @@ enum Kind {
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
     Learned(Box<LearnedPolicy>),
-    MatsLp(Box<MatsLp>),
 }
 
 impl NamedPolicy {
@@ -99,17 +99,10 @@ impl NamedPolicy {
         }
         if name_of_learned.is_some() {
             let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
-            return Ok(Self(match learned.ok_or_else(missing)? {
-                Learned::Network(policy) => {
-                    Kind::Learned(Box::new(policy.begin(instance, config, planner_settings.seed)?))
-                }
-                Learned::MatsLp(prior, params) => {
-                    let policy = MatsLp::new(&prior, params, planner_settings.threads)?;
-                    let mut policy = policy.with_cancellation(budget.cancelled);
-                    policy.begin(instance, config.on_goal);
-                    Kind::MatsLp(Box::new(policy))
-                }
-            }));
+            let learned = learned.ok_or_else(missing)?;
+            let PlannerSettings { seed, threads, .. } = planner_settings;
+            let policy = learned.begin(instance, config, seed, threads, budget.cancelled)?;
+            return Ok(Self(Kind::Learned(Box::new(policy))));
         }
         if let Some(planner) = lifelong {
             let mut policy = LifelongPolicy::new(planner, planner_settings, budget);
@@ -141,6 +134,14 @@ impl NamedPolicy {
         }
     }
 
+    /// Returns the time that a network has taken so far, added up over threads; `None` for a policy without a network.
+    pub fn network_time(&self) -> Option<Duration> {
+        match &self.0 {
+            Kind::Learned(policy) => Some(policy.network_time()),
+            _ => None,
+        }
+    }
+
     /// Returns the actions of the next step.
     ///
     /// # Errors
@@ -154,7 +155,6 @@ impl NamedPolicy {
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),
             Kind::Learned(policy) => policy.act(episode.state()),
-            Kind::MatsLp(policy) => policy.act(episode.state()),
         }
     }
 }

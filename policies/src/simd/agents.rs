@@ -1,31 +1,22 @@
-//! The loops for 16 agents, whose values lie side by side: each vector holds one value of every agent.
+//! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
+//!
+//! Half as many agents take vectors of half the width, which a processor that splits wide vectors runs twice as fast.
 //!
 //! The sums have the terms and the order of `kernels`, without the zeros of the margins. Those change at most the sign of
 //! a sum that is 0, and `+ 0.0` at its end removes that sign.
 
+use super::kernels::Convolve;
 use super::lanes::Lanes;
-use super::{AGENTS, BLOCK, CHAINS, LANES, Shape};
+use super::{BLOCK, CHAINS, LANES, Shape};
 
-/// A convolution of the windows of 16 agents. All slices hold rows of pixels of channels of agents, without margins.
-pub struct ConvolveAgents<'a> {
-    pub input: &'a [f32],
-    pub output: &'a mut [f32],
-    /// Added to the sums before the activation; laid out as the output.
-    pub added: Option<&'a [f32]>,
-    /// As those of `Convolve`.
-    pub weights: &'a [f32],
-    pub bias: &'a [f32],
-    pub shape: Shape,
-    pub relu: bool,
-}
-
-/// Output channels that are computed together, at all pixels: `V` holds some of the agents, `N` of them all 16.
+/// Output channels that are computed together, at all pixels: `N` vectors `V` hold all agents. The slices hold rows of
+/// pixels of channels of agents, without margins.
 ///
 /// # Safety
 /// `super::convolve_agents` checked the job, and the instruction set of `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut ConvolveAgents<'_>) {
+pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut Convolve<'_>) {
     let Shape { output, input, kernel, .. } = job.shape;
     let taps = kernel[0] * kernel[1] * input.channels;
     for first in (0..output.channels).step_by(C) {
@@ -48,7 +39,7 @@ pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut Convo
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
 unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
-    job: &mut ConvolveAgents<'_>,
+    job: &mut Convolve<'_>,
     weights: *const f32,
     width: usize,
     first: usize,
@@ -58,14 +49,14 @@ unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
     let inside =
         |at: usize, size: usize, kernel: usize| padding.saturating_sub(at)..kernel.min(size + padding - at);
     let (down, right) = (inside(row, input.rows, kernel[0]), inside(col, input.cols, kernel[1]));
-    let channels = input.channels;
+    let (channels, num_agents) = (input.channels, N * V::COUNT);
     // SAFETY: the job was checked, and `inside` skips what lies outside the input.
     unsafe {
         let mut sums: [[V; N]; C] =
             std::array::from_fn(|channel| [V::splat(*job.bias.as_ptr().add(first + channel)); N]);
         for tap_row in down {
             let pixel = (row + tap_row - padding) * input.cols + col + right.start - padding;
-            let mut values = job.input.as_ptr().add(pixel * channels * AGENTS);
+            let mut values = job.input.as_ptr().add(pixel * channels * num_agents);
             let mut factors = weights.add((tap_row * kernel[1] + right.start) * channels * width);
             // The pixels of a row adjoin, and so do their weights.
             for _ in 0..right.len() * channels {
@@ -76,14 +67,14 @@ unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
                         *sum = value.mul_add(factor, *sum);
                     }
                 }
-                values = values.add(AGENTS);
+                values = values.add(num_agents);
                 factors = factors.add(width);
             }
         }
-        let at = ((row * output.cols + col) * output.channels + first) * AGENTS;
+        let at = ((row * output.cols + col) * output.channels + first) * num_agents;
         for (channel, sums) in sums.into_iter().enumerate().take(output.channels - first) {
             for (vector, sum) in sums.into_iter().enumerate() {
-                let at = at + channel * AGENTS + vector * V::COUNT;
+                let at = at + channel * num_agents + vector * V::COUNT;
                 let mut sum = sum.add(V::splat(0.0));
                 if let Some(added) = job.added {
                     sum = sum.add(V::load(added.as_ptr().add(at)));
@@ -97,7 +88,7 @@ unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
     }
 }
 
-/// A dense layer of 16 agents. Both lists hold values of agents.
+/// A dense layer of 8 or 16 agents. Both lists hold values of agents.
 pub struct MultiplyAgents<'a> {
     pub input: &'a [f32],
     pub output: &'a mut [f32],
@@ -112,7 +103,8 @@ pub struct MultiplyAgents<'a> {
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
 pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut MultiplyAgents<'_>) {
-    let (num_inputs, num_outputs) = (job.input.len() / AGENTS, job.output.len() / AGENTS);
+    let num_agents = N * V::COUNT;
+    let (num_inputs, num_outputs) = (job.input.len() / num_agents, job.output.len() / num_agents);
     for first in (0..num_outputs).step_by(C) {
         // SAFETY: the job was checked.
         unsafe {
@@ -121,7 +113,7 @@ pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut Multi
             let mut sums = [[[V::splat(0.0); N]; C]; CHAINS];
             let mut add = |chain: usize, index: usize| {
                 let value: [V; N] = std::array::from_fn(|vector| {
-                    V::load(job.input.as_ptr().add(index * AGENTS + vector * V::COUNT))
+                    V::load(job.input.as_ptr().add(index * num_agents + vector * V::COUNT))
                 });
                 for (output, sums) in sums[chain].iter_mut().enumerate() {
                     let factor = V::splat(*weights.add(index * LANES + output));
@@ -147,7 +139,7 @@ pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut Multi
                 if job.relu {
                     sum = sum.relu();
                 }
-                sum.store(job.output.as_mut_ptr().add((first + output) * AGENTS + vector * V::COUNT));
+                sum.store(job.output.as_mut_ptr().add((first + output) * num_agents + vector * V::COUNT));
             }
         }
     }

@@ -5,7 +5,7 @@ use std::arch::x86_64::{
     _mm256_setzero_ps, _mm256_storeu_ps,
 };
 
-use super::agents::{self, ConvolveAgents, MultiplyAgents};
+use super::agents::{self, MultiplyAgents};
 use super::kernels::{self, Convolve, Multiply};
 use super::lanes::Lanes;
 
@@ -69,9 +69,17 @@ pub unsafe fn multiply(job: &mut Multiply<'_>) {
 /// # Safety
 /// The machine supports AVX2 and FMA, and the job was checked.
 #[target_feature(enable = "avx2,fma")]
-pub unsafe fn convolve_agents(job: &mut ConvolveAgents<'_>) {
+pub unsafe fn convolve_agents(job: &mut Convolve<'_>) {
     // SAFETY: as above.
     unsafe { agents::convolve::<Avx2, 2, 4>(job) }
+}
+
+/// # Safety
+/// The machine supports AVX2 and FMA, and the job was checked.
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn convolve_half(job: &mut Convolve<'_>) {
+    // SAFETY: as above.
+    unsafe { agents::convolve::<Avx2, 1, 8>(job) }
 }
 
 /// # Safety
@@ -80,4 +88,12 @@ pub unsafe fn convolve_agents(job: &mut ConvolveAgents<'_>) {
 pub unsafe fn multiply_agents(job: &mut MultiplyAgents<'_>) {
     // SAFETY: as above.
     unsafe { agents::multiply::<Avx2, 2, 1>(job) }
+}
+
+/// # Safety
+/// The machine supports AVX2 and FMA, and the job was checked.
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn multiply_half(job: &mut MultiplyAgents<'_>) {
+    // SAFETY: as above.
+    unsafe { agents::multiply::<Avx2, 1, 2>(job) }
 }

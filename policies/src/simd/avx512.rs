@@ -5,7 +5,8 @@ use std::arch::x86_64::{
     _mm512_setzero_ps, _mm512_storeu_ps,
 };
 
-use super::agents::{self, ConvolveAgents, MultiplyAgents};
+use super::agents::{self, MultiplyAgents};
+use super::kernels::Convolve;
 use super::lanes::Lanes;
 
 #[derive(Clone, Copy)]
@@ -52,7 +53,7 @@ impl Lanes for Avx512 {
 /// # Safety
 /// The machine supports AVX-512 F, and the job was checked.
 #[target_feature(enable = "avx512f")]
-pub unsafe fn convolve_agents(job: &mut ConvolveAgents<'_>) {
+pub unsafe fn convolve_agents(job: &mut Convolve<'_>) {
     // SAFETY: as above.
     unsafe { agents::convolve::<Avx512, 1, 8>(job) }
 }

@@ -6,7 +6,7 @@
 use super::lanes::Lanes;
 use super::{BLOCK, CHAINS, LANES, Shape};
 
-/// A convolution of one window. All slices hold rows of pixels of channels.
+/// A convolution of one window, whose slices hold rows of pixels of channels, or of several agents (see `agents`).
 pub struct Convolve<'a> {
     /// The input from its first row on, each row with its margins.
     pub input: &'a [f32],

@@ -11,12 +11,20 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "512-bit intrinsics")]
 mod avx512;
+#[cfg(test)]
+mod guard_pages;
+#[cfg(test)]
+#[allow(unsafe_code, reason = "slices next to pages without access")]
+#[path = "../../../fast/src/simd/guarded.rs"]
+mod guarded;
 #[allow(unsafe_code, reason = "pointers that the jobs' checks cover")]
 mod kernels;
 #[allow(unsafe_code, reason = "vectors read and write through pointers")]
 mod lanes;
 
-pub use agents::{ConvolveAgents, MultiplyAgents};
+use pogema_core::SimdPath;
+
+pub use agents::MultiplyAgents;
 pub use kernels::{Convolve, Multiply};
 
 /// Number of floats in a vector. The channels of activations are padded to a multiple of it.
@@ -25,45 +33,14 @@ pub const LANES: usize = 8;
 /// Number of output channels that are computed together.
 pub const BLOCK: usize = 2 * LANES;
 
-/// Number of agents whose values lie side by side in the kernels for many agents.
+/// Largest number of agents whose values lie side by side in the kernels for many agents.
 pub const AGENTS: usize = 16;
+
+/// The other number of agents for which there are such kernels.
+pub const HALF: usize = AGENTS / 2;
 
 /// Number of partial sums of each output of a dense layer.
 const CHAINS: usize = 4;
-
-/// The instruction set of a network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
-    /// No intrinsics; available on every machine.
-    Portable,
-    /// AVX2 and FMA.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// AVX2, FMA and AVX-512 F.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Path {
-    /// Returns all paths that this machine supports, the fastest last.
-    pub fn available() -> impl Iterator<Item = Self> {
-        #[cfg(target_arch = "x86_64")]
-        let has_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-        let all = [
-            Some(Self::Portable),
-            #[cfg(target_arch = "x86_64")]
-            has_avx2.then_some(Self::Avx2),
-            #[cfg(target_arch = "x86_64")]
-            (has_avx2 && is_x86_feature_detected!("avx512f")).then_some(Self::Avx512),
-        ];
-        all.into_iter().flatten()
-    }
-
-    /// Returns the fastest path that this machine supports.
-    pub fn best() -> Self {
-        Self::available().last().unwrap_or(Self::Portable)
-    }
-}
 
 /// Rows of pixels of channels. Each row has margins of zeros on both sides, so that a convolution needs no bounds test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,41 +104,49 @@ pub fn relu(value: f32) -> f32 {
 /// # Panics
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn convolve(path: Path, mut job: Convolve<'_>) {
+pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     let Shape { input, output, .. } = job.shape;
     check(&job.shape, job.weights, job.bias);
     assert_eq!((job.input.len(), job.output.len()), (input.len(), output.len()));
     assert!(job.added.is_none_or(|added| added.len() == output.len()));
     // SAFETY: the asserts above: with `padding` inside the margins, each tap lies inside its row, and the kernels skip
-    // the rows outside the input. `Path` only exists for what the machine supports.
+    // the rows outside the input. `Network::new` checked that the machine supports the path.
     match path {
-        Path::Portable => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 | Path::Avx512 => unsafe { avx2::convolve(&mut job) },
+        SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::convolve(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
 
-/// Runs a convolution of 16 agents.
+/// Runs a convolution of 8 or 16 agents, whose values lie side by side. The planes have no margins.
 ///
 /// # Panics
 /// If a slice does not fit the shape.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn convolve_agents(path: Path, mut job: ConvolveAgents<'_>) {
+pub fn convolve_agents(path: SimdPath, mut job: Convolve<'_>) {
     let Shape { input, output, .. } = job.shape;
     check(&job.shape, job.weights, job.bias);
+    let num_agents = if job.input.len() == input.num_values() * HALF { HALF } else { AGENTS };
     assert_eq!(
         (job.input.len(), job.output.len()),
-        (input.num_values() * AGENTS, output.num_values() * AGENTS)
+        (input.num_values() * num_agents, output.num_values() * num_agents)
     );
     assert!(job.added.is_none_or(|added| added.len() == job.output.len()));
-    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Path` only exists for what the machine
-    // supports.
-    match path {
-        Path::Portable => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
+    // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Network::new` checked that the machine
+    // supports the path.
+    match (path, num_agents) {
+        (SimdPath::Scalar, HALF) => unsafe { agents::convolve::<lanes::Portable, 1, 4>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::convolve_agents(&mut job) },
+        (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::convolve_half(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx512 => unsafe { avx512::convolve_agents(&mut job) },
+        (SimdPath::Avx2, _) => unsafe { avx2::convolve_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        (SimdPath::Avx512, _) => unsafe { avx512::convolve_agents(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        (SimdPath::Avx2 | SimdPath::Avx512, _) => unreachable!("`Network::new` checks the path"),
     }
 }
 
@@ -181,36 +166,45 @@ fn check(shape: &Shape, weights: &[f32], bias: &[f32]) {
 /// # Panics
 /// If a slice does not fit the numbers of inputs, outputs and rows.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn multiply(path: Path, mut job: Multiply<'_>) {
+pub fn multiply(path: SimdPath, mut job: Multiply<'_>) {
     let num_outputs = job.bias.len();
     assert_eq!(num_outputs % LANES, 0);
     assert_eq!(job.weights.len(), num_outputs * job.num_inputs);
     assert!(job.num_inputs <= job.input_stride);
     assert!(job.num_rows == 0 || job.input.len() >= (job.num_rows - 1) * job.input_stride + job.num_inputs);
     assert!(job.output.len() >= job.num_rows * num_outputs);
-    // SAFETY: the asserts above, and `Path` only exists for what the machine supports.
+    // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
     match path {
-        Path::Portable => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 | Path::Avx512 => unsafe { avx2::multiply(&mut job) },
+        SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::multiply(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
 }
 
-/// Runs a dense layer of 16 agents.
+/// Runs a dense layer of 8 or 16 agents, whose values lie side by side.
 ///
 /// # Panics
 /// If a slice does not fit the numbers of inputs and outputs.
 #[allow(unsafe_code, reason = "the kernels read through pointers")]
-pub fn multiply_agents(path: Path, mut job: MultiplyAgents<'_>) {
-    assert_eq!((job.input.len() % AGENTS, job.output.len() % AGENTS), (0, 0));
-    assert_eq!(job.bias.len(), (job.output.len() / AGENTS).next_multiple_of(LANES));
-    assert_eq!(job.weights.len(), job.bias.len() * (job.input.len() / AGENTS));
-    // SAFETY: the asserts above, and `Path` only exists for what the machine supports.
-    match path {
-        Path::Portable => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
+pub fn multiply_agents(path: SimdPath, mut job: MultiplyAgents<'_>) {
+    let num_inputs = job.weights.len() / job.bias.len();
+    let num_agents = if job.input.len() == num_inputs * HALF { HALF } else { AGENTS };
+    assert_eq!((job.input.len(), job.output.len() % num_agents), (num_inputs * num_agents, 0));
+    assert_eq!(job.bias.len(), (job.output.len() / num_agents).next_multiple_of(LANES));
+    assert_eq!(job.weights.len(), job.bias.len() * num_inputs);
+    // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
+    match (path, num_agents) {
+        (SimdPath::Scalar, HALF) => unsafe { agents::multiply::<lanes::Portable, 1, 1>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx2 => unsafe { avx2::multiply_agents(&mut job) },
+        (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::multiply_half(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        Path::Avx512 => unsafe { avx512::multiply_agents(&mut job) },
+        (SimdPath::Avx2, _) => unsafe { avx2::multiply_agents(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        (SimdPath::Avx512, _) => unsafe { avx512::multiply_agents(&mut job) },
+        #[cfg(not(target_arch = "x86_64"))]
+        (SimdPath::Avx2 | SimdPath::Avx512, _) => unreachable!("`Network::new` checks the path"),
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use pogema_core::{Action, Cell, Episode};
 use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource, Library};
-use pogema_policies::{Learned, LearnedName, Sampling};
+use pogema_policies::{LearnedName, Sampling};
 
 use crate::recorded::{read_array, weights};
 
@@ -68,13 +68,11 @@ impl Recorded {
 fn recorded_episodes_are_played_action_for_action() {
     let Some(folder) = weights("the recorded episodes of Follower-lite") else { return };
     let learned = LearnedName::Follower.read(&folder.join("follower-lite.onnx")).unwrap();
-    let Learned::Network(learned) = learned.with_sampling(Sampling::Follower).unwrap() else {
-        panic!("Follower is a network");
-    };
+    let learned = learned.with_sampling(Sampling::Follower).unwrap();
     let mut different = Vec::new();
     for recorded in Recorded::all(&folder) {
         let mut episode = recorded.start();
-        let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
+        let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0, 1, None).unwrap();
         for step in 0..256 {
             let state = episode.state();
             assert_eq!(state.cells, recorded.places(&recorded.cells, step), "{}, step {step}", recorded.name);

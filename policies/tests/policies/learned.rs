@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use pogema_core::{Action, Episode};
 use pogema_fast::Engine;
-use pogema_policies::{Learned, LearnedName, NetworkPolicy, Sampling};
+use pogema_policies::{Learned, LearnedName, LearnedPolicy, Sampling};
 
 use crate::common;
 
@@ -32,13 +32,12 @@ fn start(num_agents: usize) -> Episode<Engine> {
     common::start(&yaml).unwrap()
 }
 
-fn network(learned: Learned) -> NetworkPolicy {
-    let Learned::Network(policy) = learned else { unreachable!("MATS-LP is a search") };
-    policy
+fn begin(learned: &Learned, episode: &Episode<Engine>, seed: u64) -> LearnedPolicy {
+    learned.begin(episode.instance().unwrap(), episode.config(), seed, 1, None).unwrap()
 }
 
-fn play(learned: &NetworkPolicy, episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
-    let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), seed).unwrap();
+fn play(learned: &Learned, episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
+    let mut policy = begin(learned, episode, seed);
     let mut all = Vec::new();
     while !episode.is_over() {
         let actions = policy.act(episode.state()).unwrap();
@@ -50,8 +49,7 @@ fn play(learned: &NetworkPolicy, episode: &mut Episode<Engine>, seed: u64) -> Ve
 
 #[test]
 fn the_small_network_leads_a_lone_agent_to_its_goal() {
-    let learned =
-        network(LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy).unwrap());
+    let learned = LearnedName::Network.read(&descent()).unwrap().with_sampling(Sampling::Greedy).unwrap();
     let mut episode = start(1);
     play(&learned, &mut episode, 0);
     assert_eq!(episode.state().cells, episode.state().goals);
@@ -59,7 +57,7 @@ fn the_small_network_leads_a_lone_agent_to_its_goal() {
 
 #[test]
 fn actions_depend_on_the_seed_alone() {
-    let learned = network(LearnedName::Network.read(&descent()).unwrap());
+    let learned = LearnedName::Network.read(&descent()).unwrap();
     let first = play(&learned, &mut start(12), 1);
     assert_eq!(first, play(&learned, &mut start(12), 1));
     assert_ne!(first, play(&learned, &mut start(12), 2));
@@ -77,9 +75,9 @@ fn masks_forbid_moves_into_obstacles() {
     let folder = tempfile::tempdir().unwrap();
     let blocked = |is_masked| {
         // Weights of 0 choose all actions with the same probability.
-        let learned = network(filled(0.0, folder.path()).with_masks(is_masked).unwrap());
+        let learned = filled(0.0, folder.path()).with_masks(is_masked).unwrap();
         let mut episode = start(12);
-        let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
+        let mut policy = begin(&learned, &episode, 0);
         let mut num_blocked = 0;
         while !episode.is_over() {
             let actions = policy.act(episode.state()).unwrap();
@@ -102,9 +100,9 @@ fn masks_forbid_moves_into_obstacles() {
 #[test]
 fn logits_that_are_not_finite_name_agent_and_step() {
     let folder = tempfile::tempdir().unwrap();
-    let learned = network(filled(3e38, folder.path()));
+    let learned = filled(3e38, folder.path());
     let episode = start(3);
-    let mut policy = learned.begin(episode.instance().unwrap(), episode.config(), 0).unwrap();
+    let mut policy = begin(&learned, &episode, 0);
     let error = policy.act(episode.state()).unwrap_err();
     assert_eq!(error.to_string(), "network: the logits of agent 0 in step 0 are not finite");
 }
@@ -113,4 +111,53 @@ fn logits_that_are_not_finite_name_agent_and_step() {
 fn a_network_of_another_shape_is_no_follower() {
     let error = LearnedName::Follower.read(&descent().with_file_name("none.safetensors")).unwrap_err();
     assert!(error.to_string().contains("none"), "{error}");
+}
+
+/// Reads a network of two windows of radius 1 as that of MATS-LP, with this encoder in its JSON file.
+fn read_for_search(encoder: &str, folder: &Path) -> Result<Learned, String> {
+    use safetensors::tensor::{Dtype, TensorView, serialize};
+
+    let data = [vec![0; 5 * 18 * 4], vec![0; 5 * 4]];
+    let tensors = [("head.weight", vec![5, 18]), ("head.bias", vec![5])].into_iter().zip(&data);
+    let tensors =
+        tensors.map(|((name, shape), data)| (name, TensorView::new(Dtype::F32, shape, data).unwrap()));
+    let path = folder.join("search.safetensors");
+    fs::write(&path, serialize(tensors, None).unwrap()).unwrap();
+    let architecture = r#"{"window": [2, 3, 3], "layers": ["flatten"], "actions": "head"}"#;
+    let json = format!(r#"{{"version": 1, "architecture": {architecture}{encoder}}}"#);
+    fs::write(path.with_extension("json"), json).unwrap();
+    LearnedName::MatsLp.read(&path).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_network_of_a_search_reads_what_the_search_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |encoder: &str| read_for_search(encoder, folder.path());
+    assert!(read("").is_ok());
+    assert!(read(r#", "encoder": {"radius": 1, "channels": ["all_agents", "cost_tracer"]}"#).is_ok());
+    for (radius, channels) in
+        [(1, "cost_tracer, all_agents"), (1, "obstacles, agents"), (2, "all_agents, cost_tracer")]
+    {
+        let names = channels.replace(", ", r#"", ""#);
+        let error =
+            read(&format!(r#", "encoder": {{"radius": {radius}, "channels": ["{names}"]}}"#)).unwrap_err();
+        let expected = format!(
+            "`encoder of the network` is `{channels} with radius {radius}`, expected all_agents, cost_tracer with radius 1"
+        );
+        assert!(error.contains(&expected), "{error}");
+    }
+}
+
+#[test]
+fn only_a_search_has_expansions() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = |learned: Result<Learned, pogema_core::Error>| learned.unwrap_err().to_string();
+    let network = LearnedName::Network.read(&descent()).unwrap();
+    let reason = "the policy does not search; only `mats-lp` does";
+    assert_eq!(error(network.clone().with_expansions(3)), reason);
+    assert_eq!(error(network.with_faithful(true)), reason);
+    let search = read_for_search("", folder.path()).unwrap();
+    assert_eq!(error(search.clone().with_expansions(0)), "`expansions` is `0`, expected 1 to 100000");
+    let no_critic = "`faithful` is `false`, expected true, because the network has no critic";
+    assert_eq!(error(search.with_faithful(false)), no_critic);
 }

@@ -10,3 +10,4 @@ mod learned;
 mod mats_lp;
 #[path = "../common/mod.rs"]
 mod recorded;
+mod simd_variable;

@@ -7,6 +7,7 @@ mod boxes;
 mod cactus;
 mod compare;
 mod compose;
+mod difference;
 mod gallery;
 mod grid;
 mod image_format;
@@ -33,6 +34,7 @@ use pogema_maps::nearest;
 pub use boxes::BoxView;
 pub use cactus::CactusView;
 pub use compare::CompareView;
+pub use difference::DifferenceView;
 pub use gallery::{Gallery, ShownView};
 pub use grid::{Cell, Format, Table};
 pub use image_format::ImageFormat;
@@ -54,8 +56,18 @@ use crate::tree::Node;
 const VIEWS: &str = "results_views";
 
 /// The types of views.
-const TYPES: [&str; 9] =
-    ["tabular", "plot", "multi-plot", "radar", "box", "cactus", "compare", "seeds", "published"];
+const TYPES: [&str; 10] = [
+    "tabular",
+    "plot",
+    "multi-plot",
+    "radar",
+    "box",
+    "cactus",
+    "compare",
+    "difference",
+    "seeds",
+    "published",
+];
 
 /// One view of results.
 #[derive(Clone, Debug)]
@@ -72,6 +84,8 @@ pub enum View {
     Cactus(Box<CactusView>),
     /// `type: compare`
     Compare(Box<CompareView>),
+    /// `type: difference`
+    Difference(DifferenceView),
     /// `type: seeds`
     Seeds(SeedsView),
     /// `type: published`
@@ -125,6 +139,7 @@ impl View {
             "box" => BoxView::read(name, node).map(|view| Self::Box(Box::new(view))),
             "cactus" => CactusView::read(name, node).map(|view| Self::Cactus(Box::new(view))),
             "compare" => CompareView::read(name, node).map(|view| Self::Compare(Box::new(view))),
+            "difference" => DifferenceView::read(name, node).map(Self::Difference),
             "seeds" => SeedsView::read(name, node).map(Self::Seeds),
             "published" => PublishedView::read(name, node).map(|view| Self::Published(Box::new(view))),
             other => {
@@ -172,6 +187,7 @@ impl View {
             Self::Box(view) => view.show(name, results),
             Self::Cactus(view) => view.show(name, results),
             Self::Compare(view) => view.show(name, results),
+            Self::Difference(view) => view.show(name, results),
             Self::Seeds(view) => view.show(name, results),
             Self::Published(view) => view.show(name, results),
         }

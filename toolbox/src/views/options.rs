@@ -16,11 +16,12 @@ const COMMON: [&str; 6] =
 /// Default titles of columns.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
-const TITLES: [(&str, &str); 5] = [
+const TITLES: [(&str, &str); 6] = [
     ("algorithm", "Algorithm"),
     ("num_agents", "Number of Agents"),
     ("avg_throughput", "Average Throughput"),
     ("runtime", "Runtime (seconds)"),
+    ("network_time", "Network Time (seconds)"),
     ("max_episode_steps", "Episode Length"),
 ];
 

@@ -12,9 +12,9 @@ use super::means::Means;
 use super::options::{Common, Options};
 use super::pairing::Pairing;
 use super::{Shown, known_column};
-use crate::bootstrap::mean_of;
+use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::frame::{shown, values};
-use crate::results::{RUNTIME, Results, Row, SOLVED};
+use crate::results::{NETWORK_TIME, RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
 
@@ -30,6 +30,9 @@ const NUM_AGENTS: &str = "num_agents";
 /// `algorithm`, which is compared with the algorithm `ours` of the results. `episodes` is a folder with a folder of
 /// published results for each dataset. With it, sums of costs are compared on the instances that both solve; without
 /// it, only if both solve all instances.
+///
+/// `show_std` adds half of the 95 % interval to each of our means but that of the sums of costs. `decision_times` adds
+/// the time of a decision of one agent in lifelong results, split into planner and network.
 #[derive(Clone, Debug)]
 pub struct PublishedView {
     common: Common,
@@ -40,6 +43,8 @@ pub struct PublishedView {
     algorithm: String,
     ours: Option<String>,
     metrics: Vec<String>,
+    shows_intervals: bool,
+    shows_decisions: bool,
 }
 
 /// A row of the table before it is formatted.
@@ -61,7 +66,17 @@ struct Figure {
 
 impl PublishedView {
     pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
-        let known = ["file", "episodes", "setting", "dataset", "algorithm", "ours", "metrics"];
+        let known = [
+            "file",
+            "episodes",
+            "setting",
+            "dataset",
+            "algorithm",
+            "ours",
+            "metrics",
+            "show_std",
+            "decision_times",
+        ];
         let options = Options::new(name, node, &known)?;
         let setting = options.required("setting")?;
         let usual: &[&str] = match options.choice("setting", &["MAPF", "LMAPF"])? {
@@ -78,6 +93,8 @@ impl PublishedView {
             algorithm: options.required("algorithm")?,
             ours: options.text("ours")?,
             metrics: options.words("metrics")?.unwrap_or_else(usual),
+            shows_intervals: options.flag("show_std")?.unwrap_or(false),
+            shows_decisions: options.flag("decision_times")?.unwrap_or(false),
         })
     }
 
@@ -196,7 +213,10 @@ impl PublishedView {
         for (at, metric) in self.metrics.iter().enumerate() {
             let title = self.common.title(metric);
             let number = if [SOLVED, "ISR"].contains(&metric.as_str()) { Cell::Ratio } else { Cell::Number };
-            add(&title, &|line| number(line.figures[at].ours));
+            add(&title, &|line| match metric.as_str() {
+                metric if self.shows_intervals && metric != COST => Cell::Mean(interval(line, metric)),
+                _ => number(line.figures[at].ours),
+            });
             if lines.iter().any(|line| line.figures[at].published.is_some()) {
                 add(&format!("{title} published"), &|line| number(line.figures[at].published));
                 add(&format!("{title} ratio"), &|line| {
@@ -212,11 +232,33 @@ impl PublishedView {
                 });
             }
         }
+        if self.shows_decisions {
+            for (title, part) in [("planner µs", 0), ("network µs", 1)] {
+                let times = |line: &Line<'_>| {
+                    line.rows.iter().filter_map(|row| Some(decision_times(row)?[part])).collect::<Vec<_>>()
+                };
+                add(title, &|line| Cell::Number(mean_of(&times(line))));
+            }
+        }
         let row = |at: usize| columns.iter().map(|(_, cells)| cells[at].clone()).collect();
         let rows = (0..lines.len()).map(row).collect();
         let head = columns.iter().map(|(title, _)| title.clone()).collect();
         Table { head, rows, digits: self.common.digits, remark: Some(remark), ..Table::default() }
     }
+}
+
+/// Returns the mean of a metric with its 95 % interval.
+fn interval(line: &Line<'_>, metric: &str) -> Option<Estimate> {
+    Estimate::of(&values(&line.rows, metric), Spread::Bootstrap { level: 95.0 }, line.num_agents)
+}
+
+/// Returns the time that a decision of one agent took in a lifelong episode, outside and inside of the network. Such an
+/// episode has as many steps as its config says. Units: microseconds.
+fn decision_times(row: &Row) -> Option<[f64; 2]> {
+    row.metric("avg_throughput")?;
+    let num_decisions = row.field("max_episode_steps")?.as_f64()? * row.field(NUM_AGENTS)?.as_f64()?;
+    let (all, network) = (row.metric(RUNTIME)?, row.metric(NETWORK_TIME).unwrap_or(0.0));
+    Some([all - network, network].map(|seconds| 1e6 * seconds / num_decisions))
 }
 
 /// Returns the fields that vary in rows.

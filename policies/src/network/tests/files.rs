@@ -1,10 +1,10 @@
 //! Files that are truncated, foreign or hostile.
 
-use std::path::Path as FilePath;
+use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::{Network, Path};
+use super::{Network, SimdPath};
 use crate::network::file;
 
 const SIZES: [(&str, &[usize]); 6] = [
@@ -43,7 +43,7 @@ fn weights(change: impl FnOnce(&mut Value), value: f32) -> Vec<u8> {
 fn read(config: &Value, weights: &[u8]) -> Result<Network, String> {
     let config = file::parse_config(config.to_string().as_bytes())?;
     let mut tensors = file::parse_tensors(weights)?;
-    Network::new(config, &mut tensors, Path::best())
+    Network::new(config, &mut tensors, SimdPath::best())
 }
 
 #[track_caller]
@@ -143,13 +143,13 @@ fn wrong_configs_are_refused() {
 
 #[test]
 fn a_missing_file_is_named() {
-    let error = Network::read(FilePath::new("none/weights.safetensors")).unwrap_err().to_string();
+    let error = Network::read(Path::new("none/weights.safetensors")).unwrap_err().to_string();
     assert!(error.starts_with("none/weights.safetensors: "), "{error}");
 }
 
 #[test]
 fn the_example_of_the_reference_is_right() {
-    let page = FilePath::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reference/network.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reference/network.md");
     let page = std::fs::read_to_string(page).unwrap();
     let example = page.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
     let config = file::parse_config(example.as_bytes()).unwrap();

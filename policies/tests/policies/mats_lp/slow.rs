@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use pogema_core::{Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside};
 use pogema_core::{State, StepResults};
-use pogema_policies::MatsLpParams;
+use pogema_policies::{MatsLpParams, RootChild};
 use pogema_reference::Reference;
 
 use super::network::Linear;
@@ -32,6 +32,8 @@ pub struct Slow<'a> {
     pub on_goal: OnGoal,
     /// The goal of each agent, and its smallest cost so far.
     pub best: Vec<(Cell, i32)>,
+    /// The children of each agent's root in the last step.
+    pub roots: Vec<Vec<RootChild>>,
 }
 
 #[derive(Debug)]
@@ -61,11 +63,16 @@ impl Slow<'_> {
                 None => self.best.push((goal, cost)),
             }
         }
-        let action = |agent| if now.active[agent] { self.search(agent, now, goals) } else { Action::Stay };
-        (0..now.cells.len()).map(action).collect()
+        let search = |agent| {
+            if now.active[agent] { self.search(agent, now, goals) } else { (Action::Stay, Vec::new()) }
+        };
+        let (actions, roots) = (0..now.cells.len()).map(search).unzip();
+        self.roots = roots;
+        actions
     }
 
-    fn search(&self, own: usize, now: State<'_>, goals: &[Vec<Cell>]) -> Action {
+    /// Returns the action of an agent and the children of its root.
+    fn search(&self, own: usize, now: State<'_>, goals: &[Vec<Cell>]) -> (Action, Vec<RootChild>) {
         let agent = |index: usize| Agent {
             cell: now.cells[index],
             goals: goals[index].iter().copied().collect(),
@@ -86,7 +93,8 @@ impl Slow<'_> {
         }
         let most = root.children.iter().map(|child| child.num_visits).max().unwrap();
         let best = root.children.iter().position(|child| child.num_visits == most).unwrap();
-        root.joint_actions[best][0]
+        let known = |child: &Node| RootChild { num_visits: child.num_visits, value_sum: child.value_sum };
+        (root.joint_actions[best][0], root.children.iter().map(known).collect())
     }
 
     /// Visits a node; returns the value that goes up, and the reward of the leaf.

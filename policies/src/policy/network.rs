@@ -1,0 +1,98 @@
+//! Networks as policies: the settings with which a network acts.
+
+use pogema_core::{Config, Error, Instance};
+
+use crate::encode::EncoderSettings;
+use crate::follower::FollowerVersion;
+use crate::network::{Network, Sampling};
+use crate::policy::learned::LearnedPolicy;
+use crate::policy::network_episode::{NetworkEpisode, NetworkSettings};
+use crate::policy::sampler::NUM_ACTIONS;
+
+/// A network with everything that it needs to act.
+#[derive(Clone, Debug)]
+pub struct NetworkPolicy(NetworkSettings);
+
+impl NetworkPolicy {
+    /// Creates a policy of a network with its own encoder and sampling.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if the network has no encoder, or one of another shape; [`Error::Config`] for invalid
+    /// settings.
+    pub fn new(network: Network) -> Result<Self, Error> {
+        let Some(encoder) = network.config().encoder.clone() else {
+            return Err(Error::request("the network names no encoder, expected `encoder` in its JSON file"));
+        };
+        Self::with_encoder(network, encoder)
+    }
+
+    /// Creates a policy of a network with an encoder in place of its own.
+    ///
+    /// # Errors
+    /// Those of [`NetworkPolicy::new`].
+    pub fn with_encoder(network: Network, encoder: EncoderSettings) -> Result<Self, Error> {
+        encoder.check()?;
+        let (input, output) = (network.input_shape(), encoder.shape());
+        if input != output || network.num_scalars() != encoder.scalars_len() {
+            return Err(Error::request(format!(
+                "the network reads windows of shape {input:?} and {} scalars, the encoder writes {output:?} and {}",
+                network.num_scalars(),
+                encoder.scalars_len()
+            )));
+        }
+        if network.num_actions() != NUM_ACTIONS {
+            let found = network.num_actions();
+            return Err(Error::request(format!("the network has {found} logits, expected {NUM_ACTIONS}")));
+        }
+        let sampling = network.config().sampling.rule;
+        Ok(Self(NetworkSettings { network, encoder, sampling, masks_actions: false }))
+    }
+
+    /// Creates the policy Follower, for a network whose window has Follower's two channels.
+    ///
+    /// # Errors
+    /// Those of [`NetworkPolicy::new`].
+    pub fn follower(network: Network) -> Result<Self, Error> {
+        let [_, side, _] = network.input_shape();
+        let usual = || EncoderSettings::follower(side / 2, FollowerVersion::default());
+        let encoder = network.config().encoder.clone().unwrap_or_else(usual);
+        Self::with_encoder(network, encoder)
+    }
+
+    /// Returns the network.
+    pub fn network(&self) -> &Network {
+        &self.0.network
+    }
+
+    /// Returns what the network sees.
+    pub fn encoder(&self) -> &EncoderSettings {
+        &self.0.encoder
+    }
+
+    /// Returns the rule that chooses actions.
+    pub fn sampling(&self) -> Sampling {
+        self.0.sampling
+    }
+
+    /// Replaces the rule that chooses actions.
+    #[must_use]
+    pub fn with_sampling(mut self, sampling: Sampling) -> Self {
+        self.0.sampling = sampling;
+        self
+    }
+
+    /// Forbids actions that lead into an obstacle or off the map, if `masks_actions` is set [default: not].
+    #[must_use]
+    pub fn with_masks(mut self, masks_actions: bool) -> Self {
+        self.0.masks_actions = masks_actions;
+        self
+    }
+
+    /// Starts an episode. The same seed gives the same actions.
+    ///
+    /// # Errors
+    /// None at present; the settings were checked.
+    pub fn begin(&self, instance: &Instance, config: &Config, seed: u64) -> Result<LearnedPolicy, Error> {
+        NetworkEpisode::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_network)
+    }
+}

@@ -1,0 +1,218 @@
+//! Paired differences between two values of a varied field.
+
+use std::collections::BTreeMap;
+
+use pogema_core::Error;
+
+use super::grid::{Cell, Table};
+use super::options::{Common, Options};
+use super::pairing::Pairing;
+use super::{Shown, known_column, named};
+use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
+use crate::frame::{lacking, shown};
+use crate::results::{ALGORITHM, Results, Row};
+use crate::tree::Node;
+
+/// The column of the number of agents.
+const NUM_AGENTS: &str = "num_agents";
+
+/// `type: difference`: how much a metric differs between two values of a varied field, on the same instances.
+///
+/// `field` names the field, `first` and `second` its values, and `metrics` the metrics [default: `avg_throughput`]. Rows
+/// of one algorithm that agree in all other varied fields form a pair. The table has a row for each folder, algorithm
+/// and number of agents.
+#[derive(Clone, Debug)]
+pub struct DifferenceView {
+    common: Common,
+    field: String,
+    first: String,
+    second: String,
+    metrics: Vec<String>,
+}
+
+/// A row of the table before it is formatted.
+struct Line<'a> {
+    folder: &'a str,
+    algorithm: &'a str,
+    num_agents: String,
+    pairing: Pairing<'a>,
+}
+
+impl DifferenceView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let options = Options::new(name, node, &["field", "first", "second", "metrics"])?;
+        Ok(Self {
+            common: Common::read(&options)?,
+            field: options.required("field")?,
+            first: options.required("first")?,
+            second: options.required("second")?,
+            metrics: options.words("metrics")?.unwrap_or_else(|| vec!["avg_throughput".to_owned()]),
+        })
+    }
+
+    /// Makes the table.
+    ///
+    /// # Errors
+    /// If the results lack a metric, the field or one of its values.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        known_column(name, "field", &self.field, results)?;
+        for metric in &self.metrics {
+            known_column(name, "metrics", metric, results)?;
+        }
+        self.check_values(name, results)?;
+        let lines = self.lines(results);
+        let mut notes = lacking(&results.rows, &self.metrics);
+        let num_alone: usize = lines.iter().map(|line| line.pairing.alone).sum();
+        if num_alone > 0 {
+            notes.push(format!(
+                "view `{name}`: {num_alone} instances are left out because they have no partner"
+            ));
+        }
+        Ok(Shown { tables: vec![self.table(&lines)], notes, ..Shown::default() })
+    }
+
+    /// Checks that both values occur.
+    fn check_values(&self, name: &str, results: &Results) -> Result<(), Error> {
+        let mut known: Vec<String> = results.rows.iter().filter_map(|row| self.value(row)).collect();
+        known.sort();
+        known.dedup();
+        for (key, value) in [("first", &self.first), ("second", &self.second)] {
+            if !known.contains(value) {
+                return Err(named(name, key, value, known.iter().map(String::as_str)));
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&self, row: &Row) -> Option<String> {
+        row.settings.get(&self.field).map(shown)
+    }
+
+    fn lines<'a>(&self, results: &'a Results) -> Vec<Line<'a>> {
+        let mut groups: BTreeMap<(&str, &str, u64), Vec<&Row>> = BTreeMap::new();
+        for row in &results.rows {
+            // A missing number of agents means POGEMA's default.
+            let num_agents = row.field(NUM_AGENTS).and_then(serde_json::Value::as_u64).unwrap_or(1);
+            groups.entry((&row.set, &row.algorithm, num_agents)).or_default().push(row);
+        }
+        let line = |((folder, algorithm, num_agents), rows): ((&'a str, &'a str, u64), Vec<&'a Row>)| {
+            let of = |value: &str| {
+                let has_value = |row: &&&Row| self.value(row).as_deref() == Some(value);
+                rows.iter().filter(has_value).copied().collect::<Vec<_>>()
+            };
+            let pairing = Pairing::of(of(&self.first), of(&self.second), |row| self.partner(row));
+            Line { folder, algorithm, num_agents: num_agents.to_string(), pairing }
+        };
+        groups.into_iter().map(line).collect()
+    }
+
+    /// Returns a text that only rows of the same instance share.
+    fn partner(&self, row: &Row) -> String {
+        let others: BTreeMap<_, _> = row.settings.iter().filter(|(name, _)| **name != self.field).collect();
+        serde_json::json!(others).to_string()
+    }
+
+    fn table(&self, lines: &[Line<'_>]) -> Table {
+        let mut head: Vec<String> =
+            ["Folder", &self.common.title(ALGORITHM), &self.common.title(NUM_AGENTS), "Pairs"]
+                .map(str::to_owned)
+                .into();
+        for metric in &self.metrics {
+            let title = self.common.title(metric);
+            head.extend([&self.first, &self.second].map(|value| format!("{title} {value}")));
+            head.extend(["difference", "%"].map(str::to_owned));
+        }
+        let row = |(number, line): (usize, &Line<'_>)| {
+            let mut cells = vec![
+                Cell::Text(line.folder.to_owned()),
+                Cell::Text(self.common.algorithm(line.algorithm)),
+                Cell::Text(line.num_agents.clone()),
+                Cell::Count(line.pairing.pairs.len()),
+            ];
+            for metric in &self.metrics {
+                cells.extend(figures(&line.pairing, metric, number as u64));
+            }
+            cells
+        };
+        let remark = format!(
+            "`{}` minus `{}` on the same instances: mean ± half of the 95 % interval of the means of {RESAMPLES} samples \
+             of pairs with replacement; % of the first mean",
+            self.second, self.first
+        );
+        let rows = lines.iter().enumerate().map(|(number, line)| row((number, line))).collect();
+        Table { head, rows, digits: self.common.digits, remark: Some(remark), ..Table::default() }
+    }
+}
+
+/// Returns both means of a metric, their paired difference, and that in percent of the first mean.
+fn figures(pairing: &Pairing<'_>, metric: &str, number: u64) -> [Cell; 4] {
+    let both =
+        pairing.pairs.iter().filter_map(|(one, other)| Some((one.metric(metric)?, other.metric(metric)?)));
+    let (first, second): (Vec<f64>, Vec<f64>) = both.unzip();
+    let differences: Vec<f64> = first.iter().zip(&second).map(|(one, other)| other - one).collect();
+    let estimate = Estimate::of(&differences, Spread::Bootstrap { level: 95.0 }, number);
+    let base = mean_of(&first).filter(|mean| *mean != 0.0);
+    let percent = estimate.and_then(|estimate| Some(100.0 * estimate.mean / base?));
+    [
+        Cell::Number(mean_of(&first)),
+        Cell::Number(mean_of(&second)),
+        Cell::Mean(estimate),
+        Cell::Number(percent),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::views::{Format, View};
+
+    fn results() -> Results {
+        let row = |occupancy: &str, seed: u64, throughput: f64| -> Row {
+            serde_json::from_value(serde_json::json!({
+                "metrics": {"avg_throughput": throughput},
+                "env_grid_search": {"occupancy": occupancy, "num_agents": 8, "seed": seed},
+                "algorithm": "A",
+            }))
+            .unwrap()
+        };
+        // The rows of a pair are not in the same order, and one instance has no partner.
+        let rows = vec![
+            row("as_released", 0, 1.0),
+            row("as_released", 1, 3.0),
+            row("exact", 1, 3.5),
+            row("exact", 0, 1.5),
+            row("exact", 2, 9.0),
+        ];
+        Results { rows, notes: Vec::new() }
+    }
+
+    fn show(fields: &str) -> Result<Shown, String> {
+        let view = View::read("Cost", &Node::parse(fields).unwrap());
+        view.and_then(|view| view.show("Cost", &results(), None)).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn rows_of_the_same_instance_are_compared() {
+        let shown = show("{type: difference, field: occupancy, first: as_released, second: exact}").unwrap();
+        assert_eq!(
+            shown.tables[0].text(Format::Csv).lines().collect::<Vec<_>>(),
+            [
+                "Folder,Algorithm,Number of Agents,Pairs,Average Throughput as_released,Average Throughput exact,\
+                 difference,difference low,difference high,difference n,%",
+                ",A,8,2,2,2.5,0.5,0.5,0.5,2,25",
+            ]
+        );
+        assert_eq!(shown.notes, ["view `Cost`: 1 instances are left out because they have no partner"]);
+    }
+
+    #[test]
+    fn unknown_fields_and_values_are_errors() {
+        let error = |fields: &str| show(fields).unwrap_err();
+        let unknown = error("{type: difference, field: occupency, first: as_released, second: exact}");
+        assert!(unknown.contains("`field` is `occupency`") && unknown.contains("`occupancy`"), "{unknown}");
+        let unknown = error("{type: difference, field: occupancy, first: released, second: exact}");
+        assert!(unknown.contains("`first` is `released`"), "{unknown}");
+        let missing = error("{type: difference, field: occupancy, first: exact}");
+        assert!(missing.contains("a field `second`"), "{missing}");
+    }
+}
