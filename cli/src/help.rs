@@ -128,7 +128,7 @@ mod tests {
 
     use super::*;
 
-    /// All commands that do something, each with its path: `maps list`.
+    /// All commands without subcommands, each with its path, for example `maps list`.
     fn leaves(command: &Command, path: &str) -> Vec<(String, Command)> {
         let subcommands: Vec<&Command> =
             command.get_subcommands().filter(|command| command.get_name() != "help").collect();

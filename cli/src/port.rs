@@ -20,7 +20,7 @@ pub struct Port {
 
 impl Port {
     pub fn run(&self) -> Result<(), Error> {
-        // Otherwise the fast engine would refuse every instance.
+        // Reports an invalid `POGEMA_SIMD` now: the fast engine would reject every instance with it.
         SimdPath::from_environment()?;
         let named = ENGINES.into_iter().find(|engine| engine.name == self.engine);
         let input = self.input.limit().lines(std::io::stdin().lock());

@@ -1,4 +1,4 @@
-"""Tests of single environments, with code written for POGEMA except for the import."""
+"""Tests of single environments. Only the imports differ from code written for POGEMA."""
 
 import copy
 import pickle
@@ -214,7 +214,7 @@ def test_configs_can_be_extended_copied_and_pickled():
     assert GridConfig(**plain.dict()) == plain
 
 
-def test_too_many_agents_raise_the_classes_of_both_lines():
+def test_too_many_agents_raise_the_exceptions_of_both_release_lines():
     env = pogema_v0(GridConfig(size=3, density=0.0, num_agents=9))
     for error in (OverflowError, ValueError):
         with pytest.raises(error, match="room"):
@@ -242,7 +242,7 @@ def test_warnings_about_the_instance_reach_the_user():
 
 
 def _num_without_room(config, num_retries):
-    """Makes grids without a seed, and returns for how many of them no attempt had room."""
+    """Makes 200 grids without a seed, and returns the number of grids for which every attempt failed."""
     num_failed = 0
     for _ in range(200):
         try:
@@ -254,7 +254,7 @@ def _num_without_room(config, num_retries):
 
 @pytest.mark.filterwarnings("ignore:the agents were placed only at attempt")
 def test_grid_tries_as_often_as_num_retries_says():
-    # One random map of seven has room for all agents.
+    # One in seven random maps has room for all agents.
     config = GridConfig(size=4, density=0.5, num_agents=5)
     never, default, always = (_num_without_room(config, number) for number in (0, 10, 10_000))
     assert never > 100 > default > always == 0

@@ -19,7 +19,7 @@ pub struct PlannerArgs {
     /// gives the same plan [default: no limit]
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
-    /// Maximum number of threads of the planner; LaCAM refines plans on that many
+    /// Maximum number of threads of the planner; LaCAM refines plans on all of them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = number_of_threads())]
     threads: usize,
     /// Seed of the planner, or of the actions that a network draws

@@ -63,7 +63,7 @@ def case(seed: int, number: int) -> Case:
 
 
 def look(fields: Fields, num_agents: int) -> list[Call]:
-    """Returns calls of everything that shows the current state."""
+    """Returns calls to all functions and attributes that show the current state."""
     calls: list[Call] = [("call", name, (), {}) for name in (*_BOTH, *_PLAIN)]
     calls += [("call", name, (), {"ignore_borders": True}) for name in _BOTH]
     calls.append(("call", "get_state", (), {"as_dict": True}))
@@ -186,7 +186,7 @@ class _Episodes:
             self.calls.append(("step", plan + [0] if draw.chance(0.5) else plan[:-1], "list"))
             return
         plan[draw.number(0, self.num_agents - 1)] = draw.one(WRONG_ACTIONS)
-        # A failed step leaves POGEMA with half a step, so the script resets.
+        # A failed step can leave POGEMA in the middle of a step, so the script resets.
         self.calls += [("step", plan, draw.one(("list", "tuple"))), ("reset", None)]
 
     def _render(self) -> None:

@@ -27,7 +27,7 @@ const HEURISTICS: [Heuristic; 3] = [Heuristic::AgentBased, Heuristic::MapBased, 
 /// The sizes of neighbourhoods.
 const SIZES: [usize; 5] = [2, 4, 8, 12, 20];
 
-/// How fast weights follow rewards.
+/// The rate at which weights follow rewards.
 const REACTION: f64 = 0.02;
 
 /// The least weight, as a share of the highest one.
@@ -129,8 +129,9 @@ impl NeighbourhoodSelector {
         }
     }
 
-    /// Walks from a random step of the path of an agent along vertices from which it would arrive earlier, and adds the
-    /// agents it meets.
+    /// Walks from a random step of an agent's path, and adds the other agents that it meets.
+    ///
+    /// The walk visits only vertices from which the agent could arrive earlier than its path does.
     fn walk(&mut self, solution: &Solution<'_>, random: &mut Pcg64Mcg, agent: Agent, size: usize) {
         let (graph, costs) = (solution.graph(), solution.costs(agent));
         let path = solution.path(agent);
@@ -154,7 +155,7 @@ impl NeighbourhoodSelector {
         }
     }
 
-    /// Adds the agents that pass near a random step of the path of a delayed agent, in growing distance.
+    /// Adds a delayed agent and the agents that pass near a random step of its path, the nearest first.
     fn select_map_based(&mut self, solution: &Solution<'_>, random: &mut Pcg64Mcg, size: usize) {
         let agent = delayed_agent(solution, random);
         self.add(agent);

@@ -127,7 +127,10 @@ impl TimeTable {
         self.span()
     }
 
-    /// Returns the start of the safe interval of a vertex that contains a time, or else of the next one, or the span.
+    /// Returns the start of a vertex's safe interval at a time.
+    ///
+    /// If the vertex is occupied at that time, returns the start of its next safe interval, or the span if there is
+    /// none.
     #[inline]
     pub fn free_since_or_next(&self, vertex: Vertex, time: u32) -> u32 {
         if self.is_busy(vertex, time) { self.next_free(vertex, time) } else { self.free_since(vertex, time) }
