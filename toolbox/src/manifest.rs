@@ -47,7 +47,7 @@ impl Manifest {
     /// # Errors
     /// If weights cannot be read.
     pub fn of(suite: &Suite) -> Result<Self, Error> {
-        let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(&algorithm.fingerprint()));
+        let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(algorithm.fingerprint()));
         let mut weights = BTreeMap::new();
         for algorithm in &suite.algorithms {
             if let Some(path) = built_in::weights_of(algorithm, suite.folder()) {
@@ -56,7 +56,7 @@ impl Manifest {
         }
         Ok(Self {
             suite: std::path::absolute(&suite.path).unwrap_or_else(|_| suite.path.clone()),
-            environment: digest(&suite.environments.fingerprint()),
+            environment: digest(suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
             weights,
             runs: Vec::new(),

@@ -225,5 +225,13 @@ fn intervals_and_times_of_decisions_are_shown() {
     // 200 decisions of one agent took 0.25 and 0.5 seconds without the network.
     let expected = "2,2,0.5,0.5,0.5,2,0.5,1,1875,1250";
     assert_eq!(csv(&shown)[1], expected);
+    // A planner has no network.
+    let rows = results.rows.into_iter().map(|mut row| {
+        row.metrics.shift_remove("network_time");
+        row
+    });
+    let results = Results { rows: rows.collect(), notes: Vec::new() };
+    let shown = show(folder.path(), fields, &results).unwrap();
+    assert_eq!(csv(&shown)[1], "2,2,0.5,0.5,0.5,2,0.5,1,3125,");
     assert!(csv(&shown)[0].ends_with(",planner µs,network µs"), "{}", csv(&shown)[0]);
 }

@@ -59,6 +59,10 @@ pub enum Program {
 }
 
 impl Program {
+    #[cfg_attr(
+        not(feature = "onnx"),
+        allow(clippy::unnecessary_wraps, reason = "only a runtime has no path")
+    )]
     pub fn simd_path(&self) -> Option<SimdPath> {
         match self {
             Self::Layers(layers) => Some(layers.path),

@@ -235,7 +235,7 @@ impl PublishedView {
         if self.shows_decisions {
             for (title, part) in [("planner µs", 0), ("network µs", 1)] {
                 let times = |line: &Line<'_>| {
-                    line.rows.iter().filter_map(|row| Some(decision_times(row)?[part])).collect::<Vec<_>>()
+                    line.rows.iter().filter_map(|row| decision_times(row)?[part]).collect::<Vec<_>>()
                 };
                 add(title, &|line| Cell::Number(mean_of(&times(line))));
             }
@@ -254,11 +254,12 @@ fn interval(line: &Line<'_>, metric: &str) -> Option<Estimate> {
 
 /// Returns the time that a decision of one agent took in a lifelong episode, outside and inside of the network. Such an
 /// episode has as many steps as its config says. Units: microseconds.
-fn decision_times(row: &Row) -> Option<[f64; 2]> {
+fn decision_times(row: &Row) -> Option<[Option<f64>; 2]> {
     row.metric("avg_throughput")?;
     let num_decisions = row.field("max_episode_steps")?.as_f64()? * row.field(NUM_AGENTS)?.as_f64()?;
-    let (all, network) = (row.metric(RUNTIME)?, row.metric(NETWORK_TIME).unwrap_or(0.0));
-    Some([all - network, network].map(|seconds| 1e6 * seconds / num_decisions))
+    let (all, network) = (row.metric(RUNTIME)?, row.metric(NETWORK_TIME));
+    let seconds = [Some(all - network.unwrap_or(0.0)), network];
+    Some(seconds.map(|seconds| Some(1e6 * seconds? / num_decisions)))
 }
 
 /// Returns the fields that vary in rows.
