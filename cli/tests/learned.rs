@@ -75,7 +75,7 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "network", "--weights", "text.safetensors"], "text.safetensors: "),
         (
             &["--policy", "network", "--weights", "wide.safetensors"],
-            "wide.safetensors: the network reads windows of shape [1, 3, 3] and 0 scalars, the encoder writes [1, 5, 5] and 0",
+            "wide.safetensors: the encoder writes windows of shape [1, 5, 5] and 0 scalars, the network expects [1, 3, 3] and 0",
         ),
         (
             &["--policy", "network", "--weights", "blind.safetensors"],

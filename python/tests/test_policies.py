@@ -253,12 +253,12 @@ def test_wrong_files_are_named(tmp_path):
     with pytest.raises(OSError, match=str(tmp_path)):
         load(tmp_path)
     wrong = [
-        (good[:-7], config, "wrong.safetensors: no safetensors file"),
-        (b"PK\x03\x04" * 9, config, "wrong.safetensors: no safetensors file"),
+        (good[:-7], config, "wrong.safetensors: not a safetensors file"),
+        (b"PK\x03\x04" * 9, config, "wrong.safetensors: not a safetensors file"),
         (good, "{", "wrong.json: "),
         (good, config.replace('"version": 1', '"version": 2'), "wrong.json: `version` is `2`, expected 1"),
         (good, config.replace('"descent"', '"other"'), "wrong.safetensors: tensor `other.weight` is missing"),
-        (good, config.replace('"radius": 1', '"radius": 2'), r"wrong.safetensors: .*windows of shape \[1, 3, 3\]"),
+        (good, config.replace('"radius": 1', '"radius": 2'), r"wrong.safetensors: .*network expects \[1, 3, 3\]"),
         (good, config.replace("cost_to_go", "costs"), "wrong.json: unknown variant"),
     ]
     for weights, text, message in wrong:

@@ -11,8 +11,8 @@ pub enum ForwardError {
     /// An operator of an ONNX graph failed.
     #[error("{0}")]
     Runtime(String),
-    /// The logits or the value of an agent, given by its index in the batch, are infinite or no number.
-    #[error("the network returned a logit or value for agent {row} of the batch that is no finite number")]
+    /// The logits or the value of an agent, given by its index in the batch, are infinite or NaN.
+    #[error("the logits or the value of agent {row} of the batch are not finite")]
     NotFinite {
         /// The index of the agent in the batch.
         row: usize,

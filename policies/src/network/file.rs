@@ -96,7 +96,7 @@ pub fn parse_config(bytes: &[u8]) -> Result<NetworkConfig, String> {
 
 /// Parses the tensors of a `.safetensors` file. An error is a text.
 pub fn parse_tensors(bytes: &[u8]) -> Result<Tensors, String> {
-    let file = SafeTensors::deserialize(bytes).map_err(|error| format!("no safetensors file: {error}"))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|error| format!("not a safetensors file: {error}"))?;
     let mut tensors = Tensors::default();
     for (name, view) in file.tensors() {
         if view.dtype() != Dtype::F32 {

@@ -33,9 +33,9 @@ struct RawGraph {
 
 /// Returns the file with only the operators that the logits need. An error is a text.
 pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
-    let failed = |error: prost::DecodeError| format!("no ONNX file: {error}");
+    let failed = |error: prost::DecodeError| format!("not an ONNX file: {error}");
     let mut model = RawModel::decode(bytes).map_err(failed)?;
-    let graph = model.graph.as_mut().ok_or("no ONNX file: the model has no graph")?;
+    let graph = model.graph.as_mut().ok_or("not an ONNX file: the model has no graph")?;
     let mut needed = HashSet::from([logits.to_owned()]);
     let mut nodes = Vec::new();
     for raw in std::mem::take(&mut graph.node).into_iter().rev() {
@@ -44,10 +44,7 @@ pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
             continue;
         }
         if node.attribute.iter().any(|attribute| attribute.g.is_some() || !attribute.graphs.is_empty()) {
-            return Err(format!(
-                "operator `{}` contains a graph, which this program does not run",
-                node.op_type
-            ));
+            return Err(format!("operator `{}` contains a subgraph, which is not supported", node.op_type));
         }
         needed.extend(node.input);
         nodes.push(raw);

@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
                 _ => Err(format!("output `{output}` does not come from a dense layer")),
             },
             Some(Value::Unknown(reason)) => {
-                Err(format!("output `{output}` depends on {reason}, which is no layer of this program"))
+                Err(format!("output `{output}` depends on {reason}, which is not a supported layer"))
             }
             _ => Err(format!("output `{output}` depends on no input")),
         }

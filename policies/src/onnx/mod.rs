@@ -34,8 +34,8 @@ pub enum Graph {
 
 /// Reads an ONNX file. What follows the logits is cut off. An error is a text.
 pub fn read(bytes: &[u8]) -> Result<Graph, String> {
-    let model = Model::decode(bytes).map_err(|error| format!("no ONNX file: {error}"))?;
-    let graph = model.graph.ok_or("no ONNX file: the model has no graph")?;
+    let model = Model::decode(bytes).map_err(|error| format!("not an ONNX file: {error}"))?;
+    let graph = model.graph.ok_or("not an ONNX file: the model has no graph")?;
     let mut reader = Reader::new(&graph)?;
     for node in &graph.node {
         reader.add(node);

@@ -57,7 +57,7 @@ impl<'a> Reader<'a> {
     fn constant(&self, node: &Node, index: usize) -> Result<&'a TensorProto, String> {
         match self.value(node, index)? {
             Value::Constant(tensor) => Ok(tensor),
-            _ => Err(format!("operator `{}` whose input {index} is no constant", node.op_type)),
+            _ => Err(format!("operator `{}` whose input {index} is not a constant", node.op_type)),
         }
     }
 
@@ -171,8 +171,8 @@ impl<'a> Reader<'a> {
                 // A value follows the other if it was read later.
                 let (first, last) = (one.min(other), one.max(other));
                 let layers = self.layers_between(first, last);
-                let layers =
-                    layers.ok_or("operator `Add` of two values neither of which layers make of the other")?;
+                let layers = layers
+                    .ok_or("operator `Add` of two values, neither of which is computed from the other")?;
                 Ok(self.append(first, Layer::Residual(layers), shape))
             }
             _ => Err(String::new()),

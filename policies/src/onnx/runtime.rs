@@ -50,7 +50,8 @@ impl Runtime {
         let outputs = self.model.run(inputs, self.model.output_ids(), Some(self.options.clone()));
         let output = outputs.map_err(|error| error.to_string())?.into_iter().next();
         let output: Result<NdTensor<f32, 2>, _> = output.ok_or("the graph returns nothing")?.try_into();
-        let output = output.map_err(|_| "the logits are no floats of shape (batch, actions)")?;
+        let wrong = "the logits have another type or shape, expected floats of shape (batch, actions)";
+        let output = output.map_err(|_| wrong)?;
         if output.size(0) != 1 || output.size(1) == 0 {
             return Err(format!("the logits have shape {:?}, expected (1, actions)", output.shape()));
         }

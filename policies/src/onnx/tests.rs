@@ -96,7 +96,7 @@ fn operators_after_the_logits_do_not_matter_but_those_before_do() {
     assert!(read(nodes.clone(), tensors()).is_ok());
     nodes[0].op_type = "Celu".into();
     let error = read(nodes.clone(), tensors()).unwrap_err();
-    assert_eq!(error, "output `logits` depends on operator `Celu`, which is no layer of this program");
+    assert_eq!(error, "output `logits` depends on operator `Celu`, which is not a supported layer");
     nodes[0] = node("Flatten", &["logits"], "flat", vec![]);
     assert!(
         read(nodes, tensors()).unwrap_err().contains("value `logits`, which no earlier operator returns")
@@ -104,7 +104,7 @@ fn operators_after_the_logits_do_not_matter_but_those_before_do() {
 }
 
 #[test]
-fn hostile_files_are_refused() {
+fn hostile_files_are_rejected() {
     let huge = TensorProto {
         dims: vec![1 << 60, 18],
         data_type: 1,
@@ -122,7 +122,7 @@ fn hostile_files_are_refused() {
     assert!(read(nodes, vec![empty]).unwrap_err().contains("expected sizes above 0"));
     let error = |bytes: &[u8]| super::read(bytes).err().unwrap();
     assert!(error(b"").contains("no graph"));
-    assert!(error(b"\x89PNG").starts_with("no ONNX file: "));
+    assert!(error(b"\x89PNG").starts_with("not an ONNX file: "));
     // A length of an exabyte.
     assert!(super::read(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());
 }

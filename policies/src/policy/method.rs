@@ -104,7 +104,7 @@ impl Learned {
         match self.0 {
             Method::Network(policy) => Ok(Self(Method::Network(policy.with_sampling(sampling)))),
             Method::MatsLp(..) => {
-                Err(Error::request("`mats-lp` draws no actions, so it has no rule of sampling"))
+                Err(Error::request("`mats-lp` does not sample actions, so `sampling` is not allowed"))
             }
         }
     }
@@ -117,7 +117,7 @@ impl Learned {
         match self.0 {
             Method::Network(policy) => Ok(Self(Method::Network(policy.with_masks(masks_actions)))),
             Method::MatsLp(..) if masks_actions => {
-                Err(Error::request("`mats-lp` never moves into obstacles, so it has no mask of actions"))
+                Err(Error::request("`mats-lp` never moves into obstacles, so `mask_actions` is not allowed"))
             }
             Method::MatsLp(..) => Ok(self),
         }

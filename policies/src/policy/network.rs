@@ -35,9 +35,9 @@ impl NetworkPolicy {
         let (input, output) = (network.input_shape(), encoder.shape());
         if input != output || network.num_scalars() != encoder.scalars_len() {
             return Err(Error::request(format!(
-                "the network reads windows of shape {input:?} and {} scalars, the encoder writes {output:?} and {}",
-                network.num_scalars(),
-                encoder.scalars_len()
+                "the encoder writes windows of shape {output:?} and {} scalars, the network expects {input:?} and {}",
+                encoder.scalars_len(),
+                network.num_scalars()
             )));
         }
         if network.num_actions() != NUM_ACTIONS {

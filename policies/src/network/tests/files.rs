@@ -1,4 +1,4 @@
-//! Files that are truncated, foreign or hostile.
+//! Files that are truncated, unrelated or hostile.
 
 use std::path::Path;
 
@@ -47,62 +47,62 @@ fn read(config: &Value, weights: &[u8]) -> Result<Network, String> {
 }
 
 #[track_caller]
-fn refuses(config: &Value, weights: &[u8], expected: &str) {
+fn rejects(config: &Value, weights: &[u8], expected: &str) {
     let error = read(config, weights).unwrap_err();
     assert!(error.contains(expected) && !error.contains('\n'), "{error}");
 }
 
 #[test]
-fn a_right_file_is_read() {
+fn a_valid_file_is_read() {
     let network = read(&config(), &weights(|_| {}, 0.5)).unwrap();
     assert_eq!((network.input_shape(), network.num_actions(), network.has_value()), ([1, 3, 3], 5, false));
 }
 
 #[test]
-fn wrong_tensors_are_refused_by_name() {
+fn wrong_tensors_are_rejected_by_name() {
     let rename = |header: &mut Value, name: &str| {
         let tensor = header.as_object_mut().unwrap().remove("core.bias").unwrap();
         header[name] = tensor;
     };
-    refuses(&config(), &weights(|header| rename(header, "other"), 0.5), "tensor `core.bias` is missing");
-    refuses(&config(), &weights(|_| {}, f32::NAN), "value 0 is `NaN`, expected a finite number");
-    refuses(&config(), &weights(|_| {}, f32::INFINITY), "value 0 is `inf`, expected a finite number");
+    rejects(&config(), &weights(|header| rename(header, "other"), 0.5), "tensor `core.bias` is missing");
+    rejects(&config(), &weights(|_| {}, f32::NAN), "value 0 is `NaN`, expected a finite number");
+    rejects(&config(), &weights(|_| {}, f32::INFINITY), "value 0 is `inf`, expected a finite number");
     let reshape = |header: &mut Value| header["core.weight"]["shape"] = json!([18, 4]);
     let expected = "tensor `core.weight` has shape [18, 4], expected [any size, 18]";
-    refuses(&config(), &weights(reshape, 0.5), expected);
+    rejects(&config(), &weights(reshape, 0.5), expected);
     let retype = |header: &mut Value| header["core.weight"]["dtype"] = json!("I32");
-    refuses(&config(), &weights(retype, 0.5), "tensor `core.weight` has type I32, expected F32");
+    rejects(&config(), &weights(retype, 0.5), "tensor `core.weight` has type I32, expected F32");
     let mut shorter = config();
     shorter["architecture"]["layers"].as_array_mut().unwrap().truncate(3);
-    refuses(
+    rejects(
         &shorter,
         &weights(|_| {}, 0.5),
         "tensor `actions.weight` has shape [5, 4], expected [any size, 18]",
     );
     let mut twice = config();
     twice["architecture"]["layers"].as_array_mut().unwrap().push(json!({"dense": "core"}));
-    refuses(&twice, &weights(|_| {}, 0.5), "tensor `core.weight` is missing or used by two layers");
+    rejects(&twice, &weights(|_| {}, 0.5), "tensor `core.weight` is missing or used by two layers");
     let mut without = config();
     without["architecture"]["layers"] = json!(["flatten"]);
     without["architecture"]["window"] = json!([1, 2, 2]);
-    refuses(&without, &weights(|_| {}, 0.5), "belongs to no layer");
+    rejects(&without, &weights(|_| {}, 0.5), "belongs to no layer");
 }
 
 #[test]
-fn truncated_and_foreign_files_are_refused() {
+fn truncated_and_unrelated_files_are_rejected() {
     let whole = weights(|_| {}, 0.5);
     for len in 0..whole.len() {
-        refuses(&config(), &whole[..len], "no safetensors file: ");
+        rejects(&config(), &whole[..len], "not a safetensors file: ");
     }
-    refuses(&config(), b"PK\x03\x04 an archive of another program", "no safetensors file: ");
+    rejects(&config(), b"PK\x03\x04 an archive of another program", "not a safetensors file: ");
     // A header of an exabyte.
-    refuses(&config(), &[&u64::MAX.to_le_bytes()[..], b"{}"].concat(), "no safetensors file: ");
+    rejects(&config(), &[&u64::MAX.to_le_bytes()[..], b"{}"].concat(), "not a safetensors file: ");
     let claim = |header: &mut Value| header["core.weight"]["shape"] = json!([u64::MAX, 18]);
-    refuses(&config(), &weights(claim, 0.5), "no safetensors file: ");
+    rejects(&config(), &weights(claim, 0.5), "not a safetensors file: ");
 }
 
 #[test]
-fn wrong_configs_are_refused() {
+fn wrong_configs_are_rejected() {
     let cases = [
         (json!({"version": 2}), "`version` is `2`, expected 1"),
         (json!({"architecture": {"window": [1, 3]}}), "invalid length 2"),
@@ -113,12 +113,12 @@ fn wrong_configs_are_refused() {
     for (change, expected) in cases {
         let mut config = config();
         config.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
-        refuses(&config, &weights(|_| {}, 0.5), expected);
+        rejects(&config, &weights(|_| {}, 0.5), expected);
     }
     let window = |window: Value, expected: &str| {
         let mut config = config();
         config["architecture"]["window"] = window;
-        refuses(&config, &weights(|_| {}, 0.5), expected);
+        rejects(&config, &weights(|_| {}, 0.5), expected);
     };
     window(json!([1, 1_000_000, 1_000_000]), "the window has 1 channels, 1000000 rows and 1000000 columns");
     window(json!([u64::MAX, u64::MAX, u64::MAX]), "the window has");
@@ -127,7 +127,7 @@ fn wrong_configs_are_refused() {
     let layers = |layers: Value, expected: &str| {
         let mut config = config();
         config["architecture"]["layers"] = layers;
-        refuses(&config, &weights(|_| {}, 0.5), expected);
+        rejects(&config, &weights(|_| {}, 0.5), expected);
     };
     layers(
         json!([{"convolution": {"name": "conv", "padding": 3}}]),

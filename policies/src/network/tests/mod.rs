@@ -247,7 +247,7 @@ fn a_forward_pass_allocates_nothing_after_the_first() {
 }
 
 #[test]
-fn wrong_inputs_are_refused_and_leave_the_state() {
+fn wrong_inputs_are_rejected_and_leave_the_state() {
     let sizes = Sizes {
         window: [1, 2, 2],
         filters: 1,
@@ -270,8 +270,5 @@ fn wrong_inputs_are_refused_and_leave_the_state() {
     assert_eq!(run(&[0.0; 8], &[0.0], 2), "the list of scalars has length 1, expected 0");
     assert_eq!(run(&[0.0; 4], &[], 1), "the recurrent state has length 4, expected 2");
     let error = run(&[0.0, 0.0, 0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0], &[], 2);
-    assert_eq!(
-        error,
-        "the network returned a logit or value for agent 1 of the batch that is no finite number"
-    );
+    assert_eq!(error, "the logits or the value of agent 1 of the batch are not finite");
 }

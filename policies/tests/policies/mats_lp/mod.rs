@@ -196,7 +196,7 @@ fn agents_without_a_path_or_on_isolated_cells_play_on() -> Result<(), Error> {
 }
 
 #[test]
-fn wrong_calls_are_refused() -> Result<(), Error> {
+fn wrong_calls_are_rejected() -> Result<(), Error> {
     let network = Linear::new(5, 1.0, &mut Generator::seeded(1));
     let episode = start(instance(&["..."], &[[0, 0]], &[[0, 2]])?, OnGoal::Finish)?;
     let mut policy = MatsLp::new(&network, MatsLpParams::default(), 1)?;
