@@ -1,7 +1,7 @@
 //! Learned policies for POGEMA environments, which play on all cores and without Python.
 //!
-//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] turns that into
-//! logits of its actions. [`MatsLp`] searches with a network.
+//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] maps these inputs to
+//! the logits of the actions. [`MatsLp`] searches with a network.
 
 mod encode;
 mod follower;

@@ -21,7 +21,7 @@ pub struct Played {
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
-    /// The part of the runtime that a network took, added up over threads, if the policy has one.
+    /// The part of the runtime that a network took, summed over threads, if the policy has one.
     pub network_time: Option<Duration>,
     /// What a one-shot planner proved about the episode, if anything.
     pub proof: Proof,

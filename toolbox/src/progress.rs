@@ -24,7 +24,7 @@ pub struct Done {
     pub metrics: Pairs,
     /// Time of the policy. Units: seconds.
     pub runtime: f64,
-    /// The part of it that a network took, if the policy has one. Units: seconds, added up over threads.
+    /// The part of it that a network took, if the policy has one. Units: seconds, summed over threads.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_time: Option<f64>,
     /// The machine, if it differs from that of the run.

@@ -64,7 +64,7 @@ pub struct Episode {
     pub config: Value,
     /// Time of the policy. Units: seconds.
     pub seconds: Option<f64>,
-    /// The part of it that a network took, if the policy has one. Units: seconds, added up over threads.
+    /// The part of it that a network took, if the policy has one. Units: seconds, summed over threads.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_seconds: Option<f64>,
     /// Index of the run that played it.

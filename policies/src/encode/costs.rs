@@ -11,8 +11,8 @@ use crate::grid::Layout;
 
 /// Steps from each place to one goal.
 ///
-/// Windows of many agents read many grids, so the time depends on the size of an entry. The largest number of an entry
-/// stands for [`NO_COST`].
+/// Many agents read many grids, so speed depends on the size of an entry. The largest value of an entry stands for
+/// [`NO_COST`].
 #[derive(Clone, Debug)]
 pub(crate) enum CostGrid {
     /// The costs of maps with few free cells.
@@ -24,7 +24,7 @@ impl CostGrid {
     /// Returns the grid of these costs, `u32::MAX` where there is none.
     fn new(costs: Vec<u32>, num_free: usize) -> Self {
         if num_free < usize::from(u16::MAX) - FARTHEST {
-            // A path is shorter than the number of free cells; only the entry of a missing cost is cut.
+            // A path is shorter than the number of free cells, so only the value of a missing cost is truncated.
             Self::Small(costs.into_iter().map(|cost| cost as u16).collect())
         } else {
             Self::Large(costs.into())
@@ -87,7 +87,7 @@ pub(crate) struct ToGoal {
 }
 
 impl Costs {
-    /// Default byte budget of the grids that no agent uses at present.
+    /// Default byte budget of the grids that no agent currently uses.
     pub const MAX_BYTES: usize = 64 << 20;
 
     pub fn new(layout: Layout, map: &Map) -> Self {

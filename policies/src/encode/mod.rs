@@ -1,6 +1,6 @@
 //! Encoders: what a policy sees, as data.
 //!
-//! An [`Encoder`] turns the states of one environment into windows and numbers of its agents. It needs no engine: it
+//! An [`Encoder`] turns the states of one environment into windows and scalars of its agents. It needs no engine: it
 //! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
 
 pub(crate) mod costs;
@@ -27,7 +27,8 @@ use crate::grid::{Layout, Marks};
 /// An encoder for one environment.
 ///
 /// [`Encoder::begin`] starts an episode. [`Encoder::encode`] is then called once for the state after the reset and once
-/// after each step, because some channels remember earlier states. Encoding takes no random numbers and no threads.
+/// after each step, because some channels remember earlier states. Encoding uses neither random numbers nor
+/// threads.
 ///
 /// ```
 /// use pogema_core::{Cell, Map, Occupancy, Outside, State};
@@ -84,7 +85,7 @@ impl Encoder {
         Ok(Self { settings, cache_bytes: Costs::MAX_BYTES, episode: None })
     }
 
-    /// Limits the memory for costs to goals that no agent has at present [default: 64 MiB]. The windows do not depend
+    /// Limits the memory for costs to goals that no agent currently has [default: 64 MiB]. The windows do not depend
     /// on it.
     #[must_use]
     pub fn with_cache_bytes(self, cache_bytes: usize) -> Self {
@@ -99,7 +100,7 @@ impl Encoder {
     /// Starts an episode: forgets the last one, and prepares the map.
     ///
     /// `starts` holds the cell of each agent after the reset. For [`Outside::Noise`], an engine's map with its border
-    /// is suitable, too: the encoder draws the wall and reads only the cells beyond it.
+    /// is accepted, too: the encoder draws the wall and reads only the cells beyond it.
     pub fn begin(&mut self, map: &Map, outside: &Outside, occupancy: Occupancy, starts: &[Cell]) {
         let settings = &self.settings;
         let last = self.episode.take().map(|episode| episode.terrain);
@@ -127,7 +128,7 @@ impl Encoder {
         });
     }
 
-    /// Writes the windows and the numbers of all agents; those of an inactive agent are 0.
+    /// Writes the windows and the scalars of all agents; those of an inactive agent are 0.
     ///
     /// This is [`Encoder::follow`] and then [`Encoder::write`].
     ///
@@ -185,7 +186,7 @@ impl Encoder {
         Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())
     }
 
-    /// Writes the windows and the numbers of the state that the encoder followed last, as often as wanted.
+    /// Writes the windows and the scalars of the state that the encoder followed last. It can be called repeatedly.
     ///
     /// # Errors
     /// Those of [`Encoder::encode`].

@@ -1,4 +1,4 @@
-//! Positions and goals as numbers.
+//! Positions and goals as scalars.
 
 use pogema_core::Cell;
 
@@ -9,7 +9,7 @@ pub(crate) fn offset(from: Cell, to: Cell) -> (isize, isize) {
     (to.row as isize - from.row as isize, to.col as isize - from.col as isize)
 }
 
-/// Returns the two numbers of one kind.
+/// Returns the two values of one kind.
 pub(crate) fn scalars(kind: Scalars, start: Cell, cell: Cell, goal: Cell) -> [f32; Scalars::LEN] {
     let scaled = |(rows, cols)| [rows, cols].map(|x: isize| x as f32 / x.unsigned_abs().max(64) as f32);
     match kind {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::encode::words::{Channel, Scalars};
 use crate::follower::FollowerVersion;
 
-/// What a policy sees, as data: the windows and numbers of each agent.
+/// What a policy sees, as data: the windows and scalars of each agent.
 ///
 /// ```
 /// use pogema_policies::{Channel, EncoderSettings};
@@ -23,7 +23,7 @@ pub struct EncoderSettings {
     pub radius: usize,
     /// The windows of each agent, in this order.
     pub channels: Vec<Channel>,
-    /// The numbers of each agent, in this order.
+    /// The scalars of each agent, in this order.
     #[serde(default)]
     pub scalars: Vec<Scalars>,
     /// Number of cells that an agent sees in each direction, 1 to 128, for `seen_obstacles` and
@@ -40,7 +40,7 @@ impl EncoderSettings {
         Config::default().radius
     }
 
-    /// Creates settings with these windows, no numbers, and POGEMA's default radius as sight.
+    /// Creates settings with these windows, no scalars, and POGEMA's default radius as sight.
     pub fn new(radius: usize, channels: impl Into<Vec<Channel>>) -> Self {
         Self {
             radius,
@@ -77,7 +77,7 @@ impl EncoderSettings {
         self.shape().iter().product()
     }
 
-    /// Returns the number of values in the numbers of one agent.
+    /// Returns the number of scalar values of one agent.
     pub fn scalars_len(&self) -> usize {
         self.scalars.len() * Scalars::LEN
     }

@@ -1,4 +1,4 @@
-//! The windows and the numbers that an encoder can write, by name.
+//! The windows and the scalars that an encoder can write, by name.
 
 use pogema_core::words;
 
@@ -9,14 +9,14 @@ words! {
         Obstacles = "obstacles",
         /// 1 for a cell that the occupancy grid marks, the own cell included; else 0.
         Agents = "agents",
-        /// 1 for the cell of any other active agent and for the own cell, even if the occupancy grid lost them; else 0.
+        /// 1 for the own cell and that of any other active agent, even if the occupancy grid does not mark it; else 0.
         AllAgents = "all_agents",
         /// 1 for the goal, moved to the nearest cell of the window if it lies outside; else 0.
         Goal = "goal",
-        /// How much nearer to the goal each cell is than the own one: a share of `2 * radius` steps, -1 to 1.
+        /// Steps by which a cell is nearer to the goal than the own cell, divided by `2 * radius`, limited to -1 to 1.
         ///
-        /// The value is `(own - cost) / (2 * radius)`, limited to -1 to 1, where costs are steps to the goal without
-        /// other agents. Obstacles and cells without a path have -1.
+        /// The value is `(own - cost) / (2 * radius)` before the limit, where costs are steps to the goal without other
+        /// agents. Obstacles and cells without a path have -1.
         CostToGo = "cost_to_go",
         /// Costs to go from 0 (obstacle) to 1 (nearest cell), as MATS-LP's network `cost-tracer` reads them.
         ///
@@ -35,7 +35,7 @@ words! {
         /// -1 for an obstacle, 1 for the cells of Follower's path, else 0.
         ///
         /// The path is that of Follower's planner, which is searched anew in every state. It is drawn from the own cell
-        /// up to its first cell outside the window; `follower` tells the versions apart.
+        /// up to its first cell outside the window; `follower` selects the version.
         ///
         /// Source: Follower, `follower_cpp/follower.cpp`
         FollowerPath = "follower_path",
@@ -49,7 +49,7 @@ words! {
 }
 
 words! {
-    /// Numbers beside the windows of an agent, two of each kind.
+    /// Scalars of an agent, which a network reads beside the windows. Each kind has two values.
     pub enum Scalars {
         /// The cell relative to the start: rows and columns, each `x / max(|x|, 64)`.
         Position = "position",
@@ -63,6 +63,6 @@ words! {
 }
 
 impl Scalars {
-    /// The number of numbers of each kind.
+    /// The number of values of each kind.
     pub const LEN: usize = 2;
 }

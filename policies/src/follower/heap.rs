@@ -13,7 +13,8 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// Returns whether it comes after another element. Values of `f` that differ by less than 1e-5 count as equal, too.
+    /// Returns whether this element comes after another one. Values of `f` that differ by less than 1e-5 count as
+    /// equal, too.
     ///
     /// Of two elements, each may come after the other, so the order depends on the steps of the heap.
     fn is_after(self, other: Self) -> bool {
@@ -98,10 +99,10 @@ mod tests {
     #[test]
     fn equal_elements_leave_in_the_order_of_libstdcpp() {
         let equal: Vec<Entry> = (0..7).map(|place| entry(place, 1.0, 1.0)).collect();
-        // Pop 0: the hole takes 2 (right), then 5 is lone left of it; 6 fills that place: [2, 1, 5, 3, 4, 6].
-        // Pop 2: the hole takes 5 (right), then the lone left 6 was removed as the last: [5, 1, 6, 3, 4].
+        // Pop 0: the hole takes 2 (right), then 5, its only child; 6 fills that place: [2, 1, 5, 3, 4, 6].
+        // Pop 2: the hole takes 5 (right), whose only child 6 was removed as the last: [5, 1, 6, 3, 4].
         // Pop 5: takes 6, a leaf; 4 fills it: [6, 1, 4, 3]. Pop 6: takes 4, a leaf; 3 fills it: [4, 1, 3].
-        // Pop 4: takes the lone left 1; 3 fills its place: [1, 3].
+        // Pop 4: takes 1, the only child; 3 fills its place: [1, 3].
         assert_eq!(order(&equal), [0, 2, 5, 6, 4, 1, 3]);
     }
 

@@ -55,14 +55,14 @@ pub(crate) struct FollowerPlanner {
 struct Agent {
     goal: Option<Cell>,
     heuristic: Arc<[f32]>,
-    /// How often each place was seen occupied since the goal is known.
+    /// How often each place was seen occupied since the agent got its goal.
     dynamic: Vec<(u32, f32)>,
     path: Vec<u32>,
 }
 
 impl FollowerPlanner {
-    /// Prepares the planner for episodes on a map. `max_bytes` is the budget of the heuristics that no agent uses at
-    /// present.
+    /// Prepares the planner for episodes on a map. `max_bytes` is the budget of the heuristics that no agent currently
+    /// uses.
     pub fn new(layout: Layout, map: &Map, sight: usize, version: FollowerVersion, max_bytes: usize) -> Self {
         let graph = Graph::new(map);
         let mut costs = vec![OBSTACLE; layout.len()];
@@ -112,7 +112,7 @@ impl FollowerPlanner {
 
     /// Returns the path of an agent from its place on.
     pub fn path(&self, agent: usize, place: usize) -> impl Iterator<Item = usize> + '_ {
-        // A path that was kept begins where the agent was.
+        // A path kept from an earlier step begins at the agent's cell in that step.
         self.agents[agent].path.iter().map(|&place| place as usize).skip_while(move |&known| known != place)
     }
 

@@ -1,4 +1,4 @@
-//! Follower's A*, step by step as its authors' code.
+//! Follower's A*, with the same steps as the authors' code.
 //!
 //! Its heuristic is neither admissible nor consistent, so the path depends on the order of the search.
 
@@ -56,7 +56,7 @@ impl Search {
     /// Searches until the goal is expanded, and returns whether it was reached.
     fn reaches(&mut self, start: u32, goal: u32, costs: &[f32], heuristic: &[f32]) -> bool {
         self.begin();
-        // The start keeps no cost, so its neighbours reach it once more. That changes the heap, but no path.
+        // The start has no cost yet, so its neighbours add it again. This changes the heap, but no path.
         self.heap.push(Entry { place: start, g: 0.0, f: heuristic[start as usize] });
         while let Some(entry) = self.heap.pop() {
             if entry.place == goal {

@@ -8,9 +8,9 @@ use std::hash::BuildHasher;
 
 /// What determines the network's input for one agent, and nothing else.
 ///
-/// The window of costs depends on the cell and the goal, its centre on the cost's distance to the smallest so far, and
-/// the window of agents on the marks. Two agents with the same key thus have the same input, whichever group they are
-/// in.
+/// The window of costs depends on the cell and the goal. Its centre depends on the difference between the cost and the
+/// smallest cost so far. The window of agents depends on the marks. Two agents with the same key therefore have the
+/// same input, even in different groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Key {
     marks: [u64; 4],
@@ -40,22 +40,22 @@ impl Key {
 
 /// What a search reads from the network: the probability of each action, and the critic's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Outlook {
+pub(super) struct Prediction {
     pub probabilities: [f32; Action::ALL.len()],
     pub value: f32,
 }
 
-/// A cache that all threads share. Forgetting an entry never changes a result, only the time it takes.
+/// A cache that all threads share. Evicting an entry changes the running time, never a result.
 #[derive(Debug)]
 pub(super) struct Cache {
     shards: Vec<Mutex<Shard>>,
 }
 
-/// Two generations of entries: those of the older one are forgotten when the newer one is full.
+/// Two generations of entries: those of the older one are evicted when the newer one is full.
 #[derive(Debug, Default)]
 struct Shard {
-    newer: FxHashMap<Key, Outlook>,
-    older: FxHashMap<Key, Outlook>,
+    newer: FxHashMap<Key, Prediction>,
+    older: FxHashMap<Key, Prediction>,
 }
 
 impl Cache {
@@ -75,8 +75,8 @@ impl Cache {
         self.shards[index].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the outlook of a key, if it is known.
-    pub fn get(&self, key: &Key) -> Option<Outlook> {
+    /// Returns the prediction of a key, if it is known.
+    pub fn get(&self, key: &Key) -> Option<Prediction> {
         let mut shard = self.shard(key);
         if let Some(&known) = shard.newer.get(key) {
             return Some(known);
@@ -86,19 +86,19 @@ impl Cache {
         Some(known)
     }
 
-    /// Adds the outlook of a key.
-    pub fn insert(&self, key: Key, outlook: Outlook) {
-        self.shard(&key).insert(key, outlook);
+    /// Adds the prediction of a key.
+    pub fn insert(&self, key: Key, prediction: Prediction) {
+        self.shard(&key).insert(key, prediction);
     }
 }
 
 impl Shard {
-    fn insert(&mut self, key: Key, outlook: Outlook) {
+    fn insert(&mut self, key: Key, prediction: Prediction) {
         if self.newer.len() >= Cache::MAX_ENTRIES {
             std::mem::swap(&mut self.newer, &mut self.older);
             self.newer.clear();
         }
-        self.newer.insert(key, outlook);
+        self.newer.insert(key, prediction);
     }
 }
 
@@ -112,12 +112,12 @@ mod tests {
         let key = |number: usize| {
             Key::new(Cell::new((number / 100) as u16, (number % 100) as u16), Cell::new(0, 0), 1)
         };
-        let outlook = |number: usize| Outlook { probabilities: [0.2; 5], value: number as f32 };
+        let prediction = |number: usize| Prediction { probabilities: [0.2; 5], value: number as f32 };
         let count = 4 * Cache::NUM_SHARDS * Cache::MAX_ENTRIES;
         for number in 0..count {
-            cache.insert(key(number), outlook(number));
-            assert_eq!(cache.get(&key(number)), Some(outlook(number)));
-            assert_eq!(cache.get(&key(0)), Some(outlook(0)), "used in every turn");
+            cache.insert(key(number), prediction(number));
+            assert_eq!(cache.get(&key(number)), Some(prediction(number)));
+            assert_eq!(cache.get(&key(0)), Some(prediction(0)), "used in every turn");
         }
         assert_eq!(cache.get(&key(1)), None);
         let held =

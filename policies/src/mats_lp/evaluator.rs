@@ -5,14 +5,14 @@ use std::time::{Duration, Instant};
 use pogema_core::Error;
 use rustc_hash::FxHashMap;
 
-use crate::mats_lp::cache::{Cache, Key, Outlook};
+use crate::mats_lp::cache::{Cache, Key, Prediction};
 use crate::mats_lp::prior::{Evaluate, Evaluation, Prior};
 use crate::network::softmax;
 
-/// An outlook that is known, or the row of the batch that will give it.
+/// A known prediction, or the row of the batch that will hold it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Answer {
-    Known(Outlook),
+    Known(Prediction),
     Row(u32),
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Evaluator {
     keys: Vec<Key>,
     rows: FxHashMap<Key, u32>,
     outputs: Vec<Evaluation>,
-    outlooks: Vec<Outlook>,
+    predictions: Vec<Prediction>,
     stats: MatsLpStats,
 }
 
@@ -36,7 +36,7 @@ pub struct MatsLpStats {
     pub num_requests: u64,
     /// Number of states that the network evaluated; the others were known.
     pub num_evaluated: u64,
-    /// Time in the network, added up over threads.
+    /// Time in the network, summed over threads.
     pub network_time: Duration,
 }
 
@@ -61,12 +61,12 @@ impl Evaluator {
             keys: Vec::new(),
             rows: FxHashMap::default(),
             outputs: Vec::new(),
-            outlooks: Vec::new(),
+            predictions: Vec::new(),
             stats: MatsLpStats::default(),
         }
     }
 
-    /// Requests the outlook of a key; `write` writes its input if no earlier request has the same key.
+    /// Requests the prediction of a key; `write` writes its input if no earlier request has the same key.
     pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Answer {
         self.stats.num_requests += 1;
         if let Some(&row) = self.rows.get(&key) {
@@ -84,7 +84,7 @@ impl Evaluator {
         Answer::Row(row)
     }
 
-    /// Evaluates the batch and adds its outlooks to the cache.
+    /// Evaluates the batch and adds its predictions to the cache.
     ///
     /// # Errors
     /// Those of the network.
@@ -98,13 +98,13 @@ impl Evaluator {
         }
         self.stats.num_evaluated += self.keys.len() as u64;
         self.stats.network_time += started.elapsed();
-        self.outlooks.clear();
+        self.predictions.clear();
         for (&key, output) in self.keys.iter().zip(&self.outputs) {
-            let outlook = outlook(output);
-            if is_finite(&outlook) {
-                cache.insert(key, outlook);
+            let prediction = prediction(output);
+            if is_finite(&prediction) {
+                cache.insert(key, prediction);
             }
-            self.outlooks.push(outlook);
+            self.predictions.push(prediction);
         }
         self.clear();
         Ok(())
@@ -122,27 +122,28 @@ impl Evaluator {
         self.stats
     }
 
-    /// Returns the outlook of a request of the batch that was run last; `None` if the network's outputs are not finite.
-    pub fn outlook(&self, answer: Answer) -> Option<Outlook> {
-        let outlook = match answer {
-            Answer::Known(outlook) => outlook,
-            Answer::Row(row) => self.outlooks[row as usize],
+    /// Returns the prediction of a request of the batch that was run last; `None` if the network's outputs are not
+    /// finite.
+    pub fn prediction(&self, answer: Answer) -> Option<Prediction> {
+        let prediction = match answer {
+            Answer::Known(prediction) => prediction,
+            Answer::Row(row) => self.predictions[row as usize],
         };
-        is_finite(&outlook).then_some(outlook)
+        is_finite(&prediction).then_some(prediction)
     }
 }
 
 /// Turns logits into probabilities. Logits that are not finite give probabilities that are not.
-fn outlook(output: &Evaluation) -> Outlook {
+fn prediction(output: &Evaluation) -> Prediction {
     let mut probabilities = output.logits;
     if probabilities.iter().all(|logit| logit.is_finite()) {
         softmax(&mut probabilities);
     } else {
         probabilities.fill(f32::NAN);
     }
-    Outlook { probabilities, value: output.value }
+    Prediction { probabilities, value: output.value }
 }
 
-fn is_finite(outlook: &Outlook) -> bool {
-    outlook.value.is_finite() && outlook.probabilities.iter().all(|value| value.is_finite())
+fn is_finite(prediction: &Prediction) -> bool {
+    prediction.value.is_finite() && prediction.probabilities.iter().all(|value| value.is_finite())
 }

@@ -93,7 +93,7 @@ struct NetworkEvaluator {
 impl Evaluate for NetworkEvaluator {
     fn evaluate(&mut self, inputs: &[f32], out: &mut [Evaluation]) -> Result<(), Error> {
         match self.forward(inputs, out) {
-            // One input after the other finds all that are affected.
+            // Evaluates the inputs one by one to find every input whose outputs are not finite.
             Err(ForwardError::NotFinite { .. }) if out.len() > 1 => {
                 for (input, out) in inputs.chunks_exact(inputs.len() / out.len()).zip(out.chunks_exact_mut(1))
                 {

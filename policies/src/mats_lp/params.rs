@@ -25,8 +25,8 @@ pub struct MatsLpParams {
     /// Whether the search equals the published program where that deviates from the paper.
     ///
     /// The program reads the wrong output of its network as the critic's value, so the value of a leaf is 0. It also
-    /// adds the reward of the leaf at each level of the backup, and then the earlier rewards with one discount more.
-    /// With rewards `r1` to `rD` on the path to a leaf at depth `D`, the node at depth `k` gets
+    /// adds the reward of the leaf at each level of the backup, and discounts the earlier rewards once more. With
+    /// rewards `r1` to `rD` on the path to a leaf at depth `D`, the node at depth `k` gets
     /// `rD + sum over k < j < D of discount^(j - k) * rj`.
     ///
     /// If false, the value of a leaf is the mean of the critic's values over the group, and the node at depth `k` gets

@@ -23,7 +23,7 @@ pub trait Evaluate: Send {
     /// Shape: `inputs` is `[n, 2, side, side]`, with the side `2 * radius + 1`.
     ///
     /// # Errors
-    /// If the network cannot be run. Outputs that are not finite are no error here.
+    /// If the network cannot be run. Outputs that are not finite are not an error here.
     fn evaluate(&mut self, inputs: &[f32], out: &mut [Evaluation]) -> Result<(), Error>;
 }
 

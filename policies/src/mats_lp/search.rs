@@ -2,7 +2,7 @@
 
 use pogema_core::Action;
 
-use crate::mats_lp::cache::{Cache, Outlook};
+use crate::mats_lp::cache::{Cache, Prediction};
 use crate::mats_lp::evaluator::{Answer, Evaluator};
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::simulation::Simulation;
@@ -11,8 +11,9 @@ use crate::mats_lp::tree::{Choices, NodeId, ROOT, RootChild, Tree};
 /// The search of one agent.
 ///
 /// It advances until it needs the network, so that one batch serves many searches. The published program runs the
-/// network at each new leaf. With `faithful`, the value of a leaf is 0, and its priors matter only when it is visited
-/// again. The network therefore runs at the second visit. That gives the same tree, and most leaves are visited once.
+/// network at each new leaf. With `faithful`, the value of a leaf is 0, and its priors matter only at the second visit.
+/// The network therefore runs at the second visit. The tree is the same, and the network runs less often because most
+/// leaves are visited once.
 pub(super) struct Search<'a> {
     params: MatsLpParams,
     simulation: Simulation<'a>,
@@ -23,7 +24,7 @@ pub(super) struct Search<'a> {
     num_expansions: u32,
     is_waiting: bool,
     answers: Vec<Answer>,
-    outlooks: Vec<Outlook>,
+    predictions: Vec<Prediction>,
     choices: Vec<Choices>,
     actions: Vec<Action>,
 }
@@ -43,7 +44,7 @@ impl<'a> Search<'a> {
             num_expansions: 0,
             is_waiting: false,
             answers: Vec::new(),
-            outlooks: Vec::new(),
+            predictions: Vec::new(),
             choices: Vec::new(),
             actions,
         }
@@ -113,12 +114,12 @@ impl<'a> Search<'a> {
 
     /// Adds the children of the node that was evaluated.
     fn expand(&mut self, evaluator: &Evaluator) -> Result<(), usize> {
-        self.outlooks.clear();
+        self.predictions.clear();
         for (position, &answer) in self.answers.iter().enumerate() {
-            self.outlooks.push(evaluator.outlook(answer).ok_or(position)?);
+            self.predictions.push(evaluator.prediction(answer).ok_or(position)?);
         }
         self.choices.clear();
-        for (position, outlook) in self.outlooks.iter().enumerate() {
+        for (position, prediction) in self.predictions.iter().enumerate() {
             let plans = position < self.params.agents_to_plan;
             let is_possible = |action: &Action| self.simulation.is_possible(position, *action);
             let choice = if plans {
@@ -127,14 +128,14 @@ impl<'a> Search<'a> {
                     .filter(is_possible)
                     .fold(0, |choice, action| choice | 1 << action as u8)
             } else {
-                1 << likeliest(outlook)
+                1 << most_probable(prediction)
             };
             self.choices.push(choice);
         }
-        self.tree.expand(self.node, &self.choices, &self.outlooks);
+        self.tree.expand(self.node, &self.choices, &self.predictions);
         if !self.params.faithful {
-            let sum: f32 = self.outlooks.iter().map(|outlook| outlook.value).sum();
-            let value = sum / self.outlooks.len() as f32;
+            let sum: f32 = self.predictions.iter().map(|prediction| prediction.value).sum();
+            let value = sum / self.predictions.len() as f32;
             self.tree.set_value(self.node, value);
             if self.node != ROOT {
                 self.back_up(value);
@@ -156,8 +157,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns the number of the likeliest action; the first of equals.
-fn likeliest(outlook: &Outlook) -> usize {
-    let values = &outlook.probabilities;
+/// Returns the number of the most probable action, the first of equals.
+fn most_probable(prediction: &Prediction) -> usize {
+    let values = &prediction.probabilities;
     (1..values.len()).fold(0, |best, action| if values[action] > values[best] { action } else { best })
 }

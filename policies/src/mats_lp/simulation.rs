@@ -25,7 +25,7 @@ pub(super) struct GroupAgent {
 pub(super) struct Goals<'a> {
     /// The current goal and later ones, as many as are known.
     pub list: &'a [Cell],
-    /// Whether the agent gets its last goal again when it reaches it; if not, it stays.
+    /// Whether the agent gets its last goal again when it reaches it. Otherwise it stays.
     pub repeats_last: bool,
 }
 
@@ -158,7 +158,7 @@ impl<'a> Simulation<'a> {
         key
     }
 
-    /// Returns one plus the steps by which an agent is farther from its goal than it has been, at most 64.
+    /// Returns 1 plus the difference between the agent's cost and its smallest cost so far, at most 64.
     fn behind(&self, position: usize) -> u8 {
         let agent = self.agents[position];
         (agent.now - agent.best + 1).min(64) as u8

@@ -2,7 +2,7 @@
 
 use pogema_core::Action;
 
-use crate::mats_lp::cache::Outlook;
+use crate::mats_lp::cache::Prediction;
 use crate::mats_lp::params::MatsLpParams;
 
 /// The index of a visited node.
@@ -11,7 +11,7 @@ pub(super) type NodeId = u32;
 /// The root.
 pub(super) const ROOT: NodeId = 0;
 
-/// The entry of a child that has not been visited. The root is no child.
+/// The entry of a child that has not been visited. The root is not a child, so its index can serve as this mark.
 const UNVISITED: NodeId = ROOT;
 
 /// A visited node. Its children are joint actions of the group.
@@ -110,14 +110,14 @@ impl Tree {
 
     /// Adds the children of a node, which combine the choices of the agents.
     ///
-    /// The first agent's action varies fastest from child to child. An agent with a single choice adds no factor to the
-    /// priors. Those of the root get the uniform share of the parameters.
-    pub fn expand(&mut self, id: NodeId, choices: &[Choices], outlooks: &[Outlook]) {
+    /// The first agent's action varies fastest from child to child. An agent with a single choice contributes no
+    /// factor to the priors. Those of the root get the uniform share of the parameters.
+    pub fn expand(&mut self, id: NodeId, choices: &[Choices], predictions: &[Prediction]) {
         let first_child = self.priors.len();
         self.priors.push(1.0);
-        for (&choice, outlook) in choices.iter().zip(outlooks) {
+        for (&choice, prediction) in choices.iter().zip(predictions) {
             if choice.count_ones() > 1 {
-                self.multiply(first_child, choice, outlook);
+                self.multiply(first_child, choice, prediction);
             }
         }
         let priors = &mut self.priors[first_child..];
@@ -134,9 +134,9 @@ impl Tree {
     }
 
     /// Combines the joint actions from `first` on with the choices of one more agent.
-    fn multiply(&mut self, first: usize, choice: Choices, outlook: &Outlook) {
+    fn multiply(&mut self, first: usize, choice: Choices, prediction: &Prediction) {
         let len = self.priors.len() - first;
-        let mut actions = chosen(choice).map(|action| f64::from(outlook.probabilities[action as usize]));
+        let mut actions = chosen(choice).map(|action| f64::from(prediction.probabilities[action as usize]));
         let factor = actions.next().unwrap_or(1.0);
         for factor in actions {
             for index in first..first + len {

@@ -1,4 +1,4 @@
-//! The searches of a step, shared out over threads.
+//! The searches of a step, distributed over threads.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -45,7 +45,7 @@ pub(super) fn search_all(
     mut groups: Vec<Vec<usize>>,
     evaluators: &mut [Evaluator],
 ) -> Result<Vec<Answer>, Error> {
-    // The largest groups take longest, so they are dealt out first.
+    // The largest groups take longest, so they are distributed first.
     groups.sort_by_key(|group| (std::cmp::Reverse(group.len()), group[0]));
     let num_threads = evaluators.len();
     let mut shares: Vec<Vec<Vec<usize>>> = vec![Vec::new(); num_threads];
@@ -99,7 +99,7 @@ fn search_some(
 ) -> Result<Vec<Answer>, Failure> {
     let mut searches: Vec<(&[usize], Search<'_>)> =
         groups.iter().map(|group| (group.as_slice(), new_search(task, group))).collect();
-    // An error may have left requests of another episode.
+    // An error may leave requests of another episode.
     evaluator.clear();
     let mut answers = Vec::new();
     let mut failed: Option<Failure> = None;

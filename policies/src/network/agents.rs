@@ -1,4 +1,5 @@
-//! Runs the steps for 8 or 16 agents whose values lie side by side: each list holds, for each value, that of every agent.
+//! Runs the steps for 8 or 16 agents whose values lie side by side: a list holds the first value of all agents, then
+//! the second, and so on.
 
 use pogema_core::SimdPath;
 
@@ -35,7 +36,8 @@ impl AgentBuffers {
 }
 
 impl Steps {
-    /// Computes the outputs of at most as many agents as the buffers hold. The values of the agents that are missing are those of an earlier call.
+    /// Computes the outputs of at most as many agents as the buffers hold. The lanes of missing agents hold values of
+    /// an earlier call.
     pub fn run_agents(
         &self,
         path: SimdPath,
@@ -119,7 +121,7 @@ fn run_planes(path: SimdPath, step: &PlaneStep, buffers: &mut AgentBuffers) {
     }
 }
 
-/// Writes lists of agents as agents of values.
+/// Writes the lists of some agents side by side: the first value of all agents, then the second, and so on.
 fn interleave(lists: &[f32], len: usize, num_agents: usize, to: &mut [f32]) {
     for (agent, list) in lists.chunks_exact(len.max(1)).enumerate() {
         to.chunks_exact_mut(num_agents).zip(list).for_each(|(agents, value)| agents[agent] = *value);

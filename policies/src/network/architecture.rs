@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Architecture {
     /// Channels, rows and columns of the window.
     pub window: [usize; 3],
-    /// Number of numbers beside the window.
+    /// Number of scalars, which the network reads beside the window.
     #[serde(default)]
     pub scalars: usize,
     /// The layers in order, from the window to the input of the heads.
@@ -39,12 +39,12 @@ pub enum Layer {
     Relu,
     /// The value itself if it is positive, else exp(value) - 1.
     Elu,
-    /// Layers whose output is added to their input. `[relu, residual]` is a block that applies its first ReLU in place,
-    /// so that the input is added after the ReLU; in `residual [relu, …]` the input is added as it was.
+    /// Layers whose output is added to their input. `[relu, residual]` adds the input after the ReLU, as a block with
+    /// an in-place first ReLU does. `residual [relu, …]` adds the input before it.
     Residual(Vec<Layer>),
     /// Joins channels, rows and columns to one list, in this order.
     Flatten,
-    /// Appends the numbers beside the window, after these layers.
+    /// Passes the scalars through these layers, and appends the result.
     Scalars(Vec<Layer>),
     /// A recurrent layer, of `NAME.weight_ih_l0`, `NAME.weight_hh_l0`, `NAME.bias_ih_l0` and `NAME.bias_hh_l0`: the gates
     /// reset, update and new, as in PyTorch.

@@ -14,7 +14,7 @@ const MOST_VALUES: usize = 1 << 24;
 /// The largest number of layers, so that nested layers cannot exhaust the stack.
 const MOST_DEPTH: usize = 16;
 
-/// Builds the steps of a network. An error is a text that names the layer or the tensor.
+/// Builds the steps of a network. Errors are messages that name the layer or the tensor.
 pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Steps, Heads), String> {
     let [channels, rows, cols] = architecture.window;
     let margin = margin_of(&architecture.layers, 0)?;
@@ -143,7 +143,8 @@ impl Builder<'_> {
         Ok(Value::Flat(output))
     }
 
-    /// Adds a function of each value, as part of the last step if that made the value and no other layer needs it.
+    /// Applies a function to each value. If the last step made the value and no other layer needs it, the function
+    /// becomes part of that step.
     fn activate(&mut self, activation: Activation, value: Value) -> Value {
         let is_held = self.held.contains(&value);
         match value {

@@ -21,8 +21,8 @@ pub enum Content {
     Runtime(Box<onnx::Runtime>),
 }
 
-/// Reads a file of weights and its JSON, which an ONNX file may lack. If the network consists of layers, the config
-/// that is returned has an architecture.
+/// Reads a file of weights and its JSON. For an ONNX file, the JSON may be absent. If the network consists of layers,
+/// the returned config has an architecture.
 pub fn read(path: &Path) -> Result<(NetworkConfig, Content), Error> {
     let json = path.with_extension("json");
     let bytes = read_bytes(path)?;
@@ -85,7 +85,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     if bytes.len() as u64 > most { Err(failed(limit.file_error())) } else { Ok(bytes) }
 }
 
-/// Parses the JSON. An error is a text.
+/// Parses the JSON. Errors are messages without the path.
 pub fn parse_config(bytes: &[u8]) -> Result<NetworkConfig, String> {
     let config: NetworkConfig = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
     if config.version != NetworkConfig::VERSION {
@@ -94,7 +94,7 @@ pub fn parse_config(bytes: &[u8]) -> Result<NetworkConfig, String> {
     Ok(config)
 }
 
-/// Parses the tensors of a `.safetensors` file. An error is a text.
+/// Parses the tensors of a `.safetensors` file. Errors are messages without the path.
 pub fn parse_tensors(bytes: &[u8]) -> Result<Tensors, String> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| format!("not a safetensors file: {error}"))?;
     let mut tensors = Tensors::default();

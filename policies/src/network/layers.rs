@@ -76,7 +76,7 @@ impl Convolution {
     }
 }
 
-/// Puts the weights in the order in which the kernels read them; the channels that pad a block have weights of 0.
+/// Arranges the weights in the order in which the kernels read them; the channels that pad a block have weights of 0.
 fn pack_kernel(weight: &Tensor, shape: &Shape) -> Vec<f32> {
     let Shape { input, output, kernel: [rows, cols], .. } = *shape;
     let mut packed = Vec::with_capacity(rows * cols * input.channels * output.stride);

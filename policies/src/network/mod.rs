@@ -52,7 +52,7 @@ struct Inner {
 pub struct Inputs<'a> {
     /// Shape: batch, then [`Network::input_shape`].
     pub windows: &'a [f32],
-    /// The numbers beside the window. Shape: batch, [`Network::num_scalars`].
+    /// The scalars. Shape: batch, [`Network::num_scalars`].
     pub scalars: &'a [f32],
     /// Number of agents.
     pub batch: usize,
@@ -111,7 +111,7 @@ impl Network {
     ///
     /// A `.safetensors` file holds the tensors of the layers that the JSON names. An `.onnx` file holds its own layers, and
     /// its JSON may be absent. Its logits are the output `action_logits` or `logits`, or the only output; operators that
-    /// follow them are ignored. The output `values` or `value` is used if it stands on the same layers.
+    /// follow them are ignored. The output `values` or `value` is used if it depends on the same layers.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator;
@@ -142,7 +142,7 @@ impl Network {
             not(feature = "onnx"),
             allow(
                 clippy::infallible_destructuring_match,
-                reason = "a graph for the runtime is no list of layers"
+                reason = "a graph for the runtime is not a list of layers"
             )
         )]
         let tensors = match content {
@@ -204,7 +204,7 @@ impl Network {
         self.0.window
     }
 
-    /// Returns the number of numbers beside the window.
+    /// Returns the number of scalars, which the network reads beside the window.
     pub fn num_scalars(&self) -> usize {
         self.0.program.num_scalars()
     }
@@ -239,7 +239,7 @@ impl Network {
     /// # Errors
     /// [`ForwardError::Length`] if an input has the wrong length; the state is then unchanged.
     /// [`ForwardError::Runtime`] if an operator of an ONNX graph fails.
-    /// [`ForwardError::NotFinite`] if an output is infinite or no number.
+    /// [`ForwardError::NotFinite`] if an output is infinite or NaN.
     ///
     /// # Panics
     /// If the workspace belongs to another network.

@@ -117,7 +117,7 @@ impl Program {
         Workspace { buffers, logits: Vec::new(), values: Vec::new() }
     }
 
-    /// Appends the outputs of up to 16 agents. An error is a text, only from a runtime.
+    /// Appends the outputs of up to 16 agents. Only a runtime fails. Errors are messages without the path.
     #[cfg_attr(not(feature = "onnx"), allow(clippy::unnecessary_wraps, reason = "layers cannot fail"))]
     pub fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
         match self {
@@ -136,7 +136,7 @@ impl Program {
 
 /// The buffers of a thread that runs a network.
 ///
-/// They are allocated here and when a batch is larger than all before.
+/// Buffers grow when a batch is larger than all earlier ones.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     buffers: Option<LayerBuffers>,

@@ -1,4 +1,4 @@
-//! Lets values share a slot when none of them is needed any more, so that the slots of a network fit the cache.
+//! Assigns the same slot to values that are not needed at the same time, so that the slots fit the cache.
 
 use super::steps::{FlatStep, Heads, PlaneStep, Steps};
 

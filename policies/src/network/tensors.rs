@@ -9,7 +9,7 @@ pub struct Tensor {
     pub values: Vec<f32>,
 }
 
-/// All tensors of a file that no layer has taken yet. A problem is the text of an error that names the tensor.
+/// All tensors of a file that no layer has taken yet. Errors are messages that name the tensor.
 #[derive(Clone, Debug, Default)]
 pub struct Tensors(BTreeMap<String, Tensor>);
 

@@ -31,7 +31,7 @@ struct RawGraph {
     output: Vec<Vec<u8>>,
 }
 
-/// Returns the file with only the operators that the logits need. An error is a text.
+/// Returns the file with only the operators that the logits need. Errors are messages without the path.
 pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
     let failed = |error: prost::DecodeError| format!("not an ONNX file: {error}");
     let mut model = RawModel::decode(bytes).map_err(failed)?;

@@ -17,7 +17,7 @@ pub enum Value<'a> {
     Step(usize),
     /// The output of a product without a bias yet: its input and its weights, one row for each input.
     Product { input: usize, weights: &'a TensorProto },
-    /// Depends on something that is no layer; the text says on what.
+    /// Depends on something that is not a layer; the text names it.
     Unknown(String),
 }
 
@@ -47,7 +47,7 @@ pub struct Reader<'a> {
     /// The tensors of each layer, by its name and theirs.
     pub tensors: HashMap<String, Vec<NamedTensor>>,
     window: usize,
-    /// The step of the numbers beside the window.
+    /// The step of the scalars.
     pub scalars: Option<usize>,
 }
 
@@ -139,8 +139,8 @@ impl<'a> Reader<'a> {
         Some(layers)
     }
 
-    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if it stands on
-    /// other layers than the logits.
+    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if it depends
+    /// on other layers than the logits.
     pub fn finish(&mut self, logits: &str, value: Option<&str>) -> Result<(Architecture, Tensors), String> {
         let (last, actions) = self.head(logits)?;
         let value = value.and_then(|value| self.head(value).ok()).filter(|(step, _)| *step == last);

@@ -32,7 +32,7 @@ pub enum Graph {
     Runtime(Box<Runtime>),
 }
 
-/// Reads an ONNX file. What follows the logits is cut off. An error is a text.
+/// Reads an ONNX file. Operators after the logits are cut off. Errors are messages without the path.
 pub fn read(bytes: &[u8]) -> Result<Graph, String> {
     let model = Model::decode(bytes).map_err(|error| format!("not an ONNX file: {error}"))?;
     let graph = model.graph.ok_or("not an ONNX file: the model has no graph")?;

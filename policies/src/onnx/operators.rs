@@ -1,4 +1,4 @@
-//! The operators that are layers. An error is a text that says what is no layer; an empty text stands for the operator.
+//! The operators that are layers. An error names what has no layer; an empty text stands for the operator itself.
 
 use super::graph::{Reader, Shape, Value};
 use super::proto::{Node, TensorProto};
@@ -152,7 +152,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the sum of a product and its bias, or of a value and what layers make of it.
+    /// Reads the sum of a product and its bias, or of a value and what layers compute from it.
     fn add_values(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         match [self.value(node, 0)?, self.value(node, 1)?] {
             [Value::Product { input, weights }, Value::Constant(bias)]
@@ -204,7 +204,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads a list to which the numbers beside the window are appended.
+    /// Reads a list to which the scalars are appended.
     fn concat(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         let ((one, Shape::List(left)), (other, Shape::List(right))) =
             (self.step(node, 0)?, self.step(node, 1)?)

@@ -147,7 +147,7 @@ impl TensorProto {
     const FLOAT: i32 = 1;
     const INT64: i32 = 7;
 
-    /// Returns the shape and the values of a tensor of floats. An error is a text.
+    /// Returns the shape and the values of a tensor of floats. Errors are messages without the path.
     pub fn floats(&self) -> Result<(Vec<usize>, Vec<f32>), String> {
         let name = &self.name;
         if self.data_location != 0 {

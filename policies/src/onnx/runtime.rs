@@ -1,6 +1,6 @@
 //! Runs graphs with other operators by `rten`, agent by agent.
 //!
-//! Its sums depend on the size of a batch, so a batch would change the bits.
+//! The order of rten's sums depends on the batch size, so batches would change the bits.
 
 use std::sync::Arc;
 
@@ -17,12 +17,12 @@ pub struct Runtime {
     options: RunOptions,
     pub window: [usize; 3],
     pub num_actions: usize,
-    /// Why the graph is no list of layers.
+    /// Why the graph is not a list of layers.
     pub reason: String,
 }
 
 impl Runtime {
-    /// Reads a graph that was cut at its logits. An error is a text with the operator's name.
+    /// Reads a graph that was cut at its logits. Errors are messages that name the operator.
     pub fn read(bytes: Vec<u8>, window: [usize; 3], reason: String) -> Result<Self, String> {
         let num_values = window.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
         if !num_values.is_some_and(|num_values| (1..=MOST_VALUES).contains(&num_values)) {
@@ -42,7 +42,7 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// Appends the logits of an agent. An error is a text.
+    /// Appends the logits of an agent. Errors are messages without the path.
     pub fn run(&self, window: &[f32], logits: &mut Vec<f32>) -> Result<(), String> {
         let [channels, rows, cols] = self.window;
         let input = NdTensor::from_data([1, channels, rows, cols], window.to_vec());

@@ -220,7 +220,7 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
     assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
 }
 
-/// A head on a window whose values are doubled by an operator that is no layer.
+/// A head on a window whose values are doubled by an operator that is not a layer.
 #[cfg(feature = "onnx")]
 fn other_operator(op_type: &str) -> Vec<u8> {
     use prost::Message;

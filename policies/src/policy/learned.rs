@@ -24,7 +24,7 @@ impl LearnedPolicy {
         Self(Player::MatsLp(Box::new(search)))
     }
 
-    /// Returns the time that the network has taken since the episode began, added up over threads.
+    /// Returns the time that the network has taken since the episode began, summed over threads.
     pub fn network_time(&self) -> Duration {
         match &self.0 {
             Player::Network(network) => network.network_time(),
@@ -36,7 +36,7 @@ impl LearnedPolicy {
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Agent`] for a state that does not fit the instance; [`Error::Corrupt`] with agent
-    /// and step if the network returns no number; for MATS-LP also those of [`MatsLp::act`].
+    /// and step if the network returns a value that is not finite; for MATS-LP also those of [`MatsLp::act`].
     pub fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
         match &mut self.0 {
             Player::Network(network) => network.act(state),

@@ -54,8 +54,8 @@ impl LearnedName {
 impl Learned {
     /// Begins an episode. The same seed gives the same actions on any number of threads.
     ///
-    /// Only MATS-LP uses `threads`, and only it stops if another thread sets `cancelled`. It draws no actions, so it has
-    /// no use for the seed.
+    /// Only MATS-LP uses `threads`, and only it stops if another thread sets `cancelled`. It does not sample
+    /// actions, so it ignores the seed.
     ///
     /// # Errors
     /// [`Error::Argument`] for a number of threads out of range, or if MATS-LP needs a critic that its network lacks.
@@ -109,10 +109,10 @@ impl Learned {
         }
     }
 
-    /// Forbids actions that lead into an obstacle or off the map, if `masks_actions` is set [default: not].
+    /// If `masks_actions` is set, forbids actions that lead into an obstacle or off the map [default: off].
     ///
     /// # Errors
-    /// [`Error::Request`] for MATS-LP, which forbids them in any case.
+    /// [`Error::Request`] for MATS-LP, which always forbids them.
     pub fn with_masks(self, masks_actions: bool) -> Result<Self, Error> {
         match self.0 {
             Method::Network(policy) => Ok(Self(Method::Network(policy.with_masks(masks_actions)))),

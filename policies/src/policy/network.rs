@@ -81,7 +81,7 @@ impl NetworkPolicy {
         self
     }
 
-    /// Forbids actions that lead into an obstacle or off the map, if `masks_actions` is set [default: not].
+    /// If `masks_actions` is set, forbids actions that lead into an obstacle or off the map [default: off].
     #[must_use]
     pub fn with_masks(mut self, masks_actions: bool) -> Self {
         self.0.masks_actions = masks_actions;
@@ -91,7 +91,7 @@ impl NetworkPolicy {
     /// Starts an episode. The same seed gives the same actions.
     ///
     /// # Errors
-    /// None at present; the settings were checked.
+    /// Currently none; the settings were checked.
     pub fn begin(&self, instance: &Instance, config: &Config, seed: u64) -> Result<LearnedPolicy, Error> {
         NetworkEpisode::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_network)
     }

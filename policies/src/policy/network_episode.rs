@@ -37,7 +37,7 @@ impl NetworkEpisode {
     /// Starts an episode. The same seed gives the same actions.
     ///
     /// # Errors
-    /// None at present; the settings were checked.
+    /// Currently none; the settings were checked.
     pub fn begin(
         settings: &NetworkSettings,
         instance: &Instance,
@@ -70,7 +70,7 @@ impl NetworkEpisode {
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Agent`] for a state that does not fit the instance; [`Error::Corrupt`] with agent
-    /// and step if the network returns no number.
+    /// and step if the network returns a value that is not finite.
     pub fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
         self.encoder.encode(state, &mut self.windows, &mut self.scalars)?;
         let (num_agents, step) = (state.cells.len(), state.step);

@@ -17,7 +17,7 @@ pub(crate) type Logits = [f32; NUM_ACTIONS];
 pub(crate) enum Sampler {
     /// One stream for each agent, which does not depend on other agents.
     Softmax(Vec<Generator>),
-    /// One stream for all agents, and the number of the present step.
+    /// One stream for all agents, and the random number of the current step.
     Follower(Box<Mt>, f64),
     Greedy,
 }
@@ -66,7 +66,7 @@ fn drawn(mut logits: Logits, uniform: f64) -> usize {
         sum += f64::from(share);
         aim < sum
     };
-    // Rounding of `aim` can leave no such action; the most probable one is then as good as any.
+    // Rounding of `aim` can leave no such action; then the most probable action is returned.
     logits.iter().position(exceeds).unwrap_or_else(|| greedy(logits))
 }
 
@@ -126,7 +126,7 @@ mod tests {
             assert_eq!(drawn(logits, uniform), expected, "{uniform}");
             assert_eq!(drawn_as_follower(logits, uniform), expected, "{uniform}");
         }
-        // A forbidden action has no share, even at the ends.
+        // A forbidden action is never drawn, even at the ends of the range.
         let forbidden = [f32::NEG_INFINITY, 1.0, f32::NEG_INFINITY, 1.0, f32::NEG_INFINITY];
         for (uniform, expected) in [(0.0, 1), (0.49, 1), (0.51, 3), (1.0_f64.next_down(), 3)] {
             assert_eq!(drawn(forbidden, uniform), expected, "{uniform}");

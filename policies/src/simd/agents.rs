@@ -1,16 +1,16 @@
 //! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
 //!
-//! Half as many agents take vectors of half the width, which a processor that splits wide vectors runs twice as fast.
+//! Eight agents use vectors of half the width. Processors that split wide vectors run these twice as fast.
 //!
-//! The sums have the terms and the order of `kernels`, without the zeros of the margins. Those change at most the sign of
-//! a sum that is 0, and `+ 0.0` at its end removes that sign.
+//! The sums have the terms and the order of `kernels`. The zeros of the margins are left out. They can change only the
+//! sign of a zero sum, and the final `+ 0.0` removes that sign.
 
 use super::kernels::Convolve;
 use super::lanes::Lanes;
 use super::{BLOCK, CHAINS, LANES, Shape};
 
-/// Output channels that are computed together, at all pixels: `N` vectors `V` hold all agents. The slices hold rows of
-/// pixels of channels of agents, without margins.
+/// Computes `C` output channels together at each pixel. `N` vectors `V` hold one value of every agent. The slices hold
+/// rows of pixels of channels of agents, without margins.
 ///
 /// # Safety
 /// `super::convolve_agents` checked the job, and the instruction set of `V` is enabled.

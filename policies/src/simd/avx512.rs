@@ -12,7 +12,7 @@ use super::lanes::Lanes;
 #[derive(Clone, Copy)]
 struct Avx512(__m512);
 
-// SAFETY of all blocks: the functions below enable AVX-512 F, and only they use this type. Pointers are the caller's.
+// SAFETY of all blocks: the functions below enable AVX-512 F, and only they use this type. Callers pass valid pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
 #[allow(clippy::undocumented_unsafe_blocks, reason = "the reason stands above")]
 impl Lanes for Avx512 {
@@ -45,7 +45,7 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn relu(self) -> Self {
-        // Of two zeros, or with NaN, the instruction returns its second operand.
+        // For two zeros, or with NaN, the instruction returns its second operand.
         Self(unsafe { _mm512_max_ps(_mm512_setzero_ps(), self.0) })
     }
 }

@@ -1,4 +1,4 @@
-//! Tests that no kernel reads or writes beyond its slices: pages around them end the process when touched.
+//! Tests that no kernel reads or writes beyond its slices: access to a page around them ends the process.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -44,7 +44,7 @@ fn plane(rows: usize, cols: usize, channels: usize, margin: usize) -> Plane {
     Plane { rows, cols, channels, stride: channels.next_multiple_of(LANES), margin }
 }
 
-/// Shapes with every remainder that the kernels treat apart.
+/// Shapes with every remainder that the kernels handle separately.
 fn shapes() -> impl Iterator<Item = Shape> {
     let sizes = [(1, 1), (3, 5), (7, 7), (2, 13)];
     let kernels = [([1, 1], 0), ([3, 3], 1), ([2, 3], 1), ([1, 2], 0)];

@@ -6,7 +6,7 @@
 use super::lanes::Lanes;
 use super::{BLOCK, CHAINS, LANES, Shape};
 
-/// A convolution of one window, whose slices hold rows of pixels of channels, or of several agents (see `agents`).
+/// A convolution of one window, or of several agents (see `agents`). The slices hold rows of pixels of channels.
 pub struct Convolve<'a> {
     /// The input from its first row on, each row with its margins.
     pub input: &'a [f32],
@@ -197,7 +197,7 @@ pub unsafe fn multiply<V: Lanes>(job: &mut Multiply<'_>) {
     }
 }
 
-/// Adds the products in `CHAINS` sums, since one sum would wait for each addition.
+/// Adds the products in `CHAINS` sums, because each addition to a single sum would wait for the one before.
 ///
 /// # Safety
 /// As for `multiply`.
