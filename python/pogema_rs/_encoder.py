@@ -16,7 +16,7 @@ _MOST = 64
 
 @dataclass(frozen=True)
 class Encoder:
-    """What a policy sees, as data: the windows and the numbers of each agent.
+    """What a policy sees, as data: the windows and the scalars of each agent.
 
     The fields are those of `encoder` in the JSON file of a network. Each list may name an entry more than once.
 
@@ -27,7 +27,7 @@ class Encoder:
     radius: int
     #: The windows of each agent, in this order.
     channels: tuple[str, ...]
-    #: The numbers of each agent in this order, two of each kind.
+    #: The scalars of each agent, in this order. Each kind has two values.
     scalars: tuple[str, ...] = ()
     #: Number of cells that an agent sees in each direction, for `seen_obstacles` and `follower_path`, 1 to 128.
     sight: int = 5
@@ -85,7 +85,7 @@ class Encoder:
 
 
 def read_encoder(encoder: Union[Encoder, Mapping[str, Any]]) -> Encoder:
-    """Returns an encoder that is given as such or as a dict.
+    """Returns an encoder that is given as an `Encoder` or as a dict.
 
     Errors: those of `Encoder.from_dict`.
     """

@@ -37,7 +37,7 @@ def save(
     chooses an action: `softmax`, `greedy` or `follower`.
 
     Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not
-    fit; OSError if a file cannot be written. The files are unchanged then.
+    fit; OSError if a file cannot be written. After an error, the files are unchanged.
     """
     encoder, target = read_encoder(encoder), _target(path, ".safetensors")
     if encoder.scalars and not any(isinstance(layer, dict) and "scalars" in layer for layer in layers):
@@ -61,11 +61,11 @@ def export(module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "soft
     `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
 
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
-    attributes: `body`, the layers from the windows on; `policy`, the `nn.Linear` of the logits; optionally `value`, the
-    `nn.Linear` of the value, `scalars`, layers of the scalars, and `core`, layers after both are joined. Layers are
-    `Conv2d` with stride 1, `Linear`, `ReLU`, `ELU`, `Flatten`, `GRU` of one layer, `Sequential` of these, and residual
-    blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`. `Dropout` and `Identity`
-    do nothing. The function compares the logits of the written network with those of the module.
+    attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
+    the `nn.Linear` of the value, `scalars`, layers of the scalars, and `core`, layers after `body` and `scalars`.
+    Layers are `Conv2d` with stride 1, `Linear`, `ReLU`, `ELU`, `Flatten`, `GRU` of one layer, `Sequential` of these,
+    and residual blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`. `Dropout` and
+    `Identity` do nothing. The function compares the logits of the written network with those of the module.
 
     For `.onnx`, `torch.onnx.export` writes any module that maps windows, and scalars if the encoder has any, to logits
     or to logits and values.

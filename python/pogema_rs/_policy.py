@@ -24,8 +24,9 @@ class Policy:
     """A learned policy, which `load` reads. It plays in Rust, without PyTorch.
 
     It plays one `VecEnv` or one environment at a time. Every agent has its own recurrent state and its own stream of
-    random numbers, and both begin anew with each episode of its environment. The actions of an episode therefore depend
-    only on the episode and on the seed, as in `pogema evaluate`, and not on the number of threads or environments.
+    random numbers, and both start again with each episode of its environment. The actions of an episode therefore
+    depend only on the episode and on the seed, as in `pogema evaluate`, and not on the number of threads or
+    environments.
 
     A pickle holds the path of the weights and the settings, but no episode: the copy reads the file again.
     """
@@ -70,8 +71,8 @@ class Policy:
     ) -> Union[np.ndarray, list[int]]:
         """Returns the actions of all agents in the current state.
 
-        With a `VecEnv`, whatever its observations are, returns an array for its `step`. Call it in every state from the
-        reset on, because policies remember. In the same state it returns the same actions.
+        With a `VecEnv`, which may have any observations, returns an array for its `step`. Call it in every state from
+        the reset on, because policies remember earlier states. A second call in a state returns the same actions.
 
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
         episode. An agent on its goal that is missing in its own window counts as finished. `skip_agents` holds a flag
@@ -155,8 +156,8 @@ def load(
 
     `name` is `network`, `follower` or `mats-lp`. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
     `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle. `seed` is the
-    seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of `mats-lp`. `semantics` are those of
-    the environment whose `MAPF` observations the policy gets; a `VecEnv` has its own.
+    seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of `mats-lp`. `semantics`
+    are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its own.
 
     Errors: FileNotFoundError or OSError for a file that cannot be read; ValueError for a wrong file or setting. The
     message names the file.
@@ -183,16 +184,16 @@ def load(
 def _checked(observations: Any) -> Sequence[Mapping[str, Any]]:
     names = ("global_obstacles", "global_xy", "global_target_xy", "obstacles", "agents")
     if not isinstance(observations, Sequence) or isinstance(observations, str):
-        _refuse()
+        _reject()
     for seen in observations:
         if not isinstance(seen, Mapping) or not all(name in seen for name in names):
-            _refuse()
+            _reject()
     if not observations:
-        _refuse()
+        _reject()
     return observations
 
 
-def _refuse() -> NoReturn:
+def _reject() -> NoReturn:
     raise TypeError(
         "observations have the wrong type, expected a VecEnv, or the observations of one environment with "
         "observation_type='MAPF'"

@@ -1,4 +1,4 @@
-"""PyTorch modules as layers and arrays. No other module of the package imports PyTorch."""
+"""PyTorch modules as layers and arrays. Only this module and an integration import PyTorch."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def parts_of(module: Any, encoder: Encoder) -> Parts:
 def compare(parts: Parts, policy: Policy, encoder: Encoder) -> None:
     """Checks that a policy returns the same logits as the parts, for drawn inputs.
 
-    Errors: ValueError if they differ, for example because a residual block does something else.
+    Errors: ValueError if they differ, for example because a residual block returns something else.
     """
     rng = np.random.default_rng(0)
     windows = rng.uniform(-1, 1, (_NUM_ROWS, *encoder.shape)).astype(np.float32)
@@ -168,7 +168,7 @@ def _layers(parts: Parts, name: str, layer: Any) -> list[Any]:
 def _residual(parts: Parts, name: str, residual: Any) -> list[Any]:
     entries = _layers(parts, f"{name}.residual", residual)
     first = residual[0] if isinstance(residual, nn.Sequential) and len(residual) else residual
-    # An activation in place changes the input of the block before the block adds it.
+    # An in-place activation changes the input of the block before the block adds it.
     if getattr(first, "inplace", False):
         return [entries[0], {"residual": entries[1:]}]
     return [{"residual": entries}]
@@ -216,5 +216,5 @@ def _run(layer: Any, values: Any) -> Any:
     if isinstance(layer, nn.GRU):
         steps = values.unsqueeze(1) if layer.batch_first else values.unsqueeze(0)
         return layer(steps)[1][0]
-    # A layer in place would change the caller's values.
+    # An in-place layer would change the caller's values.
     return layer(values.clone())

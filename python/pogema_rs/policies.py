@@ -8,7 +8,7 @@
     env.reset()
     env.step(policy.act(env))
 
-`load` reads the weights of a network. `export` writes a PyTorch module as such, and `save` writes NumPy arrays.
+`load` reads the weights of a network. `export` writes them from a PyTorch module, and `save` from NumPy arrays.
 """
 
 from __future__ import annotations

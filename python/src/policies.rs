@@ -23,7 +23,7 @@ use crate::{errors, interrupt};
 
 /// A learned policy, which plays one `VecEnv` or one environment at a time.
 ///
-/// No thread waits for the lock: a call during a call of another thread raises an error.
+/// No thread waits for the lock. A call raises an error while another thread makes a call.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Policy {
     learned: Learned,
@@ -59,7 +59,7 @@ guarded! {
 impl Policy {
     /// Reads a policy: its name, the file of its weights, and the settings of a suite.
     ///
-    /// `search` are the number of expansions and whether the search is faithful, both of MATS-LP.
+    /// `search` holds two settings of MATS-LP: the number of expansions, and whether the search is faithful.
     #[new]
     fn new(
         name: &str,
@@ -113,8 +113,8 @@ impl Policy {
 
     /// Returns the actions of all agents of one environment.
     ///
-    /// `obstacles` is its map with a border of `border` cells, in whose coordinates cells and goals are. `active` are
-    /// flags of active agents, and `exact` is the semantics of the occupancy grid.
+    /// `obstacles` is its map with a border of `border` cells. `cells` and `goals` use the coordinates of this padded
+    /// map. `active` holds a flag for each agent. `exact` says whether the occupancy grid marks every agent.
     #[expect(clippy::too_many_arguments, reason = "these are the parts of an observation")]
     fn act(
         &self,
@@ -244,7 +244,7 @@ impl Policy {
 }
 
 impl Player {
-    /// Returns the actions in a state; the same ones if it is asked again.
+    /// Returns the actions in a state. A second call in this state returns the same actions.
     fn act(&mut self, state: State<'_>) -> Result<&[Action], Error> {
         if self.step != Some(state.step) {
             self.actions = self.policy.act(state)?;

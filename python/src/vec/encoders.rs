@@ -6,7 +6,7 @@ use pogema_core::{Environment, Error, Instance, Map, Outside, State};
 use pogema_fast::{Batch, Engine};
 use pogema_policies::{Encoder, EncoderSettings};
 
-/// Memory for costs to goals that no agent has at present, for all environments together. Units: bytes
+/// Memory for costs to goals that no agent currently has, for all environments together. Units: bytes
 const CACHE_BYTES: usize = 256 << 20;
 
 /// Encodes the states of all environments of a batch.
@@ -27,7 +27,7 @@ pub struct Encoded<'a> {
 /// The encoder of one environment.
 struct Lane {
     encoder: Encoder,
-    /// Which episode it follows, counted from 1 among those that the environment has begun.
+    /// The number of the environment's episode that it follows, counted from 1.
     begun: u64,
     /// The step that it followed last.
     step: Option<u64>,
@@ -191,7 +191,7 @@ impl Lane {
     }
 }
 
-/// Returns the map inside a map with a border, as engines show it, and the area beyond its wall.
+/// Splits a map with a border, as engines show it, into the map inside and the area beyond its wall.
 ///
 /// `shape` is that of the whole map, row by row.
 pub fn surroundings(

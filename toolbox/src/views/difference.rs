@@ -18,9 +18,9 @@ const NUM_AGENTS: &str = "num_agents";
 
 /// `type: difference`: how much a metric differs between two values of a varied field, on the same instances.
 ///
-/// `field` names the field, `first` and `second` its values, and `metrics` the metrics [default: `avg_throughput`]. Rows
-/// of one algorithm that agree in all other varied fields form a pair. The table has a row for each folder, algorithm
-/// and number of agents.
+/// `field` names the field, `first` and `second` its values, and `metrics` the metrics [default: `avg_throughput`].
+/// Rows of one algorithm that agree in all other varied fields form a pair. The table has a row for each folder,
+/// algorithm and number of agents.
 #[derive(Clone, Debug)]
 pub struct DifferenceView {
     common: Common,
@@ -144,7 +144,7 @@ impl DifferenceView {
     }
 }
 
-/// Returns both means of a metric, their paired difference, and that in percent of the first mean.
+/// Returns both means of a metric, their paired difference, and the difference in percent of the first mean.
 fn figures(pairing: &Pairing<'_>, metric: &str, number: u64) -> [Cell; 4] {
     let both =
         pairing.pairs.iter().filter_map(|(one, other)| Some((one.metric(metric)?, other.metric(metric)?)));
