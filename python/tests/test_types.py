@@ -11,6 +11,7 @@ import pogema_rs
 CONFIG = Path(__file__).resolve().parent.parent / "pyproject.toml"
 
 RIGHT = """
+from collections.abc import Sequence
 from typing import Any, assert_type
 
 import numpy as np
@@ -45,7 +46,7 @@ own: Pogema[dict[str, Any]] = Pogema(config, semantics="2.0")
 first, _ = own.reset()
 alone: list[dict[str, Any]] = own.reset(return_info=False)
 flags: list[bool] = own.step([0, 0, 0, 0])[2]
-places: list[tuple[int, int]] = own.get_agents_xy(only_active=True)
+places: list[Sequence[int]] = own.get_agents_xy(only_active=True)
 action = int(AStarAgent(seed=1).act(first[0]))
 count: int = FewerRewards(own).agents()
 own.save_animation("episode.svg", AnimationConfig(egocentric_idx=0))
