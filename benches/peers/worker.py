@@ -75,11 +75,10 @@ def reset(num_agents):
     return fastest(work)
 
 
-def vector(num_envs, num_agents, num_threads, dtype="float32"):
-    """Returns steps of the whole VecEnv per second, with observations."""
-    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads, dtype=dtype)
+def batch_steps(env):
+    """Returns steps of a whole VecEnv per second, with random actions."""
     env.reset(seed=0)
-    actions, at = random_actions(num_envs, num_agents), 0
+    actions, at = random_actions(env.num_envs, env.num_agents), 0
 
     def work():
         nonlocal at
@@ -87,6 +86,12 @@ def vector(num_envs, num_agents, num_threads, dtype="float32"):
         at += 1
 
     return fastest(work)
+
+
+def vector(num_envs, num_agents, num_threads, dtype="float32"):
+    """Returns steps of the whole VecEnv per second, with observations."""
+    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads, dtype=dtype)
+    return batch_steps(env)
 
 
 def encoded(num_envs, num_agents, num_threads):
@@ -94,15 +99,7 @@ def encoded(num_envs, num_agents, num_threads):
     encoder = {"radius": 5, "channels": ["obstacles", "cost_to_go", "agents"]}
     lifelong = {**config(num_agents).model_dump(), "on_target": "restart", "max_episode_steps": 256}
     env = package.VecEnv(lifelong, num_envs, num_threads=num_threads, encoder=encoder)
-    env.reset(seed=0)
-    actions, at = random_actions(num_envs, num_agents), 0
-
-    def work():
-        nonlocal at
-        env.step(actions[at % ACTIONS])
-        at += 1
-
-    return fastest(work)
+    return batch_steps(env)
 
 
 WORKS = {"step": step, "reset": reset, "vector": vector, "encoded": encoded}
