@@ -1,6 +1,6 @@
 //! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
 //!
-//! Eight agents use vectors of half the width. Processors that split wide vectors run these twice as fast.
+//! Eight agents use vectors of half the width, which processors that split wide vectors run faster.
 //!
 //! The sums have the terms and the order of `kernels`. The zeros of the margins are left out. They can change only the
 //! sign of a zero sum, and the final `+ 0.0` removes that sign.

@@ -10,11 +10,8 @@ use super::pairing::Pairing;
 use super::{Shown, known_column, named};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
 use crate::frame::{lacking, shown};
-use crate::results::{ALGORITHM, Results, Row};
+use crate::results::{ALGORITHM, NUM_AGENTS, Results, Row};
 use crate::tree::Node;
-
-/// The column of the number of agents.
-const NUM_AGENTS: &str = "num_agents";
 
 /// `type: difference`: how much a metric differs between two values of a varied field, on the same instances.
 ///

@@ -14,15 +14,12 @@ use super::pairing::Pairing;
 use super::{Shown, known_column};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::frame::{shown, values};
-use crate::results::{NETWORK_TIME, RUNTIME, Results, Row, SOLVED};
+use crate::results::{NETWORK_TIME, NUM_AGENTS, RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
 
 /// The metric that is compared only on solved instances.
 const COST: &str = "SoC";
-
-/// The column of the number of agents.
-const NUM_AGENTS: &str = "num_agents";
 
 /// `type: published`: means next to published means, with a row for each folder and number of agents.
 ///
