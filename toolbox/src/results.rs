@@ -24,9 +24,6 @@ pub(crate) const RUNTIME: &str = "runtime";
 /// The part of [`RUNTIME`] that a network took, read from the same file.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
-/// The column of the number of agents.
-pub(crate) const NUM_AGENTS: &str = "num_agents";
-
 /// The field of a config that names its map.
 const MAP_NAME: &str = "map_name";
 

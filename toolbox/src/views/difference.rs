@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use pogema_core::Error;
 
 use super::grid::{Cell, Table};
-use super::options::{Common, Options};
+use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
 use super::{Shown, known_column, named};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
 use crate::frame::{lacking, shown};
-use crate::results::{ALGORITHM, NUM_AGENTS, Results, Row};
+use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
 /// `type: difference`: how much a metric differs between two values of a varied field, on the same instances.

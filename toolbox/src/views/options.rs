@@ -13,12 +13,15 @@ use crate::tree::Node;
 const COMMON: [&str; 6] =
     ["type", "drop_keys", "round_digits", "rename_fields", "rename_algorithms", "sort_by"];
 
+/// The column of the number of agents.
+pub(super) const NUM_AGENTS: &str = "num_agents";
+
 /// Default titles of columns.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
 const TITLES: [(&str, &str); 6] = [
     ("algorithm", "Algorithm"),
-    ("num_agents", "Number of Agents"),
+    (NUM_AGENTS, "Number of Agents"),
     ("avg_throughput", "Average Throughput"),
     ("runtime", "Runtime (seconds)"),
     ("network_time", "Network Time (seconds)"),

@@ -9,12 +9,12 @@ use serde_json::Value;
 
 use super::grid::{Cell, Table};
 use super::means::Means;
-use super::options::{Common, Options};
+use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
 use super::{Shown, known_column};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::frame::{shown, values};
-use crate::results::{NETWORK_TIME, NUM_AGENTS, RUNTIME, Results, Row, SOLVED};
+use crate::results::{NETWORK_TIME, RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
 
