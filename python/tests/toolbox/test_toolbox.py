@@ -18,6 +18,8 @@ TOOLBOX = os.environ.get("POGEMA_TOOLBOX_FOLDER", "POGEMA_TOOLBOX_FOLDER is not 
 FOLDERS = os.pathsep.join([TOOLBOX, str(HERE / "stand_ins")])
 # The last one runs beside POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
 THEIRS, OURS, OURS_ON_OLD_STACK = "pogema", "pogema_rs.toolbox", "pogema_rs.toolbox on an old stack"
+# `argsort` orders equal values by the release of NumPy and the processor. Without vectors, all releases agree.
+NO_VECTORS = {"NPY_DISABLE_CPU_FEATURES": "AVX2 AVX512F AVX512_SKX X86_V3 X86_V4"}
 # Neither package is installed under POGEMA's name.
 MOVED = "changed imports"
 
@@ -27,7 +29,7 @@ def run(package, script, folder, *arguments):
     folder.mkdir(exist_ok=True)
     python = sys.executable if package in ("pogema_rs", OURS, MOVED) else os.environ["POGEMA_ORACLE_PYTHON"]
     command = [python, "-B", str(HERE / "run_as.py"), package.split()[0], FOLDERS, str(HERE / script), *arguments]
-    environment = {**os.environ, "CALLS_OF_WANDB": str(folder / "calls.txt")}
+    environment = {**os.environ, **NO_VECTORS, "CALLS_OF_WANDB": str(folder / "calls.txt")}
     if package == OURS_ON_OLD_STACK:
         alone = folder.parent / "package"
         alone.mkdir(exist_ok=True)
