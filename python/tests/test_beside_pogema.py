@@ -65,6 +65,7 @@ def test_requirements_allow_the_releases_that_pogema_needs():
         assert all(specifier.contains(installed[name]) for name, specifier in specifiers.items()), specifiers
 
 
+@pytest.mark.slow
 def test_pip_resolves_pogema_toolbox_beside_the_wheel(tmp_path):
     report = tmp_path / "report.json"
     # The wheel that `python/run` built and installed.

@@ -35,7 +35,7 @@ def test_too_many_environments_raise_memory_error(num_envs):
     [
         {"size": 8, "num_agents": 1, "obs_radius": 1},
         {"size": 64, "num_agents": 64, "obs_radius": 1, "on_target": "restart"},
-        {"size": 500, "num_agents": 2, "obs_radius": 3, "max_episode_steps": 2},
+        pytest.param({"size": 500, "num_agents": 2, "obs_radius": 3, "max_episode_steps": 2}, marks=pytest.mark.slow),
     ],
 )
 def test_no_number_of_environments_ends_the_process(config):

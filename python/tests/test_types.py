@@ -120,11 +120,13 @@ def test_package_type_checks(check):
     assert run.returncode == 0, run.stdout + run.stderr
 
 
+@pytest.mark.slow
 def test_stub_matches_the_compiled_part(check):
     run = check("mypy.stubtest", "--mypy-config-file", str(CONFIG), "pogema_rs._engine")
     assert run.returncode == 0, run.stdout + run.stderr
 
 
+@pytest.mark.slow
 def test_type_errors_of_a_program_are_found(check, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(RIGHT + "\n".join(WRONG) + "\n")

@@ -144,6 +144,7 @@ def without_added(name, text):
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("script", "num_files"), PROGRAMS)
 def test_scripts_with_changed_imports_write_the_same_files(script, num_files, tmp_path):
     text = (HERE / "scripts" / script).read_text()
