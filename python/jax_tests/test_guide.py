@@ -1,0 +1,16 @@
+"""Tests that the code of the guide runs."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "guide" / "jax.md"
+BLOCK = re.compile(r"^<!-- framework: jax -->\n```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_the_guide_runs():
+    (code,) = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
+    run = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert re.fullmatch(r"0\.\d\d goals per step\n", run.stdout)
