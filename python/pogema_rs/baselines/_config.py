@@ -15,7 +15,7 @@ from pogema_rs._encoder import Encoder
 from pogema_rs.toolbox._optional import required
 
 #: The methods that can be trained, by name.
-METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom")
+METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower")
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
 GOAL_RULES = ("nothing", "restart", "finish")
@@ -77,6 +77,7 @@ class QLearningConfig:
     target_episodes: int = 200
     mixer_hidden: int = 32
     kernels: int = 4
+    own_loss: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,7 @@ class ScheduleConfig:
     lanes: int = 32
     validate_every: int = 50
     validation_episodes: int = 64
+    validation_steps: int = 128
     checkpoint_every: int = 10
 
 
@@ -248,6 +250,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
 def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], schedule: ScheduleConfig) -> None:
     if isinstance(learner, QLearningConfig):
         check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
+        check(learner.own_loss >= 0, "learner.own_loss", "at least 0")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")

@@ -26,8 +26,8 @@ class Episodes:
     The validation episodes have their own seeds and maps, and are the same each time.
     """
 
-    def __init__(self, config: EnvironmentConfig, seed: int) -> None:
-        self._config, self._seed = config, seed
+    def __init__(self, config: EnvironmentConfig, seed: int, validation_steps: int) -> None:
+        self._config, self._seed, self._validation_steps = config, seed, validation_steps
 
     @property
     def map_size(self) -> tuple[int, int]:
@@ -42,7 +42,8 @@ class Episodes:
 
     def of_validation(self, count: int) -> tuple[list[dict[str, Any]], list[int]]:
         """Returns the configs and the seeds of the validation episodes."""
-        return self._draw(_VALIDATION, 0, count)
+        configs, seeds = self._draw(_VALIDATION, 0, count)
+        return [{**config, "max_episode_steps": self._validation_steps} for config in configs], seeds
 
     def _draw(self, stream: int, number: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
         sequence = np.random.SeedSequence(self._seed, spawn_key=(stream, number))
@@ -68,6 +69,15 @@ class Episodes:
 
 def map_text(kind: str, seed: int) -> str:
     """Returns the text of a map, drawn as the maps of the paper's set of its kind."""
+    text = _drawn(kind, seed)
+    # Some mazes have no obstacle, and equal published ones of the same size.
+    while "#" not in text:
+        seed += 1
+        text = _drawn(kind, seed)
+    return text
+
+
+def _drawn(kind: str, seed: int) -> str:
     if kind == "random":
         return generate_map(MapRangeSettings().sample(seed))
     if kind == "mazes":

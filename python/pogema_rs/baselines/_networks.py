@@ -95,19 +95,27 @@ class AgentNetwork(nn.Module):
         return features.view(*record.masks.shape[:3], -1)
 
 
-def num_state_values(map_size: tuple[int, int], num_agents: int) -> int:
+#: The number of values of each agent in a global state.
+STATE_VALUES = 7
+
+
+def num_state_values(num_agents: int) -> int:
     """Returns the number of values of a global state."""
-    return map_size[0] * map_size[1] + 4 * num_agents
+    return STATE_VALUES * num_agents
 
 
 def global_states(record: Record) -> torch.Tensor:
-    """Returns the global state of all states of a record: the map, and the cells and goals as shares of its side.
+    """Returns the global state of all states of a record.
+
+    For each agent, it holds its cell, its goal and the offset between both, as shares of the map's side, and whether
+    it is on its goal. The map is left out: with it, the mixers memorize the episodes of the replay.
 
     Shape: `(steps + 1, lanes, values)`
     """
-    maps, places = torch.from_numpy(record.maps), torch.from_numpy(record.places)
-    shares = places.float().flatten(2) / max(maps.shape[1:])
-    return torch.cat([shares, maps.float().flatten(1).expand(len(shares), -1, -1)], dim=-1)
+    places = torch.from_numpy(record.places).float() / max(record.maps.shape[1:])
+    offsets = places[..., 2:] - places[..., :2]
+    on_goal = (offsets == 0).all(dim=-1, keepdim=True).float()
+    return torch.cat([places, offsets, on_goal], dim=-1).flatten(2)
 
 
 def tensors(record: Record) -> dict[str, Any]:

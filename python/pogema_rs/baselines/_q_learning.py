@@ -34,7 +34,7 @@ class QLearner:
         self.config, self.learner, self._generator = config, config.learner, generator
         self._map_size = map_size
         self.network = AgentNetwork(config.encoder, config.network, has_value=False)
-        num_values = _networks.num_state_values(map_size, config.environment.num_agents)
+        num_values = _networks.num_state_values(config.environment.num_agents)
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.mixer: nn.Module = module.make_mixer(config, num_values)
         self.target_network, self.target_mixer = copy.deepcopy(self.network), copy.deepcopy(self.mixer)
@@ -88,48 +88,46 @@ class QLearner:
         return float(loss.detach())
 
     def loss(self, record: Record) -> torch.Tensor:
-        """Returns the mean squared error of the mixed values over all steps that were played."""
+        """Returns the mean squared error of the mixed values, and of the agents' own values if they have a weight."""
         parts = _networks.tensors(record)
-        states = _networks.global_states(record)
-        masks, active, actions = parts["masks"], parts["active"], parts["actions"]
+        states, active, actions = _networks.global_states(record), parts["active"], parts["actions"]
         values = self.network.policy(self.network.of_record(record))
         chosen = values[:-1].gather(-1, actions.unsqueeze(-1)).squeeze(-1)
+        best = values[:-1].masked_fill(~parts["masks"][:-1], LEAST).amax(dim=-1)
         with torch.no_grad():
-            # A finished agent stays, and counts for nothing.
-            allowed = values.detach().masked_fill(~masks, LEAST)
-            targets = self._next_values(record, allowed.argmax(dim=-1), active, states)
-            rewards, terminated, ended = self._ends(parts, targets)
-            targets = lambda_returns(
-                self.learner.discount, self.learner.td_lambda, targets, rewards, terminated, ended
-            )
-        best = values[:-1].masked_fill(~masks[:-1], LEAST).amax(dim=-1)
+            greedy = values.masked_fill(~parts["masks"], LEAST).argmax(dim=-1)
+            later, later_best = self._next_values(record, greedy)
+            # A finished agent counts for nothing.
+            later, later_best = later * active[1:], later_best * active[1:]
+            mixed_later = self.target_mixer(later, later_best, greedy[1:], states[1:])
         mixed = self.mixer(chosen * active[:-1], best * active[:-1], actions, states[:-1])
-        counts = parts["played"].unsqueeze(-1).expand_as(mixed)
-        if mixed.shape[-1] > 1:
-            counts = counts & active[:-1]
-        loss: torch.Tensor = ((mixed - targets).square() * counts).sum() / counts.sum().clamp(min=1)
+        loss = self._error(parts, mixed, mixed_later)
+        if self.learner.own_loss and self.config.method != "iql":
+            loss = loss + self.learner.own_loss * self._error(parts, chosen, later)
         return loss
 
-    def _next_values(
-        self, record: Record, best: torch.Tensor, active: torch.Tensor, states: torch.Tensor
-    ) -> torch.Tensor:
-        """Returns the target's values of the best actions of the network in the states after each step."""
-        values = self.target_network.policy(self.target_network.of_record(record))
-        allowed = values.masked_fill(~torch.from_numpy(record.masks), LEAST)
-        chosen = values.gather(-1, best.unsqueeze(-1)).squeeze(-1)
-        parts = (chosen * active)[1:], (allowed.amax(dim=-1) * active)[1:]
-        mixed: torch.Tensor = self.target_mixer(*parts, best[1:], states[1:])
-        return mixed
+    def _next_values(self, record: Record, greedy: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Returns the target's values of the given and of its own best actions in the states after each step."""
+        values = self.target_network.policy(self.target_network.of_record(record))[1:]
+        best = values.masked_fill(~torch.from_numpy(record.masks[1:]), LEAST).amax(dim=-1)
+        return values.gather(-1, greedy[1:].unsqueeze(-1)).squeeze(-1), best
 
-    def _ends(
-        self, parts: dict[str, torch.Tensor], mixed: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Returns rewards and ends, of each agent or of the team, as the mixer returns values."""
+    def _error(self, parts: dict[str, torch.Tensor], values: torch.Tensor, later: torch.Tensor) -> torch.Tensor:
+        """Returns the mean squared error of values against their returns, over all steps that were played.
+
+        Values with an axis of 1 are those of the team, whose reward is the mean of the agents' rewards.
+        """
         rewards, terminated = parts["rewards"], parts["terminated"]
-        if mixed.shape[-1] == 1 and rewards.shape[-1] != 1:
+        counts = parts["played"].unsqueeze(-1)
+        ended = last_steps(parts["played"]).unsqueeze(-1)
+        if values.shape[-1] == 1:
             rewards, terminated = rewards.mean(dim=-1, keepdim=True), terminated.all(dim=-1, keepdim=True)
-        ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(rewards)
-        return rewards, terminated, ended
+        else:
+            counts = counts & parts["active"][:-1]
+        settings = self.learner.discount, self.learner.td_lambda
+        returns = lambda_returns(*settings, later, rewards, terminated, ended.expand_as(rewards))
+        loss: torch.Tensor = ((values - returns).square() * counts).sum() / counts.sum().clamp(min=1)
+        return loss
 
     def state(self) -> dict[str, Any]:
         """Returns everything that a checkpoint must hold, besides the replay's files."""

@@ -80,3 +80,9 @@ def by_lane(record: Record) -> dict[str, np.ndarray]:
 def by_step(arrays: dict[str, np.ndarray]) -> Record:
     """Returns a record of arrays whose first axis is that of the lanes."""
     return Record(**{name: one if name == "maps" else one.swapaxes(0, 1) for name, one in arrays.items()})
+
+
+def lanes_of(record: Record, lanes: np.ndarray) -> Record:
+    """Returns the episodes of some lanes."""
+    arrays = {one.name: getattr(record, one.name) for one in fields(record)}
+    return Record(**{name: array[lanes] if name == "maps" else array[:, lanes] for name, array in arrays.items()})

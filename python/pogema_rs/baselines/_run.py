@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import platform
 import shutil
@@ -86,7 +87,7 @@ class _Run:
         torch.use_deterministic_algorithms(True)
         torch.manual_seed(seed)
         self.generator = torch.Generator().manual_seed(seed)
-        self.episodes = Episodes(config.environment, seed)
+        self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
         kind: Any = QLearner if isinstance(config.learner, QLearningConfig) else PPOLearner
         self.learner: Union[QLearner, PPOLearner] = kind(config, self.episodes.map_size, self.generator)
         self.curve = Curve(SCORES[config.environment.on_target])
@@ -96,11 +97,11 @@ class _Run:
             self._restore(saved)
         folder.mkdir(parents=True, exist_ok=True)
         self.learner.open(folder)
-        make = self._collector
-        self.lanes, self.judges = make(config.schedule.lanes), make(config.schedule.validation_episodes)
-
-    def _collector(self, lanes: int) -> Collector:
-        return Collector(self.config, self.episodes.map_size, lanes, self.threads)
+        size, schedule = self.episodes.map_size, config.schedule
+        self.lanes = Collector(config, size, schedule.lanes, threads)
+        environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
+        judged = dataclasses.replace(config, environment=environment)
+        self.judges = Collector(judged, size, schedule.validation_episodes, threads)
 
     def play(self, budget: Budget) -> dict[str, float]:
         """Trains until the budget is used up."""
