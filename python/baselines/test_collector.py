@@ -42,8 +42,9 @@ def test_bytes_hold_windows_exactly(radius):
 
 @pytest.mark.parametrize("on_target", ["nothing", "restart", "finish"])
 def test_rewards_and_ends_are_those_of_the_environment(on_target):
-    changes = [f"environment.on_target={on_target}", "rewards.goal=1.0", "rewards.progress=0.25", "rewards.step=-0.125", "learner.replay=16"]
-    config = small_config("iql", *changes, "environment.max_episode_steps=40", "schedule.lanes=16")
+    changes = [f"environment.on_target={on_target}", "environment.max_episode_steps=40", "schedule.lanes=16"]
+    rewards = ["rewards.goal=1.0", "rewards.progress=0.25", "rewards.step=-0.125"]
+    config = small_config("iql", *changes, *rewards, "learner.replay=16")
     record, seen, metrics, (configs, seeds) = played(config)
     env = VecEnv(configs, autoreset_mode="Disabled", encoder=config.encoder, masks=True)
     windows, _ = env.reset(seed=seeds)

@@ -135,7 +135,11 @@ def test_wrong_arguments_are_one_clear_line(tmp_path, capsys):
 
 
 def test_missing_torch_is_one_line_that_names_the_extra(tmp_path):
-    blocked = "import sys; sys.modules['torch'] = None; import pogema_rs.baselines.__main__ as program; sys.exit(program.main())"
+    blocked = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from pogema_rs.baselines.__main__ import main\n"
+        "sys.exit(main())"
+    )
     command = [sys.executable, "-c", blocked, "train", "qmix", "--out", str(tmp_path / "run")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Optional
 
 from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
+from pogema_rs.toolbox._optional import required
 
 #: The packages of the extra `train`, by the name of their module.
 _NEEDED = ("torch", "torchrl", "tensordict", "yaml", "matplotlib")
@@ -32,13 +34,13 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m pogema_rs.baselines", description=__doc__.partition(":")[0] + ".")
+    parser = argparse.ArgumentParser(prog="python -m pogema_rs.baselines", description="Trains learned methods.")
     commands = parser.add_subparsers(dest="command", required=True)
     train = commands.add_parser("train", help="train a method and export its weights")
     show = commands.add_parser("config", help="print the hyperparameters of a method as YAML")
     for command in (train, show):
         command.add_argument("method", metavar="METHOD", help=f"one of {', '.join(METHODS)}")
-        command.add_argument("--config", metavar="FILE", help="YAML file of hyperparameters [default: the method's own]")
+        command.add_argument("--config", metavar="FILE", help="YAML file of hyperparameters [default: the package's]")
         command.add_argument(
             "--set", metavar="SECTION.KEY=VALUE", action="append", default=[], help="replaces one hyperparameter"
         )
@@ -81,8 +83,6 @@ def _check_packages() -> None:
 
     Errors: ImportError with the command that installs the extra.
     """
-    import importlib
-
     for name in _NEEDED:
         try:
             importlib.import_module(name)
@@ -91,9 +91,7 @@ def _check_packages() -> None:
 
 
 def _show(config: TrainingConfig) -> None:
-    import yaml
-
-    print(yaml.safe_dump(config.to_dict(), sort_keys=False), end="")
+    print(required("yaml", "printing hyperparameters").safe_dump(config.to_dict(), sort_keys=False), end="")
 
 
 def _line(error: BaseException) -> str:

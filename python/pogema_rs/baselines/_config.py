@@ -232,7 +232,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     for key in ("num_agents", "max_episode_steps", "obs_radius", "size"):
         check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
     check(environment.size <= 255, "environment.size", "at most 255")
-    check(all(one in CHANNELS for one in config.encoder.channels), "encoder.channels", f"names of {', '.join(CHANNELS)}")
+    known = all(channel in CHANNELS for channel in config.encoder.channels)
+    check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
     for key in ("filters", "blocks", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
     check(config.network.hidden >= 1, "network.hidden", "at least 1")

@@ -1,6 +1,7 @@
 """Follower: PPO on a window with the path of an own planner; the reward is to follow it, and to reach goals.
 
-Source: Skrynnik et al., "Learn to Follow: decentralized lifelong multi-agent pathfinding via planning and learning", 2024
+Source: Skrynnik et al., "Learn to Follow: decentralized lifelong multi-agent pathfinding via planning and learning",
+2024
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ class PPOLearner:
         """Returns the advantages, the returns and the log-probabilities of all actions."""
         parts = _networks.tensors(record)
         logits, values = self._outputs(record)
-        odds = Categorical(logits=logits[:-1], validate_args=False).log_prob(parts["actions"])
+        odds = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
         ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(parts["rewards"])
         settings = self.learner.discount, self.learner.gae_lambda
         gains, returns = advantages(*settings, values, parts["rewards"], parts["terminated"], ended)
@@ -123,7 +123,8 @@ class PPOLearner:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores what `state` returned."""
-        for module, values in zip((self.network, self.critic, self.optimizer), state["modules"]):
+        modules: tuple[Any, ...] = (self.network, self.critic, self.optimizer)
+        for module, values in zip(modules, state["modules"]):
             module.load_state_dict(values)
 
 

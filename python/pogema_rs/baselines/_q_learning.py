@@ -139,7 +139,7 @@ class QLearner:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores what `state` returned."""
-        modules = (self.network, self.mixer, self.target_network, self.target_mixer, self.optimizer)
+        modules: tuple[Any, ...] = (self.network, self.mixer, self.target_network, self.target_mixer, self.optimizer)
         for module, values in zip(modules, state["modules"]):
             module.load_state_dict(values)
         self._steps, self._copied, self._episodes = state["counts"]

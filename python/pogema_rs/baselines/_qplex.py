@@ -49,7 +49,8 @@ class Duplex(nn.Module):
         values = (weights * best + self.biases(states)).sum(dim=-1, keepdim=True)
         # The gradient of the advantages must not reach the maxima, which the values train.
         gaps = weights * (chosen - best.detach())
-        return values + (self._importance(actions, states) * gaps).sum(dim=-1, keepdim=True)
+        mixed: torch.Tensor = values + (self._importance(actions, states) * gaps).sum(dim=-1, keepdim=True)
+        return mixed
 
     def _importance(self, actions: torch.Tensor, states: torch.Tensor) -> torch.Tensor:
         joint = functional.one_hot(actions, NUM_ACTIONS).flatten(-2).to(states.dtype)

@@ -64,7 +64,7 @@ def layout(config: TrainingConfig, map_size: tuple[int, int]) -> dict[str, tuple
 
 def empty(config: TrainingConfig, map_size: tuple[int, int], lanes: int) -> Record:
     """Returns a record of zeros for `lanes` episodes."""
-    arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     for name, (shape, dtype) in layout(config, map_size).items():
         full = (lanes, *shape) if name == "maps" else (shape[0], lanes, *shape[1:])
         arrays[name] = np.zeros(full, dtype=dtype)

@@ -21,8 +21,8 @@ def lambda_returns(
     """Returns TD(lambda) returns, where `trace` is lambda."""
     flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
     numbers = next_values.unsqueeze(-1), rewards.unsqueeze(-1)
-    returns = td_lambda_return_estimate(discount, trace, *numbers, *flags, time_dim=0)
-    return returns.squeeze(-1)
+    returns: torch.Tensor = td_lambda_return_estimate(discount, trace, *numbers, *flags, time_dim=0).squeeze(-1)
+    return returns
 
 
 def advantages(
