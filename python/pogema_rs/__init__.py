@@ -26,6 +26,7 @@ Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a comm
 `pogema_rs.toolbox.generators.generator_utils`, `pogema_rs.toolbox.generators.maze_generator`,
 `pogema_rs.toolbox.generators.random_generator` and `pogema_rs.toolbox.generators.warehouse_generator`.
 
+Trainers, with a command line (`python -m`): `pogema_rs.baselines`.
 The rules as functions for JAX: `pogema_rs.jax`.
 
 Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,

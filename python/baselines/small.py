@@ -1,0 +1,47 @@
+"""Small trainings, which take seconds."""
+
+import subprocess
+import sys
+
+from pogema_rs.baselines import load_config
+
+Q_METHODS = ("iql", "vdn", "qmix", "qplex")
+PPO_METHODS = ("ippo", "mappo", "follower")
+
+_SMALL = (
+    "environment.maps=[plain]",
+    "environment.size=5",
+    "environment.density=0.1",
+    "environment.num_agents=2",
+    "environment.max_episode_steps=12",
+    "schedule.lanes=4",
+    "schedule.validate_every=2",
+    "schedule.validation_episodes=4",
+    "schedule.validation_steps=12",
+    "schedule.checkpoint_every=2",
+    "network.hidden=16",
+)
+
+
+def changes(method):
+    """Returns the values that make a training small."""
+    learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
+    recurrent = () if method == "follower" else ("network.recurrent=16",)
+    return (*_SMALL, *learner, *recurrent)
+
+
+def small_config(method, *others):
+    """Returns the hyperparameters of a small training."""
+    return load_config(method, None, [*changes(method), *others])
+
+
+def command(method, folder, *arguments):
+    """Returns the command of a small training."""
+    settings = [part for change in changes(method) for part in ("--set", change)]
+    program = [sys.executable, "-B", "-m", "pogema_rs.baselines", "train", method]
+    return [*program, "--out", str(folder), *settings, *arguments]
+
+
+def run(method, folder, *arguments):
+    """Runs the command of a small training and returns its result."""
+    return subprocess.run(command(method, folder, *arguments), capture_output=True, text=True, check=False)

@@ -1,0 +1,187 @@
+"""Tests of whole trainings: repeated, killed and resumed ones, their files, and the networks that they export."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from pogema_rs import VecEnv, policies
+from pogema_rs.baselines import METHODS, Budget, _checkpoint, train
+from pogema_rs.baselines._acting import Actor
+from pogema_rs.baselines._episodes import Episodes
+from pogema_rs.baselines._networks import AgentNetwork
+from safetensors.numpy import load_file
+from small import Q_METHODS, command, run, small_config
+
+
+def weights(folder):
+    """Returns the exported and the last weights of a run."""
+    method = json.loads((folder / "run.json").read_text())["method"]
+    saved = _checkpoint.load(folder / "checkpoint.pt", method)
+    last = {name: values.numpy() for name, values in saved["learner"]["modules"][0].items()}
+    return {**load_file(folder / "weights.safetensors"), **{f"last.{name}": one for name, one in last.items()}}
+
+
+def check_equal(first, second):
+    """Checks that two runs ended with the same bits."""
+    ours, theirs = weights(first), weights(second)
+    assert ours.keys() == theirs.keys() and len(ours) > 6
+    for name in ours:
+        assert ours[name].tobytes() == theirs[name].tobytes(), name
+
+
+def test_the_methods_are_covered():
+    assert set(METHODS) == {*Q_METHODS, "ippo", "mappo", "follower"}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_seed_repeats_and_a_resumed_run_equals_an_uninterrupted_one(method, tmp_path):
+    config = small_config(method)
+    train(config, tmp_path / "whole", Budget(updates=8), seed=3)
+    train(config, tmp_path / "part", Budget(updates=4), seed=3)
+    halfway = weights(tmp_path / "part")
+    train(config, tmp_path / "part", Budget(updates=8), seed=3, resume=True)
+    check_equal(tmp_path / "whole", tmp_path / "part")
+    assert any(not np.array_equal(halfway[name], one) for name, one in weights(tmp_path / "part").items())
+    train(config, tmp_path / "other", Budget(updates=4), seed=4)
+    assert any(not np.array_equal(halfway[name], one) for name, one in weights(tmp_path / "other").items())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
+    config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")
+    train(config, tmp_path, Budget(updates=4))
+    assert (tmp_path / "weights.safetensors").stat().st_size <= 2**20
+    assert policies.load(tmp_path / "weights.safetensors").sampling == ("greedy" if method in Q_METHODS else "softmax")
+    network = AgentNetwork(config.encoder, config.network, has_value=method in ("ippo", "follower"))
+    exported = load_file(tmp_path / "weights.safetensors")
+    network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
+    policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
+    actor = Actor(network, torch.Generator(), 0.0)
+    configs, seeds = Episodes(config.environment, 9, 32).of_validation(8)
+    env = VecEnv(configs, encoder=config.encoder, masks=True, autoreset_mode="Disabled")
+    windows, infos = env.reset(seed=seeds)
+    moves = 0
+    for _ in range(32):
+        actions = actor(windows, np.zeros((8, 4, 0), dtype=np.float32), infos["action_masks"])
+        np.testing.assert_array_equal(policy.act(env), actions)
+        moves += int((actions != 0).sum())
+        windows, _, _, _, infos = env.step(actions)
+    assert moves > 100
+
+
+def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
+    changes = ["network.filters=4", "network.blocks=1", "encoder.scalars=[goal_offset]", "learner.batch=2"]
+    config = small_config("iql", *changes)
+    train(config, tmp_path, Budget(updates=1))
+    policy = policies.load(tmp_path / "weights.safetensors")
+    assert policy.encoder == config.encoder
+    network = AgentNetwork(config.encoder, config.network, has_value=False)
+    exported = load_file(tmp_path / "weights.safetensors")
+    network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
+    rng = np.random.default_rng(0)
+    windows = rng.integers(-1, 2, (64, *config.encoder.shape)).astype(np.float32)
+    scalars = rng.uniform(-1, 1, (64, 2)).astype(np.float32)
+    with torch.no_grad():
+        features, _ = network.features(torch.from_numpy(windows).view(1, 64, -1), torch.from_numpy(scalars)[None])
+        expected = network.policy(features[0]).numpy()
+    np.testing.assert_allclose(policy.logits(windows, scalars), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("method", ["qmix", "ippo"])
+def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
+    assert run(method, tmp_path / "whole", "--updates", "120").returncode == 0
+    killed = tmp_path / "killed"
+    checkpoint, kills = killed / "checkpoint.pt", 0
+    for number in range(3):
+        process = subprocess.Popen(
+            command(method, killed, "--updates", "120", *(["--resume"] if number else [])),
+            stdout=subprocess.DEVNULL,
+        )
+        before = checkpoint.stat().st_mtime_ns if number else None
+        while process.poll() is None:
+            if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
+                # Between checkpoints, or while one is written.
+                time.sleep(0.05 * (number + 1))
+                break
+            time.sleep(0.01)
+        kills += process.poll() is None
+        process.kill()
+        process.wait()
+        reached = _checkpoint.load(checkpoint, method)["progress"][0]
+        assert reached < 120, "the training ended before the kill"
+    assert kills == 3
+    assert run(method, killed, "--updates", "120", "--resume").returncode == 0
+    check_equal(tmp_path / "whole", killed)
+    assert not list(killed.glob("*.part"))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no SIGINT for another process")
+def test_an_interrupted_run_says_how_to_continue(tmp_path):
+    process = subprocess.Popen(command("iql", tmp_path, "--minutes", "5"), stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "checkpoint.pt").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (130, "stopped; --resume continues from the last checkpoint\n")
+
+
+def test_a_run_writes_its_files(tmp_path):
+    done = run("vdn", tmp_path, "--updates", "4", "--seed", "5", "--tensorboard")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 3 and "min left" in lines[0] and lines[-1] == f"wrote {tmp_path / 'weights.safetensors'}"
+    rows = list(csv.DictReader((tmp_path / "curve.csv").read_text().splitlines()))
+    assert [row["iteration"] for row in rows] == ["2", "4"]
+    assert all(0 <= float(row["ISR"]) <= 1 for row in rows)
+    assert ElementTree.parse(tmp_path / "curve.svg").getroot().tag.endswith("svg")
+    values = json.loads((tmp_path / "run.json").read_text())
+    assert (values["method"], values["seed"], values["iterations"]) == ("vdn", 5, 4)
+    assert values["budget"] == {"minutes": None, "updates": 4} and values["minutes"] > 0
+    assert values["config"]["environment"]["size"] == 5 and values["versions"]["torch"] == torch.__version__
+    assert list((tmp_path / "tensorboard").iterdir())
+
+
+def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
+    folder = tmp_path / "run"
+    assert run("iql", folder, "--updates", "2").returncode == 0
+    content = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    config = "learner.discount is 0.95, not 0.5"
+    broken, missing = tmp_path / "broken", tmp_path / "missing"
+    broken.mkdir()
+    (broken / "checkpoint.pt").write_bytes(content[folder / "checkpoint.pt"][:-100])
+    for method, where, arguments, expected in (
+        ("iql", folder, [], "the folder holds a run; continue it with --resume or name another folder"),
+        ("vdn", folder, ["--resume"], "the checkpoint is one of iql, expected vdn"),
+        ("iql", folder, ["--resume", "--seed", "1"], "the run has seed 0, not 1"),
+        ("iql", folder, ["--resume", "--set", "learner.discount=0.5"], f"the run has another config: {config}"),
+        ("iql", broken, ["--resume"], "the file is not a checkpoint of a training"),
+        ("iql", missing, ["--resume"], "no checkpoint to resume from; train without --resume"),
+    ):
+        done = run(method, where, "--updates", "4", *arguments)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+        assert expected in done.stderr and done.stderr.startswith(f"train {method}: {where}")
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == content
+    assert not missing.exists()
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "checkpoint.pt"
+    _checkpoint.save(path, {"method": "iql", "number": 1})
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        _checkpoint.save(path, {"method": "iql", "number": 2})
+    assert _checkpoint.load(path, "iql")["number"] == 1
+    assert [one.name for one in Path(tmp_path).iterdir()] == ["checkpoint.pt"]

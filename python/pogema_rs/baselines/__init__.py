@@ -1,0 +1,25 @@
+"""Trainers of the learned methods of POGEMA's paper, from a seed to weights that play in Rust.
+
+    python -m pogema_rs.baselines train qmix --out runs/qmix --minutes 60
+
+Training needs the extra `train`: `pip install 'pogema-rs[train]'`. Importing this package imports no PyTorch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
+
+if TYPE_CHECKING:
+    from pogema_rs.baselines._run import Budget, train
+
+__all__ = ["METHODS", "Budget", "TrainingConfig", "load_config", "train"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in ("Budget", "train"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from pogema_rs.baselines import _run
+
+    return getattr(_run, name)

@@ -1,0 +1,133 @@
+"""Plays whole episodes in all lanes of a `VecEnv`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Optional
+
+import numpy as np
+
+from pogema_rs.baselines import _record
+from pogema_rs.baselines._config import TrainingConfig
+from pogema_rs.baselines._record import Record
+from pogema_rs.vec_env import AutoresetMode, VecEnv
+
+#: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`.
+Act = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+class Collector:
+    """Plays one episode in each lane at a time, and records it.
+
+    Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training can therefore
+    resume from the number of its iteration, without the state of an environment.
+    """
+
+    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], lanes: int, threads: int) -> None:
+        self._config, self._map_size, self._lanes, self._threads = config, map_size, lanes, threads
+        self._env: Optional[VecEnv[Any]] = None
+
+    def play(self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act) -> tuple[Record, dict[str, float]]:
+        """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
+        env = self._begin(configs)
+        seen, infos = env.reset(seed=list(seeds))
+        record = _record.empty(self._config, self._map_size, self._lanes)
+        metrics: dict[str, np.ndarray] = {}
+        state = self._note(record, 0, seen, infos, env)
+        # The engine's map is as large as the largest map so far; the rest of the record's map is obstacles.
+        record.maps[:] = 1
+        obstacles = state["obstacles"]
+        record.maps[:, : obstacles.shape[1], : obstacles.shape[2]] = obstacles
+        is_over = np.zeros(self._lanes, dtype=np.bool_)
+        for step in range(len(record.actions)):
+            if is_over.all():
+                break
+            windows, scalars = self._parts(seen)
+            actions = act(windows, scalars, infos["action_masks"])
+            record.actions[step], record.played[step] = actions, ~is_over
+            seen, own, terminated, truncated, infos = env.step(actions)
+            self._note(record, step + 1, seen, infos, env)
+            self._reward(record, step, own)
+            record.terminated[step] = terminated
+            is_over |= (terminated.all(axis=1)) | (truncated.all(axis=1))
+            if "metrics" in infos:
+                _keep(metrics, infos["metrics"], infos["_metrics"])
+        return record, {name: float(values.mean()) for name, values in metrics.items()}
+
+    def close(self) -> None:
+        """Frees the environments."""
+        if self._env is not None:
+            self._env.close()
+            self._env = None
+
+    def _begin(self, configs: list[dict[str, Any]]) -> VecEnv[Any]:
+        if self._env is None:
+            self._env = VecEnv(
+                configs,
+                num_threads=self._threads,
+                autoreset_mode=AutoresetMode.DISABLED,
+                masks=True,
+                map_size=self._map_size,
+                encoder=self._config.encoder,
+            )
+        else:
+            self._env.set_configs(configs)
+        return self._env
+
+    def _parts(self, seen: Any) -> tuple[np.ndarray, np.ndarray]:
+        if isinstance(seen, dict):
+            return seen["windows"], seen["scalars"]
+        lanes, agents = seen.shape[:2]
+        return seen, np.zeros((lanes, agents, 0), dtype=np.float32)
+
+    def _note(self, record: Record, step: int, seen: Any, infos: dict[str, Any], env: VecEnv[Any]) -> dict[str, Any]:
+        """Writes what agents see in a state into the record, and returns the global state."""
+        windows, scalars = self._parts(seen)
+        scaled = np.rint(windows * (2.0 * self._config.encoder.radius))
+        record.windows[step] = scaled.reshape(*windows.shape[:2], -1)
+        record.scalars[step], record.masks[step] = scalars, infos["action_masks"]
+        record.active[step] = infos["is_active"]
+        state = env.state()
+        record.places[step] = np.concatenate([state["positions"], state["goals"]], axis=2)
+        return state
+
+    def _reward(self, record: Record, step: int, own: np.ndarray) -> None:
+        """Writes the rewards of a step into the record."""
+        config, weights = self._config, self._config.rewards
+        rewards = np.full(own.shape, weights.step, dtype=np.float32)
+        if config.environment.on_target == "nothing":
+            places = record.places[step + 1]
+            rewards += weights.goal * (places[..., :2] == places[..., 2:]).all(axis=2)
+        else:
+            rewards += weights.goal * own
+        for weight, channel in ((weights.progress, "cost_to_go"), (weights.path, "follower_path")):
+            if weight:
+                rewards += weight * self._at_next_cell(record, step, channel)
+        # A finished agent gets no reward.
+        rewards *= record.active[step] & record.played[step][:, None]
+        if weights.team:
+            rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
+        record.rewards[step] = rewards
+
+    def _at_next_cell(self, record: Record, step: int, channel: str) -> np.ndarray:
+        """Returns the value of a channel, as it was before the step, at the cell that each agent moved to; else 0.
+
+        For `cost_to_go` the unit is one step towards the goal.
+        """
+        encoder = self._config.encoder
+        _, side, _ = encoder.shape
+        moves = record.places[step + 1, ..., :2].astype(np.int64) - record.places[step, ..., :2]
+        cells = (moves[..., 0] + encoder.radius) * side + moves[..., 1] + encoder.radius
+        cells += encoder.channels.index(channel) * side * side
+        values = np.take_along_axis(record.windows[step], cells[..., None], axis=2)[..., 0].astype(np.float32)
+        has_moved = moves.any(axis=2)
+        scale = 1.0 if channel == "cost_to_go" else 2.0 * encoder.radius
+        return np.asarray(has_moved * values / scale, dtype=np.float32)
+
+
+def _keep(metrics: dict[str, np.ndarray], found: dict[str, np.ndarray], ended: np.ndarray) -> None:
+    """Adds the metrics of the episodes that ended."""
+    for name, values in found.items():
+        if not name.startswith("_"):
+            kept = metrics.setdefault(name, np.full(len(values), np.nan))
+            kept[ended] = values[ended]

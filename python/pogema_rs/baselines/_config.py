@@ -1,0 +1,295 @@
+"""The hyperparameters of a training, read from YAML and checked."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from pogema_rs._encoder import Encoder
+from pogema_rs.toolbox._optional import required
+
+#: The methods that can be trained, by name.
+METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower")
+
+MAP_KINDS = ("random", "mazes", "warehouse", "plain")
+GOAL_RULES = ("nothing", "restart", "finish")
+#: Channels whose values are multiples of `1 / (2 * radius)`, so that a byte holds them exactly.
+CHANNELS = ("obstacles", "agents", "all_agents", "goal", "cost_to_go", "path", "follower_path", "seen_obstacles")
+
+Section = TypeVar("Section")
+
+
+@dataclass(frozen=True)
+class EnvironmentConfig:
+    """The episodes of the training."""
+
+    maps: tuple[str, ...] = ("random",)
+    num_agents: int = 8
+    on_target: str = "nothing"
+    max_episode_steps: int = 128
+    collision_system: str = "soft"
+    obs_radius: int = 5
+    size: int = 8
+    density: float = 0.3
+
+
+@dataclass(frozen=True)
+class RewardConfig:
+    """The weights of the parts of the reward."""
+
+    team: bool = False
+    goal: float = 1.0
+    progress: float = 0.0
+    path: float = 0.0
+    step: float = 0.0
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """The sizes of the network that each agent plays with."""
+
+    filters: int = 0
+    blocks: int = 0
+    hidden: int = 128
+    recurrent: int = 128
+
+
+@dataclass(frozen=True)
+class QLearningConfig:
+    """The hyperparameters of the methods that learn values of actions."""
+
+    discount: float = 0.99
+    td_lambda: float = 0.6
+    learning_rate: float = 0.001
+    max_gradient: float = 10.0
+    epsilon_start: float = 1.0
+    epsilon_end: float = 0.05
+    epsilon_steps: int = 100_000
+    replay: int = 5000
+    batch: int = 32
+    updates: int = 2
+    target_episodes: int = 200
+    mixer_hidden: int = 32
+    kernels: int = 4
+    own_loss: float = 0.0
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """The hyperparameters of the methods that learn a policy by PPO."""
+
+    discount: float = 0.99
+    gae_lambda: float = 0.95
+    learning_rate: float = 0.0005
+    max_gradient: float = 0.5
+    clip: float = 0.2
+    entropy: float = 0.01
+    value: float = 0.5
+    epochs: int = 3
+    minibatches: int = 4
+    masks: bool = True
+    critic_hidden: int = 256
+
+
+@dataclass(frozen=True)
+class ScheduleConfig:
+    """What an iteration of the training plays, and how often it is validated and saved."""
+
+    lanes: int = 32
+    validate_every: int = 50
+    validation_episodes: int = 64
+    validation_steps: int = 128
+    checkpoint_every: int = 10
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """All hyperparameters of one training."""
+
+    method: str
+    encoder: Encoder
+    learner: Union[QLearningConfig, PPOConfig]
+    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
+    rewards: RewardConfig = field(default_factory=RewardConfig)
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the values as a YAML file has them."""
+        values: dict[str, Any] = _plain(dataclasses.asdict(self))
+        return {**values, "encoder": _plain(self.encoder.to_dict())}
+
+
+def load_config(
+    method: str, path: Union[None, str, os.PathLike[str]] = None, changes: Sequence[str] = ()
+) -> TrainingConfig:
+    """Returns the hyperparameters of a method: those of the package, or those of a YAML file.
+
+    `changes` are texts of the form `section.key=value`, which replace single values.
+
+    Errors: ImportError without PyYAML; OSError for a file that cannot be read; ValueError or TypeError for a wrong
+    value, with the file and the nearest key.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}{_hint(method, METHODS)}")
+    yaml = required("yaml", "reading the hyperparameters of a training")
+    if path is None:
+        name = f"{method}.yaml"
+        text = (resources.files(__package__) / "configs" / name).read_text(encoding="utf-8")
+    else:
+        name, text = os.fspath(path), Path(path).read_text(encoding="utf-8")
+    try:
+        values = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(f"{name}: {' '.join(str(error).split())}") from None
+    if not isinstance(values, dict):
+        raise TypeError(f"{name}: the file holds a {type(values).__name__}, expected a mapping")
+    for change in changes:
+        _apply(values, change, yaml)
+    return read_config(values, method, name)
+
+
+def read_config(values: Mapping[str, Any], method: str, name: str) -> TrainingConfig:
+    """Returns the checked hyperparameters of a mapping; `name` stands in the messages of errors.
+
+    Errors: ValueError or TypeError, see `load_config`.
+    """
+    learner = QLearningConfig if method in ("iql", "vdn", "qmix", "qplex") else PPOConfig
+    sections: dict[str, Any] = {
+        "environment": EnvironmentConfig,
+        "rewards": RewardConfig,
+        "network": NetworkConfig,
+        "learner": learner,
+        "schedule": ScheduleConfig,
+    }
+    _check_keys(name, "", values, ["method", "encoder", *sections])
+    for key in ("method", "encoder"):
+        if key not in values:
+            raise ValueError(f"{name}: the key {key!r} is missing")
+    if values["method"] != method:
+        raise ValueError(f"{name}: method is {values['method']!r}, expected {method!r}")
+    read = {key: _section(name, key, values.get(key, {}), kind) for key, kind in sections.items()}
+    try:
+        encoder = Encoder.from_dict(values["encoder"])
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name}: encoder: {error}") from None
+    config = TrainingConfig(method=method, encoder=encoder, **read)
+    _check_values(name, config)
+    return config
+
+
+def _section(name: str, key: str, values: Any, kind: type[Section]) -> Section:
+    if not isinstance(values, Mapping):
+        raise TypeError(f"{name}: {key} is {values!r}, expected a mapping")
+    hints = get_type_hints(kind)
+    _check_keys(name, f"{key}.", values, list(hints))
+    return kind(**{one: _value(f"{name}: {key}.{one}", values[one], hints[one]) for one in values})
+
+
+def _value(place: str, value: Any, kind: Any) -> Any:
+    if get_origin(kind) is tuple:
+        word = get_args(kind)[0]
+        if not isinstance(value, (list, tuple)) or not value or not all(isinstance(one, word) for one in value):
+            raise TypeError(f"{place} is {value!r}, expected a list of names")
+        return tuple(value)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        expected = {int: "a whole number", float: "a number", bool: "true or false", str: "a name"}[kind]
+        raise TypeError(f"{place} is {value!r}, expected {expected}")
+    return value
+
+
+def _check_keys(name: str, prefix: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
+    for key in values:
+        if key not in known:
+            raise ValueError(f"{name}: unknown key {prefix + str(key)!r}{_hint(str(key), known, prefix)}")
+
+
+def _hint(word: str, known: Sequence[str], prefix: str = "") -> str:
+    near = difflib.get_close_matches(word, known, 1, 0.5)
+    return f"; did you mean {prefix + near[0]!r}?" if near else f"; expected one of {', '.join(known)}"
+
+
+def _check_values(name: str, config: TrainingConfig) -> None:
+    """Checks the ranges of all values, and that they fit each other."""
+
+    def check(is_right: bool, key: str, expected: str) -> None:
+        if not is_right:
+            section, _, last = key.partition(".")
+            value = getattr(getattr(config, section), last)
+            raise ValueError(f"{name}: {key} is {value!r}, expected {expected}")
+
+    environment, learner, schedule = config.environment, config.learner, config.schedule
+    check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names of {', '.join(MAP_KINDS)}")
+    check(environment.on_target in GOAL_RULES, "environment.on_target", f"one of {', '.join(GOAL_RULES)}")
+    for key in ("num_agents", "max_episode_steps", "obs_radius", "size"):
+        check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
+    check(environment.size <= 255, "environment.size", "at most 255")
+    known = all(channel in CHANNELS for channel in config.encoder.channels)
+    check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
+    for key in ("filters", "blocks", "recurrent"):
+        check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
+    check(config.network.hidden >= 1, "network.hidden", "at least 1")
+    check(config.network.blocks == 0 or config.network.filters > 0, "network.blocks", "0 without filters")
+    for one in dataclasses.fields(schedule):
+        check(getattr(schedule, one.name) >= 1, f"schedule.{one.name}", "at least 1")
+    check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
+    check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
+    _check_learner(check, learner, schedule)
+    for part, channel in (("progress", "cost_to_go"), ("path", "follower_path")):
+        needs = getattr(config.rewards, part) != 0 and channel not in config.encoder.channels
+        check(not needs, f"rewards.{part}", f"0 without the channel {channel!r}")
+
+
+def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], schedule: ScheduleConfig) -> None:
+    if isinstance(learner, QLearningConfig):
+        check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
+        check(learner.own_loss >= 0, "learner.own_loss", "at least 0")
+        check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
+        check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
+        check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
+        for key in ("epsilon_steps", "batch", "updates", "target_episodes", "mixer_hidden", "kernels"):
+            check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
+    else:
+        check(0 <= learner.gae_lambda <= 1, "learner.gae_lambda", "0 to 1")
+        check(learner.clip > 0, "learner.clip", "more than 0")
+        for key in ("epochs", "minibatches", "critic_hidden"):
+            check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
+
+
+def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:
+    key, is_change, text = change.partition("=")
+    section, has_section, last = key.partition(".")
+    if not is_change or not has_section:
+        raise ValueError(f"--set {change!r}: expected SECTION.KEY=VALUE, for example learner.discount=0.95")
+    inner = values.setdefault(section, {})
+    if not isinstance(inner, dict):
+        raise ValueError(f"--set {change!r}: {section!r} is no section, expected SECTION.KEY=VALUE")
+    inner[last] = yaml.safe_load(text)
+
+
+def _plain(value: Any) -> Any:
+    """Returns a value with lists in place of tuples, as YAML and JSON store them."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value
+
+
+def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = "") -> Optional[str]:
+    """Returns the first key whose values differ, with both values; None if all are equal."""
+    for key in sorted({*ours, *theirs}):
+        one, other = ours.get(key), theirs.get(key)
+        if isinstance(one, Mapping) and isinstance(other, Mapping):
+            inner = differences(one, other, f"{prefix}{key}.")
+            if inner is not None:
+                return inner
+        elif one != other:
+            return f"{prefix}{key} is {one!r}, not {other!r}"
+    return None

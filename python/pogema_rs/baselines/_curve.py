@@ -1,0 +1,66 @@
+"""The learning curve of a training, as CSV, SVG and for TensorBoard."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from pogema_rs.baselines import _checkpoint
+from pogema_rs.toolbox._optional import required
+
+#: The metric that chooses the best weights, by the rule of goals.
+SCORES = {"nothing": "ISR", "finish": "ISR", "restart": "avg_throughput"}
+
+
+class Curve:
+    """The rows of a learning curve: one for each validation."""
+
+    def __init__(self, score: str) -> None:
+        self.score = score
+        self.rows: list[dict[str, float]] = []
+
+    @property
+    def best(self) -> float:
+        """The best score so far, or minus infinity."""
+        return max((row[self.score] for row in self.rows), default=float("-inf"))
+
+    def write(self, folder: Path, title: str, drawn: bool) -> None:
+        """Writes `curve.csv` and, if `drawn`, `curve.svg` into a folder.
+
+        Errors: ImportError without Matplotlib, if `drawn`; OSError if a file cannot be written.
+        """
+        if not self.rows:
+            return
+        text = io.StringIO()
+        names = list(dict.fromkeys(name for row in self.rows for name in row))
+        writer = csv.DictWriter(text, names, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in self.rows)
+        _checkpoint.write(folder / "curve.csv", text.getvalue().encode())
+        if drawn:
+            _checkpoint.write(folder / "curve.svg", self._svg(title))
+
+    def _svg(self, title: str) -> bytes:
+        figures = required("matplotlib.figure", "drawing the learning curve")
+        figure = figures.Figure(figsize=(6, 3.6))
+        axes = figure.add_subplot()
+        minutes = [row["minutes"] for row in self.rows]
+        axes.plot(minutes, [row[self.score] for row in self.rows], color="#c1433c")
+        axes.set(xlabel="minutes", ylabel=f"{self.score} on validation episodes", title=title)
+        axes.set_ylim(bottom=0)
+        axes.spines[["top", "right"]].set_visible(False)
+        figure.tight_layout()
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="svg")
+        return buffer.getvalue()
+
+
+def open_tensorboard(folder: Path) -> Any:
+    """Returns a writer of TensorBoard's files.
+
+    Errors: ImportError without TensorBoard.
+    """
+    required("tensorboard", "--tensorboard")
+    return required("torch.utils.tensorboard", "--tensorboard").SummaryWriter(str(folder / "tensorboard"))

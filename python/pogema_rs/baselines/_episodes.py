@@ -1,0 +1,87 @@
+"""The configs and seeds of the episodes of a training, which no published set holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pogema_rs.baselines._config import EnvironmentConfig
+from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, MazeRangeSettings
+from pogema_rs.toolbox.generators.random_generator import MapRangeSettings, generate_map
+from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
+
+#: The smallest seed of a map or an episode. Published sets have small seeds, at most 2175.
+FIRST_SEED = 2**32
+#: The rows and columns of the largest map of each kind.
+LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
+
+# The streams of seeds.
+_TRAINING, _VALIDATION = 0, 1
+
+
+class Episodes:
+    """The configs and seeds of all episodes of a training, as a function of its seed.
+
+    The validation episodes have their own seeds and maps, and are the same each time.
+    """
+
+    def __init__(self, config: EnvironmentConfig, seed: int, validation_steps: int) -> None:
+        self._config, self._seed, self._validation_steps = config, seed, validation_steps
+
+    @property
+    def map_size(self) -> tuple[int, int]:
+        """The rows and columns that have room for all maps."""
+        sizes = [LARGEST.get(kind, (self._config.size, self._config.size)) for kind in self._config.maps]
+        rows, columns = zip(*sizes)
+        return max(rows), max(columns)
+
+    def of_iteration(self, iteration: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
+        """Returns the configs and the seeds of the training episodes of an iteration."""
+        return self._draw(_TRAINING, iteration, count)
+
+    def of_validation(self, count: int) -> tuple[list[dict[str, Any]], list[int]]:
+        """Returns the configs and the seeds of the validation episodes."""
+        configs, seeds = self._draw(_VALIDATION, 0, count)
+        return [{**config, "max_episode_steps": self._validation_steps} for config in configs], seeds
+
+    def _draw(self, stream: int, number: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
+        sequence = np.random.SeedSequence(self._seed, spawn_key=(stream, number))
+        drawn = sequence.generate_state(2 * count, np.uint64)
+        seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[:count]]
+        kinds = self._config.maps
+        maps = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
+        return [self._environment(kinds[lane % len(kinds)], maps[lane]) for lane in range(count)], seeds
+
+    def _environment(self, kind: str, map_seed: int) -> dict[str, Any]:
+        config = self._config
+        fields: dict[str, Any] = {
+            "num_agents": config.num_agents,
+            "on_target": config.on_target,
+            "max_episode_steps": config.max_episode_steps,
+            "collision_system": config.collision_system,
+            "obs_radius": config.obs_radius,
+        }
+        if kind == "plain":
+            return {**fields, "size": config.size, "density": config.density}
+        return {**fields, "map": map_text(kind, map_seed)}
+
+
+def map_text(kind: str, seed: int) -> str:
+    """Returns the text of a map, drawn as the maps of the paper's set of its kind."""
+    text = _drawn(kind, seed)
+    # Some mazes have no obstacle, and equal published ones of the same size.
+    while "#" not in text:
+        seed += 1
+        text = _drawn(kind, seed)
+    return text
+
+
+def _drawn(kind: str, seed: int) -> str:
+    if kind == "random":
+        return generate_map(MapRangeSettings().sample(seed))
+    if kind == "mazes":
+        return MazeGenerator.generate_maze(**MazeRangeSettings(17, 21, 17, 21).sample(seed))
+    # The paper's warehouse has 5 rows of shelves.
+    rng = np.random.default_rng(seed)
+    return generate_warehouse(WarehouseConfig(walls_in_row=int(rng.integers(3, 6)), walls_rows=int(rng.integers(3, 5))))

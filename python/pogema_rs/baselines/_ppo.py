@@ -1,0 +1,143 @@
+"""PPO on whole episodes, with TorchRL's loss: IPPO, MAPPO and Follower."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torch.distributions import Categorical
+from torchrl.modules import ProbabilisticActor
+from torchrl.objectives import ClipPPOLoss
+
+from pogema_rs.baselines import _networks
+from pogema_rs.baselines._acting import LEAST, Actor
+from pogema_rs.baselines._config import PPOConfig, TrainingConfig
+from pogema_rs.baselines._networks import AgentNetwork
+from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._targets import advantages, last_steps
+
+
+class PPOLearner:
+    """Learns a policy by clipped ratios, on the episodes of one iteration at a time.
+
+    Source: Schulman et al., "Proximal policy optimization algorithms", 2017
+    """
+
+    #: The rule by which the trained network plays.
+    sampling = "softmax"
+
+    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
+        assert isinstance(config.learner, PPOConfig)
+        self.config, self.learner, self._generator = config, config.learner, generator
+        module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
+        self.critic: nn.Module = module.make_critic(config, map_size)
+        self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE)
+        nn.init.orthogonal_(self.network.policy.weight, 0.01)
+        self._parameters = [*self.network.parameters(), *self.critic.parameters()]
+        self.optimizer = torch.optim.Adam(self._parameters, self.learner.learning_rate, eps=1e-5)
+        self._objective = _objective(self.learner)
+
+    def open(self, folder: Path) -> None:
+        """Does nothing: no episode is kept."""
+
+    def save(self) -> None:
+        """Does nothing: no episode is kept."""
+
+    def actor(self) -> Actor:
+        """Returns what plays the episodes of an iteration."""
+        return Actor(self.network, self._generator, None, self.learner.masks)
+
+    def judge(self, generator: torch.Generator) -> Actor:
+        """Returns what plays the validation episodes."""
+        return Actor(self.network, generator, None, self.learner.masks)
+
+    def learn(self, record: Record) -> dict[str, float]:
+        """Updates the networks on the episodes; returns means of the updates."""
+        gains, returns, odds = self._judged(record)
+        played = torch.from_numpy(record.active[:-1] & record.played[..., None])
+        spread, mean = torch.std_mean(gains[played])
+        gains = (gains - mean) / (spread + 1e-8)
+        sums: dict[str, float] = {}
+        count = self.learner.epochs * self.learner.minibatches
+        for _ in range(self.learner.epochs):
+            order = torch.randperm(record.shape[1], generator=self._generator)
+            for lanes in torch.tensor_split(order, self.learner.minibatches):
+                if len(lanes):
+                    parts = gains[:, lanes], returns[:, lanes], odds[:, lanes], played[:, lanes]
+                    for name, value in self._update(lanes_of(record, lanes.numpy()), *parts).items():
+                        sums[name] = sums.get(name, 0.0) + value / count
+        return sums
+
+    def _outputs(self, record: Record) -> tuple[torch.Tensor, torch.Tensor]:
+        """Returns the logits of all states and their values. Shape: `(steps + 1, lanes, agents, ...)`."""
+        features = self.network.of_record(record)
+        logits = self.network.policy(features)
+        if self.learner.masks:
+            logits = logits.masked_fill(~torch.from_numpy(record.masks), LEAST)
+        values: torch.Tensor = self.critic(self.network, features, record)
+        return logits, values
+
+    @torch.no_grad()
+    def _judged(self, record: Record) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Returns the advantages, the returns and the log-probabilities of all actions."""
+        parts = _networks.tensors(record)
+        logits, values = self._outputs(record)
+        odds = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
+        ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(parts["rewards"])
+        settings = self.learner.discount, self.learner.gae_lambda
+        gains, returns = advantages(*settings, values, parts["rewards"], parts["terminated"], ended)
+        return gains, returns, odds
+
+    def _update(
+        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, odds: torch.Tensor, played: torch.Tensor
+    ) -> dict[str, float]:
+        logits, values = self._outputs(record)
+        actions = torch.from_numpy(record.actions).long()[played]
+        batch = TensorDict(
+            {
+                "logits": logits[:-1][played],
+                "value": values[:-1][played].unsqueeze(-1),
+                "action": actions,
+                "action_log_prob": odds[played],
+                "advantage": gains[played].unsqueeze(-1),
+                "value_target": returns[played].unsqueeze(-1),
+            },
+            batch_size=actions.shape,
+        )
+        losses = self._objective(batch)
+        loss = losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]
+        self.optimizer.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(self._parameters, self.learner.max_gradient)
+        self.optimizer.step()
+        return {name: float(losses[f"loss_{name}"].detach()) for name in ("objective", "critic", "entropy")}
+
+    def state(self) -> dict[str, Any]:
+        """Returns everything that a checkpoint must hold."""
+        return {"modules": [one.state_dict() for one in (self.network, self.critic, self.optimizer)]}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Restores what `state` returned."""
+        modules: tuple[Any, ...] = (self.network, self.critic, self.optimizer)
+        for module, values in zip(modules, state["modules"]):
+            module.load_state_dict(values)
+
+
+def _objective(learner: PPOConfig) -> ClipPPOLoss:
+    """Returns TorchRL's loss of outputs that are already computed."""
+    logits = TensorDictModule(nn.Identity(), in_keys=["logits"], out_keys=["logits"])
+    actor = ProbabilisticActor(logits, in_keys=["logits"], distribution_class=Categorical, return_log_prob=True)
+    critic = TensorDictModule(nn.Identity(), in_keys=["value"], out_keys=["state_value"])
+    return ClipPPOLoss(
+        actor,
+        critic,
+        clip_epsilon=learner.clip,
+        entropy_coeff=learner.entropy,
+        critic_coeff=learner.value,
+        loss_critic_type="l2",
+    )

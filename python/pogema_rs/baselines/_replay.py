@@ -1,0 +1,63 @@
+"""A replay of whole episodes, in files that outlive a killed training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pogema_rs.baselines import _record
+from pogema_rs.baselines._config import TrainingConfig
+from pogema_rs.baselines._record import Record
+
+
+class Replay:
+    """The last `capacity` episodes, as memory-mapped files, one for each array.
+
+    The files have room for `spare` more episodes. Episodes that are added after a checkpoint, at most `spare`, thus
+    overwrite none of the episodes that the checkpoint refers to, and a checkpoint need only hold their number.
+    """
+
+    def __init__(
+        self, folder: Path, config: TrainingConfig, map_size: tuple[int, int], sizes: tuple[int, int], count: int
+    ) -> None:
+        """Opens the files, or creates them if `count`, the number of episodes so far, is 0.
+
+        Errors: FileNotFoundError or ValueError if a file is missing or has the wrong size.
+        """
+        self.capacity, spare = sizes
+        self.count, self._slots = count, self.capacity + spare
+        folder.mkdir(parents=True, exist_ok=True)
+        self._arrays: dict[str, np.ndarray] = {}
+        for name, (shape, dtype) in _record.layout(config, map_size).items():
+            full = (self._slots, *shape)
+            if 0 in full:
+                self._arrays[name] = np.zeros(full, dtype=dtype)
+                continue
+            path = folder / f"{name}.bin"
+            size = int(np.prod(full)) * np.dtype(dtype).itemsize
+            if count and (not path.is_file() or path.stat().st_size != size):
+                raise FileNotFoundError(f"{path}: the replay is missing or has another size, so the run cannot resume")
+            self._arrays[name] = np.memmap(path, dtype, "r+" if count else "w+", shape=full)
+
+    def __len__(self) -> int:
+        return min(self.count, self.capacity)
+
+    def add(self, record: Record) -> None:
+        """Adds the episodes of all lanes."""
+        lanes = record.shape[1]
+        slots = np.arange(self.count, self.count + lanes) % self._slots
+        for name, array in _record.by_lane(record).items():
+            self._arrays[name][slots] = array
+        self.count += lanes
+
+    def sample(self, draws: np.ndarray) -> Record:
+        """Returns the episodes with the given ages: 0 is the newest, `len(self) - 1` the oldest."""
+        slots = (self.count - 1 - draws) % self._slots
+        return _record.by_step({name: np.asarray(array[slots]) for name, array in self._arrays.items()})
+
+    def flush(self) -> None:
+        """Writes all episodes to the disk."""
+        for array in self._arrays.values():
+            if isinstance(array, np.memmap):
+                array.flush()

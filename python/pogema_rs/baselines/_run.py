@@ -1,0 +1,225 @@
+"""One training from a seed to weights: its loop, its budget and its files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Optional, Union
+
+import torch
+
+from pogema_rs import __version__, policies
+from pogema_rs.baselines import _checkpoint
+from pogema_rs.baselines._collector import Collector
+from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, differences
+from pogema_rs.baselines._curve import SCORES, Curve, open_tensorboard
+from pogema_rs.baselines._episodes import Episodes
+from pogema_rs.baselines._ppo import PPOLearner
+from pogema_rs.baselines._progress import Progress
+from pogema_rs.baselines._q_learning import QLearner
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The end of a training: a number of minutes, or of iterations, whichever is reached first."""
+
+    minutes: Optional[float] = None
+    updates: Optional[int] = None
+
+    def share(self, seconds: float, iteration: int) -> float:
+        """Returns the share of the budget that is used up; 1 and more end the training."""
+        shares = [0.0]
+        if self.minutes is not None:
+            shares.append(seconds / (60 * self.minutes))
+        if self.updates is not None:
+            shares.append(iteration / self.updates)
+        return max(shares)
+
+
+def train(
+    config: TrainingConfig,
+    folder: Path,
+    budget: Budget,
+    *,
+    seed: int = 0,
+    threads: int = 1,
+    resume: bool = False,
+    tensorboard: bool = False,
+    draw: bool = True,
+) -> dict[str, float]:
+    """Trains a method, writes everything into a folder, and returns the last row of the learning curve.
+
+    With a budget of updates, the same config, seed and number of threads give the same weights on the same machine,
+    also if the training is killed and resumed.
+
+    Errors: FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError or ValueError if there
+    is no run of this config to resume; OSError if a file cannot be written.
+    """
+    run = _Run(config, folder, seed, threads, resume)
+    run.writer = open_tensorboard(folder) if tensorboard else None
+    run.draw = draw
+    try:
+        return run.play(budget)
+    finally:
+        run.close()
+
+
+class _Run:
+    """A training that is going on."""
+
+    writer: Any = None
+    draw = True
+
+    def __init__(self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool) -> None:
+        self.config, self.folder, self.seed, self.threads = config, folder, seed, threads
+        self.path = folder / "checkpoint.pt"
+        if not resume and self.path.exists():
+            raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
+        saved = _checkpoint.load(self.path, config.method) if resume else None
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(True)
+        torch.manual_seed(seed)
+        self.generator = torch.Generator().manual_seed(seed)
+        self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
+        kind: Any = QLearner if isinstance(config.learner, QLearningConfig) else PPOLearner
+        self.learner: Union[QLearner, PPOLearner] = kind(config, self.episodes.map_size, self.generator)
+        self.curve = Curve(SCORES[config.environment.on_target])
+        self.iteration, self.seconds, self.agent_steps = 0, 0.0, 0
+        self.best_weights = self._weights()
+        if saved is not None:
+            self._restore(saved)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.learner.open(folder)
+        size, schedule = self.episodes.map_size, config.schedule
+        self.lanes = Collector(config, size, schedule.lanes, threads)
+        environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
+        judged = dataclasses.replace(config, environment=environment)
+        self.judges = Collector(judged, size, schedule.validation_episodes, threads)
+
+    def play(self, budget: Budget) -> dict[str, float]:
+        """Trains until the budget is used up."""
+        progress = Progress(self.config.method, budget.share(self.seconds, self.iteration))
+        schedule = self.config.schedule
+        if self.iteration == 0:
+            self._describe(budget)
+            self._save()
+        while budget.share(self.seconds, self.iteration) < 1:
+            began = time.perf_counter()
+            parts = self._train_once()
+            self.seconds += time.perf_counter() - began
+            share = budget.share(self.seconds, self.iteration)
+            if self.iteration % schedule.validate_every == 0 or share >= 1:
+                self._validate(parts)
+                progress.tell(share, self.seconds, self.agent_steps, self.curve)
+            if self.iteration % schedule.checkpoint_every == 0 or share >= 1:
+                self._save()
+        self._export()
+        self._describe(budget)
+        return self.curve.rows[-1] if self.curve.rows else {}
+
+    def close(self) -> None:
+        """Frees the environments."""
+        self.lanes.close()
+        self.judges.close()
+        if self.writer is not None:
+            self.writer.close()
+
+    def _train_once(self) -> dict[str, float]:
+        """Plays the episodes of one iteration, and learns from them."""
+        configs, seeds = self.episodes.of_iteration(self.iteration, self.config.schedule.lanes)
+        record, _ = self.lanes.play(configs, seeds, self.learner.actor())
+        parts = self.learner.learn(record)
+        self.iteration += 1
+        self.agent_steps += int(record.active[:-1][record.played].sum())
+        return parts
+
+    def _validate(self, parts: dict[str, float]) -> None:
+        """Plays the validation episodes, and keeps the weights if they are the best so far."""
+        configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes)
+        generator = torch.Generator().manual_seed(self.seed)
+        _, metrics = self.judges.play(configs, seeds, self.learner.judge(generator))
+        if metrics[self.curve.score] > self.curve.best:
+            self.best_weights = self._weights()
+        row = {"iteration": self.iteration, "agent_steps": self.agent_steps, "minutes": self.seconds / 60}
+        self.curve.rows.append({**row, **metrics, **parts})
+        if self.writer is not None:
+            for name, value in {**metrics, **parts}.items():
+                self.writer.add_scalar(name, value, self.agent_steps)
+
+    def _weights(self) -> dict[str, torch.Tensor]:
+        return {name: values.clone() for name, values in self.learner.network.state_dict().items()}
+
+    def _save(self) -> None:
+        """Writes a checkpoint, and the files that show the progress."""
+        self.learner.save()
+        _checkpoint.save(
+            self.path,
+            {
+                "method": self.config.method,
+                "config": json.dumps(self.config.to_dict()),
+                "seed": self.seed,
+                "progress": [self.iteration, self.seconds, self.agent_steps],
+                "generators": [self.generator.get_state(), torch.get_rng_state()],
+                "learner": self.learner.state(),
+                "curve": self.curve.rows,
+                "best_weights": self.best_weights,
+            },
+        )
+        self.curve.write(self.folder, f"{self.config.method}, seed {self.seed}", self.draw)
+
+    def _restore(self, saved: dict[str, Any]) -> None:
+        difference = differences(json.loads(saved["config"]), self.config.to_dict())
+        if difference is not None:
+            raise ValueError(f"{self.path}: the run has another config: {difference}")
+        if saved["seed"] != self.seed:
+            raise ValueError(f"{self.path}: the run has seed {saved['seed']}, not {self.seed}")
+        self.iteration, self.seconds, self.agent_steps = saved["progress"]
+        self.generator.set_state(saved["generators"][0])
+        torch.set_rng_state(saved["generators"][1])
+        self.learner.restore(saved["learner"])
+        self.curve.rows, self.best_weights = saved["curve"], saved["best_weights"]
+
+    def _export(self) -> None:
+        """Writes the best weights, as crate `pogema-policies` plays them."""
+        last = self._weights()
+        self.learner.network.load_state_dict(self.best_weights)
+        path = self.folder / "weights.safetensors"
+        policies.export(self.learner.network, self.config.encoder, path, sampling=self.learner.sampling)
+        self.learner.network.load_state_dict(last)
+
+    def _describe(self, budget: Budget) -> None:
+        """Writes what made the run, and what it reached, as JSON."""
+        values = {
+            "method": self.config.method,
+            "seed": self.seed,
+            "budget": {"minutes": budget.minutes, "updates": budget.updates},
+            "threads": self.threads,
+            "minutes": round(self.seconds / 60, 3),
+            "iterations": self.iteration,
+            "agent_steps": self.agent_steps,
+            "score": self.curve.score,
+            "best": self.curve.best if self.curve.rows else None,
+            "versions": {"pogema_rs": __version__, "torch": torch.__version__, "python": platform.python_version()},
+            "commit": _commit(),
+            "machine": f"{platform.machine()}, {platform.system()}, {torch.backends.cpu.get_cpu_capability()}",
+            "command": sys.argv,
+            "config": self.config.to_dict(),
+        }
+        _checkpoint.write(self.folder / "run.json", (json.dumps(values, indent=2) + "\n").encode())
+
+
+def _commit() -> Optional[str]:
+    """Returns the commit of the checkout that this package lies in; None for an installed package."""
+    git = shutil.which("git")
+    source = Path(__file__).resolve()
+    if git is None or "site-packages" in source.parts:
+        return None
+    done = subprocess.run([git, "rev-parse", "HEAD"], cwd=source.parent, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or None

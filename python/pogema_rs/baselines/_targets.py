@@ -1,0 +1,46 @@
+"""Returns and advantages, by TorchRL.
+
+All tensors have the axes `(steps, ...)`. `ended` is True at the last step of an episode, and `terminated` where no
+reward follows it; an episode that only the time limit ends continues with the value of its last state.
+"""
+
+from __future__ import annotations
+
+import torch
+from torchrl.objectives.value.functional import generalized_advantage_estimate, td_lambda_return_estimate
+
+
+def lambda_returns(
+    discount: float,
+    trace: float,
+    next_values: torch.Tensor,
+    rewards: torch.Tensor,
+    terminated: torch.Tensor,
+    ended: torch.Tensor,
+) -> torch.Tensor:
+    """Returns TD(lambda) returns, where `trace` is lambda."""
+    flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
+    numbers = next_values.unsqueeze(-1), rewards.unsqueeze(-1)
+    returns: torch.Tensor = td_lambda_return_estimate(discount, trace, *numbers, *flags, time_dim=0).squeeze(-1)
+    return returns
+
+
+def advantages(
+    discount: float,
+    trace: float,
+    values: torch.Tensor,
+    rewards: torch.Tensor,
+    terminated: torch.Tensor,
+    ended: torch.Tensor,
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Returns advantages by GAE, and the returns; `values` has one step more than the rest."""
+    flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
+    numbers = values[:-1].unsqueeze(-1), values[1:].unsqueeze(-1), rewards.unsqueeze(-1)
+    gains, returns = generalized_advantage_estimate(discount, trace, *numbers, *flags, time_dim=0)
+    return gains.squeeze(-1), returns.squeeze(-1)
+
+
+def last_steps(played: torch.Tensor) -> torch.Tensor:
+    """Returns which steps are the last of their episode. Shape: `(steps, lanes)`, bool."""
+    after = torch.cat([played[1:], torch.zeros_like(played[:1])])
+    return played & ~after

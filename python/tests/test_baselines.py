@@ -1,0 +1,156 @@
+"""Tests of the trainers that need no PyTorch; `./check baselines` runs the others."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from pogema_rs import GridConfig, VecEnv
+from pogema_rs.baselines import METHODS, __main__, _config, _episodes, load_config
+from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, MazeRangeSettings
+from pogema_rs.toolbox.generators.random_generator import MapRangeSettings, generate_map
+from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
+
+CONFIGS = Path(_config.__file__).parent / "configs"
+SUITES = Path(__file__).resolve().parents[2] / "suites"
+#: The seeds of pogema-toolbox's sets for validation and training.
+PUBLISHED_SEEDS = range(128 + 2048)
+
+
+def cells(text):
+    """Returns the obstacles of a map, whatever the signs of its free cells."""
+    return re.sub(r"[^#\n]", ".", text.strip())
+
+
+def published_maps():
+    mazes = MazeRangeSettings(17, 21, 17, 21)
+    for seed in PUBLISHED_SEEDS:
+        yield cells(generate_map(MapRangeSettings().sample(seed)))
+        yield cells(MazeGenerator.generate_maze(**mazes.sample(seed)))
+    yield cells(generate_warehouse(WarehouseConfig()))
+
+
+def test_training_uses_no_published_map_and_no_published_seed():
+    published = set(published_maps())
+    suites = [yaml.safe_load(path.read_text()) for path in SUITES.glob("*/*.yaml")]
+    seeds = set()
+    for suite in suites:
+        listed = suite["environment"].get("seed", 0) if "environment" in suite else 0
+        seeds.update(listed["grid_search"] if isinstance(listed, dict) else [listed])
+    assert suites and seeds and max(seeds) < _episodes.FIRST_SEED
+    assert max(PUBLISHED_SEEDS) < _episodes.FIRST_SEED
+    for kind in ("random", "mazes", "warehouse"):
+        episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=(kind,)), 0, 128)
+        parts = [episodes.of_validation(64), *(episodes.of_iteration(number, 64) for number in range(20))]
+        for configs, drawn in parts:
+            assert min(drawn) >= _episodes.FIRST_SEED
+            assert published.isdisjoint(cells(config["map"]) for config in configs)
+    # The comparison finds a published map.
+    assert cells(_episodes.map_text("random", 5)) in published
+
+
+def test_episodes_depend_on_seed_and_iteration_and_validation_has_its_own():
+    episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=("random", "mazes")), 3, 256)
+    first, again = episodes.of_iteration(7, 8), episodes.of_iteration(7, 8)
+    assert first == again
+    drawn = [seed for number in range(50) for seed in episodes.of_iteration(number, 16)[1]]
+    judged = episodes.of_validation(64)[1]
+    assert len({*drawn, *judged}) == 50 * 16 + 64
+    assert episodes.of_validation(2)[0][0]["max_episode_steps"] == 256
+    other = _episodes.Episodes(_config.EnvironmentConfig(maps=("random", "mazes")), 4, 256)
+    assert other.of_iteration(7, 8) != first
+
+
+@pytest.mark.parametrize("kind", _config.MAP_KINDS)
+def test_every_map_fits_the_room(kind):
+    episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=(kind,), num_agents=4), 0, 64)
+    for number in range(5):
+        configs, seeds = episodes.of_iteration(number, 16)
+        env = VecEnv([GridConfig(**config) for config in configs], map_size=episodes.map_size)
+        env.reset(seed=seeds)
+        env.close()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_hyperparameter_has_a_source(method):
+    lines = (CONFIGS / f"{method}.yaml").read_text().splitlines()
+    values = [line for line in lines if re.match(r" +\w+: ", line)]
+    assert len(values) > 20
+    assert [line for line in values if not re.search(r"  # \S+", line)] == []
+    assert load_config(method).method == method
+
+
+WRONG = {
+    "learner: {discuont: 0.9}": "unknown key 'learner.discuont'; did you mean 'learner.discount'?",
+    "learnr: {}": "unknown key 'learnr'; did you mean 'learner'?",
+    "learner: {zzz: 1}": "unknown key 'learner.zzz'; expected one of",
+    "learner: 3": "learner is 3, expected a mapping",
+    "learner: {batch: 1.5}": "learner.batch is 1.5, expected a whole number",
+    "learner: {batch: true}": "learner.batch is True, expected a whole number",
+    "learner: {discount: high}": "learner.discount is 'high', expected a number",
+    "learner: {discount: 1.5}": "learner.discount is 1.5, expected more than 0, at most 1",
+    "learner: {replay: 3}": "learner.replay is 3, expected at least the 32 lanes",
+    "environment: {maps: [cave]}": "environment.maps is ('cave',), expected names of random",
+    "environment: {maps: random}": "environment.maps is 'random', expected a list of names",
+    "environment: {on_target: stop}": "environment.on_target is 'stop', expected one of nothing",
+    "rewards: {path: 1}": "rewards.path is 1.0, expected 0 without the channel 'follower_path'",
+    "network: {blocks: 2}": "network.blocks is 2, expected 0 without filters",
+    "schedule: {lanes: 0}": "schedule.lanes is 0, expected at least 1",
+    "encoder: {radius: 5, channels: [cost_tracer]}": "encoder.channels is ('cost_tracer',), expected names of",
+    "encoder: {radius: 0, channels: [goal]}": "encoder: radius is 0, expected 1 to 128",
+    "method: vdn": "method is 'vdn', expected 'qmix'",
+    "a: [": "while parsing",
+    "[]": "the file holds a list, expected a mapping",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_wrong_files_are_one_clear_line(text, tmp_path, capsys):
+    path = tmp_path / "own.yaml"
+    rest = "" if text.startswith(("[", "method")) else "method: qmix\n"
+    rest += "" if "encoder" in text or text.startswith("[") else "encoder: {radius: 5, channels: [goal]}\n"
+    path.write_text(rest + text + "\n")
+    assert __main__.main(["config", "qmix", "--config", str(path)]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith(f"config qmix: {path}: ") and WRONG[text] in message
+    assert message.count("\n") == 1
+
+
+def test_wrong_arguments_are_one_clear_line(tmp_path, capsys):
+    out = ["--out", str(tmp_path / "run")]
+    for arguments, expected in (
+        (["train", "qmx", *out], "method is 'qmx', expected one of iql"),
+        (["train", "qmix", *out, "--minutes", "0"], "--minutes is 0.0, expected more than 0"),
+        (["train", "qmix", *out, "--updates", "-1"], "--updates is -1, expected more than 0"),
+        (["train", "qmix", *out, "--seed", "-1"], "--seed is -1, expected 0 to"),
+        (["train", "qmix", *out, "--set", "discount=1"], "expected SECTION.KEY=VALUE"),
+        (["train", "qmix", *out, "--config", str(tmp_path / "none.yaml")], "none.yaml: No such file or directory"),
+    ):
+        assert __main__.main(arguments) == 1
+        message = capsys.readouterr().err
+        assert expected in message and message.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_missing_torch_is_one_line_that_names_the_extra(tmp_path):
+    blocked = (
+        "import sys; sys.modules['torch'] = None\n"
+        "from pogema_rs.baselines.__main__ import main\n"
+        "sys.exit(main())"
+    )
+    command = [sys.executable, "-c", blocked, "train", "qmix", "--out", str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "train qmix: training needs torch: pip install 'pogema-rs[train]'\n"
+    assert not (tmp_path / "run").exists()
+
+
+def test_import_needs_no_package_of_the_extra():
+    program = (
+        "import sys\n"
+        "for name in ('torch', 'torchrl', 'tensordict', 'yaml', 'matplotlib'): sys.modules[name] = None\n"
+        "import pogema_rs.baselines\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
