@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Union
 
 import jax
@@ -59,13 +60,14 @@ class InstancePool:
         if len(chosen) != num:
             raise ValueError(f"seeds has {len(chosen)} values, expected {num}, one per instance")
         config = config if isinstance(config, GridConfig) else GridConfig(**config)
-        made = [_Made(config, seed) for seed in chosen]
-        size = made[0].size
-        for seed, one in zip(chosen, made):
-            if one.size != size:
-                raise ValueError(f"the map of seed {seed} has size {one.size}, that of seed {chosen[0]} {size}")
-        self.params = Params.of(config, size, semantics=semantics, rewards=rewards)
-        self.arrays = _pack(self.params, made)
+        made = [_draw(config, seed) for seed in chosen]
+        sizes = [tuple(side - 2 * config.obs_radius for side in one.obstacles.shape) for one in made]
+        for seed, size in zip(chosen, sizes):
+            if size != sizes[0]:
+                raise ValueError(f"the map of seed {seed} has size {size}, that of seed {chosen[0]} {sizes[0]}")
+        rows, columns = sizes[0]
+        self.params = Params.of(config, (rows, columns), semantics=semantics, rewards=rewards)
+        self.arrays = pack(self.params, made)
 
     @property
     def num_bytes(self) -> int:
@@ -73,26 +75,30 @@ class InstancePool:
         return sum(array.nbytes for array in self.arrays)
 
 
-class _Made:
-    """One instance, as POGEMA draws it."""
+@dataclass(frozen=True)
+class Instance:
+    """One instance on the host: obstacles of the map with its border, and cells as indices in it."""
 
-    def __init__(self, config: GridConfig, seed: int) -> None:
-        changes = {"seed": seed, "observation_type": "default", "integration": None, "auto_reset": False}
-        env: Any = pogema_v0(GridConfig(**{**config.dict(), **changes}))
-        env.reset()
-        radius = config.obs_radius
-        self.obstacles = np.asarray(env.unwrapped.get_obstacles()) != 0
-        rows, columns = self.obstacles.shape
-        self.size = (rows - 2 * radius, columns - 2 * radius)
-        stride = columns
-        self.starts = _places(env.unwrapped.get_agents_xy(), stride)
-        if config.on_target == "restart":
-            later = [_places(goals, stride) for goals in env.unwrapped.get_lifelong_targets_xy()]
-            self.goals = [
-                _within(start, goals, stride, config.max_episode_steps) for start, goals in zip(self.starts, later)
-            ]
-        else:
-            self.goals = [goal[None] for goal in _places(env.unwrapped.get_targets_xy(), stride)]
+    obstacles: np.ndarray
+    starts: np.ndarray
+    goals: list[np.ndarray]
+
+
+def _draw(config: GridConfig, seed: int) -> Instance:
+    """Returns the instance that POGEMA draws from a seed."""
+    changes = {"seed": seed, "observation_type": "default", "integration": None, "auto_reset": False}
+    env: Any = pogema_v0(GridConfig(**{**config.dict(), **changes})).unwrapped
+    env.reset()
+    obstacles = np.asarray(env.get_obstacles()) != 0
+    stride = obstacles.shape[1]
+    starts = _places(env.get_agents_xy(), stride)
+    if config.on_target == "restart":
+        lists = [_places(goals, stride) for goals in env.get_lifelong_targets_xy()]
+        limit = config.max_episode_steps
+        goals = [_within(start, goals, stride, limit) for start, goals in zip(starts, lists)]
+    else:
+        goals = [goal[None] for goal in _places(env.get_targets_xy(), stride)]
+    return Instance(obstacles, starts, goals)
 
 
 def _places(cells: Any, stride: int) -> np.ndarray:
@@ -109,8 +115,8 @@ def _within(start: np.ndarray, goals: np.ndarray, stride: int, num_steps: int) -
     return goals[: num_reached + 1]
 
 
-def _pack(params: Params, made: Sequence[_Made]) -> Instances:
-    """Returns the instances as arrays, with the smallest type that holds all cells."""
+def pack(params: Params, made: Sequence[Instance]) -> Instances:
+    """Returns instances as arrays, with the smallest type that holds all cells."""
     place: Any = np.uint16 if params.num_cells <= 2**16 else np.int32
     lengths = np.array([[len(goals) for goals in one.goals] for one in made], dtype=np.int64)
     ends = lengths.reshape(-1).cumsum()
