@@ -18,5 +18,8 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     need_pogema = {path for path in {item.path for item in items} if "POGEMA_ORACLE_PYTHON" in path.read_text(encoding="utf-8")}
     for item in items:
+        # Each process of a Dask cluster takes seconds to start.
+        if "dask" in item.name:
+            item.add_marker("slow")
         if item.path in need_pogema:
             item.add_marker("oracle")

@@ -72,7 +72,7 @@ def kill_at_random(folder, dice, longest):
 
 @pytest.mark.parametrize(
     "backend",
-    [pytest.param(name, marks=[] if name in ("multiprocessing", "dask") else pytest.mark.slow) for name in BACKENDS],
+    [pytest.param(name, marks=[] if name == "multiprocessing" else pytest.mark.slow) for name in BACKENDS],
 )
 def test_killed_run_leaves_no_process_and_resumes_to_the_same_bytes(backend, tmp_path):
     content, whole = suite(backend, seconds=0.02), suite()
