@@ -1,78 +1,129 @@
-"""Tests that wrong arguments raise one clear error before anything is compiled."""
+"""Tests that wrong input gives an error that names the argument, before anything is compiled."""
 
 import subprocess
 import sys
 
+import jax
 import jax.numpy as jnp
+import numpy as np
+import pogema_rs.jax as pj
 import pytest
+from jax.experimental import checkify
+from pogema_rs import GridConfig
+from pogema_rs.packed import words_per_agent
 
-from pogema_rs.jax import InstancePool, Params, reset, step
-
-CONFIG = {"size": 6, "num_agents": 3, "density": 0.1}
-
-
-@pytest.mark.parametrize("num", [0, -1, True, 2.0, "2"])
-def test_wrong_sizes_of_a_pool(num):
-    with pytest.raises(ValueError, match="num is .*, expected a whole number from 1"):
-        InstancePool(CONFIG, num)
+CONFIG = GridConfig(size=6, num_agents=3, density=0.2, obs_radius=2, max_episode_steps=8, seed=1)
 
 
-def test_wrong_number_of_seeds():
-    with pytest.raises(ValueError, match="seeds has 2 values, expected 3, one per instance"):
-        InstancePool(CONFIG, 3, [1, 2])
+@pytest.fixture(scope="module")
+def pool():
+    return pj.InstancePool(CONFIG, 4)
 
 
 @pytest.mark.parametrize(
-    ("fields", "error"),
+    ("changes", "error", "text"),
     [
-        ({"collision_system": "hard"}, "collision_system is 'hard', expected one of priority, block_both, soft"),
-        ({"on_target": "stay"}, "on_target is 'stay', expected one of finish, nothing, restart"),
-        ({"height": 0}, "height is 0, expected at least 1"),
-        ({"height": 2**16, "width": 2**16}, "cells, expected at most 1073741824"),
-        ({"max_episode_steps": 2**31}, "max_episode_steps is 2147483648, expected at most 2147483647"),
+        ({"num_agents": 0}, ValueError, "num_agents is 0, expected at least 1"),
+        ({"height": 2.5}, TypeError, "height is 2.5, expected a whole number"),
+        ({"width": True}, TypeError, "width is True, expected a whole number"),
+        ({"radius": 129}, ValueError, "radius is 129, expected 1 to 128"),
+        ({"collision": "sofd"}, ValueError, "collision is 'sofd', expected one of .*; did you mean 'soft'"),
+        ({"on_goal": "stop"}, ValueError, "on_goal is 'stop', expected one of 'finish', 'nothing', 'restart'"),
+        ({"occupancy": "none"}, ValueError, "occupancy is 'none'"),
+        ({"reward": "all"}, ValueError, "reward is 'all'"),
+        ({"height": 50_000, "width": 50_000}, ValueError, "height x width is too large"),
+        ({"num_agents": 2**31}, ValueError, "num_agents is too large"),
     ],
 )
-def test_wrong_parameters(fields, error):
-    with pytest.raises(ValueError, match=error):
-        Params(**{"num_agents": 2, "height": 5, "width": 5, **fields})
-
-
-def test_wrong_rewards_and_semantics():
-    with pytest.raises(ValueError, match="rewards is 'mean', expected 'own' or 'shared'"):
-        InstancePool(CONFIG, 1, rewards="mean")
-    with pytest.raises(ValueError, match="'3.0' is not a valid Semantics"):
-        InstancePool(CONFIG, 1, semantics="3.0")
+def test_a_wrong_config_names_its_field(changes, error, text):
+    fields = {"num_agents": 2, "height": 4, "width": 4, **changes}
+    with pytest.raises(error, match=text):
+        pj.Config(**fields)
 
 
 @pytest.mark.parametrize(
-    ("actions", "kind", "error"),
+    ("arguments", "error", "text"),
     [
-        (jnp.zeros(2, jnp.int32), ValueError, r"actions has shape \(2,\), expected \(3,\)"),
-        (jnp.zeros((1, 3), jnp.int32), ValueError, r"actions has shape \(1, 3\), expected \(3,\)"),
-        (jnp.zeros(3), TypeError, "actions has type float32, expected integers"),
+        ({"num": 0}, ValueError, "num is 0, expected at least 1"),
+        ({"num": 2.0}, TypeError, "num is 2.0, expected a whole number"),
+        ({"seeds": -1}, ValueError, "seeds is -1, expected at least 0"),
+        ({"seeds": [1, 2]}, ValueError, "seeds holds 2 seeds, expected 3, one for each instance"),
+        ({"seeds": [1, 2, "3"]}, TypeError, r"seeds\[2\] is '3', expected a whole number"),
+        ({"seeds": [1, 2, 2**64]}, ValueError, r"seeds\[2\] is 18446744073709551616, expected at most"),
+        ({"num_steps": -1}, ValueError, "num_steps is -1, expected at least 0"),
+        ({"num_agents": 2}, ValueError, "num_agents is 3, expected at most 2, as in the config"),
+        ({"map_size": (5, 9)}, ValueError, "map_size is 6 x 6, expected at most 5 x 9, as in the config"),
+        ({"map_size": 9}, TypeError, "map_size is 9, expected a pair"),
+        ({"rewards": "all"}, ValueError, "reward is 'all', expected one of 'own', 'shared'"),
+        ({"semantics": "3"}, ValueError, "semantics is '3', expected '1.4.0' or '2.0'"),
     ],
 )
-def test_wrong_actions(actions, kind, error):
-    pool = InstancePool(CONFIG, 1)
-    with pytest.raises(kind, match=error):
-        step(pool.params, pool.arrays, reset(pool.params, pool.arrays, 0), actions)
+def test_a_wrong_argument_of_a_pool_is_named(arguments, error, text):
+    with pytest.raises(error, match=text):
+        pj.InstancePool(CONFIG, **{"num": 3, **arguments})
 
 
-def test_actions_outside_the_range_are_clipped():
-    pool = InstancePool(CONFIG, 1)
-    state = reset(pool.params, pool.arrays, 0)
-    for wrong, right in ((7, 4), (-3, 0)):
-        found, _ = step(pool.params, pool.arrays, state, jnp.full(3, wrong))
-        expected, _ = step(pool.params, pool.arrays, state, jnp.full(3, right))
-        assert (found.cells == expected.cells).all()
+def test_a_refill_that_fails_keeps_the_instances(pool):
+    before = pool.params
+    with pytest.raises(ValueError, match="seeds holds 1 seeds, expected 4"):
+        pool.refill([1])
+    assert pool.params is before
+
+
+def test_wrong_actions_are_errors_before_compilation(pool):
+    state = pj.reset(pool.params, 0)
+    step = jax.jit(pj.step)
+    for actions in (np.zeros(2, int), np.zeros((3, 1), int), 0):
+        with pytest.raises(ValueError, match=r"actions has shape \(.*\), expected \(3,\)"):
+            step(pool.params, state, actions)
+    with pytest.raises(TypeError, match="actions has type float32, expected an integer type"):
+        step(pool.params, state, np.zeros(3, np.float32))
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int16, np.int32, np.int64, np.uint32])
+def test_actions_of_any_integer_type_are_equal(pool, dtype):
+    state = pj.reset(pool.params, 0)
+    expected, _ = pj.step(pool.params, state, jnp.array([1, 2, 4]))
+    actual, _ = pj.step(pool.params, state, np.array([1, 2, 4], dtype))
+    jax.tree.map(np.testing.assert_array_equal, actual, expected)
+
+
+@pytest.mark.parametrize(("wrong", "nearest"), [(-1, 0), (5, 4), (2**31 - 1, 4), (-(2**31), 0)])
+def test_actions_out_of_range_are_clipped_and_counted(pool, wrong, nearest):
+    state = pj.reset(pool.params, 0)
+    actual, _ = pj.step(pool.params, state, jnp.array([wrong, 0, wrong]))
+    expected, _ = pj.step(pool.params, state, jnp.array([nearest, 0, nearest]))
+    assert int(actual.num_clipped) == 2 and int(expected.num_clipped) == 0
+    jax.tree.map(np.testing.assert_array_equal, actual._replace(num_clipped=0), expected._replace(num_clipped=0))
+
+
+def test_checked_steps_name_the_wrong_action(pool):
+    step = jax.jit(checkify.checkify(pj.checked_step))
+    state = pj.reset(pool.params, 0)
+    error, _ = step(pool.params, state, jnp.array([0, 7, -1]))
+    with pytest.raises(checkify.JaxRuntimeError, match="action of agent 1 is 7, expected 0"):
+        error.throw()
+    error, _ = step(pool.params, state, jnp.array([0, 1, 2]))
+    error.throw()
+
+
+def test_wrong_packed_observations_are_errors():
+    words = words_per_agent(2)
+    with pytest.raises(TypeError, match="packed has type int32, expected uint32"):
+        pj.unpack(jnp.zeros((2, words), jnp.int32), 2)
+    with pytest.raises(ValueError, match=rf"packed has shape \(2, 1\), expected \(\.\.\., {words}\) at radius 2"):
+        pj.unpack(jnp.zeros((2, 1), jnp.uint32), 2)
+    with pytest.raises(ValueError, match="expected .*5, 1.* at radius 2"):
+        pj.unpack_rows(jnp.zeros((4, 1), jnp.uint32), 2)
+
+
+def test_a_missing_jax_is_one_line_that_names_the_extra():
+    code = "import sys; sys.modules['jax'] = None; import pogema_rs.jax"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    last = run.stderr.strip().splitlines()[-1]
+    assert run.returncode == 1 and last.startswith("ImportError: pogema_rs.jax needs JAX") and "[jax]" in last
 
 
 def test_the_package_imports_no_jax():
-    code = "import sys, pogema_rs, pogema_rs.vec_env; assert 'jax' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_missing_jax_is_one_line():
-    code = "import sys; sys.modules['jax'] = None\ntry:\n    import pogema_rs.jax\nexcept ImportError as error:\n    print(error)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "pogema_rs.jax needs `pip install 'pogema-rs[jax]'`\n"
+    code = "import sys, pogema_rs; pogema_rs.VecEnv; sys.exit('jax' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -27,7 +27,7 @@ Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a comm
 `pogema_rs.toolbox.generators.random_generator` and `pogema_rs.toolbox.generators.warehouse_generator`.
 
 Trainers, with a command line (`python -m`): `pogema_rs.baselines`.
-The rules as functions for JAX: `pogema_rs.jax`.
+The rules as functions for JAX: `pogema_rs.jax`, and their port for the conformance kit: `pogema_rs.jax.port`.
 
 Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,
 `pogema_rs.integrations.pettingzoo`, `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`,

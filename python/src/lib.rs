@@ -7,6 +7,7 @@ mod errors;
 mod evaluation;
 mod fields;
 mod guard;
+mod instances;
 mod interrupt;
 mod lists;
 mod maps;
@@ -43,6 +44,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::cost_to_go, module)?)?;
+    module.add_function(wrap_pyfunction!(instances::make_instances, module)?)?;
     module.add_function(wrap_pyfunction!(maps::maze, module)?)?;
     module.add_function(wrap_pyfunction!(maps::movingai_map, module)?)?;
     module.add_function(wrap_pyfunction!(maps::random_map, module)?)?;

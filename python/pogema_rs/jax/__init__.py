@@ -1,35 +1,55 @@
-"""The rules of POGEMA 1.4.0 as pure functions for JAX: for `jit`, `vmap` and `scan`, on CPU, GPU and TPU.
+"""The rules of POGEMA as pure JAX functions, for training loops that are compiled as a whole.
 
-    from pogema_rs.jax import InstancePool, observe, reset, step
+All functions play one environment; `jax.vmap` plays many, with `(None, 0, 0)` as the axes of params, state and
+actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 
-    pool = InstancePool({"num_agents": 8, "size": 16}, 100, seed=0)
-    state = reset(pool.params, pool.arrays, 0)
-    state, outcome = step(pool.params, state, actions)
-    windows = observe(pool.params, state)
-
-Importing this module imports JAX; importing `pogema_rs` does not. Install it with `pip install 'pogema-rs[jax]'`.
-
-Errors: ImportError without JAX, with the command that installs it.
+| file | phase |
+| --- | --- |
+| `_config`, `_pool` | static sizes and rules; the instances, made in Rust |
+| `_state` | the state and its beginning |
+| `_step` | the order of the phases in a step; the next episode |
+| `_collide` | conflicting moves |
+| `_goals` | the effects of reaching a goal: rewards, ends and next goals |
+| `_observe`, `_unpack` | observations |
+| `_metrics` | the metrics of an episode |
 """
 
-from pogema_rs.toolbox._optional import required
+from __future__ import annotations
 
-required("jax", "pogema_rs.jax")
+try:
+    import jax as _jax  # noqa: F401
+except ImportError as _error:
+    raise ImportError('pogema_rs.jax needs JAX, which the extra `jax` installs: pip install "pogema-rs[jax]"') from _error
 
-from pogema_rs.jax._params import Params
-from pogema_rs.jax._pool import InstancePool, Instances
-from pogema_rs.jax._observe import observe
+from pogema_rs.jax._checked import checked_step
+from pogema_rs.jax._config import Config
+from pogema_rs.jax._cost_to_go import cost_to_go, cost_to_go_windows
+from pogema_rs.jax._metrics import exact_metrics, metrics
+from pogema_rs.jax._observe import GlobalState, global_state, observe, observe_rows
+from pogema_rs.jax._pool import InstancePool, Params, Pool
 from pogema_rs.jax._state import State, reset
-from pogema_rs.jax._step import Outcome, step, step_and_reset
+from pogema_rs.jax._step import StepOut, auto_reset, step
+from pogema_rs.jax._unpack import unpack, unpack_rows
 
 __all__ = [
+    "Config",
+    "GlobalState",
     "InstancePool",
-    "Instances",
-    "Outcome",
     "Params",
+    "Pool",
     "State",
+    "StepOut",
+    "auto_reset",
+    "checked_step",
+    "cost_to_go",
+    "cost_to_go_windows",
+    "exact_metrics",
+    "global_state",
+    "metrics",
     "observe",
+    "observe_rows",
     "reset",
     "step",
-    "step_and_reset",
+    "unpack",
+    "unpack_rows",
 ]

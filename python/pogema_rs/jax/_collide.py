@@ -2,105 +2,146 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from pogema_rs.jax._params import Params
+from pogema_rs.jax._config import Config
 from pogema_rs.jax._state import State
 
+__all__ = ["Moved", "move_agents"]
 
-def moved_cells(params: Params, state: State, actions: jax.Array) -> jax.Array:
-    """Returns the cells of all agents after their moves.
+# Row and column of stay, up, down, left, right.
+MOVES = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]], dtype=np.int32)
+
+
+class Moved(NamedTuple):
+    """The cells after the moves, which agents have their marks, and the cells that they aimed at.
+
+    Shape: `cells` `(agents, 2)`, int32; `marked`, `moves` and `is_blocked` (by an obstacle) `(agents,)`, bool
+    """
+
+    cells: jax.Array
+    marked: jax.Array
+    moves: jax.Array
+    is_blocked: jax.Array
+
+
+class Aims(NamedTuple):
+    """What each agent aims at. Cells are numbers on the grid; those of inactive agents are off it.
+
+    Shape: `(agents,)` each, but `board` `(cells,)`, the active agent on each cell, or the number of agents
+    """
+
+    here: jax.Array
+    there: jax.Array
+    occupant: jax.Array
+    is_blocked: jax.Array
+    board: jax.Array
+
+
+def move_agents(config: Config, state: State, actions: jax.Array) -> Moved:
+    """Moves the active agents by their actions, as far as the collision system allows.
+
+    Shape: `actions` `(agents,)`, 0 to 4
 
     Rule: move/actions, move/inactive
     """
-    offsets = jnp.array([0, -params.stride, params.stride, -1, 1], jnp.int32)
-    targets = jnp.where(state.active, state.cells + offsets[actions], state.cells)
-    moves = {"priority": _priority, "block_both": _block_both, "soft": _soft}[params.collision_system]
-    return jnp.where(moves(params, state, targets) & state.active, targets, state.cells)
+    aimed = state.cells + jnp.asarray(MOVES)[actions]
+    aims = _aims(config, state, aimed)
+    resolve = {"priority": _by_priority, "block_both": _blocking_both, "soft": _softly}[config.collision]
+    moves = resolve(config, state, aims)
+    cells = jnp.where(moves[:, None], aimed, state.cells)
+    is_lost = _lost_marks(config, aims, moves) if _loses_marks(config) else jnp.zeros_like(moves)
+    return Moved(cells, state.active & ~is_lost, moves, aims.is_blocked)
 
 
-def marks(params: Params, state: State, cells: jax.Array) -> jax.Array:
-    """Returns the occupancy grid after agents have moved to new cells.
+def _aims(config: Config, state: State, aimed: jax.Array) -> Aims:
+    rows, columns = config.grid
+    num_cells = rows * columns
 
-    The agents move one after another, lowest index first. Each erases its old mark and sets the new one, so a cell that
-    one agent leaves and another enters stays marked only if the index of the agent that enters it is not lower.
+    def number(cells: jax.Array) -> jax.Array:
+        shifted = cells + config.radius
+        return jnp.where(state.active, shifted[:, 0] * columns + shifted[:, 1], num_cells)
 
-    Rule: occupancy/as-released, occupancy/exact
+    here, there = number(state.cells), number(aimed)
+    agents = jnp.arange(config.num_agents, dtype=jnp.int32)
+    board = jnp.full(num_cells, config.num_agents, jnp.int32).at[here].set(agents, mode="drop")
+    row, column = aimed[:, 0] + config.radius, aimed[:, 1] + config.radius
+    bits = state.obstacles[row, column >> 5] >> (column & 31).astype(jnp.uint32)
+    return Aims(here, there, board.at[there].get(mode="clip"), (bits & 1) == 1, board)
+
+
+def _lowest(config: Config, aims: Aims, claims: jax.Array) -> jax.Array:
+    """Returns which of the claiming agents have the lowest index among those that claim the same cell."""
+    agents = jnp.arange(config.num_agents, dtype=jnp.int32)
+    num_cells = aims.board.shape[0]
+    claimed = jnp.where(claims, aims.there, num_cells)
+    first = jnp.full(num_cells, config.num_agents, jnp.int32).at[claimed].min(agents, mode="drop")
+    return claims & (first.at[aims.there].get(mode="clip") == agents)
+
+
+def _follow(config: Config, aims: Aims, wins: jax.Array) -> jax.Array:
+    """Returns which winners move: those whose queue ends with a winner, and those in rings.
+
+    A queue leads from each winner to the agent on the cell that it won. Its end points to itself, so that
+    ⌈log2 agents⌉ doublings of the pointers reach it from anywhere. All agents between a winner and the end are winners.
     """
-    nobody = jnp.full(params.num_cells, -1, jnp.int32)
-    agents = jnp.arange(params.num_agents, dtype=jnp.int32)
-    old, new = _where(state.active, state.cells), _where(state.active, cells)
-    leaving = nobody.at[old].set(agents, mode="drop")
-    entering = nobody.at[new].set(agents, mode="drop")
-    if params.exact_occupancy:
-        return (entering >= 0) | (state.occupied & (leaving < 0))
-    return jnp.where(entering >= 0, entering >= leaving, state.occupied & (leaving < 0))
+    agents = jnp.arange(config.num_agents, dtype=jnp.int32)
+    ahead = jnp.where(wins & (aims.occupant < config.num_agents), aims.occupant, agents)
+    num_hops = (config.num_agents - 1).bit_length()
+    ahead = jax.lax.fori_loop(0, num_hops, lambda _, pointer: pointer[pointer], ahead)
+    return wins & wins[ahead]
 
 
-def _where(flags: jax.Array, cells: jax.Array) -> jax.Array:
-    """Returns the cells of the agents whose flag is set, and for the others an index that scatters drop."""
-    return jnp.where(flags, cells, jnp.iinfo(jnp.int32).max)
-
-
-def _occupants(params: Params, state: State) -> jax.Array:
-    """Returns the active agent on each cell, or -1."""
-    agents = jnp.arange(params.num_agents, dtype=jnp.int32)
-    nobody = jnp.full(params.num_cells, -1, jnp.int32)
-    return nobody.at[_where(state.active, state.cells)].set(agents, mode="drop")
-
-
-def _lowest(params: Params, claims: jax.Array, targets: jax.Array) -> jax.Array:
-    """Returns for each agent whether it has the lowest index of all agents that claim its target."""
-    agents = jnp.arange(params.num_agents, dtype=jnp.int32)
-    winners = jnp.full(params.num_cells, params.num_agents, jnp.int32)
-    winners = winners.at[_where(claims, targets)].min(agents, mode="drop")
-    return claims & (winners[targets] == agents)
-
-
-def _along_queues(params: Params, wins: jax.Array, occupants: jax.Array) -> jax.Array:
-    """Returns which agents move if each winner moves exactly if the occupant of its target does.
-
-    `occupants` is the agent on each agent's target, or -1. Each agent points to that agent; the end of a queue points to
-    itself. Doubling the pointers reaches the end of a queue of n agents after log2(n) rounds. In a ring all agents win,
-    so all move.
-    """
-    agents = jnp.arange(params.num_agents, dtype=jnp.int32)
-    ahead = jnp.where(wins & (occupants >= 0), occupants, agents)
-    num_rounds = (params.num_agents - 1).bit_length()
-    ahead = jax.lax.fori_loop(0, num_rounds, lambda _, ahead: ahead[ahead], ahead)
-    return wins[ahead]
-
-
-def _priority(params: Params, state: State, targets: jax.Array) -> jax.Array:
-    """Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
-
-    Only an agent with a higher index than the occupant can find the occupant gone.
-
-    Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
-    """
-    agents = jnp.arange(params.num_agents, dtype=jnp.int32)
-    occupants = _occupants(params, state)[targets]
-    claims = state.active & ~state.obstacles[targets] & (occupants < agents)
-    return _along_queues(params, _lowest(params, claims, targets), occupants)
-
-
-def _block_both(params: Params, state: State, targets: jax.Array) -> jax.Array:
-    """Moves agents onto cells that were unoccupied before the step and that no other agent requests.
-
-    Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
-    """
-    counts = jnp.zeros(params.num_cells, jnp.int32).at[_where(state.active, targets)].add(1, mode="drop")
-    return ~state.obstacles[targets] & ~state.occupied[targets] & (counts[targets] == 1)
-
-
-def _soft(params: Params, state: State, targets: jax.Array) -> jax.Array:
+def _softly(config: Config, state: State, aims: Aims) -> jax.Array:
     """Moves all agents simultaneously, and reverts only impossible moves.
 
     Rule: collide/soft, collide/soft/stay, collide/soft/swap, collide/soft/contest, collide/soft/chain
     """
-    occupants = _occupants(params, state)[targets]
-    # A waiting agent swaps with itself.
-    swaps = (occupants >= 0) & (targets[occupants] == state.cells)
-    claims = state.active & ~state.obstacles[targets] & ~swaps
-    return _along_queues(params, _lowest(params, claims, targets), occupants)
+    # The occupant of a free cell is no agent, whose target no agent stands on. An agent that stays swaps with itself.
+    target_of_occupant = aims.there.at[aims.occupant].get(mode="fill", fill_value=-1)
+    alone = state.active & ~aims.is_blocked & (target_of_occupant != aims.here)
+    return _follow(config, aims, _lowest(config, aims, alone))
+
+
+def _by_priority(config: Config, state: State, aims: Aims) -> jax.Array:
+    """Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
+
+    The parallel form is exact. An agent with a lower index than the occupant comes before the occupant can leave, so it
+    stays. Of the others, the lowest claims the cell first: it enters exactly if the occupant has left, and otherwise
+    no other agent does.
+
+    Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
+    """
+    agents = jnp.arange(config.num_agents, dtype=jnp.int32)
+    is_free = aims.occupant == config.num_agents
+    claims = state.active & ~aims.is_blocked & (is_free | (aims.occupant < agents))
+    return _follow(config, aims, _lowest(config, aims, claims))
+
+
+def _blocking_both(config: Config, state: State, aims: Aims) -> jax.Array:
+    """Moves agents onto cells that were unoccupied before the step and that no other agent requests.
+
+    Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
+    """
+    contenders = jnp.zeros_like(aims.board).at[aims.there].add(1, mode="drop")
+    is_alone = contenders.at[aims.there].get(mode="clip") == 1
+    return state.active & ~aims.is_blocked & (aims.occupant == config.num_agents) & is_alone
+
+
+def _loses_marks(config: Config) -> bool:
+    return config.collision == "soft" and config.occupancy == "as_released"
+
+
+def _lost_marks(config: Config, aims: Aims, moves: jax.Array) -> jax.Array:
+    """Returns which agents entered a cell that an agent with a higher index left in the same step.
+
+    That agent clears the cell after the other one marked it.
+
+    Rule: occupancy/as-released
+    """
+    agents = jnp.arange(config.num_agents, dtype=jnp.int32)
+    return moves & (aims.occupant < config.num_agents) & (aims.occupant > agents)

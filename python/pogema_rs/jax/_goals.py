@@ -2,57 +2,86 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from pogema_rs.jax._params import Params
-from pogema_rs.jax._pool import Instances
-from pogema_rs.jax._state import State
+from pogema_rs.jax._config import Config
+from pogema_rs.jax._pool import Params
+from pogema_rs.jax._state import State, cell_of
+
+__all__ = ["advance_goals", "pay", "terminate", "truncate"]
 
 
-def rewards(params: Params, on_goal: jax.Array) -> jax.Array:
-    """Returns the reward of each agent. Shape: `(agents,)`, float32
+class Advanced(NamedTuple):
+    """Goals after a step. Shape: `goals` `(agents, 2)`, `goal_index` `(agents,)`, `num_wraps` a scalar; int32"""
+
+    goals: jax.Array
+    goal_index: jax.Array
+    num_wraps: jax.Array
+
+
+def all_on_goal(state: State) -> jax.Array:
+    """Returns whether all agents are on their goals. Rule: goal/nothing"""
+    return state.on_goal.sum() == state.num_agents
+
+
+def pay(config: Config, state: State) -> jax.Array:
+    """Returns the reward of each agent; that of padding is 0.
+
+    Shape: `(agents,)`, float32
 
     Rule: reward/own, reward/shared
     """
-    if params.shared_rewards:
-        # A table, because a compiler may multiply by the inverse in place of dividing.
-        shares = np.arange(params.num_agents + 1, dtype=np.float32) / np.float32(params.num_agents)
-        return jnp.broadcast_to(jnp.asarray(shares)[on_goal.sum()], on_goal.shape)
-    if params.on_target == "nothing":
-        return jnp.broadcast_to(on_goal.all(), on_goal.shape).astype(jnp.float32)
-    return on_goal.astype(jnp.float32)
+    present = jnp.arange(config.num_agents) < state.num_agents
+    if config.reward == "shared":
+        # XLA would replace the division by a constant with an inexact multiplication.
+        num_agents = jax.lax.optimization_barrier(state.num_agents.astype(jnp.float32))
+        share = state.on_goal.sum().astype(jnp.float32) / num_agents
+        return jnp.where(present, share, jnp.float32(0))
+    paid = all_on_goal(state) & present if config.on_goal == "nothing" else state.on_goal
+    return paid.astype(jnp.float32)
 
 
-def terminated(params: Params, state: State) -> jax.Array:
-    """Returns which agents are terminated. Shape: `(agents,)`, bool
+def terminate(config: Config, state: State) -> jax.Array:
+    """Returns which agents are terminated; padding is.
+
+    Shape: `(agents,)`, bool
 
     Rule: end/terminated
     """
-    if params.on_target == "finish":
-        return state.cells == state.goals
-    if params.on_target == "nothing":
-        return jnp.broadcast_to(state.on_goal.all(), state.on_goal.shape)
-    return jnp.zeros_like(state.on_goal)
+    if config.on_goal == "finish":
+        # A finished agent stays on its goal, so it stays terminated.
+        ended = (state.cells == state.goals).all(-1)
+    elif config.on_goal == "nothing":
+        ended = jnp.full(config.num_agents, all_on_goal(state))
+    else:
+        ended = jnp.zeros(config.num_agents, bool)
+    return ended | (jnp.arange(config.num_agents) >= state.num_agents)
 
 
-def change(params: Params, instances: Instances, state: State) -> State:
-    """Lets the agents on their goals leave the map or get their next goals.
+def truncate(params: Params, state: State) -> jax.Array:
+    """Returns which agents are truncated; padding is.
 
-    Rule: goal/finish/leave, goal/nothing, goal/restart/next
+    Shape: `(agents,)`, bool
+
+    Rule: end/truncated, end/after
     """
-    if params.on_target == "nothing":
-        return state
-    if params.on_target == "finish":
-        left = jnp.where(state.on_goal, state.cells, jnp.iinfo(jnp.int32).max)
-        occupied = state.occupied.at[left].set(False, mode="drop")
-        return state._replace(occupied=occupied, active=state.active & ~state.on_goal)
-    has_next = state.goal_index + 1 < state.goal_end
-    later = jnp.where(has_next, state.goal_index + 1, state.goal_begin)
-    index = jnp.where(state.on_goal, later, state.goal_index)
-    return state._replace(
-        goal_index=index,
-        goals=instances.goals[index].astype(jnp.int32),
-        num_wraps=state.num_wraps + (state.on_goal & ~has_next).sum(dtype=jnp.int32),
-    )
+    return (state.step >= params.max_steps) | (jnp.arange(params.config.num_agents) >= state.num_agents)
+
+
+def advance_goals(params: Params, state: State) -> Advanced:
+    """Returns the goals after agents on their goals got their next ones; the first follows the last of a list.
+
+    Rule: goal/restart, goal/restart/next, goal/restart/sequence
+    """
+    config, pool = params.config, params.pool
+    firsts, ends = pool.offsets[state.instance, :-1], pool.offsets[state.instance, 1:]
+    index = state.goal_index + state.on_goal
+    wraps = state.on_goal & (index >= ends - firsts)
+    index = jnp.where(wraps, 0, index)
+    # Where nothing changes, the goal is kept: a step taken back restores the goal, but not the index.
+    found = cell_of(config, pool.goals.at[firsts + index].get(mode="clip"))
+    goals = jnp.where(state.on_goal[:, None], found, state.goals)
+    return Advanced(goals, index, state.num_wraps + wraps.sum(dtype=jnp.int32))

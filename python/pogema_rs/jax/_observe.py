@@ -1,39 +1,108 @@
-"""The observations of agents."""
+"""The observations of agents, from rows of bits."""
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from pogema_rs.jax._params import Params
+from pogema_rs.jax._config import Config
+from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State
+from pogema_rs.jax._unpack import unpack_rows
+
+__all__ = ["GlobalState", "global_state", "marks", "observe", "observe_rows"]
 
 
-def observe(params: Params, state: State, dtype: jnp.dtype = jnp.float32) -> jax.Array:
-    """Returns the `default` observation of all agents: windows of obstacles, of agents, and of the goal.
+class GlobalState(NamedTuple):
+    """The state that a centralised critic sees, as `VecEnv.state()` returns it.
 
-    Shape: `(agents, 3, 2 * obs_radius + 1, 2 * obs_radius + 1)`, `dtype`, with values 0 and 1.
-
-    Rule: observe/default, observe/default/agents, observe/default/goal, observe/default/inactive,
-    observe/default/window
+    Shape: `obstacles` `(height, width)`, uint8; `positions` and `goals` `(agents, 2)`, int32; `active` `(agents,)`, bool
     """
-    radius, side = params.obs_radius, params.side
-    around = np.arange(-radius, radius + 1)
-    offsets = jnp.asarray((around[:, None] * params.stride + around[None, :]).reshape(-1), jnp.int32)
-    seen = state.cells[:, None] + offsets[None, :]
-    # One gather for both grids.
-    both = state.obstacles.astype(jnp.uint8) | (state.occupied.astype(jnp.uint8) << 1)
-    values = both[seen]
-    goals = _goal_places(params, state)[:, None] == jnp.arange(side * side, dtype=jnp.int32)[None, :]
-    channels = jnp.stack([values & 1, values >> 1, goals.astype(jnp.uint8)], axis=1)
-    return channels.astype(dtype).reshape(params.num_agents, 3, side, side)
+
+    obstacles: jax.Array
+    positions: jax.Array
+    goals: jax.Array
+    active: jax.Array
 
 
-def _goal_places(params: Params, state: State) -> jax.Array:
-    """Returns the place of each goal in the agent's window, clamped to its rim in each axis."""
-    radius = params.obs_radius
-    down = state.goals // params.stride - state.cells // params.stride
-    right = state.goals % params.stride - state.cells % params.stride
-    down, right = jnp.clip(down, -radius, radius) + radius, jnp.clip(right, -radius, radius) + radius
-    return down * params.side + right
+def observe(params: Params, state: State, dtype: Any = jnp.float32) -> jax.Array:
+    """Returns the `default` observation of all agents, finished ones included; that of padding is 0.
+
+    Shape: `(agents, 3, side, side)` of `dtype`, with every value 0 or 1: obstacles, agents, goal
+
+    Rule: observe/default, observe/default/agents, observe/default/inactive
+    """
+    return unpack_rows(observe_rows(params, state), params.config.radius, dtype)
+
+
+def observe_rows(params: Params, state: State) -> jax.Array:
+    """Returns the `default` observation as rows of bits; the first column is the lowest bit of the first word.
+
+    Shape: `(agents, 3, side, words)`, uint32, where words is `Config.window_words`
+
+    Rule: observe/default, observe/default/window, observe/default/agents, observe/default/goal
+    """
+    config = params.config
+    obstacles = _windows(config, state.obstacles, state.cells)
+    agents = _windows(config, marks(config, state), state.cells)
+    windows = jnp.stack([obstacles, agents, _goal_rows(config, state)], axis=1)
+    present = jnp.arange(config.num_agents) < state.num_agents
+    return jnp.where(present[:, None, None, None], windows, jnp.uint32(0))
+
+
+def marks(config: Config, state: State) -> jax.Array:
+    """Returns the occupancy grid as rows of bits, with the border.
+
+    Shape: `(rows, words)`, uint32
+
+    Rule: occupancy/as-released, occupancy/exact
+    """
+    row, column = state.cells[:, 0] + config.radius, state.cells[:, 1] + config.radius
+    bits = jnp.where(state.active & state.marked, jnp.uint32(1) << (column & 31).astype(jnp.uint32), jnp.uint32(0))
+    # Active agents are on different cells, so adding bits sets them.
+    return jnp.zeros((config.grid[0], config.words), jnp.uint32).at[row, column >> 5].add(bits)
+
+
+def global_state(params: Params, state: State) -> GlobalState:
+    """Returns the map without its border, padded with obstacles, and the cells, goals and flags of all agents."""
+    config = params.config
+    bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
+    grid = bits.reshape(config.grid[0], -1).astype(jnp.uint8)
+    inner = slice(config.radius, config.radius + config.height), slice(config.radius, config.radius + config.width)
+    return GlobalState(grid[inner], state.cells, state.goals, state.active)
+
+
+def _windows(config: Config, grid: jax.Array, cells: jax.Array) -> jax.Array:
+    """Returns the part of a grid around each agent as rows of bits. Shape: `(agents, side, words)`, uint32
+
+    Rule: observe/default/window
+    """
+    rows = cells[:, :1] + jnp.arange(config.side)
+    word, shift = cells[:, 1] >> 5, (cells[:, 1] & 31).astype(jnp.uint32)[:, None, None]
+    num_words = config.window_words
+    columns = word[:, None] + jnp.arange(num_words + 1)
+    # Every row of the grid has one word more than its cells need, so all words are inside.
+    found = grid.at[rows[:, :, None], columns[:, None, :]].get(mode="promise_in_bounds")
+    low, high = found[..., :-1] >> shift, (found[..., 1:] << 1) << (31 - shift)
+    return (low | high) & _last_mask(config)
+
+
+def _last_mask(config: Config) -> jax.Array:
+    """Returns the bits of the words of a window's row that are columns of the window."""
+    ends = [min(32, config.side - 32 * word) for word in range(config.window_words)]
+    return jnp.array([(1 << end) - 1 for end in ends], dtype=jnp.uint32)
+
+
+def _goal_rows(config: Config, state: State) -> jax.Array:
+    """Returns a single 1 for each goal, clamped to the rim of the window, as rows of bits.
+
+    Rule: observe/default/goal
+    """
+    radius = config.radius
+    down, right = (jnp.clip(state.goals - state.cells, -radius, radius) + radius).T
+    is_row = down[:, None, None] == jnp.arange(config.side)[:, None]
+    is_word = (right >> 5)[:, None, None] == jnp.arange(config.window_words)
+    bit = jnp.uint32(1) << (right & 31).astype(jnp.uint32)
+    return jnp.where(is_row & is_word, bit[:, None, None], jnp.uint32(0))

@@ -1,43 +1,68 @@
-"""Instances of a config, made by the generator of `pogema_rs` and packed into arrays for a device."""
+"""The instances of a pool: made in Rust, played on a device."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Union
+from typing import Any, NamedTuple, Optional, Union
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pogema_rs.integrations.make_pogema import pogema_v0
+from pogema_rs import _engine
+from pogema_rs._vec_configs import _engine_config
+from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.grid_config import GridConfig
-from pogema_rs.jax._params import Params
+from pogema_rs.jax._config import Config, check_whole
 from pogema_rs.semantics import Semantics
 
+__all__ = ["InstancePool", "Params", "Pool", "check_fits", "make_params", "make_pool"]
 
-class Instances(NamedTuple):
-    """Packed instances, as a pytree: the same arrays for all environments, indexed and never copied."""
+LARGEST_STEP = 2**31 - 1
+LARGEST_SEED = 2**63 - 1
 
-    #: Shape: `(instances, rows, bytes)`, uint8: obstacles of the maps with their borders, eight cells per byte.
-    maps: jax.Array
-    #: Shape: `(instances, agents)`: cells of the agents.
+
+class Pool(NamedTuple):
+    """The arrays of all instances. A cell is the number `row * config.width + col`, as uint16 if all fit, else int32.
+
+    Shape: `obstacles` `(num, rows, words)`, uint32, the maps with their borders; `starts` `(num, agents)`; `goals`
+    `(total,)`, the goals of all agents of all instances; `offsets` `(num, agents + 1)`, int32, where the goals of each
+    agent begin; `num_agents` `(num,)`, int32
+    """
+
+    obstacles: jax.Array
     starts: jax.Array
-    #: Shape: `(goals,)`: the goals of all agents of all instances, one agent after another.
     goals: jax.Array
-    #: Shape: `(instances,)`, int32: place of the first goal of each instance.
-    begin: jax.Array
-    #: Shape: `(instances, agents)`, int32: place after the last goal of each agent.
-    ends: jax.Array
+    offsets: jax.Array
+    num_agents: jax.Array
+
+
+class Params(NamedTuple):
+    """Everything that a step needs besides the state: the static config, the limit of steps, and the instances.
+
+    With `jax.vmap`, its axis is None: all environments share it, and nothing copies it.
+    """
+
+    config: Config
+    max_steps: jax.Array
+    pool: Pool
 
 
 class InstancePool:
-    """Instances of one config, bit for bit those of POGEMA, on a device.
+    """Instances of a config, bit for bit those of POGEMA for the same seeds.
 
-    `arrays` holds them as `Instances`, `params` what functions are compiled for. Instance i is POGEMA's episode of the
-    seed `seeds[i]`; a number stands for the seeds from it on. Under `restart`, the pool holds as many goals of an agent
-    as it can have within `max_episode_steps`, by the sum of the Manhattan distances between them. If steps continue
-    after the time limit, a list may end; it then begins again, and `State.num_wraps` counts it.
+    `config` is a GridConfig or a dict. `seeds` is one seed, S, or one for each instance; with one, the seed of instance
+    i is `int(SeedSequence(S, spawn_key=(i,)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
+    `SeedSequence`. `num_steps` is the number of steps for which lifelong agents have goals [default: the config's
+    `max_episode_steps`]. An agent that reaches the last of its goals continues with its first one, and
+    `State.num_wraps` counts it. This never happens within `num_steps` steps of an episode, except to sequences of the
+    config, which repeat by the rules (Rule: goal/restart/sequence).
+
+    `num_agents` and `map_size`, rows and columns, make room for larger instances [default: those of the config].
+    `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
+
+    Errors: TypeError or ValueError for wrong arguments, before anything is made; `InstanceError` if a seed has no
+    instance.
     """
 
     def __init__(
@@ -46,88 +71,141 @@ class InstancePool:
         num: int,
         seeds: Union[int, Sequence[int]] = 0,
         *,
-        semantics: Union[str, Semantics] = Semantics.RELEASED,
+        num_steps: Optional[int] = None,
+        num_agents: Optional[int] = None,
+        map_size: Optional[tuple[int, int]] = None,
         rewards: str = "own",
+        semantics: Union[str, Semantics] = Semantics.RELEASED,
     ) -> None:
-        """Makes the instances.
+        self.num = check_whole("num", num, 1)
+        check_pair("map_size", map_size)
+        known = [each.value for each in Semantics]
+        if semantics not in known:
+            raise ValueError(f"semantics is {semantics!r}, expected {' or '.join(map(repr, known))}")
+        if not isinstance(config, GridConfig):
+            config = GridConfig(**config)
+        self._fields, self._registered = _engine_config(config, "own")
+        limit = config.max_episode_steps if num_steps is None else num_steps
+        self.num_steps = check_whole("num_steps", limit, 0)
+        occupancy = "exact" if Semantics(semantics).occupancy_is_exact else "as_released"
+        probe = self._arrays(self._seeds(seeds)[:1])
+        rows, columns = (int(size) for size in probe["sizes"])
+        agents = len(probe["num_goals"])
+        height, width = (rows, columns) if map_size is None else map_size
+        self.config = Config(
+            num_agents=agents if num_agents is None else num_agents,
+            height=height,
+            width=width,
+            radius=config.obs_radius,
+            collision=config.collision_system,
+            on_goal=config.on_target,
+            occupancy=occupancy,
+            reward=rewards,
+        )
+        check_fits(self.config, agents, (rows, columns))
+        self._max_steps = config.max_episode_steps
+        self._capacity = 0
+        self.params = self._make(seeds)
 
-        Errors: ValueError for a pool without instances, for a wrong number of seeds, and for maps of different sizes;
-        those of `GridConfig`; `InstanceError` if a seed has no instance.
+    def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
+        """Replaces all instances, and returns the new `params`.
+
+        The arrays keep their shapes, so nothing is compiled again, unless the goals need more room than the first
+        ones and an eighth. Current episodes continue with the old `params`; with the new ones, lifelong agents continue with goals
+        of the new instances. After an error the old instances stay.
         """
-        if isinstance(num, bool) or not isinstance(num, int) or num < 1:
-            raise ValueError(f"num is {num!r}, expected a whole number from 1")
-        chosen = range(seeds, seeds + num) if isinstance(seeds, int) else list(seeds)
-        if len(chosen) != num:
-            raise ValueError(f"seeds has {len(chosen)} values, expected {num}, one per instance")
-        config = config if isinstance(config, GridConfig) else GridConfig(**config)
-        made = [_draw(config, seed) for seed in chosen]
-        sizes = [tuple(side - 2 * config.obs_radius for side in one.obstacles.shape) for one in made]
-        for seed, size in zip(chosen, sizes):
-            if size != sizes[0]:
-                raise ValueError(f"the map of seed {seed} has size {size}, that of seed {chosen[0]} {sizes[0]}")
-        rows, columns = sizes[0]
-        self.params = Params.of(config, (rows, columns), semantics=semantics, rewards=rewards)
-        self.arrays = pack(self.params, made)
+        self.params = self._make(seeds)
+        return self.params
 
     @property
     def num_bytes(self) -> int:
-        """Number of bytes of the arrays."""
-        return sum(array.nbytes for array in self.arrays)
+        """The size of all arrays on the device. Units: bytes."""
+        return sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(self.params))
+
+    def _make(self, seeds: Union[int, Sequence[int]]) -> Params:
+        arrays = self._arrays(self._seeds(seeds))
+        rows, columns = (int(size) for size in arrays["sizes"][:2])
+        maps = arrays["maps"].reshape(self.num, rows, columns)
+        border = 2 * self.config.radius
+        noise = arrays["noise"].reshape(-1, rows + border, columns + border)
+        grids = pack_grids(self.config, maps, noise if len(noise) else None)
+        agents = len(arrays["num_goals"]) // self.num
+        starts = arrays["starts"].reshape(self.num, agents, 2)
+        num_goals = arrays["num_goals"].reshape(self.num, agents)
+        goals = arrays["goals"].reshape(-1, 2)
+        if len(goals) > self._capacity:
+            self._capacity = -(-9 * len(goals) // 8192) * 1024
+        pool = make_pool(self.config, grids, starts, goals, num_goals, self._capacity)
+        return make_params(self.config, self._max_steps, pool)
+
+    def _arrays(self, seeds: list[int]) -> dict[str, Array]:
+        return _engine.make_instances(self._fields, self._registered, seeds, self.num_steps)
+
+    def _seeds(self, seeds: Union[int, Sequence[int]]) -> list[int]:
+        if isinstance(seeds, (int, np.integer)):
+            first = check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
+            sequences = (np.random.SeedSequence(first, spawn_key=(index,)) for index in range(self.num))
+            return [int(each.generate_state(1, np.uint64)[0]) % (2**63 - 1) for each in sequences]
+        listed = [check_whole(f"seeds[{index}]", seed, 0) for index, seed in enumerate(seeds)]
+        for index, seed in enumerate(listed):
+            if seed > LARGEST_SEED:
+                raise ValueError(f"seeds[{index}] is {seed}, expected at most {LARGEST_SEED}")
+        if len(listed) != self.num:
+            raise ValueError(f"seeds holds {len(listed)} seeds, expected {self.num}, one for each instance")
+        return listed
 
 
-@dataclass(frozen=True)
-class Instance:
-    """One instance on the host: obstacles of the map with its border, and cells as indices in it."""
-
-    obstacles: np.ndarray
-    starts: np.ndarray
-    goals: list[np.ndarray]
+def check_pair(name: str, value: Any) -> None:
+    """Checks that an argument is a pair of numbers of rows and columns, or None."""
+    if value is not None and (not isinstance(value, (list, tuple)) or len(value) != 2):
+        raise TypeError(f"{name} is {value!r}, expected a pair (rows, columns)")
 
 
-def _draw(config: GridConfig, seed: int) -> Instance:
-    """Returns the instance that POGEMA draws from a seed."""
-    changes = {"seed": seed, "observation_type": "default", "integration": None, "auto_reset": False}
-    env: Any = pogema_v0(GridConfig(**{**config.dict(), **changes})).unwrapped
-    env.reset()
-    obstacles = np.asarray(env.get_obstacles()) != 0
-    stride = obstacles.shape[1]
-    starts = _places(env.get_agents_xy(), stride)
-    if config.on_target == "restart":
-        lists = [_places(goals, stride) for goals in env.get_lifelong_targets_xy()]
-        limit = config.max_episode_steps
-        goals = [_within(start, goals, stride, limit) for start, goals in zip(starts, lists)]
-    else:
-        goals = [goal[None] for goal in _places(env.get_targets_xy(), stride)]
-    return Instance(obstacles, starts, goals)
+def check_fits(config: Config, num_agents: int, size: tuple[int, int]) -> None:
+    """Checks that an instance fits the arrays of a config."""
+    if num_agents > config.num_agents:
+        raise ValueError(f"num_agents is {num_agents}, expected at most {config.num_agents}, as in the config")
+    if size[0] > config.height or size[1] > config.width:
+        room = f"{config.height} x {config.width}"
+        raise ValueError(f"map_size is {size[0]} x {size[1]}, expected at most {room}, as in the config")
 
 
-def _places(cells: Any, stride: int) -> np.ndarray:
-    pairs = np.asarray(cells, dtype=np.int64).reshape(-1, 2)
-    return pairs[:, 0] * stride + pairs[:, 1]
+def make_pool(
+    config: Config, grids: Array, starts: Array, goals: Array, num_goals: Array, capacity: int = 0
+) -> Pool:
+    """Returns instances as arrays on the default device.
 
+    Shape: `grids` as `pack_grids` returns them; `starts` `(num, agents, 2)`; `goals` `(total, 2)`; `num_goals`
+    `(num, agents)`. `capacity` is the least length of the array of goals.
+    """
+    num, agents = num_goals.shape
+    if num == 0:
+        raise ValueError("the pool is empty, expected at least 1 instance")
+    total = max(len(goals), capacity)
+    if total > LARGEST_STEP:
+        raise ValueError(f"num_steps is too large: the instances have {total} goals, expected at most {LARGEST_STEP}")
+    dtype = np.uint16 if config.height * config.width <= 2**16 else np.int32
 
-def _within(start: np.ndarray, goals: np.ndarray, stride: int, num_steps: int) -> np.ndarray:
-    """Returns the goals that an agent can have within a number of steps, one more than it can reach."""
-    cells = np.concatenate([[start], goals])
-    steps = np.abs(np.diff(cells // stride)) + np.abs(np.diff(cells % stride))
-    # An agent spends at least one step on each goal.
-    num_reached = int((np.maximum(steps, 1).cumsum() <= num_steps).sum())
-    return goals[: num_reached + 1]
+    def numbered(cells: Array, room: tuple[int, ...]) -> Array:
+        numbers = np.zeros(room, dtype=dtype)
+        filled = tuple(slice(size) for size in cells.shape[:-1])
+        numbers[filled] = cells[..., 0].astype(np.int64) * config.width + cells[..., 1]
+        return numbers
 
-
-def pack(params: Params, made: Sequence[Instance]) -> Instances:
-    """Returns instances as arrays, with the smallest type that holds all cells."""
-    place: Any = np.uint16 if params.num_cells <= 2**16 else np.int32
-    lengths = np.array([[len(goals) for goals in one.goals] for one in made], dtype=np.int64)
-    ends = lengths.reshape(-1).cumsum()
-    if ends[-1] > 2**31 - 1:
-        raise ValueError(f"the pool has {ends[-1]} goals, expected at most {2**31 - 1}")
-    ends = ends.reshape(lengths.shape)
-    arrays = (
-        np.stack([np.packbits(one.obstacles, axis=-1) for one in made]),
-        np.stack([one.starts for one in made]).astype(place),
-        np.concatenate([goals for one in made for goals in one.goals]).astype(place),
-        (ends[:, 0] - lengths[:, 0]).astype(np.int32),
-        ends.astype(np.int32),
+    ends = np.cumsum(num_goals.ravel(), dtype=np.int64).reshape(num, agents)
+    offsets = np.empty((num, config.num_agents + 1), dtype=np.int32)
+    offsets[:, 0] = np.concatenate([[0], ends[:-1, -1]])
+    offsets[:, 1 : agents + 1] = ends
+    offsets[:, agents + 1 :] = ends[:, -1:]
+    return Pool(
+        obstacles=jnp.asarray(grids),
+        starts=jnp.asarray(numbered(starts, (num, config.num_agents))),
+        goals=jnp.asarray(numbered(goals, (total,))),
+        offsets=jnp.asarray(offsets),
+        num_agents=jnp.full(num, agents, dtype=jnp.int32),
     )
-    return Instances(*(jnp.asarray(array) for array in arrays))
+
+
+def make_params(config: Config, max_steps: int, pool: Pool) -> Params:
+    """Returns the parameters of a step. The largest limit of steps is 2**31 - 1; larger ones have the same effect."""
+    return Params(config, jnp.int32(max(min(max_steps, LARGEST_STEP), -1)), pool)

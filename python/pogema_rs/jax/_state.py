@@ -7,61 +7,76 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pogema_rs.jax._params import Params
-from pogema_rs.jax._pool import Instances
+from pogema_rs.jax._config import Config
+from pogema_rs.jax._metrics import EpisodeCounts, new_counts
+from pogema_rs.jax._pool import Params
+
+__all__ = ["State", "reset"]
 
 
 class State(NamedTuple):
-    """The state of one environment, as a pytree. `jax.vmap` adds an axis for environments.
+    """The state of one environment, without its instances.
 
-    A cell is its index in the map with its border, row by row. `goal_index` is the place of an agent's goal in
-    `Instances.goals`; `goal_begin` is the place of its first goal, and `goal_end` the place after its last.
+    Cells are (row, col), counted from the corner of the map. The rows after the agents of an instance are padding,
+    which is never active.
+
+    Shape: `obstacles` `(rows, words)`, uint32, the map with its border as rows of bits; `cells`, `goals` and `starts`
+    `(agents, 2)`, int32; `active`, `marked` (whether the cell has the agent's mark) and `on_goal` `(agents,)`, bool;
+    `goal_index` `(agents,)`, int32, the index of the goal in the agent's list; all others are scalars, int32
+
+    `num_wraps` counts lists of goals that began again, and `num_clipped` actions out of range, both since the reset.
     """
 
-    #: Shape: `(cells,)`, bool: obstacles of the map and its border.
     obstacles: jax.Array
-    #: Shape: `(cells,)`, bool: the cells where observations show an agent.
-    occupied: jax.Array
-    #: Shape: `(agents,)`, int32.
     cells: jax.Array
-    #: Shape: `(agents,)`, int32.
     goals: jax.Array
-    #: Shape: `(agents,)`, bool: False for agents that have finished.
+    starts: jax.Array
     active: jax.Array
-    #: Shape: `(agents,)`, bool: the agents that are on their goals and active.
+    marked: jax.Array
     on_goal: jax.Array
-    #: Shape: `(agents,)`, int32.
     goal_index: jax.Array
-    #: Shape: `(agents,)`, int32.
-    goal_begin: jax.Array
-    #: Shape: `(agents,)`, int32.
-    goal_end: jax.Array
-    #: Shape: `()`, int32: number of steps of the episode.
-    num_steps: jax.Array
-    #: Shape: `()`, int32: how often an agent has reached its last goal, after which its list begins again.
+    instance: jax.Array
+    num_agents: jax.Array
+    step: jax.Array
     num_wraps: jax.Array
+    num_clipped: jax.Array
+    counts: EpisodeCounts
 
 
-def reset(params: Params, instances: Instances, index: jax.Array | int) -> State:
-    """Returns the first state of an episode of the instance at an index.
+def reset(params: Params, instance: jax.Array) -> State:
+    """Begins an episode of the instance with an index, which is clamped to the pool.
+
+    Shape: a scalar, int32; with `jax.vmap`, one for each environment
 
     Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
     """
-    rows = jnp.unpackbits(instances.maps[index], axis=-1, count=params.stride)
-    cells = instances.starts[index].astype(jnp.int32)
-    ends = instances.ends[index]
-    first = jnp.concatenate([instances.begin[index][None], ends[:-1]])
-    goals = instances.goals[first].astype(jnp.int32)
+    config, pool = params.config, params.pool
+    instance = jnp.clip(jnp.asarray(instance, jnp.int32), 0, pool.starts.shape[0] - 1)
+    num_agents = pool.num_agents[instance]
+    present = jnp.arange(config.num_agents) < num_agents
+    cells = cell_of(config, pool.starts[instance])
+    # An agent of the padding has no goals; its offset may be the end of the list.
+    firsts = jnp.where(present, pool.offsets[instance, :-1], 0)
+    goals = jnp.where(present[:, None], cell_of(config, pool.goals[firsts]), 0)
     return State(
-        obstacles=rows.reshape(-1).astype(jnp.bool_),
-        occupied=jnp.zeros(params.num_cells, jnp.bool_).at[cells].set(True),
+        obstacles=pool.obstacles[instance],
         cells=cells,
         goals=goals,
-        active=jnp.ones(params.num_agents, jnp.bool_),
-        on_goal=cells == goals,
-        goal_index=first,
-        goal_begin=first,
-        goal_end=ends,
-        num_steps=jnp.int32(0),
+        starts=cells,
+        active=present,
+        marked=present,
+        on_goal=present & (cells == goals).all(-1),
+        goal_index=jnp.zeros(config.num_agents, jnp.int32),
+        instance=instance,
+        num_agents=num_agents,
+        step=jnp.int32(0),
         num_wraps=jnp.int32(0),
+        num_clipped=jnp.int32(0),
+        counts=new_counts(config),
     )
+
+
+def cell_of(config: Config, numbers: jax.Array) -> jax.Array:
+    """Returns the cells with some numbers of a pool. Shape: `(...)` becomes `(..., 2)`, int32"""
+    numbers = numbers.astype(jnp.int32)
+    return jnp.stack([numbers // config.width, numbers % config.width], axis=-1)

@@ -1,4 +1,4 @@
-"""The phases of a step in their order, and the automatic start of the next episode."""
+"""The order of the phases in a step, and the next episode of an ended one."""
 
 from __future__ import annotations
 
@@ -7,76 +7,92 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pogema_rs.jax import _collide, _goals
-from pogema_rs.jax._params import Params
-from pogema_rs.jax._pool import Instances
+from pogema_rs.jax._collide import move_agents
+from pogema_rs.jax._goals import advance_goals, pay, terminate, truncate
+from pogema_rs.jax._metrics import feed
+from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State, reset
 
+__all__ = ["StepOut", "auto_reset", "step"]
 
-class Outcome(NamedTuple):
-    """The results of a step, one value per agent."""
+NUM_ACTIONS = 5
 
-    #: Shape: `(agents,)`, float32.
+
+class StepOut(NamedTuple):
+    """The results of a step. Padding has rewards of 0 and is terminated and truncated.
+
+    Shape: `rewards` `(agents,)`, float32; `terminated` and `truncated` `(agents,)`, bool; `ended`, whether the episode
+    has ended, a scalar, bool
+    """
+
     rewards: jax.Array
-    #: Shape: `(agents,)`, bool.
     terminated: jax.Array
-    #: Shape: `(agents,)`, bool.
     truncated: jax.Array
-
-    @property
-    def is_over(self) -> jax.Array:
-        """Whether the episode is over. Shape: `()`, bool."""
-        return (self.terminated | self.truncated).all(axis=-1)
+    ended: jax.Array
 
 
-def step(params: Params, instances: Instances, state: State, actions: jax.Array) -> tuple[State, Outcome]:
-    """Advances an environment by one step.
+def step(params: Params, state: State, actions: jax.Array) -> tuple[State, StepOut]:
+    """Plays one step of one environment. Steps after the end of an episode follow the same rules.
 
-    `actions` is `(agents,)`, integers from 0 to 4: stay, up, down, left, right. Compiled code cannot raise an error, so
-    values outside are clipped to this range.
+    An action outside 0 to 4 is clipped, and `State.num_clipped` counts it; `checked_step` raises instead.
 
-    Errors: ValueError or TypeError for actions of another shape or another type.
+    Shape: `actions` `(agents,)`, integers from 0 to 4
 
-    Rule: move/actions, end/truncated, end/after
+    Errors: TypeError or ValueError for another shape or type, before anything is compiled.
 
-    Source: POGEMA 1.4.0, `envs.py`, `Pogema.step`, `PogemaLifeLong.step`, `PogemaCoopFinish.step`
+    Rule: move/actions, move/inactive, end/after
     """
-    _check(params, actions)
-    actions = jnp.clip(actions, 0, 4)
-    cells = _collide.moved_cells(params, state, actions)
+    config = params.config
+    actions = check_actions(params, actions)
+    present = jnp.arange(config.num_agents) < state.num_agents
+    clipped = jnp.clip(actions, 0, NUM_ACTIONS - 1).astype(jnp.int32)
+    num_clipped = state.num_clipped + (present & (actions != clipped)).sum(dtype=jnp.int32)
+    moved = move_agents(config, state, clipped)
+    reverted = state.active & (clipped != 0) & ~moved.moves
+    on_goal = state.active & (moved.cells == state.goals).all(-1)
     state = state._replace(
-        cells=cells,
-        occupied=_collide.marks(params, state, cells),
-        on_goal=state.active & (cells == state.goals),
-        num_steps=state.num_steps + 1,
+        step=state.step + 1, cells=moved.cells, marked=moved.marked, on_goal=on_goal, num_clipped=num_clipped
     )
-    outcome = Outcome(
-        rewards=_goals.rewards(params, state.on_goal),
-        terminated=_goals.terminated(params, state),
-        truncated=jnp.broadcast_to(state.num_steps >= params.max_episode_steps, (params.num_agents,)),
-    )
-    return _goals.change(params, instances, state), outcome
+    rewards, terminated, truncated = pay(config, state), terminate(config, state), truncate(params, state)
+    ended = terminated.all() | truncated.all()
+    by = jnp.stack([reverted & ~moved.is_blocked, reverted & moved.is_blocked]).sum(-1, dtype=jnp.int32)
+    state = state._replace(counts=feed(config, state.counts, on_goal, ended, by))
+    return change_goals(params, state), StepOut(rewards, terminated, truncated, ended)
 
 
-def step_and_reset(
-    params: Params, instances: Instances, state: State, actions: jax.Array, key: jax.Array
-) -> tuple[State, Outcome]:
-    """Advances an environment by one step; if the episode ends, the returned state begins another one.
+def change_goals(params: Params, state: State) -> State:
+    """Lets the agents on their goals leave the map or get their next goals.
 
-    `key` draws the instance of the next episode from all instances, with replacement. It also works under `vmap`.
-
-    Errors: those of `step`.
+    Rule: goal/finish/leave, goal/nothing, goal/restart/next
     """
-    state, outcome = step(params, instances, state, actions)
-    index = jax.random.randint(key, (), 0, instances.maps.shape[0])
-    first = reset(params, instances, index)
-    state = jax.tree.map(lambda new, old: jnp.where(outcome.is_over, new, old), first, state)
-    return state, outcome
+    if params.config.on_goal == "finish":
+        return state._replace(active=state.active & ~state.on_goal, marked=state.marked & ~state.on_goal)
+    if params.config.on_goal == "restart":
+        goals, goal_index, num_wraps = advance_goals(params, state)
+        return state._replace(goals=goals, goal_index=goal_index, num_wraps=num_wraps)
+    return state
 
 
-def _check(params: Params, actions: jax.Array) -> None:
-    """Checks what is known before compilation."""
+def auto_reset(
+    params: Params, key: jax.Array, state: State, actions: jax.Array
+) -> tuple[State, StepOut, State]:
+    """Plays one step, and begins an episode of an instance that the key draws if the step ended one.
+
+    Returns the state to continue with, the results of the step, and the state before the reset, for its observation
+    and metrics.
+    """
+    last, out = step(params, state, actions)
+    drawn = jax.random.randint(key, (), 0, params.pool.starts.shape[0], dtype=jnp.int32)
+    first = reset(params, drawn)
+    return jax.tree.map(lambda new, old: jnp.where(out.ended, new, old), first, last), out, last
+
+
+def check_actions(params: Params, actions: jax.Array) -> jax.Array:
+    """Returns actions as an array of integers of the right shape."""
+    actions = jnp.asarray(actions)
+    expected = (params.config.num_agents,)
+    if actions.shape != expected:
+        raise ValueError(f"actions has shape {actions.shape}, expected {expected}; use jax.vmap for a batch")
     if not jnp.issubdtype(actions.dtype, jnp.integer):
-        raise TypeError(f"actions has type {actions.dtype}, expected integers")
-    if actions.shape != (params.num_agents,):
-        raise ValueError(f"actions has shape {actions.shape}, expected ({params.num_agents},)")
+        raise TypeError(f"actions has type {actions.dtype}, expected an integer type")
+    return actions

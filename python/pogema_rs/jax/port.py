@@ -1,148 +1,311 @@
-"""Serves `pogema_rs.jax` to the conformance kit: `pogema conform --port "python -m pogema_rs.jax.port"`.
+"""Serves `pogema_rs.jax` to the conformance kit: `python -m pogema_rs.jax.port`.
 
-Reads one question per line from standard input and writes one answer per line, as docs/PORTING.md describes.
+The port pads instances to a few sizes, so that few functions are compiled, and keeps them in a folder of compiled
+functions: `--cache FOLDER` [default: none].
 """
 
 from __future__ import annotations
 
+import argparse
+import functools
 import json
 import sys
-from functools import partial
 from typing import Any, Optional
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from pogema_rs.jax._observe import observe
-from pogema_rs.jax._params import Params
-from pogema_rs.jax._pool import Instance, Instances, pack
+from pogema_rs import __version__, _engine
+from pogema_rs.jax._pack import pack_grids
+from pogema_rs.jax._config import Config
+from pogema_rs.jax._metrics import exact_metrics
+from pogema_rs.jax._observe import marks, observe_rows
+from pogema_rs.jax._pool import Params, make_params, make_pool
 from pogema_rs.jax._state import State, reset
-from pogema_rs.jax._step import Outcome, step
+from pogema_rs.jax._step import step
 
-CLAIMS = {
+Record = dict[str, Any]
+
+CLAIMS: Record = {
     "protocol": "pogema-conform/1",
     "name": "pogema_rs.jax",
-    "version": "1",
-    "profiles": ["core", "observations"],
+    "version": __version__,
+    "profiles": ["core", "observations", "metrics", "history", "policies"],
     "collision": ["priority", "block_both", "soft"],
     "on_goal": ["finish", "nothing", "restart"],
-    "observation": ["default"],
+    "observation": ["default", "POMAPF", "MAPF"],
     "occupancy": ["as_released", "exact"],
     "reward": ["own", "shared"],
     "noise": True,
-    "tells": ["on_goal", "occupied"],
+    "metrics": [
+        "ISR", "CSR", "ep_length", "SoC", "makespan", "avg_throughput", "avg_agents_density", "a_collisions",
+        "o_collisions",
+    ],
+    "tells": ["on_goal", "occupied", "padded", "actions_after"],
+    "max_radius": 128,
 }
 
-#: Sides of maps are rounded up to multiples of this number, so that fewer functions are compiled. The wall around the
-#: map stays where it is; the cells beyond it are never entered.
-_ROUNDING = 8
 
-_reset = partial(jax.jit, static_argnums=0)(reset)
-_step = partial(jax.jit, static_argnums=0)(step)
-_observe = partial(jax.jit, static_argnums=(0, 2))(observe)
+class Refusal(Exception):
+    """A question that the port answers with an error."""
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _begin(config: Config, params: Params) -> tuple[State, Any]:
+    state = reset(params, np.int32(0))
+    return state, _seen(params, state)
+
+
+@jax.jit
+def _play(params: Params, state: State, actions: jax.Array) -> tuple[State, Any, Any]:
+    after, out = step(params, state, actions)
+    return after, _seen(params, after), out
+
+
+@jax.jit
+def _seen(params: Params, state: State) -> Any:
+    return observe_rows(params, state), marks(params.config, state)
+
+
+class Episode:
+    """One instance, and the states of its episode."""
+
+    def __init__(self, instance: Record, measured: list[str]) -> None:
+        rules = instance["config"]
+        self.rules, self.measured = rules, measured
+        self.num_agents, self.radius = rules["num_agents"], rules["radius"]
+        cells = np.array([[cell == "#" for cell in row] for row in instance["map"]], dtype=np.uint8)
+        self.size = cells.shape
+        self.params = _params(instance, cells)
+        self.states: list[Any] = []
+        self.means: list[float] = []
+        self.agents: Optional[list[Any]] = None
+        state, self.seen = _begin(self.params.config, self.params)
+        self._keep(state)
+        self._measure()
+
+    @property
+    def state(self) -> Any:
+        """The current state, on the host."""
+        return self.states[-1]
+
+    def _keep(self, state: Any) -> None:
+        # One transfer for all arrays, which the answers then read several times.
+        state, self.seen = jax.device_get((state, self.seen))
+        self.states.append(state)
+
+    def step(self, actions: Any) -> Record:
+        """Plays a step, and returns the whole answer."""
+        is_list = isinstance(actions, list) and len(actions) == self.num_agents
+        if not is_list or any(type(action) is not int or not 0 <= action <= 4 for action in actions):
+            raise Refusal(f"expected {self.num_agents} actions from 0 to 4")
+        padded = np.zeros(self.params.config.num_agents, dtype=np.int32)
+        padded[: self.num_agents] = actions
+        before = self.state
+        state, self.seen, out = _play(self.params, before, padded)
+        out = jax.device_get(out)
+        if self.rules["persistent"]:
+            self._keep(state)
+        else:
+            self.states.clear()
+            self._keep(state)
+        self._measure()
+        num = self.num_agents
+        stays = before.active & (before.cells == self.state.cells).all(-1)
+        is_soft = self.rules["collision"] == "soft"
+        return {
+            "rewards": out.rewards[:num].tolist(),
+            "terminated": out.terminated[:num].tolist(),
+            "truncated": out.truncated[:num].tolist(),
+            "actions": actions,
+            "actions_after": [0 if is_soft and stays[agent] else action for agent, action in enumerate(actions)],
+            "metrics": self._metrics(bool(out.ended)),
+            **self.answer(),
+        }
+
+    def act(self, policy: str) -> Record:
+        """Plays a step of POGEMA's A* agents."""
+        if policy != "astar":
+            raise Refusal(f"policy `{policy}` needs the seed of a config, and this port plays instances")
+        if self.agents is None:
+            self.agents = [_engine.AStarAgent(0) for _ in range(self.num_agents)]
+        windows = self._windows()[:, 0].astype(np.float32)
+        state, actions = self.state, []
+        for index, agent in enumerate(self.agents):
+            start = state.starts[index]
+            here, goal = state.cells[index] - start, state.goals[index] - start
+            action, _ = agent.act(tuple(here.tolist()), tuple(goal.tolist()), windows[index])
+            actions.append(int(action))
+        return self.step(actions)
+
+    def back(self) -> Record:
+        """Takes the last step back. Rule: history/step-back"""
+        if not self.rules["persistent"]:
+            raise Refusal("steps are only kept with persistent: true")
+        moved = len(self.states) > 1
+        if moved:
+            last = self.states.pop()
+            kept = {name: getattr(last, name) for name in ("goal_index", "on_goal", "counts", "num_wraps")}
+            self.states[-1] = self.state._replace(**kept)
+            self.seen = jax.device_get(_seen(self.params, self.state))
+        return {"moved": moved, **self.answer()}
+
+    def history(self) -> Record:
+        """Returns the changes of each agent, and its state at each step. Rule: history/changes"""
+        changes: list[list[Any]] = []
+        full: list[list[Any]] = []
+        for agent in range(self.num_agents):
+            changes.append([])
+            full.append([])
+            for number, state in enumerate(self.states):
+                cells = [*state.cells[agent].tolist(), *state.goals[agent].tolist()]
+                entry = [*cells, number, bool(state.active[agent])]
+                if not changes[-1] or [*changes[-1][-1][:4], changes[-1][-1][5]] != [*cells, entry[5]]:
+                    changes[-1].append(entry)
+                full[-1].append(changes[-1][-1])
+        return {"full": full, "changes": changes}
+
+    def answer(self, at_reset: bool = False) -> Record:
+        """Returns the state and the observations."""
+        num, state = self.num_agents, self.state
+        grid = np.unpackbits(self.seen[1].view(np.uint8), axis=-1, bitorder="little")
+        record = {
+            "cells": state.cells[:num].tolist(),
+            "goals": state.goals[:num].tolist(),
+            "active": state.active[:num].tolist(),
+            "on_goal": state.on_goal[:num].tolist(),
+            "occupied": (np.argwhere(grid) - self.radius).tolist(),
+            "observations": self._observations(at_reset),
+        }
+        if at_reset:
+            record["padded"] = self._padded()
+        return record
+
+    def _windows(self) -> np.ndarray:
+        rows = np.ascontiguousarray(self.seen[0][: self.num_agents])
+        bits = np.unpackbits(rows.view(np.uint8), axis=-1, bitorder="little")
+        return bits[..., : 2 * self.radius + 1]
+
+    def _observations(self, at_reset: bool) -> Any:
+        windows, state, num = self._windows(), self.state, self.num_agents
+        kind = self.rules["observation"]
+        if kind == "default":
+            return [np.packbits(window).tobytes().hex() for window in windows]
+        seen = {
+            "obstacles": [np.packbits(window).tobytes().hex() for window in windows[:, 0]],
+            "agents": [np.packbits(window).tobytes().hex() for window in windows[:, 1]],
+            "xy": (state.cells - state.starts)[:num].tolist(),
+            "target_xy": (state.goals - state.starts)[:num].tolist(),
+        }
+        if kind == "MAPF":
+            seen["global_xy"] = (state.cells + self.radius)[:num].tolist()
+            seen["global_target_xy"] = (state.goals + self.radius)[:num].tolist()
+            if at_reset:
+                seen["global_obstacles"] = self._padded()
+        return seen
+
+    def _padded(self) -> list[str]:
+        grid = np.unpackbits(np.ascontiguousarray(self.state.obstacles).view(np.uint8), axis=-1, bitorder="little")
+        rows, columns = (side + 2 * self.radius for side in self.size)
+        return ["".join(".#"[cell] for cell in row) for row in grid[:rows, :columns]]
+
+    def _measure(self) -> None:
+        """Adds the density of one frame. Rule: metrics/density"""
+        if "avg_agents_density" in self.measured:
+            windows = self._windows().reshape(self.num_agents, 3, -1).astype(np.int64)
+            free = (1 - windows[:, 0]).sum(-1)
+            shares = np.where(free == 0, 0.0, windows[:, 1].sum(-1) / np.maximum(free, 1))
+            self.means.append(float(np.mean(shares)))
+
+    def _metrics(self, ended: bool) -> Optional[Record]:
+        if not ended:
+            return None
+        found: Record = {}
+        if not self.rules["persistent"]:
+            config, counts = self.params.config, self.state.counts
+            found.update(exact_metrics(config, counts, self.num_agents, self.rules["max_steps"]) or {})
+        if "avg_agents_density" in self.measured:
+            found["avg_agents_density"] = float(np.mean(np.array(self.means)))
+        for place, name in enumerate(("a_collisions", "o_collisions")):
+            if name in self.measured:
+                found[name] = int(self.state.counts.collisions[place])
+        return found or None
+
+
+def _params(instance: Record, cells: np.ndarray) -> Params:
+    rules = instance["config"]
+    height, width = cells.shape
+    config = Config(
+        num_agents=_room(rules["num_agents"], 4),
+        height=_room(height, 8),
+        width=_room(width, 8),
+        radius=rules["radius"],
+        collision=rules["collision"],
+        on_goal=rules["on_goal"],
+        occupancy=rules["occupancy"],
+        reward=rules["reward"],
+    )
+    outside = instance.get("outside", "free")
+    noise = None
+    if outside != "free":
+        noise = np.array([[[cell == "#" for cell in row] for row in outside["noise"]]], dtype=np.uint8)
+    grids = pack_grids(config, cells[None], noise)
+    goals = np.array([goal for goals in instance["goals"] for goal in goals]).reshape(-1, 2)
+    counts = np.array([[len(goals) for goals in instance["goals"]]])
+    pool = make_pool(config, grids, np.array([instance["starts"]]), goals, counts, _room(len(goals), 64))
+    return make_params(config, rules["max_steps"], pool)
+
+
+def _room(size: int, least: int) -> int:
+    """Returns the least power of two that a size fits into."""
+    return max(least, 1 << (size - 1).bit_length())
 
 
 class Port:
     """Answers questions. A refusal is also an answer."""
 
-    def __init__(self) -> None:
-        self._params: Optional[Params] = None
-        self._instances: Optional[Instances] = None
-        self._state: Optional[State] = None
+    episode: Optional[Episode] = None
 
-    def answer(self, question: dict[str, Any]) -> dict[str, Any]:
+    def answer(self, question: Record) -> Record:
         """Answers one question."""
-        if question["type"] == "hello":
-            return dict(CLAIMS)
+        kind = question.get("type")
+        if kind == "hello":
+            return CLAIMS
         try:
-            if question["type"] == "reset" and "instance" in question:
-                self._params, self._instances = _read(question["instance"])
-                self._state = _reset(self._params, self._instances, 0)
-                return self._describe(self._state, None)
-            if question["type"] == "step" and self._params and self._state and self._instances:
-                actions = _actions(question["actions"], self._params.num_agents)
-                before = self._state
-                self._state, outcome = _step(self._params, self._instances, before, actions)
-                return self._describe(self._state, outcome)
-            raise ValueError(f"the question {question['type']!r} is not claimed, or came before an instance")
-        except (KeyError, TypeError, ValueError) as error:
+            if kind == "reset" and "config" not in question:
+                return self._reset(question)
+            if self.episode is None:
+                raise Refusal("this question arrived before an instance")
+            if kind in ("step", "act"):
+                return self.episode.step(question["actions"]) if kind == "step" else self.episode.act(question["policy"])
+            if kind in ("back", "history"):
+                return self.episode.back() if kind == "back" else self.episode.history()
+            raise Refusal(f"the question {kind!r} is not claimed")
+        except (KeyError, Refusal, TypeError, ValueError) as error:
             return {"error": f"{type(error).__name__}: {error}"}
 
-    def _describe(self, state: State, outcome: Optional[Outcome]) -> dict[str, Any]:
-        assert self._params is not None
-        params = self._params
-        windows = np.asarray(_observe(params, state, jnp.uint8)).reshape(params.num_agents, -1)
-        values = {
-            "cells": _pairs(params, state.cells),
-            "goals": _pairs(params, state.goals),
-            "active": np.asarray(state.active).tolist(),
-            "on_goal": np.asarray(state.on_goal).tolist(),
-            "occupied": _pairs(params, np.flatnonzero(np.asarray(state.occupied))),
-            "observations": [np.packbits(window).tobytes().hex() for window in windows],
-        }
-        if outcome is not None:
-            values.update({name: np.asarray(found).tolist() for name, found in outcome._asdict().items()})
-        return values
-
-
-def _actions(values: Any, num_agents: int) -> jax.Array:
-    if len(values) != num_agents or any(value not in range(5) for value in values):
-        raise ValueError(f"expected {num_agents} actions from 0 to 4")
-    return jnp.asarray(values, jnp.int32)
-
-
-def _pairs(params: Params, cells: Any) -> list[list[int]]:
-    """Returns cells as pairs of row and column on the map without its border."""
-    cells = np.asarray(cells)
-    rows, columns = cells // params.stride - params.obs_radius, cells % params.stride - params.obs_radius
-    return np.stack([rows, columns], axis=-1).tolist()  # type: ignore[no-any-return, unused-ignore]
-
-
-def _read(instance: dict[str, Any]) -> tuple[Params, Instances]:
-    """Returns an instance of the protocol, packed."""
-    config, rows = instance["config"], instance["map"]
-    radius, height, width = config["radius"], len(rows), len(rows[0])
-    params = Params(
-        num_agents=config["num_agents"],
-        height=-(-height // _ROUNDING) * _ROUNDING,
-        width=-(-width // _ROUNDING) * _ROUNDING,
-        obs_radius=radius,
-        collision_system=config["collision"],
-        on_target=config["on_goal"],
-        max_episode_steps=min(config["max_steps"], 2**31 - 1),
-        exact_occupancy=config["occupancy"] == "exact",
-        shared_rewards=config["reward"] == "shared",
-    )
-    obstacles = np.zeros((params.height + 2 * radius, params.stride), dtype=bool)
-    if instance["outside"] != "free":
-        obstacles[: height + 2 * radius, : width + 2 * radius] = _grid(instance["outside"]["noise"])
-    obstacles[radius - 1 : radius + height + 1, radius - 1 : radius + width + 1] = True
-    obstacles[radius : radius + height, radius : radius + width] = _grid(rows)
-    goals = [_places(params, cells) for cells in instance["goals"]]
-    if params.on_target != "restart":
-        goals = [cells[:1] for cells in goals]
-    packed = pack(params, [Instance(obstacles, _places(params, instance["starts"]), goals)])
-    # Lists of goals of similar length share a compiled function.
-    room = 1 << (len(packed.goals) - 1).bit_length()
-    return params, packed._replace(goals=jnp.pad(packed.goals, (0, room - len(packed.goals))))
-
-
-def _grid(rows: list[str]) -> np.ndarray:
-    return np.array([[cell == "#" for cell in row] for row in rows])
-
-
-def _places(params: Params, cells: Any) -> np.ndarray:
-    pairs = np.asarray(cells, dtype=np.int64) + params.obs_radius
-    return np.asarray(pairs[:, 0] * params.stride + pairs[:, 1])
+    def _reset(self, question: Record) -> Record:
+        if "instance" in question:
+            self.instance, self.measured = question["instance"], question.get("measure", [])
+        elif self.episode is None:
+            raise Refusal("this reset needs an instance")
+        self.episode = Episode(self.instance, question.get("measure", self.measured))
+        return self.episode.answer(at_reset=True)
 
 
 def main() -> None:
-    """Answers questions until `bye` or the end of the input."""
+    """Reads one question per line and writes one answer per line, until `bye`."""
+    parser = argparse.ArgumentParser(prog="python -m pogema_rs.jax.port", description=__doc__)
+    parser.add_argument("--cache", metavar="FOLDER", help="folder for compiled functions")
+    options = parser.parse_args()
+    if options.cache is not None:
+        jax.config.update("jax_compilation_cache_dir", options.cache)
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     port = Port()
     for line in sys.stdin:
         question = json.loads(line)
-        if question["type"] == "bye":
+        if question.get("type") == "bye":
             break
         print(json.dumps(port.answer(question), separators=(",", ":")), flush=True)
 

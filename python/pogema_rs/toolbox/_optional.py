@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-_ON_PYPI = {"jax": "'pogema-rs[jax]'", "yaml": "PyYAML"}
+_ON_PYPI = {"yaml": "PyYAML"}
 
 
 def required(module: str, purpose: str) -> Any:

@@ -1,0 +1,122 @@
+"""Tests the instances of pools against those of `VecEnv`, and what their functions need."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pogema_rs
+import pogema_rs.jax as pj
+import pytest
+from pogema_rs import GridConfig, VecEnv
+from pogema_rs.packed import words_per_agent
+
+
+def lifelong(**changes):
+    fields = {"size": 8, "num_agents": 4, "density": 0.2, "obs_radius": 2, "max_episode_steps": 64, **changes}
+    return GridConfig(on_target="restart", collision_system="soft", **fields)
+
+
+def test_one_seed_gives_the_first_episodes_of_children_of_that_seed():
+    config = lifelong()
+    pool = pj.InstancePool(config, 9, 5)
+    child = np.random.SeedSequence(5, spawn_key=(7,)).generate_state(1, np.uint64)[0]
+    alone = pj.InstancePool(config, 1, [int(child) % (2**63 - 1)])
+    every, one = pj.reset(pool.params, 7), pj.reset(alone.params, 0)
+    jax.tree.map(np.testing.assert_array_equal, every._replace(instance=0), one._replace(instance=0))
+
+
+def test_10_000_instances_take_less_than_60_megabytes():
+    config = lifelong(size=32, num_agents=64, obs_radius=5, max_episode_steps=256)
+    pool = pj.InstancePool(config, 10_000)
+    assert pool.num_bytes < 60e6
+    env = VecEnv(config, 1)
+    env.reset(seed=[int(pool._seeds(0)[9_999])])
+    seen, expected = pj.global_state(pool.params, pj.reset(pool.params, 9_999)), env.state()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(getattr(seen, name), values[0], err_msg=name)
+
+
+def test_a_refill_changes_the_instances_and_compiles_nothing():
+    pool = pj.InstancePool(lifelong(), 16, 1)
+    compiled = 0
+
+    @jax.jit
+    def begin(params):
+        nonlocal compiled
+        compiled += 1
+        return jax.vmap(pj.reset, (None, 0))(params, jnp.arange(16))
+
+    before = begin(pool.params)
+    after = begin(pool.refill(2))
+    assert compiled == 1
+    assert (np.asarray(before.cells) != np.asarray(after.cells)).any()
+    fresh = pj.InstancePool(lifelong(), 16, 2)
+    jax.tree.map(np.testing.assert_array_equal, after, begin(fresh.params))
+
+
+def test_goals_that_run_out_begin_again_and_are_counted():
+    config = GridConfig(map="...", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 2]]], on_target="restart", obs_radius=1)
+    params = pj.InstancePool(config, 1).params
+    state, goals = pj.reset(params, 0), []
+    for action in (4, 4, 3, 4):
+        state, _ = pj.step(params, state, jnp.array([action]))
+        goals.append(state.goals[0].tolist())
+    assert goals == [[0, 2], [0, 1], [0, 2], [0, 1]] and int(state.num_wraps) == 2
+
+
+def test_goals_suffice_for_the_steps_that_they_were_made_for():
+    # Agents on a map of two cells reach a goal in almost every step.
+    config = GridConfig(map="..", num_agents=1, on_target="restart", obs_radius=1, max_episode_steps=50)
+    params = pj.InstancePool(config, 3, 4).params
+    state = pj.reset(params, 1)
+    step = jax.jit(pj.step)
+    for _ in range(50):
+        down = state.goals[0, 1] - state.cells[0, 1]
+        state, _ = step(params, state, jnp.where(down > 0, 4, jnp.where(down < 0, 3, 0))[None])
+    assert int(state.num_wraps) == 0 and int(state.goal_index[0]) == 50
+
+
+def test_episodes_follow_each_other_inside_a_compiled_scan():
+    pool = pj.InstancePool(lifelong(max_episode_steps=7), 32)
+
+    def body(carry, key):
+        state, seen = carry
+        draw, act = jax.random.split(key)
+        actions = jax.random.randint(act, (6, 4), 0, 5)
+        keys = jax.random.split(draw, 6)
+        state, out, _ = jax.vmap(pj.auto_reset, (None, 0, 0, 0))(pool.params, keys, state, actions)
+        seen = jax.vmap(pj.observe, (None, 0))(pool.params, state)
+        return (state, seen), (out.ended, state.step, state.instance)
+
+    state = jax.vmap(pj.reset, (None, 0))(pool.params, jnp.arange(6))
+    seen = jax.vmap(pj.observe, (None, 0))(pool.params, state)
+    keys = jax.random.split(jax.random.key(0), 30)
+    (state, _), (ended, steps, instances) = jax.jit(lambda carry: jax.lax.scan(body, carry, keys))((state, seen))
+    assert np.asarray(ended).sum() == 6 * (30 // 7)
+    np.testing.assert_array_equal(np.asarray(steps) == 0, ended)
+    assert len(set(np.asarray(instances).ravel().tolist())) > 10
+
+
+@pytest.mark.parametrize("radius", [1, 2, 5, 15, 16, 33])
+def test_bits_of_a_vec_env_are_unpacked(radius):
+    size = (2, 3, words_per_agent(radius))
+    words = np.random.default_rng(radius).integers(2**32, size=size, dtype=np.uint32)
+    for dtype in (np.float32, np.uint8, bool):
+        actual = jax.jit(lambda words, dtype=dtype: pj.unpack(words, radius, dtype))(words)
+        np.testing.assert_array_equal(actual, pogema_rs.unpack(words, radius, dtype))
+
+
+@pytest.mark.parametrize("size", [5, 9])
+def test_costs_to_go_are_those_of_the_encoders(size):
+    config = GridConfig(size=size, num_agents=4, density=0.35, obs_radius=3, max_episode_steps=30)
+    env = VecEnv(config, 8, encoder={"radius": 3, "channels": ["cost_to_go"]}, autoreset_mode="Disabled")
+    expected, _ = env.reset(seed=[*range(8)])
+    params = pj.InstancePool(config, 8, [*range(8)]).params
+    state = jax.vmap(pj.reset, (None, 0))(params, jnp.arange(8))
+    costs = jax.vmap(pj.cost_to_go, (None, 0))(params, state)
+    look = jax.jit(jax.vmap(pj.cost_to_go_windows, (None, 0, 0)))
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        np.testing.assert_array_equal(look(params, state, costs), expected[:, :, 0])
+        actions = rng.integers(5, size=(8, 4))
+        expected, *_ = env.step(actions)
+        state, _ = jax.vmap(pj.step, (None, 0, 0))(params, state, actions)

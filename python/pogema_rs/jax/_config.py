@@ -1,0 +1,92 @@
+"""The static sizes and rules of environments on a device."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import jax
+
+from pogema_rs import _engine
+
+__all__ = ["Config"]
+
+LARGEST_RADIUS = 128
+# Cells are int32 pairs, and the grid is addressed by one int32.
+LARGEST_GRID = 2**31 - 1
+COLLISIONS = ("priority", "block_both", "soft")
+ON_GOAL = ("finish", "nothing", "restart")
+OCCUPANCIES = ("as_released", "exact")
+REWARDS = ("own", "shared")
+
+
+@jax.tree_util.register_static
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """The sizes and rules that a compiled function is specialised for.
+
+    `num_agents`, `height` and `width` are the largest that an instance may have; smaller instances are padded. The
+    limit of steps is data, not part of this class, so that a new limit compiles nothing.
+
+    Errors: TypeError or ValueError that names the first wrong field.
+    """
+
+    num_agents: int
+    height: int
+    width: int
+    radius: int = 5
+    collision: str = "priority"
+    on_goal: str = "finish"
+    occupancy: str = "as_released"
+    reward: str = "own"
+
+    def __post_init__(self) -> None:
+        for name in ("num_agents", "height", "width", "radius"):
+            check_whole(name, getattr(self, name), 1)
+        if self.radius > LARGEST_RADIUS:
+            raise ValueError(f"radius is {self.radius}, expected 1 to {LARGEST_RADIUS}")
+        rows, columns = self.grid
+        if rows * columns > LARGEST_GRID or self.num_agents > LARGEST_GRID // 4:
+            large = "num_agents" if rows * columns <= LARGEST_GRID else "height x width"
+            raise ValueError(f"{large} is too large: a grid has at most {LARGEST_GRID} cells, with its border")
+        check_word("collision", self.collision, COLLISIONS)
+        check_word("on_goal", self.on_goal, ON_GOAL)
+        check_word("occupancy", self.occupancy, OCCUPANCIES)
+        check_word("reward", self.reward, REWARDS)
+
+    @property
+    def side(self) -> int:
+        """The side of a window. Units: cells."""
+        return 2 * self.radius + 1
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """The numbers of rows and columns of the largest map with its border. Rule: border/ring"""
+        return self.height + 2 * self.radius, self.width + 2 * self.radius
+
+    @property
+    def words(self) -> int:
+        """The number of 32-bit words of a row of the grid, with one word after the last for windows."""
+        return -(-self.grid[1] // 32) + 1
+
+    @property
+    def window_words(self) -> int:
+        """The number of 32-bit words of a row of a window."""
+        return -(-self.side // 32)
+
+
+def check_whole(name: str, value: Any, least: int) -> int:
+    """Returns an argument that is a whole number of at least `least`."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise TypeError(f"{name} is {value!r}, expected a whole number")
+    if int(value) < least:
+        raise ValueError(f"{name} is {value}, expected at least {least}")
+    return int(value)
+
+
+def check_word(name: str, value: Any, known: tuple[str, ...]) -> None:
+    """Checks that an argument is one of the known words."""
+    if value not in known:
+        nearest = _engine.nearest_name(str(value), list(known))
+        hint = f"; did you mean {nearest!r}?" if nearest else ""
+        raise ValueError(f"{name} is {value!r}, expected one of {', '.join(map(repr, known))}{hint}")

@@ -1,0 +1,62 @@
+"""The numbers of steps to the goals, without other agents, and the windows on them."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from pogema_rs.jax._pool import Params
+from pogema_rs.jax._state import State
+
+__all__ = ["cost_to_go", "cost_to_go_windows"]
+
+# A number larger than any cost.
+FAR = 2**31 - 1
+
+
+def cost_to_go(params: Params, state: State) -> jax.Array:
+    """Returns the number of steps to each agent's goal from every cell of the map with its border, -1 without a path.
+
+    Compute it when goals change, and keep it: it takes as many rounds as the longest path has steps. As in the encoders,
+    the goal itself has cost 0 even if it is an obstacle.
+
+    Shape: `(agents, rows, columns)`, int32, with `Config.grid` rows and columns
+    """
+    config = params.config
+    rows, columns = config.grid
+    bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
+    is_free = bits.reshape(rows, -1)[:, :columns] == 0
+    goal = state.goals + config.radius
+    start = (jnp.arange(rows)[:, None] == goal[:, :1, None]) & (jnp.arange(columns) == goal[:, 1:, None])
+
+    def spread(carry: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
+        costs, front, step = carry
+        around = jnp.pad(front, ((0, 0), (1, 1), (1, 1)))
+        near = around[:, :-2, 1:-1] | around[:, 2:, 1:-1] | around[:, 1:-1, :-2] | around[:, 1:-1, 2:]
+        front = near & is_free & (costs < 0)
+        return jnp.where(front, step, costs), front, step + 1
+
+    costs = jnp.where(start, 0, -1).astype(jnp.int32)
+    return jax.lax.while_loop(lambda carry: carry[1].any(), spread, (costs, start, jnp.int32(1)))[0]
+
+
+def cost_to_go_windows(params: Params, state: State, costs: jax.Array) -> jax.Array:
+    """Returns the channel `cost_to_go` of the encoders: how much nearer to the goal each cell of a window is.
+
+    The value is (own cost - cost) / (2 * radius), limited to -1 to 1; obstacles and cells without a path have -1.
+    All values of an inactive agent are 0.
+
+    Shape: `costs` as `cost_to_go` returns them; the result is `(agents, side, side)`, float32
+    """
+    config = params.config
+    agents = jnp.arange(config.num_agents)
+    offsets = jnp.arange(config.side)
+    rows, columns = state.cells[:, :1] + offsets, state.cells[:, 1:] + offsets
+    found = costs[agents[:, None, None], rows[:, :, None], columns[:, None, :]]
+    own = found[:, config.radius, config.radius][:, None, None]
+    # Numbers of steps are whole, so the largest that counts can be cut before the division.
+    nearer = jnp.clip(own - found, -2 * config.radius, 2 * config.radius).astype(jnp.float32)
+    # XLA would replace the division by a constant with an inexact multiplication.
+    scale = jax.lax.optimization_barrier(jnp.float32(2 * config.radius))
+    values = jnp.where((found < 0) | (own < 0), jnp.float32(-1), nearer / scale)
+    return jnp.where(state.active[:, None, None], values, jnp.float32(0))

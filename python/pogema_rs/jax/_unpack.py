@@ -1,0 +1,52 @@
+"""Packed observations as windows, unpacked on the device."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from pogema_rs.packed import words_per_agent
+
+__all__ = ["unpack", "unpack_rows"]
+
+
+def unpack(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax.Array:
+    """Returns the observations of `VecEnv(dtype="bits")` as windows, like `pogema_rs.unpack`.
+
+    Shape: `(..., words)`, uint32, becomes `(..., 3, side, side)`, where words is `words_per_agent(radius)` and side is
+    `2 * radius + 1`
+
+    Errors: TypeError for another type, ValueError for another shape, before anything is compiled.
+    """
+    words, side = words_per_agent(radius), 2 * radius + 1
+    packed = _check("packed", packed, (words,), radius)
+    bits = (packed[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
+    cells = bits.reshape(*packed.shape[:-1], -1)[..., : 3 * side * side]
+    return cells.reshape(*packed.shape[:-1], 3, side, side).astype(dtype)
+
+
+def unpack_rows(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax.Array:
+    """Returns the rows of `observe_rows` as windows.
+
+    Shape: `(..., side, words)`, uint32, becomes `(..., side, side)`, where words is side / 32, rounded up
+
+    Errors: TypeError for another type, ValueError for another shape, before anything is compiled.
+    """
+    side = 2 * radius + 1
+    packed = _check("packed", packed, (side, -(-side // 32)), radius)
+    if side <= 32:
+        return ((packed >> jnp.arange(side, dtype=jnp.uint32)) & 1).astype(dtype)
+    bits = (packed[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
+    return bits.reshape(*packed.shape[:-1], -1)[..., :side].astype(dtype)
+
+
+def _check(name: str, packed: jax.Array, ends: tuple[int, ...], radius: int) -> jax.Array:
+    packed = jnp.asarray(packed)
+    if packed.dtype != jnp.uint32:
+        raise TypeError(f"{name} has type {packed.dtype}, expected uint32")
+    if packed.shape[-len(ends) :] != ends:
+        expected = ", ".join(map(str, ends))
+        raise ValueError(f"{name} has shape {packed.shape}, expected (..., {expected}) at radius {radius}")
+    return packed

@@ -1,0 +1,128 @@
+//! Instances of many seeds as flat arrays, for environments on devices.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use numpy::PyArray1;
+use pogema_core::{Cell, Error, GoalStream, Instance, OnGoal, Outside};
+use pogema_maps::InstanceSource;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::fields::Fields;
+use crate::guard::guarded;
+use crate::{config, errors, interrupt};
+
+/// The parts of all instances, each as one flat list.
+#[derive(Default)]
+struct Parts {
+    sizes: Vec<u16>,
+    maps: Vec<u8>,
+    noise: Vec<u8>,
+    starts: Vec<u16>,
+    goals: Vec<u16>,
+    num_goals: Vec<u32>,
+}
+
+guarded! {
+/// Makes one instance for each seed, and returns their parts as flat arrays.
+///
+/// `sizes` holds rows and columns per instance; `maps` the cells, row by row; `noise` those of the maps with their
+/// borders, or nothing; `starts` and `goals` rows and columns; `num_goals` the number of goals of each agent. No agent
+/// can reach its last goal before step `num_steps`, unless its sequence is shorter.
+#[pyfunction]
+pub fn make_instances(
+    py: Python<'_>,
+    fields: Fields,
+    registered: Option<String>,
+    seeds: Vec<u64>,
+    num_steps: u64,
+) -> PyResult<Bound<'_, PyDict>> {
+    let source = config::source(&fields, registered.as_deref()).map_err(|error| errors::config(py, &error))?;
+    let stop = Arc::<AtomicBool>::default();
+    let source = source.cancelled_by(&stop);
+    let flag = Arc::clone(&stop);
+    let make = move || make_parts(&source, &seeds, num_steps, &flag);
+    let parts = interrupt::detach(py, make).inspect_err(|_| stop.store(true, Relaxed))?;
+    let parts = parts.map_err(|error| errors::instance(py, &error))?;
+    let arrays = PyDict::new(py);
+    arrays.set_item("sizes", PyArray1::from_vec(py, parts.sizes))?;
+    arrays.set_item("maps", PyArray1::from_vec(py, parts.maps))?;
+    arrays.set_item("noise", PyArray1::from_vec(py, parts.noise))?;
+    arrays.set_item("starts", PyArray1::from_vec(py, parts.starts))?;
+    arrays.set_item("goals", PyArray1::from_vec(py, parts.goals))?;
+    arrays.set_item("num_goals", PyArray1::from_vec(py, parts.num_goals))?;
+    Ok(arrays)
+}
+}
+
+/// Makes the instance of each seed as the first episode of a new environment.
+fn make_parts(
+    source: &InstanceSource,
+    seeds: &[u64],
+    num_steps: u64,
+    stop: &AtomicBool,
+) -> Result<Parts, Error> {
+    let mut parts = Parts::default();
+    let is_lifelong = source.config().on_target == OnGoal::Restart;
+    for &seed in seeds {
+        if stop.load(Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        let mut source = source.clone();
+        source.reseed(Some(seed));
+        parts.push(&source.generate()?.instance, is_lifelong.then_some(num_steps));
+    }
+    Ok(parts)
+}
+
+impl Parts {
+    fn push(&mut self, instance: &Instance, num_steps: Option<u64>) {
+        let map = instance.map();
+        self.sizes.extend([map.height() as u16, map.width() as u16]);
+        self.maps.extend(map.obstacles().iter().map(|&obstacle| u8::from(obstacle)));
+        if let Outside::Noise(noise) = instance.outside() {
+            self.noise.extend(noise.obstacles().iter().map(|&obstacle| u8::from(obstacle)));
+        }
+        for (&start, goals) in instance.starts().iter().zip(instance.goals()) {
+            push_cell(&mut self.starts, start);
+            let count = match num_steps {
+                Some(num_steps) => self.push_goals(start, goals.clone(), num_steps),
+                None => {
+                    push_cell(&mut self.goals, goals.first());
+                    1
+                }
+            };
+            self.num_goals.push(count);
+        }
+    }
+
+    /// Adds the goals that an agent can reach within a number of steps, and the one after them. Returns their number.
+    ///
+    /// A sequence that is shorter is added once, because it repeats by the rules.
+    fn push_goals(&mut self, start: Cell, mut stream: GoalStream, num_steps: u64) -> u32 {
+        let (mut at, mut goal) = (start, stream.first());
+        let (mut count, mut steps) = (0, 0);
+        loop {
+            push_cell(&mut self.goals, goal);
+            count += 1;
+            // An agent reaches at most one goal per step, and moves by at most one cell.
+            steps += distance(at, goal).max(1);
+            at = goal;
+            goal = stream.advance(at);
+            let has_wrapped = matches!(stream.turn(), Some((_, 0)));
+            if steps > num_steps || has_wrapped {
+                return count;
+            }
+        }
+    }
+}
+
+fn push_cell(cells: &mut Vec<u16>, cell: Cell) {
+    cells.extend([cell.row, cell.col]);
+}
+
+/// Returns the Manhattan distance of two cells.
+fn distance(from: Cell, to: Cell) -> u64 {
+    u64::from(from.row.abs_diff(to.row)) + u64::from(from.col.abs_diff(to.col))
+}
