@@ -7,6 +7,7 @@ import pogema_rs
 import pogema_rs.jax as pj
 import pytest
 from pogema_rs import GridConfig, VecEnv
+from pogema_rs.jax._division import nearest_quotient
 from pogema_rs.packed import words_per_agent
 
 
@@ -120,3 +121,24 @@ def test_costs_to_go_are_those_of_the_encoders(size):
         actions = rng.integers(5, size=(8, 4))
         expected, *_ = env.step(actions)
         state, _ = jax.vmap(pj.step, (None, 0, 0))(params, state, actions)
+
+
+def test_quotients_are_those_of_ieee_754():
+    rng = np.random.default_rng(0)
+    large = rng.integers(0, 2**29, (2, 20_000)) >> rng.integers(0, 29, (2, 20_000))
+    above = np.concatenate([np.repeat(np.arange(130), 130), large[0]])
+    below = np.concatenate([np.tile(np.arange(130), 130), large[1]])
+    above, below = above[below > 0].astype(np.int32), below[below > 0].astype(np.int32)
+    # Whole numbers below 2**29 and their float64 quotients are exact enough that rounding them twice changes nothing.
+    expected = (above.astype(np.float64) / below).astype(np.float32)
+    np.testing.assert_array_equal(jax.jit(jax.vmap(nearest_quotient))(above, below), expected)
+
+
+def test_shared_rewards_of_constant_instances_are_exact():
+    """XLA knows the number of agents at compilation, and would divide by a constant."""
+    agents = 41
+    cells = [[0, column] for column in range(agents)]
+    config = GridConfig(map="." * agents, agents_xy=cells, targets_xy=cells[:12] + cells[11:-1], obs_radius=1)
+    params = pj.InstancePool(config, 1, rewards="shared").params
+    first = jax.jit(lambda actions: pj.step(params, pj.reset(params, 0), actions)[1].rewards)
+    np.testing.assert_array_equal(first(jnp.zeros(agents, jnp.int32)), np.full(agents, np.float32(12) / np.float32(41)))

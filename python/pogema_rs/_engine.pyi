@@ -22,6 +22,7 @@ __all__ = [
     "cost_to_go",
     "derive_config",
     "machine",
+    "make_instances",
     "make_plan",
     "maze",
     "movingai_map",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State
@@ -54,9 +55,9 @@ def cost_to_go_windows(params: Params, state: State, costs: jax.Array) -> jax.Ar
     rows, columns = state.cells[:, :1] + offsets, state.cells[:, 1:] + offsets
     found = costs[agents[:, None, None], rows[:, :, None], columns[:, None, :]]
     own = found[:, config.radius, config.radius][:, None, None]
-    # Numbers of steps are whole, so the largest that counts can be cut before the division.
-    nearer = jnp.clip(own - found, -2 * config.radius, 2 * config.radius).astype(jnp.float32)
-    # XLA would replace the division by a constant with an inexact multiplication.
-    scale = jax.lax.optimization_barrier(jnp.float32(2 * config.radius))
-    values = jnp.where((found < 0) | (own < 0), jnp.float32(-1), nearer / scale)
+    # XLA would replace the division by a constant with an inexact multiplication, so NumPy divides.
+    most = 2 * config.radius
+    quotients = np.arange(-most, most + 1, dtype=np.float32) / np.float32(most)
+    nearer = jnp.clip(own - found, -most, most) + most
+    values = jnp.where((found < 0) | (own < 0), jnp.float32(-1), jnp.asarray(quotients)[nearer])
     return jnp.where(state.active[:, None, None], values, jnp.float32(0))

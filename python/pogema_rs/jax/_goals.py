@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from pogema_rs.jax._config import Config
+from pogema_rs.jax._division import nearest_quotient
 from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State, cell_of
 
@@ -36,9 +37,7 @@ def pay(config: Config, state: State) -> jax.Array:
     """
     present = jnp.arange(config.num_agents) < state.num_agents
     if config.reward == "shared":
-        # XLA would replace the division by a constant with an inexact multiplication.
-        num_agents = jax.lax.optimization_barrier(state.num_agents.astype(jnp.float32))
-        share = state.on_goal.sum().astype(jnp.float32) / num_agents
+        share = nearest_quotient(state.on_goal.sum(dtype=jnp.int32), state.num_agents)
         return jnp.where(present, share, jnp.float32(0))
     paid = all_on_goal(state) & present if config.on_goal == "nothing" else state.on_goal
     return paid.astype(jnp.float32)

@@ -139,7 +139,10 @@ class Episode:
         return self.step(actions)
 
     def back(self) -> Record:
-        """Takes the last step back. Rule: history/step-back"""
+        """Takes the last step back.
+
+        Rule: history/step-back
+        """
         if not self.rules["persistent"]:
             raise Refusal("steps are only kept with persistent: true")
         moved = len(self.states) > 1
@@ -151,7 +154,10 @@ class Episode:
         return {"moved": moved, **self.answer()}
 
     def history(self) -> Record:
-        """Returns the changes of each agent, and its state at each step. Rule: history/changes"""
+        """Returns the changes of each agent, and its state at each step.
+
+        Rule: history/changes
+        """
         changes: list[list[Any]] = []
         full: list[list[Any]] = []
         for agent in range(self.num_agents):
@@ -286,10 +292,10 @@ class Port:
 
     def _reset(self, question: Record) -> Record:
         if "instance" in question:
-            self.instance, self.measured = question["instance"], question.get("measure", [])
+            self.instance, self.measured = question["instance"], question.get("measure") or []
         elif self.episode is None:
             raise Refusal("this reset needs an instance")
-        self.episode = Episode(self.instance, question.get("measure", self.measured))
+        self.episode = Episode(self.instance, question.get("measure") or self.measured)
         return self.episode.answer(at_reset=True)
 
 
