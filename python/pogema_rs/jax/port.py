@@ -292,10 +292,12 @@ class Port:
 
     def _reset(self, question: Record) -> Record:
         if "instance" in question:
-            self.instance, self.measured = question["instance"], question.get("measure") or []
+            self.instance, self.measured = question["instance"], []
         elif self.episode is None:
             raise Refusal("this reset needs an instance")
-        self.episode = Episode(self.instance, question.get("measure") or self.measured)
+        if "measure" in question:
+            self.measured = question["measure"]
+        self.episode = Episode(self.instance, self.measured)
         return self.episode.answer(at_reset=True)
 
 
