@@ -86,12 +86,11 @@ impl Parts {
         }
         for (&start, goals) in instance.starts().iter().zip(instance.goals()) {
             push_cell(&mut self.starts, start);
-            let count = match num_steps {
-                Some(num_steps) => self.push_goals(start, goals.clone(), num_steps),
-                None => {
-                    push_cell(&mut self.goals, goals.first());
-                    1
-                }
+            let count = if let Some(num_steps) = num_steps {
+                self.push_goals(start, goals.clone(), num_steps)
+            } else {
+                push_cell(&mut self.goals, goals.first());
+                1
             };
             self.num_goals.push(count);
         }
