@@ -18,7 +18,7 @@ RULES = list(
 # Sides, agents, radius, noise, and room for more agents and cells.
 SHAPES = [
     (8, 10, 2, False, None, None),
-    (6, 12, 5, True, 16, (9, 7)),
+    (7, 8, 5, True, 16, (9, 7)),
     (40, 9, 17, False, 9, (40, 70)),
     (5, 1, 1, True, 3, (5, 5)),
 ]
@@ -85,7 +85,11 @@ def test_every_array_equals_that_of_a_vec_env(number):
         windows, seen = see(params, state)
         np.testing.assert_array_equal(windows, expected)
         for name, values in env.state().items():
-            np.testing.assert_array_equal(getattr(seen, name), values, err_msg=name)
+            found = getattr(seen, name)
+            if name == "obstacles":
+                # Beyond a smaller map, `VecEnv` has obstacles, and `global_state` what the border holds.
+                found, values = found[:, :size, :size], values[:, :size, :size]
+            np.testing.assert_array_equal(found, values, err_msg=name)
         actions = rng.integers(5, size=(NUM_ENVS, pool.config.num_agents))
         expected, *ends, infos = env.step(actions)
         state, out = play(params, state, actions)

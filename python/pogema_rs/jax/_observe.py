@@ -16,7 +16,7 @@ __all__ = ["GlobalState", "global_state", "marks", "observe", "observe_rows"]
 
 
 class GlobalState(NamedTuple):
-    """The state that a centralised critic sees, as `VecEnv.state()` returns it.
+    """The state that a centralised critic sees, as `VecEnv.state()` returns it, except beyond smaller maps.
 
     Shape: `obstacles` `(height, width)`, uint8; `positions` and `goals` `(agents, 2)`, int32; `active` `(agents,)`, bool
     """
@@ -66,7 +66,11 @@ def marks(config: Config, state: State) -> jax.Array:
 
 
 def global_state(params: Params, state: State) -> GlobalState:
-    """Returns the map without its border, padded with obstacles, and the cells, goals and flags of all agents."""
+    """Returns the map without its border, and the cells, goals and flags of all agents.
+
+    Beyond the rows and columns of a smaller map, `obstacles` holds its wall and what lies outside it. No agent can
+    enter these cells.
+    """
     config = params.config
     bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
     grid = bits.reshape(config.grid[0], -1).astype(jnp.uint8)
