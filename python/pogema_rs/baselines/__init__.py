@@ -14,7 +14,8 @@ from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 if TYPE_CHECKING:
     from pogema_rs.baselines._run import Budget, train
 
-__all__ = ["METHODS", "Budget", "TrainingConfig", "load_config", "train"]
+# `Budget` and `train` need PyTorch, which an import of all names must not.
+__all__ = ["METHODS", "TrainingConfig", "load_config"]
 
 
 def __getattr__(name: str) -> Any:
