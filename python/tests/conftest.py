@@ -8,7 +8,7 @@ _SOURCE = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "slow: the test takes long and repeats much of another; `./check slow` runs it")
+    config.addinivalue_line("markers", "slow: the test takes long; `./check slow` runs it")
     config.addinivalue_line("markers", "oracle: the test needs POGEMA 1.4.0 in POGEMA_ORACLE_PYTHON, or pogema-toolbox in POGEMA_TOOLBOX_FOLDER")
     where = Path(pogema_rs.__file__).resolve()
     if where.is_relative_to(_SOURCE):

@@ -45,7 +45,8 @@ def save(path: Path, values: dict[str, Any]) -> None:
 def load(path: Path, method: str) -> dict[str, Any]:
     """Reads a checkpoint of a method.
 
-    Errors: FileNotFoundError without a checkpoint; ValueError for a file that is none, or one of another method.
+    Errors: FileNotFoundError without a checkpoint; ValueError for another file, or for a checkpoint
+    of another method.
     """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no checkpoint to resume from; train without --resume")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 
 from pogema_rs.baselines._curve import Curve
@@ -26,4 +25,3 @@ class Progress:
             f"best {curve.best:.3f}",
             flush=True,
         )
-        sys.stdout.flush()

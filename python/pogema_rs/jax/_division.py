@@ -1,7 +1,7 @@
-"""The quotient of two whole numbers as the nearest float32, for whatever XLA makes of a division.
+"""Divides whole numbers, and rounds the quotient to the nearest float32.
 
-XLA replaces the division by a constant with the multiplication by its reciprocal, which may round differently, and an
-accelerator may divide approximately. Whole numbers have no such freedom.
+XLA replaces a division by a constant with a multiplication by its reciprocal, which may round differently, and an
+accelerator may divide approximately. Integer arithmetic is exact everywhere.
 """
 
 from __future__ import annotations

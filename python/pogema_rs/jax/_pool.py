@@ -11,9 +11,9 @@ import numpy as np
 
 from pogema_rs import _engine
 from pogema_rs._vec_configs import _engine_config
-from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.jax._config import Config, check_whole
+from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.semantics import Semantics
 
 __all__ = ["InstancePool", "Params", "Pool", "check_fits", "make_params", "make_pool"]

@@ -7,7 +7,6 @@ functions: `--cache FOLDER` [default: none].
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 import sys
 from typing import Any, Optional
@@ -16,10 +15,10 @@ import jax
 import numpy as np
 
 from pogema_rs import __version__, _engine
-from pogema_rs.jax._pack import pack_grids
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._metrics import exact_metrics
 from pogema_rs.jax._observe import marks, observe_rows
+from pogema_rs.jax._pack import pack_grids
 from pogema_rs.jax._pool import Params, make_params, make_pool
 from pogema_rs.jax._state import State, reset
 from pogema_rs.jax._step import step
@@ -50,8 +49,8 @@ class Refusal(Exception):
     """A question that the port answers with an error."""
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _begin(config: Config, params: Params) -> tuple[State, Any]:
+@jax.jit
+def _begin(params: Params) -> tuple[State, Any]:
     state = reset(params, np.int32(0))
     return state, _seen(params, state)
 
@@ -80,7 +79,7 @@ class Episode:
         self.states: list[Any] = []
         self.means: list[float] = []
         self.agents: Optional[list[Any]] = None
-        state, self.seen = _begin(self.params.config, self.params)
+        state, self.seen = _begin(self.params)
         self._keep(state)
         self._measure()
 
@@ -104,11 +103,9 @@ class Episode:
         before = self.state
         state, self.seen, out = _play(self.params, before, padded)
         out = jax.device_get(out)
-        if self.rules["persistent"]:
-            self._keep(state)
-        else:
+        if not self.rules["persistent"]:
             self.states.clear()
-            self._keep(state)
+        self._keep(state)
         self._measure()
         num = self.num_agents
         stays = before.active & (before.cells == self.state.cells).all(-1)
