@@ -133,6 +133,16 @@ def test_select_an_agent(world):
         assert text(page, "agents").startswith(f"agent {most}"), text(page, "agents")
 
 
+def test_a_press_on_a_row_counts_if_the_list_changes_its_size_before_the_release(world):
+    with world.open("restart") as page:
+        page.hover("#agents-1")
+        page.mouse.down()
+        page.evaluate("document.getElementById('agents').style.maxHeight = '90px'")
+        settle(page)
+        page.mouse.up()
+        equal(text(page, "agent-name"), "Agent 1")
+
+
 def test_reverted_moves_are_listed_and_lead_to_their_steps(world):
     for name in ("restart", "soft"):
         film = world.film(name)

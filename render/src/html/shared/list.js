@@ -3,21 +3,21 @@
 class LongList {
   // `fill(row, index)` writes one row; `choose(index)` is called when a row is selected.
   constructor(box, label, fill, choose) {
-    Object.assign(this, { box, fill, choose, length: 0, chosen: -1 });
+    Object.assign(this, { box, fill, choose, length: 0, chosen: -1, rows: new Map() });
     this.rowHeight = 30;
     this.spacer = make("div", { className: "spacer" });
     box.setAttribute("role", "listbox");
     box.setAttribute("aria-label", label);
     box.tabIndex = 0;
     box.append(this.spacer);
-    box.addEventListener("scroll", () => this.draw());
-    // By position and not by row element, because a row may be replaced between press and release.
+    box.addEventListener("scroll", () => this.show());
+    // By position and not by row element: if the rows move between press and release, they are different elements.
     box.addEventListener("click", (event) => {
       const index = Math.floor((event.clientY - this.spacer.getBoundingClientRect().top) / this.rowHeight);
       if (index >= 0 && index < this.length) choose(index);
     });
     box.addEventListener("keydown", (event) => this.key(event));
-    new ResizeObserver(() => this.draw()).observe(box);
+    new ResizeObserver(() => this.show()).observe(box);
   }
 
   set(length, chosen) {
@@ -38,13 +38,30 @@ class LongList {
     this.draw();
   }
 
+  // Makes all rows again.
   draw() {
-    const { box, rowHeight, length } = this;
+    this.rows.clear();
+    this.spacer.replaceChildren();
+    this.show();
+  }
+
+  // Adds the rows that became visible and removes the others. A visible row stays the same element, because browsers
+  // drop a click if the pressed element was removed before the release.
+  show() {
+    const { box, rowHeight, length, rows, spacer } = this;
     const first = Math.max(0, Math.floor(box.scrollTop / rowHeight) - 1);
     const last = Math.min(length, Math.ceil((box.scrollTop + box.clientHeight) / rowHeight) + 1);
-    const rows = [];
-    for (let index = first; index < last; index += 1) rows.push(this.row(index));
-    this.spacer.replaceChildren(...rows);
+    for (const [index, row] of rows) {
+      if (index >= first && index < last) continue;
+      row.remove();
+      rows.delete(index);
+    }
+    for (let index = last - 1; index >= first; index -= 1) {
+      if (rows.has(index)) continue;
+      const row = this.row(index);
+      spacer.insertBefore(row, rows.get(index + 1) ?? null);
+      rows.set(index, row);
+    }
     const chosen = this.chosen >= first && this.chosen < last ? `${box.id}-${this.chosen}` : "";
     box.setAttribute("aria-activedescendant", chosen);
   }
