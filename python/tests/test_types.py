@@ -143,6 +143,7 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py"}
 
 
+@pytest.mark.slow
 def test_examples_are_typed_strictly(check):
     files = sorted(EXAMPLES.glob("*.py"))
     assert {path.name for path in files} > WITH_FRAMEWORK

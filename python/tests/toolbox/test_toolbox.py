@@ -105,7 +105,8 @@ PROGRAMS = [("train_on_paths.py", 1), ("collect_expert_data.py", 12), ("evaluate
 
 
 @pytest.mark.parametrize(
-    ("script", "num_files"), [*PROGRAMS, ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
+    ("script", "num_files"),
+    [*PROGRAMS, ("evaluate_lifelong.py", 5), pytest.param("make_and_show.py", 9, marks=pytest.mark.slow)],
 )
 def test_unmodified_scripts_write_the_same_files(script, num_files, tmp_path):
     found = []
