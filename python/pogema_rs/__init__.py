@@ -29,9 +29,10 @@ Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a comm
 Trainers, with a command line (`python -m`): `pogema_rs.baselines`.
 The rules as functions for JAX: `pogema_rs.jax`, and their port for the conformance kit: `pogema_rs.jax.port`.
 
-Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.make_pogema`,
-`pogema_rs.integrations.pettingzoo`, `pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`,
-`pogema_rs.integrations.rllib`, `pogema_rs.integrations.sample_factory`,
+Adapters for frameworks, in `pogema_rs.integrations`: `pogema_rs.integrations.gymnax`,
+`pogema_rs.integrations.jaxmarl`, `pogema_rs.integrations.make_pogema`, `pogema_rs.integrations.pettingzoo`,
+`pogema_rs.integrations.pufferlib`, `pogema_rs.integrations.pymarl`, `pogema_rs.integrations.rllib`,
+`pogema_rs.integrations.sample_factory`,
 `pogema_rs.integrations.sample_factory_batched` and `pogema_rs.integrations.torchrl`.
 """
 

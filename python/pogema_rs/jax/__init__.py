@@ -25,7 +25,7 @@ from pogema_rs.jax._checked import checked_step
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._cost_to_go import cost_to_go, cost_to_go_windows
 from pogema_rs.jax._metrics import exact_metrics, metrics
-from pogema_rs.jax._observe import GlobalState, global_state, observe, observe_rows
+from pogema_rs.jax._observe import GlobalState, action_masks, global_state, observe, observe_rows
 from pogema_rs.jax._pool import InstancePool, Params, Pool
 from pogema_rs.jax._state import State, reset
 from pogema_rs.jax._step import StepOut, auto_reset, step
@@ -39,6 +39,7 @@ __all__ = [
     "Pool",
     "State",
     "StepOut",
+    "action_masks",
     "auto_reset",
     "checked_step",
     "cost_to_go",

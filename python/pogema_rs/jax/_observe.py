@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pogema_rs.jax._collide import MOVES
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State
 from pogema_rs.jax._unpack import unpack_rows
 
-__all__ = ["GlobalState", "global_state", "marks", "observe", "observe_rows"]
+__all__ = ["GlobalState", "action_masks", "global_state", "marks", "observe", "observe_rows"]
 
 
 class GlobalState(NamedTuple):
@@ -76,6 +77,19 @@ def global_state(params: Params, state: State) -> GlobalState:
     grid = bits.reshape(config.grid[0], -1).astype(jnp.uint8)
     inner = slice(config.radius, config.radius + config.height), slice(config.radius, config.radius + config.width)
     return GlobalState(grid[inner], state.cells, state.goals, state.active)
+
+
+def action_masks(params: Params, state: State) -> jax.Array:
+    """Returns the actions that no obstacle blocks now, as `VecEnv.action_masks` does.
+
+    Shape: `(agents, 5)`, bool; an inactive agent and padding can only stay
+
+    Rule: move/actions
+    """
+    cells = state.cells[:, None] + params.config.radius + jnp.array(MOVES)
+    row, column = cells[..., 0], cells[..., 1]
+    blocked = (state.obstacles[row, column >> 5] >> (column & 31).astype(jnp.uint32)) & 1
+    return jnp.where(state.active[:, None], blocked == 0, jnp.arange(len(MOVES)) == 0)
 
 
 def _windows(config: Config, grid: jax.Array, cells: jax.Array) -> jax.Array:

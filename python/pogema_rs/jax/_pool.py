@@ -16,7 +16,7 @@ from pogema_rs.jax._config import Config, check_whole
 from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.semantics import Semantics
 
-__all__ = ["InstancePool", "Params", "Pool", "check_fits", "make_params", "make_pool"]
+__all__ = ["InstancePool", "Params", "Pool", "check_fits", "draw_instance", "make_params", "make_pool"]
 
 LARGEST_STEP = 2**31 - 1
 LARGEST_SEED = 2**63 - 1
@@ -153,6 +153,11 @@ class InstancePool:
         if len(listed) != self.num:
             raise ValueError(f"seeds holds {len(listed)} seeds, expected {self.num}, one for each instance")
         return listed
+
+
+def draw_instance(params: Params, key: jax.Array) -> jax.Array:
+    """Returns the index of an instance that the key draws, every instance with the same probability."""
+    return jax.random.randint(key, (), 0, params.pool.starts.shape[0], dtype=jnp.int32)
 
 
 def check_pair(name: str, value: Any) -> None:

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pogema_rs.jax._collide import move_agents
+from pogema_rs.jax._collide import MOVES, move_agents
 from pogema_rs.jax._goals import advance_goals, pay, terminate, truncate
 from pogema_rs.jax._metrics import feed
-from pogema_rs.jax._pool import Params
+from pogema_rs.jax._pool import Params, draw_instance
 from pogema_rs.jax._state import State, reset
 
 __all__ = ["StepOut", "auto_reset", "step"]
 
-NUM_ACTIONS = 5
+NUM_ACTIONS = len(MOVES)
 
 
 class StepOut(NamedTuple):
@@ -82,8 +82,7 @@ def auto_reset(
     and metrics.
     """
     last, out = step(params, state, actions)
-    drawn = jax.random.randint(key, (), 0, params.pool.starts.shape[0], dtype=jnp.int32)
-    first = reset(params, drawn)
+    first = reset(params, draw_instance(params, key))
     return jax.tree.map(lambda new, old: jnp.where(out.ended, new, old), first, last), out, last
 
 
