@@ -8,7 +8,7 @@ use std::{env, fs};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_pogema");
 
-/// All commands, in an order in which each finds the files that earlier examples write.
+/// All commands, in an order in which each finds the files that earlier examples write. The last three take long.
 const COMMANDS: [&str; 18] = [
     "run",
     "plan",
@@ -56,14 +56,24 @@ fn examples(command: &str) -> Vec<String> {
 }
 
 #[test]
+fn examples_of_short_commands_run() {
+    run_examples(&COMMANDS[..15]);
+}
+
+#[test]
+#[ignore = "half a minute: `./check slow` runs it"]
 fn examples_of_all_commands_run() {
+    run_examples(&COMMANDS);
+}
+
+fn run_examples(commands: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     fs::write(path.join("config.yaml"), "{size: 8, num_agents: 2, seed: 3, collision_system: soft}").unwrap();
     fs::write(path.join("suite.yaml"), SUITE).unwrap();
     let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/ports/template.py");
     fs::copy(template, path.join("adapter.py")).unwrap();
-    for command in COMMANDS {
+    for command in commands {
         for example in examples(command) {
             let words = shell_words::split(&example).unwrap();
             let words: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();

@@ -45,7 +45,7 @@ fn perform(op: &Op, plan: &Plan, pair: &mut Pair, counts: &mut EventCounts) -> O
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2500) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
 
     #[test]
     fn fast_engine_equals_the_reference(plan in plans()) {
