@@ -15,8 +15,11 @@ import sys
 import time
 from pathlib import Path
 
+from workers import Worker, print_table
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+WORKER = HERE / "worker.py"
 OURS = ROOT / "target/python/new/bin/python"
 PROGRAM = ROOT / "target/release/pogema"
 BATCH = "64 lanes of 64 agents"
@@ -24,26 +27,6 @@ BATCH = "64 lanes of 64 agents"
 ENCODED_BAR = 5e6
 # Rows whose observations are compared with writing zeros.
 WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]
-
-
-class Worker:
-    """A package in a separate process."""
-
-    def __init__(self, python, package):
-        self.child = subprocess.Popen(
-            [python, "-B", HERE / "worker.py", package],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def time(self, *work):
-        """Returns calls per second."""
-        print(json.dumps(work), file=self.child.stdin, flush=True)
-        line = self.child.stdout.readline()
-        if not line:
-            sys.exit(f"python_package: the worker of {self.child.args[-1]} exited during {work}")
-        return json.loads(line)
 
 
 def imports_per_second(python, statement):
@@ -105,7 +88,7 @@ def main():
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     pogema = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("python_package: POGEMA_ORACLE_PYTHON is not set")
-    peer, ours = Worker(pogema, "pogema"), Worker(OURS, "pogema_rs")
+    peer, ours = Worker(pogema, WORKER, "pogema"), Worker(OURS, WORKER, "pogema_rs")
     rounds = [measure(peer, ours, pogema) for _ in range(arguments.rounds)]
     table = []
     for rows in zip(*rounds):
@@ -114,9 +97,7 @@ def main():
         table.append({"work": name, "peer": theirs, "ours": own, "times": statistics.median(r[2] / r[1] for r in rows)})
     if arguments.json:
         arguments.json.write_text(json.dumps(table, indent=2) + "\n")
-    print(f"{'work':60}{'peer/s':>12}{'ours/s':>12}{'times':>9}")
-    for row in table:
-        print(f"{row['work']:60}{row['peer']:12.4g}{row['ours']:12.4g}{row['times']:9.2f}")
+    print_table(table)
 
 
 main()

@@ -1,0 +1,67 @@
+"""Compares the speed of `pogema_rs.jax` with POGEMA 1.4.0 and with VecEnv, in one run on one machine.
+
+python3.11 benches/peers/jax.py [--rounds N] [--environments N] [--json FILE]
+
+JAX_PYTHON names a Python with JAX and the released wheel, POGEMA_ORACLE_PYTHON one with POGEMA. All rates are steps of
+one environment of 32 x 32 cells with 64 agents, radius 5 and `soft`, per second. POGEMA is one process. The peers take
+turns. Each ratio is the median over the rounds of the ratios within a round.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import sys
+from pathlib import Path
+
+from workers import Worker, print_table
+
+HERE = Path(__file__).resolve().parent
+NUM_AGENTS = 64
+# A step and its observation must compile within this time. Units: seconds.
+COMPILE_BAR = 3.0
+
+
+def measure(pogema, rust, compiled, num_envs):
+    """Returns the rows of one round: name, the peer's rate, ours."""
+    peer = pogema.time("step", NUM_AGENTS)
+    batch = {
+        dtype: num_envs * rust.time("vector", num_envs, NUM_AGENTS, os.cpu_count(), dtype)
+        for dtype in ("float32", "uint8", "bits")
+    }
+    ours = {view: num_envs * compiled.time("steps", num_envs, NUM_AGENTS, view) for view in ("f32", "u8", "rows", None)}
+    return [
+        ("f32 windows, against POGEMA", peer, ours["f32"]),
+        ("u8 windows, against POGEMA", peer, ours["u8"]),
+        ("packed rows, against POGEMA", peer, ours["rows"]),
+        ("f32 windows, against VecEnv", batch["float32"], ours["f32"]),
+        ("u8 windows, against VecEnv", batch["uint8"], ours["u8"]),
+        ("packed rows, against VecEnv with bits", batch["bits"], ours["rows"]),
+        ("step alone, against VecEnv with f32", batch["float32"], ours[None]),
+        (f"compilations, against {COMPILE_BAR:.0f} s each", 1 / COMPILE_BAR, compiled.time("compile", num_envs, NUM_AGENTS)),
+    ]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--environments", type=int, default=512)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    python = os.environ.get("JAX_PYTHON") or sys.exit("jax: JAX_PYTHON is not set")
+    oracle = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("jax: POGEMA_ORACLE_PYTHON is not set")
+    pogema = Worker(oracle, HERE / "worker.py", "pogema")
+    rust = Worker(python, HERE / "worker.py", "pogema_rs")
+    compiled = Worker(python, HERE / "jax_worker.py")
+    rounds = [measure(pogema, rust, compiled, arguments.environments) for _ in range(arguments.rounds)]
+    table = []
+    for rows in zip(*rounds):
+        theirs, own = (statistics.median(row[at] for row in rows) for at in (1, 2))
+        times = [row[2] / row[1] for row in rows]
+        table.append({"work": rows[0][0], "peer": theirs, "ours": own, "times": statistics.median(times), "all": times})
+    if arguments.json:
+        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
+    print_table(table)
+
+
+main()
