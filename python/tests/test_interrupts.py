@@ -37,7 +37,7 @@ def test_each_compiled_entry_is_interrupted_or_short():
     assert interrupted | set(short) == set(entries(ast.parse(STUB.read_text(encoding="utf-8")).body))
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, marks=[pytest.mark.slow] if case in SLOW else []) for case in CASES])
+@pytest.mark.parametrize("case", [pytest.param(case, marks=pytest.mark.slow if case in SLOW else ()) for case in CASES])
 def test_interrupt_ends_the_call_and_leaves_the_state(case, tmp_path):
     command = [sys.executable, "-B", str(SCRIPT), case]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)

@@ -102,12 +102,13 @@ def tables(folder):
 
 # A trainer, a data collector and an evaluation, each after a public repository that its first lines name.
 PROGRAMS = [("train_on_paths.py", 1), ("collect_expert_data.py", 12), ("evaluate_sets.py", 9)]
-SLOW = [("train_on_paths.py", 1), ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
+SCRIPTS = [*PROGRAMS, ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
+SLOW = {"train_on_paths.py", "evaluate_lifelong.py", "make_and_show.py"}
 
 
 @pytest.mark.parametrize(
     ("script", "num_files"),
-    [*PROGRAMS[1:], *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)],
+    [pytest.param(*each, marks=pytest.mark.slow if each[0] in SLOW else ()) for each in SCRIPTS],
 )
 def test_unmodified_scripts_write_the_same_files(script, num_files, tmp_path):
     found = []
