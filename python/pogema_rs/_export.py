@@ -29,12 +29,13 @@ def save(
     actions: str = "policy",
     value: Optional[str] = None,
     sampling: str = "softmax",
+    mask_actions: bool = False,
 ) -> None:
     """Writes a network as a `.safetensors` file and the JSON file beside it.
 
     `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by the names that the layers
     use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
-    chooses an action: `softmax`, `greedy` or `follower`.
+    chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle.
 
     Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not
     fit; OSError if a file cannot be written. After an error, the files are unchanged.
@@ -51,14 +52,17 @@ def save(
     if value is not None:
         architecture["value"] = value
     arrays = [(name, np.ascontiguousarray(array, dtype=np.float32)) for name, array in tensors.items()]
-    config = _config(encoder, sampling, architecture=architecture)
+    config = _config(encoder, sampling, mask_actions, architecture=architecture)
     _engine.write_network(target, json.dumps(config), arrays)
 
 
-def export(module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "softmax") -> None:
+def export(
+    module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "softmax", mask_actions: bool = False
+) -> None:
     """Writes a PyTorch module, so that it plays in Rust: as `.safetensors` or `.onnx`, with a JSON file beside it.
 
     `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
+    With `mask_actions`, no agent moves into an obstacle.
 
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
     attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
@@ -75,37 +79,43 @@ def export(module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "soft
     """
     encoder = read_encoder(encoder)
     if os.fspath(path).endswith(".onnx"):
-        _export_onnx(module, encoder, _target(path, ".onnx"), sampling)
+        _export_onnx(module, _target(path, ".onnx"), encoder, _config(encoder, sampling, mask_actions))
         return
     target = _target(path, ".safetensors")
     from pogema_rs import _torch_layers
 
     parts = _torch_layers.parts_of(module, encoder)
+    names: dict[str, Any] = {"actions": parts.actions, "value": parts.value}
+
+    def write(path: _Path) -> None:
+        save(path, encoder, parts.layers, parts.tensors, **names, sampling=sampling, mask_actions=mask_actions)
+
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.safetensors"
-        save(trial, encoder, parts.layers, parts.tensors, actions=parts.actions, value=parts.value, sampling=sampling)
+        write(trial)
         _torch_layers.compare(parts, load(trial), encoder)
-    save(target, encoder, parts.layers, parts.tensors, actions=parts.actions, value=parts.value, sampling=sampling)
+    write(target)
 
 
-def _export_onnx(module: Any, encoder: Encoder, target: str, sampling: str) -> None:
+def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, Any]) -> None:
     from pogema_rs import _torch_layers
 
-    config = json.dumps(_config(encoder, sampling), indent=2) + "\n"
+    text = json.dumps(config, indent=2) + "\n"
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.onnx"
         _torch_layers.write_onnx(module, encoder, str(trial))
-        trial.with_suffix(".json").write_text(config)
+        trial.with_suffix(".json").write_text(text)
         load(trial)
         Path(target).write_bytes(trial.read_bytes())
-    Path(target).with_suffix(".json").write_text(config)
+    Path(target).with_suffix(".json").write_text(text)
 
 
-def _config(encoder: Encoder, sampling: str, **other: Any) -> dict[str, Any]:
+def _config(encoder: Encoder, sampling: str, mask_actions: bool, **other: Any) -> dict[str, Any]:
     if sampling not in _engine.WORDS["sampling"]:
         expected = ", ".join(map(repr, _engine.WORDS["sampling"]))
         raise ValueError(f"sampling is {sampling!r}, expected one of {expected}")
-    return {"version": 1, **other, "encoder": encoder.to_dict(), "sampling": {"rule": sampling}}
+    rule = {"rule": sampling, "mask_actions": bool(mask_actions)}
+    return {"version": 1, **other, "encoder": encoder.to_dict(), "sampling": rule}
 
 
 def _target(path: _Path, suffix: str) -> str:

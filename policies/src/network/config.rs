@@ -42,6 +42,9 @@ pub struct SamplingConfig {
     /// The rule.
     #[serde(default)]
     pub rule: Sampling,
+    /// Whether actions that lead into an obstacle or off the map are forbidden.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mask_actions: bool,
 }
 
 words! {

@@ -4,7 +4,7 @@ use pogema_core::{Config, Error, Instance};
 
 use crate::encode::EncoderSettings;
 use crate::follower::FollowerVersion;
-use crate::network::{Network, Sampling};
+use crate::network::{Network, Sampling, SamplingConfig};
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::network_episode::{NetworkEpisode, NetworkSettings};
 use crate::policy::sampler::NUM_ACTIONS;
@@ -44,8 +44,8 @@ impl NetworkPolicy {
             let found = network.num_actions();
             return Err(Error::request(format!("the network has {found} logits, expected {NUM_ACTIONS}")));
         }
-        let sampling = network.config().sampling.rule;
-        Ok(Self(NetworkSettings { network, encoder, sampling, masks_actions: false }))
+        let SamplingConfig { rule: sampling, mask_actions: masks_actions } = network.config().sampling;
+        Ok(Self(NetworkSettings { network, encoder, sampling, masks_actions }))
     }
 
     /// Creates the policy Follower, for a network whose window has Follower's two channels.
@@ -81,7 +81,7 @@ impl NetworkPolicy {
         self
     }
 
-    /// If `masks_actions` is set, forbids actions that lead into an obstacle or off the map [default: off].
+    /// Sets whether actions that lead into an obstacle or off the map are forbidden.
     #[must_use]
     pub fn with_masks(mut self, masks_actions: bool) -> Self {
         self.0.masks_actions = masks_actions;
