@@ -40,9 +40,9 @@ def test_bytes_hold_windows_exactly(radius):
         np.testing.assert_array_equal(record.masks[step], masks != 0)
 
 
-@pytest.mark.parametrize("on_target", ["nothing", "restart", "finish"])
+@pytest.mark.parametrize("on_target", ["nothing", "restart", "finish", "restart, nothing"])
 def test_rewards_and_ends_are_those_of_the_environment(on_target):
-    changes = [f"environment.on_target={on_target}", "environment.max_episode_steps=40", "schedule.lanes=16"]
+    changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=40", "schedule.lanes=16"]
     rewards = ["rewards.goal=1.0", "rewards.progress=0.25", "rewards.step=-0.125"]
     config = small_config("iql", *changes, *rewards, "learner.replay=16")
     record, seen, metrics, (configs, seeds) = played(config)
@@ -59,7 +59,7 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
             down, right = now["positions"][lane, agent] - state["positions"][lane, agent]
             nearer = windows[lane, agent, 2, 5 + down, 5 + right] * 10
             on_goal = (now["positions"][lane, agent] == now["goals"][lane, agent]).all()
-            goal = on_goal if on_target == "nothing" else own[lane, agent]
+            goal = on_goal if configs[lane]["on_target"] == "nothing" else own[lane, agent]
             assert record.rewards[step, lane, agent] == pytest.approx(goal + 0.25 * nearer - 0.125, abs=1e-6)
             rewarded += bool(goal)
         assert (record.rewards[step][~active] == 0).all()

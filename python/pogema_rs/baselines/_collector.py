@@ -17,7 +17,7 @@ Act = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 class Collector:
-    """Plays one episode in each lane at a time, and records it.
+    """Plays one episode in each lane at a time with one rule of goals, and records it.
 
     Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training can therefore
     resume from the number of its iteration, without the state of an environment.
@@ -30,6 +30,7 @@ class Collector:
     def play(self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act) -> tuple[Record, dict[str, float]]:
         """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
         env = self._begin(configs)
+        self._agents_stay = configs[0]["on_target"] == "nothing"
         seen, infos = env.reset(seed=list(seeds))
         record = _record.empty(self._config, self._map_size, self._lanes)
         metrics: dict[str, np.ndarray] = {}
@@ -52,7 +53,9 @@ class Collector:
             is_over |= (terminated.all(axis=1)) | (truncated.all(axis=1))
             if "metrics" in infos:
                 _keep(metrics, infos["metrics"], infos["_metrics"])
-        return record, {name: float(values.mean()) for name, values in metrics.items()}
+        means = {name: float(values.mean()) for name, values in metrics.items()}
+        acted = record.active[:-1] & record.played[:, :, None]
+        return record, {**means, "reward": float(record.rewards.sum() / max(1, acted.sum()))}
 
     def close(self) -> None:
         """Frees the environments."""
@@ -95,7 +98,7 @@ class Collector:
         """Writes the rewards of a step into the record."""
         config, weights = self._config, self._config.rewards
         rewards = np.full(own.shape, weights.step, dtype=np.float32)
-        if config.environment.on_target == "nothing":
+        if self._agents_stay:
             places = record.places[step + 1]
             rewards += weights.goal * (places[..., :2] == places[..., 2:]).all(axis=2)
         else:

@@ -31,7 +31,8 @@ class EnvironmentConfig:
 
     maps: tuple[str, ...] = ("random",)
     num_agents: int = 8
-    on_target: str = "nothing"
+    #: The rules of goals: each iteration plays one of them, in turn.
+    on_target: tuple[str, ...] = ("nothing",)
     max_episode_steps: int = 128
     collision_system: str = "soft"
     obs_radius: int = 5
@@ -228,7 +229,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
 
     environment, learner, schedule = config.environment, config.learner, config.schedule
     check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names of {', '.join(MAP_KINDS)}")
-    check(environment.on_target in GOAL_RULES, "environment.on_target", f"one of {', '.join(GOAL_RULES)}")
+    rules = f"names of {', '.join(GOAL_RULES)}"
+    check(all(rule in GOAL_RULES for rule in environment.on_target), "environment.on_target", rules)
     for key in ("num_agents", "max_episode_steps", "obs_radius", "size"):
         check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
     check(environment.size <= 255, "environment.size", "at most 255")

@@ -10,8 +10,12 @@ from typing import Any
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.toolbox._optional import required
 
-#: The metric that chooses the best weights, by the rule of goals.
-SCORES = {"nothing": "ISR", "finish": "ISR", "restart": "avg_throughput"}
+
+
+def score_of(on_target: tuple[str, ...]) -> str:
+    """Returns the metric that chooses the best weights: the mean reward of a step if no other metric has all episodes."""
+    scores = {"avg_throughput" if rule == "restart" else "ISR" for rule in on_target}
+    return scores.pop() if len(scores) == 1 else "reward"
 
 
 class Curve:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -38,26 +38,27 @@ class Episodes:
 
     def of_iteration(self, iteration: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
         """Returns the configs and the seeds of the training episodes of an iteration."""
-        return self._draw(_TRAINING, iteration, count)
+        rules = self._config.on_target
+        return self._draw(_TRAINING, iteration, count, rules[iteration % len(rules)])
 
-    def of_validation(self, count: int) -> tuple[list[dict[str, Any]], list[int]]:
-        """Returns the configs and the seeds of the validation episodes."""
-        configs, seeds = self._draw(_VALIDATION, 0, count)
+    def of_validation(self, count: int, on_target: Optional[str] = None) -> tuple[list[dict[str, Any]], list[int]]:
+        """Returns the configs and the seeds of the validation episodes with a rule of goals [default: the first]."""
+        configs, seeds = self._draw(_VALIDATION, 0, count, on_target or self._config.on_target[0])
         return [{**config, "max_episode_steps": self._validation_steps} for config in configs], seeds
 
-    def _draw(self, stream: int, number: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
+    def _draw(self, stream: int, number: int, count: int, on_target: str) -> tuple[list[dict[str, Any]], list[int]]:
         sequence = np.random.SeedSequence(self._seed, spawn_key=(stream, number))
         drawn = sequence.generate_state(2 * count, np.uint64)
         seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[:count]]
         kinds = self._config.maps
         maps = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
-        return [self._environment(kinds[lane % len(kinds)], maps[lane]) for lane in range(count)], seeds
+        return [self._environment(kinds[lane % len(kinds)], on_target, maps[lane]) for lane in range(count)], seeds
 
-    def _environment(self, kind: str, map_seed: int) -> dict[str, Any]:
+    def _environment(self, kind: str, on_target: str, map_seed: int) -> dict[str, Any]:
         config = self._config
         fields: dict[str, Any] = {
             "num_agents": config.num_agents,
-            "on_target": config.on_target,
+            "on_target": on_target,
             "max_episode_steps": config.max_episode_steps,
             "collision_system": config.collision_system,
             "obs_radius": config.obs_radius,

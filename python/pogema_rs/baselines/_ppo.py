@@ -34,6 +34,8 @@ class PPOLearner:
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
         assert isinstance(config.learner, PPOConfig)
         self.config, self.learner, self._generator = config, config.learner, generator
+        #: Whether the trained network never moves into obstacles.
+        self.masks = config.learner.masks
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.critic: nn.Module = module.make_critic(config, map_size)
         self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE)
@@ -50,11 +52,11 @@ class PPOLearner:
 
     def actor(self) -> Actor:
         """Returns what plays the episodes of an iteration."""
-        return Actor(self.network, self._generator, None, self.learner.masks)
+        return Actor(self.network, self._generator, None, self.masks)
 
     def judge(self, generator: torch.Generator) -> Actor:
         """Returns what plays the validation episodes."""
-        return Actor(self.network, generator, None, self.learner.masks)
+        return Actor(self.network, generator, None, self.masks)
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
@@ -77,7 +79,7 @@ class PPOLearner:
         """Returns the logits of all states and their values. Shape: `(steps + 1, lanes, agents, ...)`."""
         features = self.network.of_record(record)
         logits = self.network.policy(features)
-        if self.learner.masks:
+        if self.masks:
             logits = logits.masked_fill(~torch.from_numpy(record.masks), LEAST)
         values: torch.Tensor = self.critic(self.network, features, record)
         return logits, values

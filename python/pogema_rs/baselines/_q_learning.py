@@ -28,6 +28,8 @@ class QLearner:
 
     #: The rule by which the trained network plays.
     sampling = "greedy"
+    #: Whether it then never moves into obstacles.
+    masks = True
 
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
         assert isinstance(config.learner, QLearningConfig)

@@ -19,7 +19,7 @@ from pogema_rs import __version__, policies
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, differences
-from pogema_rs.baselines._curve import SCORES, Curve, open_tensorboard
+from pogema_rs.baselines._curve import Curve, score_of, open_tensorboard
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._ppo import PPOLearner
 from pogema_rs.baselines._progress import Progress
@@ -90,7 +90,7 @@ class _Run:
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
         kind: Any = QLearner if isinstance(config.learner, QLearningConfig) else PPOLearner
         self.learner: Union[QLearner, PPOLearner] = kind(config, self.episodes.map_size, self.generator)
-        self.curve = Curve(SCORES[config.environment.on_target])
+        self.curve = Curve(score_of(config.environment.on_target))
         self.iteration, self.seconds, self.agent_steps = 0, 0.0, 0
         self.best_weights = self._weights()
         if saved is not None:
@@ -98,10 +98,12 @@ class _Run:
         folder.mkdir(parents=True, exist_ok=True)
         self.learner.open(folder)
         size, schedule = self.episodes.map_size, config.schedule
-        self.lanes = Collector(config, size, schedule.lanes, threads)
+        # An environment keeps its rule of goals.
+        self.lanes = [Collector(config, size, schedule.lanes, threads) for _ in config.environment.on_target]
         environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
         judged = dataclasses.replace(config, environment=environment)
-        self.judges = Collector(judged, size, schedule.validation_episodes, threads)
+        episodes = schedule.validation_episodes
+        self.judges = {rule: Collector(judged, size, episodes, threads) for rule in environment.on_target}
 
     def play(self, budget: Budget) -> dict[str, float]:
         """Trains until the budget is used up."""
@@ -126,15 +128,16 @@ class _Run:
 
     def close(self) -> None:
         """Frees the environments."""
-        self.lanes.close()
-        self.judges.close()
+        for collector in (*self.lanes, *self.judges.values()):
+            collector.close()
         if self.writer is not None:
             self.writer.close()
 
     def _train_once(self) -> dict[str, float]:
         """Plays the episodes of one iteration, and learns from them."""
         configs, seeds = self.episodes.of_iteration(self.iteration, self.config.schedule.lanes)
-        record, _ = self.lanes.play(configs, seeds, self.learner.actor())
+        lanes = self.lanes[self.iteration % len(self.lanes)]
+        record, _ = lanes.play(configs, seeds, self.learner.actor())
         parts = self.learner.learn(record)
         self.iteration += 1
         self.agent_steps += int(record.active[:-1][record.played].sum())
@@ -142,9 +145,15 @@ class _Run:
 
     def _validate(self, parts: dict[str, float]) -> None:
         """Plays the validation episodes, and keeps the weights if they are the best so far."""
-        configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes)
-        generator = torch.Generator().manual_seed(self.seed)
-        _, metrics = self.judges.play(configs, seeds, self.learner.judge(generator))
+        metrics: dict[str, float] = {}
+        rewards = 0.0
+        for rule, judges in self.judges.items():
+            configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes, rule)
+            generator = torch.Generator().manual_seed(self.seed)
+            _, found = judges.play(configs, seeds, self.learner.judge(generator))
+            rewards += found["reward"] / len(self.judges)
+            metrics.update(found)
+        metrics["reward"] = rewards
         if metrics[self.curve.score] > self.curve.best:
             self.best_weights = self._weights()
         row = {"iteration": self.iteration, "agent_steps": self.agent_steps, "minutes": self.seconds / 60}
@@ -191,7 +200,8 @@ class _Run:
         last = self._weights()
         self.learner.network.load_state_dict(self.best_weights)
         path = self.folder / "weights.safetensors"
-        policies.export(self.learner.network, self.config.encoder, path, sampling=self.learner.sampling)
+        rules: dict[str, Any] = {"sampling": self.learner.sampling, "mask_actions": self.learner.masks}
+        policies.export(self.learner.network, self.config.encoder, path, **rules)
         self.learner.network.load_state_dict(last)
 
     def _describe(self, budget: Budget) -> None:
@@ -209,7 +219,7 @@ class _Run:
             "versions": {"pogema_rs": __version__, "torch": torch.__version__, "python": platform.python_version()},
             "commit": _commit(),
             "machine": f"{platform.machine()}, {platform.system()}, {torch.backends.cpu.get_cpu_capability()}",
-            "command": sys.argv,
+            "command": ["python", "-m", "pogema_rs.baselines", *sys.argv[1:]],
             "config": self.config.to_dict(),
         }
         _checkpoint.write(self.folder / "run.json", (json.dumps(values, indent=2) + "\n").encode())
