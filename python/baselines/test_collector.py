@@ -49,7 +49,7 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
     env = VecEnv(configs, autoreset_mode="Disabled", encoder=config.encoder, masks=True)
     windows, _ = env.reset(seed=seeds)
     windows, state, is_over = windows.copy(), env.state(), np.zeros(16, dtype=bool)
-    rewarded = 0
+    rewarded, costs = 0, config.encoder.channels.index("cost_to_go")
     for step in range(len(record.actions)):
         np.testing.assert_array_equal(record.played[step], ~is_over)
         active = state["active"] & ~is_over[:, None]
@@ -57,7 +57,7 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
         now = env.state()
         for lane, agent in np.argwhere(active):
             down, right = now["positions"][lane, agent] - state["positions"][lane, agent]
-            nearer = windows[lane, agent, 2, 5 + down, 5 + right] * 10
+            nearer = windows[lane, agent, costs, 5 + down, 5 + right] * 10
             on_goal = (now["positions"][lane, agent] == now["goals"][lane, agent]).all()
             goal = on_goal if configs[lane]["on_target"] == "nothing" else own[lane, agent]
             assert record.rewards[step, lane, agent] == pytest.approx(goal + 0.25 * nearer - 0.125, abs=1e-6)
