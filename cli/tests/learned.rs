@@ -43,6 +43,31 @@ fn a_network_plays_and_its_trace_replays() {
 }
 
 #[test]
+fn policies_with_weights_in_the_program_need_no_file() {
+    let folder = folder();
+    for policy in ["follower", "qmix"] {
+        let (summary, error, status) = run(folder.path(), &["--policy", policy]);
+        assert_eq!((error.as_str(), status), ("", 0));
+        let (other, error, status) =
+            run(folder.path(), &["--policy", policy, "--weights", "descent.safetensors"]);
+        if policy == "qmix" {
+            assert_eq!(status, 0, "{error}");
+            assert_ne!(other, summary);
+        } else {
+            assert!(error.starts_with("error: descent.safetensors: "), "{error}");
+        }
+    }
+    let suite = fs::read_to_string(folder.path().join("descent.yaml")).unwrap();
+    let suite = suite.replace("{name: network, weights: descent.safetensors}", "{name: QMIX}");
+    fs::write(folder.path().join("shipped.yaml"), suite).unwrap();
+    let (_, error, status) = pogema(folder.path(), &["evaluate", "shipped.yaml", "--out", "out"]);
+    assert_eq!(status, 0, "{error}");
+    let (_, error, status) = pogema(folder.path(), &["replay", "out", "Descent", "2"]);
+    assert_eq!(status, 0, "{error}");
+    assert!(!error.contains("differ"), "{error}");
+}
+
+#[test]
 fn wrong_input_ends_with_one_line() {
     let folder = folder();
     fs::write(folder.path().join("text.safetensors"), "weights").unwrap();
@@ -59,14 +84,14 @@ fn wrong_input_ends_with_one_line() {
     copy("wide", json.replace("\"radius\": 1", "\"radius\": 2"));
     copy("blind", json.lines().filter(|line| !line.contains("encoder")).collect());
     let cases: [(&[&str], &str); 8] = [
-        (&["--policy", "follower"], "`--policy follower` needs `--weights FILE`"),
+        (&["--policy", "mats-lp"], "`--policy mats-lp` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs a learned policy: `--policy` with one of follower, mats-lp, network",
+            "`--weights` needs a learned policy: `--policy` with one of follower, mats-lp, network, qmix",
         ),
         (
             &["--mask-actions"],
-            "`--mask-actions` needs a learned policy: `--policy` with one of follower, mats-lp, network",
+            "`--mask-actions` needs a learned policy: `--policy` with one of follower, mats-lp, network, qmix",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],

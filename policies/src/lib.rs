@@ -20,7 +20,8 @@ pub use network::{
     SamplingConfig, Workspace, softmax,
 };
 pub use policy::{
-    Learned, LearnedName, LearnedPolicy, NamedPolicy, NetworkPolicy, PolicySettings, SimplePolicy,
+    Learned, LearnedName, LearnedPolicy, NamedPolicy, NetworkPolicy, PolicySettings, ShippedWeights,
+    SimplePolicy,
 };
 
 /// The README, whose example the tests compile and run.

@@ -3,7 +3,12 @@
 import subprocess
 import sys
 
+import numpy as np
+import torch
+from pogema_rs import VecEnv
 from pogema_rs.baselines import load_config
+from pogema_rs.baselines._acting import Actor
+from pogema_rs.baselines._episodes import Episodes
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
 PPO_METHODS = ("ippo", "mappo", "follower")
@@ -45,3 +50,20 @@ def command(method, folder, *arguments):
 def run(method, folder, *arguments):
     """Runs the command of a small training and returns its result."""
     return subprocess.run(command(method, folder, *arguments), capture_output=True, text=True, check=False)
+
+
+def compare_play(policy, network, config, *, lanes, steps, masks=True):
+    """Checks that a policy in Rust and a network in PyTorch choose the same actions; returns the number of moves."""
+    actor = Actor(network, torch.Generator(), 0.0, masks)
+    configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
+    env = VecEnv(configs, encoder=config.encoder, masks=True, autoreset_mode="Disabled")
+    windows, infos = env.reset(seed=seeds)
+    scalars = np.zeros((*windows.shape[:2], 0), dtype=np.float32)
+    moves = 0
+    for _ in range(steps):
+        actions = actor(windows, scalars, infos["action_masks"])
+        np.testing.assert_array_equal(policy.act(env), actions)
+        moves += int((actions != 0).sum())
+        windows, _, _, _, infos = env.step(actions)
+    env.close()
+    return moves

@@ -40,7 +40,7 @@ def test_bytes_hold_windows_exactly(radius):
         np.testing.assert_array_equal(record.masks[step], masks != 0)
 
 
-@pytest.mark.parametrize("on_target", ["nothing", "restart", "finish", "restart, nothing"])
+@pytest.mark.parametrize("on_target", ["nothing", "restart", "finish"])
 def test_rewards_and_ends_are_those_of_the_environment(on_target):
     changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=40", "schedule.lanes=16"]
     rewards = ["rewards.goal=1.0", "rewards.progress=0.25", "rewards.step=-0.125"]
@@ -70,15 +70,26 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
     assert all(np.isfinite(value) for value in metrics.values())
 
 
+def test_the_rules_of_goals_take_turns():
+    config = small_config("iql", "environment.on_target=[restart, nothing]")
+    episodes = Episodes(config.environment, 1, 12)
+    drawn = [episodes.of_iteration(iteration, 3)[0] for iteration in range(4)]
+    rules = [{one["on_target"] for one in configs} for configs in drawn]
+    assert rules == [{"restart"}, {"nothing"}, {"restart"}, {"nothing"}]
+    lifelong, one_shot = (episodes.of_validation(3, rule) for rule in ("restart", "nothing"))
+    assert lifelong[1] == one_shot[1] and lifelong[0][0]["on_target"] == "restart"
+
+
 def test_rewards_of_follower_are_moves_along_the_path():
     config = small_config("follower", "rewards.path=1.0", "schedule.lanes=16")
+    radius = config.encoder.radius
     record, seen, _, _ = played(config)
     assert set(np.unique(record.rewards)) == {0.0, 1.0}
     for step, (windows, _, _) in enumerate(seen):
         moves = record.places[step + 1, ..., :2].astype(int) - record.places[step, ..., :2]
         for lane, agent in np.ndindex(moves.shape[:2]):
             down, right = moves[lane, agent]
-            is_on_path = windows[lane, agent, 0, 3 + down, 3 + right] == 1 and (down, right) != (0, 0)
+            is_on_path = windows[lane, agent, 0, radius + down, radius + right] == 1 and (down, right) != (0, 0)
             assert record.rewards[step, lane, agent] == is_on_path
 
 

@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from pogema_rs import VecEnv, policies
+from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, train
-from pogema_rs.baselines._acting import Actor
-from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
-from small import Q_METHODS, command, run, small_config
+from small import Q_METHODS, command, compare_play, run, small_config
 
 
 def weights(folder):
@@ -64,17 +62,7 @@ def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     exported = load_file(tmp_path / "weights.safetensors")
     network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
     policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
-    actor = Actor(network, torch.Generator(), 0.0)
-    configs, seeds = Episodes(config.environment, 9, 32).of_validation(8)
-    env = VecEnv(configs, encoder=config.encoder, masks=True, autoreset_mode="Disabled")
-    windows, infos = env.reset(seed=seeds)
-    moves = 0
-    for _ in range(32):
-        actions = actor(windows, np.zeros((8, 4, 0), dtype=np.float32), infos["action_masks"])
-        np.testing.assert_array_equal(policy.act(env), actions)
-        moves += int((actions != 0).sum())
-        windows, _, _, _, infos = env.step(actions)
-    assert moves > 100
+    assert compare_play(policy, network, config, lanes=8, steps=32) > 100
 
 
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
@@ -93,6 +81,20 @@ def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
         features, _ = network.features(torch.from_numpy(windows).view(1, 64, -1), torch.from_numpy(scalars)[None])
         expected = network.policy(features[0]).numpy()
     np.testing.assert_allclose(policy.logits(windows, scalars), expected, atol=1e-5)
+
+
+def test_lifelong_and_one_shot_episodes_share_a_training(tmp_path):
+    config = small_config("qmix", "environment.on_target=[restart, nothing]")
+    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
+    rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
+    assert len(rows) == 2 and {"reward", "ISR", "avg_throughput"} < set(rows[0])
+    assert json.loads((tmp_path / "whole" / "run.json").read_text())["score"] == "reward"
+    # The run stops between the two rules.
+    train(config, tmp_path / "part", Budget(updates=3), seed=3)
+    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    whole, part = weights(tmp_path / "whole"), weights(tmp_path / "part")
+    last = [name for name in whole if name.startswith("last.")]
+    assert last and all(whole[name].tobytes() == part[name].tobytes() for name in last)
 
 
 @pytest.mark.parametrize("method", ["qmix", "ippo"])

@@ -173,9 +173,9 @@ class Policy:
     def __new__(
         cls,
         name: str,
-        weights: str,
+        weights: Optional[str],
         sampling: Optional[str],
-        mask_actions: bool,
+        mask_actions: Optional[bool],
         seed: int,
         threads: int,
         search: tuple[Optional[int], Optional[bool]],

@@ -16,7 +16,8 @@ from pogema_rs.semantics import Semantics
 if TYPE_CHECKING:
     from pogema_rs.vec_env import VecEnv
 
-_NAMES = ("network", "follower", "mats-lp")
+#: The names of all learned policies.
+LEARNED = tuple(_engine.WORDS["learned"])
 _Path = Union[str, "os.PathLike[str]"]
 
 
@@ -31,7 +32,7 @@ class Policy:
     A pickle holds the path of the weights and the settings, but no episode: the copy reads the file again.
     """
 
-    def __init__(self, path: str, settings: dict[str, Any]) -> None:
+    def __init__(self, path: Optional[str], settings: dict[str, Any]) -> None:
         """Reads the weights; use `load`."""
         self._path, self._settings = path, settings
         search = (settings["expansions"], settings["faithful"])
@@ -45,7 +46,7 @@ class Policy:
 
     @property
     def name(self) -> str:
-        """The name of the policy: `network`, `follower` or `mats-lp`."""
+        """The name of the policy."""
         return str(self._settings["name"])
 
     @overload
@@ -133,19 +134,19 @@ class Policy:
         """Forgets all episodes and the environment, so that the policy can play another one."""
         self._policy.reset()
 
-    def __reduce__(self) -> tuple[Any, tuple[str, dict[str, Any]]]:
+    def __reduce__(self) -> tuple[Any, tuple[Optional[str], dict[str, Any]]]:
         return Policy, (self._path, self._settings)
 
     def __repr__(self) -> str:
-        return f"Policy({self.name!r}, {self._path!r})"
+        return f"Policy({self.name!r})" if self._path is None else f"Policy({self.name!r}, {self._path!r})"
 
 
 def load(
-    path: _Path,
+    path: Optional[_Path] = None,
     *,
     name: str = "network",
     sampling: Optional[str] = None,
-    mask_actions: bool = False,
+    mask_actions: Optional[bool] = None,
     seed: int = 0,
     num_threads: int = 1,
     expansions: Optional[int] = None,
@@ -154,16 +155,17 @@ def load(
 ) -> Policy:
     """Reads a learned policy from a file of weights, `.safetensors` or `.onnx`, and the JSON file beside it.
 
-    `name` is `network`, `follower` or `mats-lp`. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
-    `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle. `seed` is the
-    seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of `mats-lp`. `semantics`
+    `name` is the name of a policy in `LEARNED`. Without a path, it plays the weights in this package, which
+    `network`, `follower` and `mats-lp` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
+    `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle [default: as the
+    JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of `mats-lp`. `semantics`
     are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its own.
 
     Errors: FileNotFoundError or OSError for a file that cannot be read; ValueError for a wrong file or setting. The
     message names the file.
     """
-    if name not in _NAMES:
-        raise ValueError(f"name is {name!r}, expected one of {', '.join(map(repr, _NAMES))}")
+    if name not in LEARNED:
+        raise ValueError(f"name is {name!r}, expected one of {', '.join(map(repr, LEARNED))}")
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
         raise TypeError(f"seed is {seed!r}, expected a whole number")
     if not 0 <= seed < 2**64:
@@ -171,14 +173,14 @@ def load(
     settings = {
         "name": name,
         "sampling": sampling,
-        "mask_actions": bool(mask_actions),
+        "mask_actions": None if mask_actions is None else bool(mask_actions),
         "seed": int(seed),
         "num_threads": num_threads,
         "expansions": expansions,
         "faithful": faithful,
         "semantics": Semantics(semantics).value,
     }
-    return Policy(os.path.abspath(os.fspath(path)), settings)
+    return Policy(None if path is None else os.path.abspath(os.fspath(path)), settings)
 
 
 def _checked(observations: Any) -> Sequence[Mapping[str, Any]]:

@@ -15,6 +15,6 @@ from __future__ import annotations
 
 from pogema_rs._encoder import Encoder
 from pogema_rs._export import export, save
-from pogema_rs._policy import Policy, load
+from pogema_rs._policy import LEARNED, Policy, load
 
-__all__ = ["Encoder", "Policy", "export", "load", "save"]
+__all__ = ["LEARNED", "Encoder", "Policy", "export", "load", "save"]

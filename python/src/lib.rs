@@ -19,7 +19,7 @@ mod views;
 
 use pogema_core::{Collision, Observation, OnGoal, Words};
 use pogema_maps::Integration;
-use pogema_policies::{Channel, FollowerVersion, Sampling, Scalars};
+use pogema_policies::{Channel, FollowerVersion, LearnedName, Sampling, Scalars};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -65,5 +65,6 @@ fn words(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     words.set_item("scalars", Scalars::NAMES)?;
     words.set_item("follower", FollowerVersion::NAMES)?;
     words.set_item("sampling", Sampling::NAMES)?;
+    words.set_item("learned", LearnedName::NAMES)?;
     Ok(words)
 }

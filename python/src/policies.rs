@@ -63,20 +63,26 @@ impl Policy {
     #[new]
     fn new(
         name: &str,
-        weights: PathBuf,
+        weights: Option<PathBuf>,
         sampling: Option<&str>,
-        mask_actions: bool,
+        mask_actions: Option<bool>,
         seed: u64,
         threads: usize,
         search: (Option<u32>, Option<bool>),
     ) -> PyResult<Self> {
         let read = || {
             let name = <LearnedName as Words>::read("name", name)?;
-            let mut learned = name.read(&weights)?;
+            let mut learned = match &weights {
+                Some(file) => name.read(file)?,
+                None => name.with_shipped_weights()?,
+            };
             if let Some(sampling) = sampling {
                 learned = learned.with_sampling(Sampling::read("sampling", sampling)?)?;
             }
-            let learned = with_search(learned, search)?.with_masks(mask_actions)?;
+            learned = with_search(learned, search)?;
+            if let Some(masks_actions) = mask_actions {
+                learned = learned.with_masks(masks_actions)?;
+            }
             learned.check_threads(threads).map(|()| learned)
         };
         let learned = read().map_err(|error| to_py_error(&error))?;

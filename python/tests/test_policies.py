@@ -11,7 +11,7 @@ import pytest
 from network_model import PlainNetwork, drawn_network
 from pogema_rs import GridConfig, VecEnv, pogema_v0
 from pogema_rs.errors import NotResetError, StateError
-from pogema_rs.policies import Encoder, Policy, load, save
+from pogema_rs.policies import LEARNED, Encoder, Policy, load, save
 from pogema_rs.toolbox.evaluator import evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
@@ -269,7 +269,7 @@ def test_wrong_files_are_named(tmp_path):
 
 def test_wrong_arguments_are_refused():
     for arguments, error, message in [
-        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'network', 'follower', 'mats-lp'"),
+        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'follower', 'mats-lp', 'network', 'qmix'"),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"seed": 1.5}, TypeError, "seed is 1.5"),
@@ -284,6 +284,24 @@ def test_wrong_arguments_are_refused():
             policy.act(observations)
     with pytest.raises(ValueError, match=r"windows have shape \(2, 1, 5, 5\), expected \(2, 1, 3, 3\)"):
         policy.logits(np.zeros((2, 1, 5, 5)))
+
+
+@pytest.mark.parametrize("name", ["follower", "qmix"])
+def test_weights_of_the_package_play_by_name(name):
+    policy = load(name=name)
+    assert name in LEARNED and repr(policy) == f"Policy({name!r})"
+    copies = [policy, pickle.loads(pickle.dumps(policy))]
+    env = VecEnv(CONFIG, 2)
+    env.reset(seed=0)
+    first, second = (one.act(env) for one in copies)
+    np.testing.assert_array_equal(first, second)
+    assert policy.encoder is not None and (first != 0).any()
+
+
+def test_policies_without_weights_need_a_file():
+    for name in ["network", "mats-lp"]:
+        with pytest.raises(ValueError, match=f"`{name}` needs the weights of a network"):
+            load(name=name)
 
 
 def test_infinite_logits_name_the_agent(tmp_path):

@@ -8,7 +8,7 @@ use std::time::Duration;
 use pogema_core::{Error, MAX_THREADS, Words};
 use pogema_maps::nearest;
 use pogema_planners::Budget;
-use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling};
+use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling, ShippedWeights};
 
 use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
@@ -87,17 +87,18 @@ impl BuiltIn {
             return Err(Error::Syntax { reason });
         };
         let path_of = |key: &str| format!("{}.{key}", algorithm.key);
-        let weights = find("weights").ok_or_else(|| {
-            let (line, path) = (algorithm.line, path_of("weights"));
-            Error::Syntax {
-                reason: format!("line {line}: `{path}` is missing, expected the path of a network"),
+        let mut learned = match find("weights") {
+            Some((key, node)) => {
+                let file = node.text().ok_or_else(|| wrong(node, &path_of(key), "the path of a network"))?;
+                name.read(&folder.join(file))?
             }
-        })?;
-        let file = weights
-            .1
-            .text()
-            .ok_or_else(|| wrong(&weights.1, &path_of("weights"), "the path of a network"))?;
-        let mut learned = name.read(&folder.join(file))?;
+            None if name.shipped_weights().is_some() => name.with_shipped_weights()?,
+            None => {
+                let (line, path) = (algorithm.line, path_of("weights"));
+                let reason = format!("line {line}: `{path}` is missing, expected the path of a network");
+                return Err(Error::Syntax { reason });
+            }
+        };
         let in_line = |key: &str, node: &Node, error: Error| {
             let (line, path) = (node.line, path_of(key));
             Error::Syntax { reason: format!("line {line}: `{path}`: {error}") }
@@ -156,11 +157,21 @@ fn name_of(algorithm: &Algorithm) -> String {
     }
 }
 
-/// Returns the file with the weights of an algorithm, if it is a learned policy.
-pub(crate) fn weights_of(algorithm: &Algorithm, folder: &Path) -> Option<PathBuf> {
-    LearnedName::of_word(&name_of(algorithm))?;
-    let (_, node) = algorithm.parameters.iter().find(|(key, _)| key == "weights")?;
-    node.text().map(|file| folder.join(file))
+/// The weights of an algorithm.
+pub(crate) enum Weights {
+    /// A file, beside which a JSON file may stand.
+    File(PathBuf),
+    /// Those of crate `pogema-policies`.
+    Shipped(ShippedWeights),
+}
+
+/// Returns the weights of an algorithm, if it is a learned policy.
+pub(crate) fn weights_of(algorithm: &Algorithm, folder: &Path) -> Option<Weights> {
+    let name = LearnedName::of_word(&name_of(algorithm))?;
+    match algorithm.parameters.iter().find(|(key, _)| key == "weights") {
+        Some((_, node)) => node.text().map(|file| Weights::File(folder.join(file))),
+        None => name.shipped_weights().map(Weights::Shipped),
+    }
 }
 
 /// Sets a parameter of a search.

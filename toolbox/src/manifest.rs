@@ -8,7 +8,7 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::built_in;
+use crate::built_in::{self, Weights};
 use crate::suite::{Algorithm, Suite};
 
 /// Name of the manifest's file.
@@ -50,8 +50,8 @@ impl Manifest {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(algorithm.fingerprint()));
         let mut weights = BTreeMap::new();
         for algorithm in &suite.algorithms {
-            if let Some(path) = built_in::weights_of(algorithm, suite.folder()) {
-                weights.insert(algorithm.key.clone(), digest_of_weights(&path)?);
+            if let Some(found) = built_in::weights_of(algorithm, suite.folder()) {
+                weights.insert(algorithm.key.clone(), digest_of_weights(&found)?);
             }
         }
         Ok(Self {
@@ -130,13 +130,18 @@ fn first_difference<'a>(
     known.iter().find(|(key, known)| now.get(*key).is_some_and(|now| now != *known)).map(|(key, _)| key)
 }
 
-/// Returns a short hash of a network's file and of the JSON file beside it, which may be absent.
-fn digest_of_weights(path: &Path) -> Result<String, Error> {
+/// Returns a short hash of a network's tensors and of its JSON, which may be absent.
+fn digest_of_weights(weights: &Weights) -> Result<String, Error> {
     let read = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
-    let weights = Sha256::digest(read(path)?);
-    let config = path.with_extension("json");
-    let config = if config.exists() { Sha256::digest(read(&config)?).to_vec() } else { Vec::new() };
-    Ok(digest([weights.as_slice(), &config].concat()))
+    let (tensors, config) = match weights {
+        Weights::File(path) => {
+            let config = path.with_extension("json");
+            (read(path)?, if config.exists() { Some(read(&config)?) } else { None })
+        }
+        Weights::Shipped(shipped) => (shipped.tensors.to_vec(), Some(shipped.config.to_vec())),
+    };
+    let config = config.map_or_else(Vec::new, |bytes| Sha256::digest(bytes).to_vec());
+    Ok(digest([Sha256::digest(tensors).as_slice(), &config].concat()))
 }
 
 /// Returns a short hash of bytes.

@@ -10,7 +10,7 @@ use pogema_policies::{Learned, LearnedName, Sampling};
 /// The network of a learned policy.
 #[derive(Args, Clone, Debug)]
 pub struct LearnedArgs {
-    /// Weights of the network, for `--policy follower`, `--policy mats-lp` or `--policy network`
+    /// Weights of the network of a learned policy, instead of those that the program contains
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Rule that chooses actions from the logits of the network [default: that of its JSON file]
@@ -46,11 +46,17 @@ impl LearnedArgs {
                 None => Ok(None),
             };
         };
-        let missing = || Error::request(format!("`--policy {policy}` needs `--weights FILE`"));
-        let mut learned = name.read(self.weights.as_deref().ok_or_else(missing)?)?;
+        let mut learned = match &self.weights {
+            Some(file) => name.read(file)?,
+            None if name.shipped_weights().is_some() => name.with_shipped_weights()?,
+            None => return Err(Error::request(format!("`--policy {policy}` needs `--weights FILE`"))),
+        };
         if let Some(rule) = self.sampling.as_deref().and_then(Sampling::of_word) {
             learned = learned.with_sampling(rule)?;
         }
-        learned.with_masks(self.mask_actions).map(Some)
+        if self.mask_actions {
+            learned = learned.with_masks(true)?;
+        }
+        Ok(Some(learned))
     }
 }

@@ -131,6 +131,20 @@ impl Network {
         network.map_err(|reason| Error::io(path, reason))
     }
 
+    /// Creates a network from the bytes of its JSON file and of its `.safetensors` file.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] for wrong bytes, with the name of the tensor or layer; [`Error::Config`] as for
+    /// [`Network::read`].
+    pub fn from_bytes(config: &[u8], tensors: &[u8]) -> Result<Self, Error> {
+        let simd_path = SimdPath::from_environment()?;
+        let network = file::parse_config(config).and_then(|config| {
+            let mut tensors = file::parse_tensors(tensors)?;
+            Self::new(config, &mut tensors, simd_path)
+        });
+        network.map_err(|reason| Error::Corrupt { what: "network".into(), reason })
+    }
+
     /// Writes the network of a file as a `.safetensors` file and the JSON beside it.
     ///
     /// # Errors

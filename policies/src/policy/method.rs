@@ -4,15 +4,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Config, Error, Instance, words};
+use pogema_core::{Config, Error, Instance, Words, words};
 
 use crate::mats_lp::{MatsLp, MatsLpParams, NetworkPrior};
 use crate::network::{Network, Sampling};
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::network::NetworkPolicy;
+use crate::policy::shipped::{self, ShippedWeights};
 
 words! {
-    /// The policies that need the weights of a network.
+    /// The policies that play with a network.
     pub enum LearnedName {
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
@@ -20,6 +21,8 @@ words! {
         MatsLp = "mats-lp",
         /// Any network whose JSON file names its encoder.
         Network = "network",
+        /// QMIX, whose windows show costs to go.
+        Qmix = "qmix",
     }
 }
 
@@ -39,15 +42,37 @@ impl LearnedName {
     /// # Errors
     /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy.
     pub fn read(self, weights: &Path) -> Result<Learned, Error> {
-        let network = Network::read(weights)?;
+        self.of_network(Network::read(weights)?).map_err(|error| Error::io(weights, error))
+    }
+
+    /// Returns the policy with the weights that this crate contains for it.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if there are none; [`Error::Config`] as for [`Network::read`].
+    pub fn with_shipped_weights(self) -> Result<Learned, Error> {
+        let missing = || Error::request(format!("`{}` needs the weights of a network", self.word()));
+        let ShippedWeights { config, tensors } = self.shipped_weights().ok_or_else(missing)?;
+        self.of_network(Network::from_bytes(config, tensors)?)
+    }
+
+    /// Returns the weights that this crate contains for the policy.
+    pub fn shipped_weights(self) -> Option<ShippedWeights> {
+        match self {
+            Self::Follower => Some(shipped::FOLLOWER),
+            Self::Qmix => Some(shipped::QMIX),
+            Self::MatsLp | Self::Network => None,
+        }
+    }
+
+    fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
             Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
             Self::MatsLp => {
                 NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
-            Self::Network => NetworkPolicy::new(network).map(Method::Network),
+            Self::Network | Self::Qmix => NetworkPolicy::new(network).map(Method::Network),
         };
-        method.map(Learned).map_err(|error| Error::io(weights, error))
+        method.map(Learned)
     }
 }
 
@@ -109,7 +134,8 @@ impl Learned {
         }
     }
 
-    /// If `masks_actions` is set, forbids actions that lead into an obstacle or off the map [default: off].
+    /// Sets whether actions that lead into an obstacle or off the map are forbidden [default: as the network's JSON
+    /// says].
     ///
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which always forbids them.

@@ -6,8 +6,10 @@ mod named;
 mod network;
 mod network_episode;
 mod sampler;
+mod shipped;
 
 pub use learned::LearnedPolicy;
 pub use method::{Learned, LearnedName};
 pub use named::{NamedPolicy, PolicySettings, SimplePolicy};
 pub use network::NetworkPolicy;
+pub use shipped::ShippedWeights;

@@ -97,9 +97,8 @@ impl NamedPolicy {
         if name_of_learned.is_none() && learned.is_some() {
             return Err(Error::Request { reason: format!("`{name}` does not use weights") });
         }
-        if name_of_learned.is_some() {
-            let missing = || Error::Request { reason: format!("`{name}` needs the weights of a network") };
-            let learned = learned.ok_or_else(missing)?;
+        if let Some(name) = name_of_learned {
+            let learned = learned.map_or_else(|| name.with_shipped_weights(), Ok)?;
             let PlannerSettings { seed, threads, .. } = planner_settings;
             let policy = learned.begin(instance, config, seed, threads, budget.cancelled)?;
             return Ok(Self(Kind::Learned(Box::new(policy))));

@@ -10,4 +10,5 @@ mod learned;
 mod mats_lp;
 #[path = "../common/mod.rs"]
 mod recorded;
+mod shipped;
 mod simd_variable;

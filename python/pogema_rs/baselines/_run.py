@@ -80,6 +80,8 @@ class _Run:
     def __init__(self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool) -> None:
         self.config, self.folder, self.seed, self.threads = config, folder, seed, threads
         self.path = folder / "checkpoint.pt"
+        # Of the code that is loaded now: the checkout may change later.
+        self.commit = _commit()
         if not resume and self.path.exists():
             raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
         saved = _checkpoint.load(self.path, config.method) if resume else None
@@ -217,7 +219,7 @@ class _Run:
             "score": self.curve.score,
             "best": self.curve.best if self.curve.rows else None,
             "versions": {"pogema_rs": __version__, "torch": torch.__version__, "python": platform.python_version()},
-            "commit": _commit(),
+            "commit": self.commit,
             "machine": f"{platform.machine()}, {platform.system()}, {torch.backends.cpu.get_cpu_capability()}",
             "command": ["python", "-m", "pogema_rs.baselines", *sys.argv[1:]],
             "config": self.config.to_dict(),

@@ -1,0 +1,25 @@
+//! The weights that this crate contains, which `pogema_rs.baselines` trained.
+
+/// The weights of a policy, and the JSON that describes its network.
+#[derive(Clone, Copy, Debug)]
+pub struct ShippedWeights {
+    /// The JSON, see [`NetworkConfig`](crate::NetworkConfig).
+    pub config: &'static [u8],
+    /// A `.safetensors` file.
+    pub tensors: &'static [u8],
+}
+
+/// Includes the weights of a folder below `weights/`.
+macro_rules! shipped {
+    ($folder:literal) => {
+        ShippedWeights {
+            config: include_bytes!(concat!("../../weights/", $folder, "/weights.json")),
+            tensors: include_bytes!(concat!("../../weights/", $folder, "/weights.safetensors")),
+        }
+    };
+}
+
+/// Follower, see `weights/follower/run.json`.
+pub const FOLLOWER: ShippedWeights = shipped!("follower");
+/// QMIX, see `weights/qmix/run.json`.
+pub const QMIX: ShippedWeights = shipped!("qmix");
