@@ -53,17 +53,21 @@ def run(method, folder, *arguments):
 
 
 def compare_play(policy, network, config, *, lanes, steps, masks=True):
-    """Checks that a policy in Rust and a network in PyTorch choose the same actions; returns the number of moves."""
+    """Checks that a policy in Rust and a network in PyTorch choose the same actions; returns the number of moves.
+
+    Half of the agents act at random in each step, so that even a network that stays sees many states.
+    """
     actor = Actor(network, torch.Generator(), 0.0, masks)
     configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
     env = VecEnv(configs, encoder=config.encoder, masks=True, autoreset_mode="Disabled")
     windows, infos = env.reset(seed=seeds)
     scalars = np.zeros((*windows.shape[:2], 0), dtype=np.float32)
-    moves = 0
+    moves, rng = 0, np.random.default_rng(0)
     for _ in range(steps):
         actions = actor(windows, scalars, infos["action_masks"])
         np.testing.assert_array_equal(policy.act(env), actions)
         moves += int((actions != 0).sum())
-        windows, _, _, _, infos = env.step(actions)
+        random = rng.integers(5, size=actions.shape)
+        windows, _, _, _, infos = env.step(np.where(rng.random(actions.shape) < 0.5, random, actions))
     env.close()
     return moves

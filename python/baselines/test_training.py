@@ -62,7 +62,7 @@ def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     exported = load_file(tmp_path / "weights.safetensors")
     network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
     policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
-    assert compare_play(policy, network, config, lanes=8, steps=32) > 100
+    assert compare_play(policy, network, config, lanes=8, steps=32) > 20
 
 
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
@@ -156,7 +156,7 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
     folder = tmp_path / "run"
     assert run("iql", folder, "--updates", "2").returncode == 0
     content = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    config = "learner.discount is 0.95, not 0.5"
+    config = "learner.discount is 0.9, not 0.5"
     broken, missing = tmp_path / "broken", tmp_path / "missing"
     broken.mkdir()
     (broken / "checkpoint.pt").write_bytes(content[folder / "checkpoint.pt"][:-100])

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
+import optax  # type: ignore[import-untyped, unused-ignore]
 from pogema_rs.jax import InstancePool, Params, State, action_masks, auto_reset, observe, observe_rows, reset, step
 from pogema_rs.jax import unpack_rows
 
@@ -248,7 +248,7 @@ def main() -> None:
     while seconds < 60 * arguments.minutes:
         resumed = time.perf_counter()
         trained = compiled(params, trained, jnp.float32(seconds / (60 * arguments.minutes)))
-        jax.block_until_ready(trained.weights)
+        trained.weights["value.bias"].block_until_ready()
         num_steps += settings.num_envs * settings.num_steps * NUM_AGENTS
         seconds += time.perf_counter() - resumed
         if seconds / 60 >= curve[-1][0] + arguments.judge_every or seconds >= 60 * arguments.minutes:

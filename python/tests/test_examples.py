@@ -1,4 +1,4 @@
-"""Tests that every example runs in a short mode; `./check frameworks` runs those that need a framework."""
+"""Tests that every example runs in a short mode; `./check frameworks` and `jax` run those that need a framework."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ SHORT = {
 
 
 def test_all_examples_are_listed():
-    with_framework = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py"}
+    with_framework = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py", "train_ppo_jax.py"}
     assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHORT, *with_framework}
 
 

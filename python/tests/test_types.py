@@ -139,8 +139,8 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
 
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-# Those with a framework, which `./check frameworks` installs and checks.
-WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py"}
+# Those with a framework, which `./check frameworks` or `./check jax` installs and checks.
+WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py", "train_ppo_jax.py"}
 
 
 @pytest.mark.slow
