@@ -59,7 +59,7 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
             down, right = now["positions"][lane, agent] - state["positions"][lane, agent]
             nearer = windows[lane, agent, costs, 5 + down, 5 + right] * 10
             on_goal = (now["positions"][lane, agent] == now["goals"][lane, agent]).all()
-            goal = on_goal if configs[lane]["on_target"] == "nothing" else own[lane, agent]
+            goal = on_goal if on_target == "nothing" else own[lane, agent]
             assert record.rewards[step, lane, agent] == pytest.approx(goal + 0.25 * nearer - 0.125, abs=1e-6)
             rewarded += bool(goal)
         assert (record.rewards[step][~active] == 0).all()

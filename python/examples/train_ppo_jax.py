@@ -225,6 +225,7 @@ def plot(curve: list[tuple[float, float]], path: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes, without compilation")
+    parser.add_argument("--iterations", type=int, metavar="N", help="end after N iterations instead, repeatably")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--instances", type=int, default=20_000, help="number of instances in the pool")
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
@@ -244,15 +245,19 @@ def main() -> None:
     began = time.perf_counter()
     compiled = iterate.lower(settings, params, trained, jnp.float32(0)).compile()
     print(f"compiled in {time.perf_counter() - began:.1f} s")
-    curve, seconds, num_steps = [(0.0, float(evaluate(judged, trained.weights, judge)))], 0.0, 0
-    while seconds < 60 * arguments.minutes:
+    curve, seconds, iteration = [(0.0, float(evaluate(judged, trained.weights, judge)))], 0.0, 0
+    progress = 0.0
+    while progress < 1:
         resumed = time.perf_counter()
-        trained = compiled(params, trained, jnp.float32(seconds / (60 * arguments.minutes)))
+        trained = compiled(params, trained, jnp.float32(progress))
         trained.weights["value.bias"].block_until_ready()
-        num_steps += settings.num_envs * settings.num_steps * NUM_AGENTS
+        iteration += 1
         seconds += time.perf_counter() - resumed
-        if seconds / 60 >= curve[-1][0] + arguments.judge_every or seconds >= 60 * arguments.minutes:
+        limit = arguments.iterations
+        progress = seconds / (60 * arguments.minutes) if limit is None else iteration / limit
+        if seconds / 60 >= curve[-1][0] + arguments.judge_every or progress >= 1:
             curve.append((seconds / 60, float(evaluate(judged, trained.weights, judge))))
+            num_steps = iteration * settings.num_envs * settings.num_steps * NUM_AGENTS
             speed = num_steps / seconds
             print(f"{curve[-1][0]:6.1f} min  {num_steps:>12,} agent steps  {speed:8,.0f}/s  ISR {curve[-1][1]:.3f}")
     print(f"ISR on {len(EVALUATION_SEEDS)} unseen seeds: {curve[-1][1]:.3f}")

@@ -13,7 +13,7 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 def test_the_example_trains_and_its_weights_play_in_rust(tmp_path):
     path = tmp_path / "policy.safetensors"
-    command = [sys.executable, "-B", str(EXAMPLES / "train_ppo_jax.py"), "--minutes", "0.3", "--instances", "500"]
+    command = [sys.executable, "-B", str(EXAMPLES / "train_ppo_jax.py"), "--iterations", "8", "--instances", "500"]
     run = subprocess.run([*command, "--save", str(path)], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     # Agents that act at random reach 0.36.

@@ -156,10 +156,11 @@ def load(
     """Reads a learned policy from a file of weights, `.safetensors` or `.onnx`, and the JSON file beside it.
 
     `name` is the name of a policy in `LEARNED`. Without a path, it plays the weights in this package, which
-    `network`, `follower` and `mats-lp` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
+    `network` and `mats-lp` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
     `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle [default: as the
-    JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of `mats-lp`. `semantics`
-    are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its own.
+    JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of
+    `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its
+    own.
 
     Errors: FileNotFoundError or OSError for a file that cannot be read; ValueError for a wrong file or setting. The
     message names the file.

@@ -30,7 +30,6 @@ class Collector:
     def play(self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act) -> tuple[Record, dict[str, float]]:
         """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
         env = self._begin(configs)
-        self._agents_stay = configs[0]["on_target"] == "nothing"
         seen, infos = env.reset(seed=list(seeds))
         record = _record.empty(self._config, self._map_size, self._lanes)
         metrics: dict[str, np.ndarray] = {}
@@ -48,7 +47,7 @@ class Collector:
             record.actions[step], record.played[step] = actions, ~is_over
             seen, own, terminated, truncated, infos = env.step(actions)
             self._note(record, step + 1, seen, infos, env)
-            self._reward(record, step, own)
+            self._reward(record, step, own, configs[0]["on_target"])
             record.terminated[step] = terminated
             is_over |= (terminated.all(axis=1)) | (truncated.all(axis=1))
             if "metrics" in infos:
@@ -94,11 +93,11 @@ class Collector:
         record.places[step] = np.concatenate([state["positions"], state["goals"]], axis=2)
         return state
 
-    def _reward(self, record: Record, step: int, own: np.ndarray) -> None:
+    def _reward(self, record: Record, step: int, own: np.ndarray, on_target: str) -> None:
         """Writes the rewards of a step into the record."""
         config, weights = self._config, self._config.rewards
         rewards = np.full(own.shape, weights.step, dtype=np.float32)
-        if self._agents_stay:
+        if on_target == "nothing":
             places = record.places[step + 1]
             rewards += weights.goal * (places[..., :2] == places[..., 2:]).all(axis=2)
         else:

@@ -101,11 +101,12 @@ class _Run:
         self.learner.open(folder)
         size, schedule = self.episodes.map_size, config.schedule
         # An environment keeps its rule of goals.
-        self.lanes = [Collector(config, size, schedule.lanes, threads) for _ in config.environment.on_target]
+        rules = config.environment.on_target
+        self.lanes = {rule: Collector(config, size, schedule.lanes, threads) for rule in rules}
         environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
         judged = dataclasses.replace(config, environment=environment)
         episodes = schedule.validation_episodes
-        self.judges = {rule: Collector(judged, size, episodes, threads) for rule in environment.on_target}
+        self.judges = {rule: Collector(judged, size, episodes, threads) for rule in rules}
 
     def play(self, budget: Budget) -> dict[str, float]:
         """Trains until the budget is used up."""
@@ -130,7 +131,7 @@ class _Run:
 
     def close(self) -> None:
         """Frees the environments."""
-        for collector in (*self.lanes, *self.judges.values()):
+        for collector in (*self.lanes.values(), *self.judges.values()):
             collector.close()
         if self.writer is not None:
             self.writer.close()
@@ -138,7 +139,7 @@ class _Run:
     def _train_once(self) -> dict[str, float]:
         """Plays the episodes of one iteration, and learns from them."""
         configs, seeds = self.episodes.of_iteration(self.iteration, self.config.schedule.lanes)
-        lanes = self.lanes[self.iteration % len(self.lanes)]
+        lanes = self.lanes[configs[0]["on_target"]]
         record, _ = lanes.play(configs, seeds, self.learner.actor())
         parts = self.learner.learn(record)
         self.iteration += 1
