@@ -60,6 +60,7 @@ fn encoders(criterion: &mut Criterion) {
         ("cost_tracer", vec![Channel::AllAgents, Channel::CostTracer]),
         ("obstacles, agents", vec![Channel::Obstacles, Channel::Agents]),
         ("path", vec![Channel::Path]),
+        ("seen_agents", vec![Channel::SeenAgents]),
         ("seen_obstacles", vec![Channel::SeenObstacles]),
     ];
     for (name, channels) in all {

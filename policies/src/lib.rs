@@ -10,6 +10,7 @@ mod mats_lp;
 mod network;
 mod onnx;
 mod policy;
+mod replan;
 mod simd;
 
 pub use encode::{Channel, Encoder, EncoderSettings, Scalars};

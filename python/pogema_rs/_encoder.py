@@ -29,7 +29,8 @@ class Encoder:
     channels: tuple[str, ...]
     #: The scalars of each agent, in this order. Each kind has two values.
     scalars: tuple[str, ...] = ()
-    #: Number of cells that an agent sees in each direction, for `seen_obstacles` and `follower_path`, 1 to 128.
+    #: Number of cells that an agent sees in each direction, for `seen_agents`, `seen_obstacles` and
+    #: `follower_path`, 1 to 128.
     sight: int = 5
     #: The version of Follower whose path `follower_path` shows: `cpp` or `python`.
     follower: str = "cpp"

@@ -89,6 +89,10 @@ class PlainEncoder:
     def agents(self, agent):
         return [place in self.marks for place in self.shown(agent)]
 
+    def seen_agents(self, agent):
+        seen = set(self.places_around(self.cells[agent], self.encoder.sight))
+        return [place in self.marks and place in seen for place in self.shown(agent)]
+
     def all_agents(self, agent):
         present = {cell for cell, is_active in zip(self.cells, self.active) if is_active}
         return [place in present for place in self.shown(agent)]

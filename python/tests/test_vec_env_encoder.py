@@ -9,7 +9,7 @@ from pogema_rs.vec_env import AutoresetMode
 from vec_helpers import CONFIG, Plain, own_seeds
 
 CHANNELS = [
-    "obstacles", "agents", "all_agents", "goal", "cost_to_go", "cost_tracer", "path", "seen_obstacles",
+    "obstacles", "agents", "all_agents", "goal", "cost_to_go", "cost_tracer", "path", "seen_agents", "seen_obstacles",
 ]  # fmt: skip
 SCALARS = ["position", "goal_position", "goal_offset", "goal_direction"]
 EVERYTHING = Encoder(3, CHANNELS, SCALARS, sight=2)

@@ -121,7 +121,9 @@ impl Encoder {
         self.episode = Some(Episode {
             terrain,
             starts: starts.to_vec(),
-            marks: settings.has(&[Channel::Agents]).then(|| Marks::new(layout, occupancy)),
+            marks: settings
+                .has(&[Channel::Agents, Channel::SeenAgents])
+                .then(|| Marks::new(layout, occupancy)),
             all: settings.has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
             window: vec![0; settings.side() * settings.side()],
@@ -259,7 +261,7 @@ impl Episode {
         }
         let area = settings.side() * settings.side();
         for (&channel, window) in settings.channels.iter().zip(out.chunks_exact_mut(area)) {
-            self.write_window(channel, agent, state, settings.radius, window);
+            self.write_window(channel, agent, state, (settings.radius, settings.sight), window);
         }
     }
 
@@ -268,7 +270,7 @@ impl Episode {
         channel: Channel,
         agent: usize,
         state: State<'_>,
-        radius: usize,
+        (radius, sight): (usize, usize),
         window: &mut [f32],
     ) {
         let Terrain { layout, obstacles, costs, .. } = &self.terrain;
@@ -278,6 +280,10 @@ impl Episode {
             (Channel::Obstacles, ..) => layout.copy_window(obstacles, place, window),
             (Channel::Agents, Some(marks), ..) | (Channel::AllAgents, _, Some(marks), _) => {
                 layout.copy_window(marks.grid(), place, window);
+            }
+            (Channel::SeenAgents, Some(marks), ..) => {
+                layout.copy_window(marks.grid(), place, window);
+                clear_beyond(sight, window);
             }
             (Channel::Goal, ..) => {
                 window.fill(0.0);
@@ -321,6 +327,19 @@ impl Episode {
         for (&known, out) in settings.scalars.iter().zip(out.chunks_exact_mut(Scalars::LEN)) {
             let values = if state.active[agent] { scalars(known, start, cell, goal) } else { [0.0; 2] };
             out.copy_from_slice(&values);
+        }
+    }
+}
+
+/// Sets the cells of a window beyond a distance from its centre to 0.
+fn clear_beyond(distance: usize, window: &mut [f32]) {
+    let side = window.len().isqrt();
+    let is_beyond = |index: usize| index.abs_diff(side / 2) > distance;
+    for (row, cells) in window.chunks_exact_mut(side).enumerate() {
+        for (col, cell) in cells.iter_mut().enumerate() {
+            if is_beyond(row) || is_beyond(col) {
+                *cell = 0.0;
+            }
         }
     }
 }

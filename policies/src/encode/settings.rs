@@ -26,7 +26,7 @@ pub struct EncoderSettings {
     /// The scalars of each agent, in this order.
     #[serde(default)]
     pub scalars: Vec<Scalars>,
-    /// Number of cells that an agent sees in each direction, 1 to 128, for `seen_obstacles` and
+    /// Number of cells that an agent sees in each direction, 1 to 128, for `seen_agents`, `seen_obstacles` and
     /// `follower_path`.
     #[serde(default = "EncoderSettings::default_sight")]
     pub sight: usize,

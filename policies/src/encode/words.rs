@@ -39,6 +39,8 @@ words! {
         ///
         /// Source: Follower, `follower_cpp/follower.cpp`
         FollowerPath = "follower_path",
+        /// 1 for a cell within `sight` that the occupancy grid marks, the own cell included; else 0.
+        SeenAgents = "seen_agents",
         /// 1 for an obstacle that the agent has seen in this episode; else 0.
         ///
         /// The agent sees the cells within `sight` in every state that is encoded.

@@ -45,6 +45,14 @@ impl Layout {
         (usize::from(cell.row) + self.margin) * self.stride() + usize::from(cell.col) + self.margin
     }
 
+    /// Returns the place of a cell that may lie outside the map; `None` beyond the margin.
+    pub fn find_place(&self, row: i32, col: i32) -> Option<usize> {
+        let place = |x: i32, len: usize| {
+            usize::try_from(i64::from(x) + self.margin as i64).ok().filter(|&x| x < len + 2 * self.margin)
+        };
+        Some(place(row, self.height)? * self.stride() + place(col, self.width)?)
+    }
+
     /// Returns the first place of each row of the window around a place.
     pub fn window_rows(&self, place: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (first, stride) = (place - radius * self.stride() - radius, self.stride());

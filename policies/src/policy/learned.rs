@@ -6,18 +6,24 @@ use pogema_core::{Action, Error, State};
 
 use crate::mats_lp::MatsLp;
 use crate::policy::network_episode::NetworkEpisode;
+use crate::policy::switcher::Switcher;
 
 /// A learned policy that chooses the actions of all agents of one episode.
 pub struct LearnedPolicy(Player);
 
 enum Player {
     Network(Box<NetworkEpisode>),
+    Switcher(Box<Switcher>),
     MatsLp(Box<MatsLp>),
 }
 
 impl LearnedPolicy {
     pub(crate) fn of_network(network: NetworkEpisode) -> Self {
         Self(Player::Network(Box::new(network)))
+    }
+
+    pub(crate) fn of_switcher(switcher: Switcher) -> Self {
+        Self(Player::Switcher(Box::new(switcher)))
     }
 
     pub(crate) fn of_search(search: MatsLp) -> Self {
@@ -28,6 +34,7 @@ impl LearnedPolicy {
     pub fn network_time(&self) -> Duration {
         match &self.0 {
             Player::Network(network) => network.network_time(),
+            Player::Switcher(switcher) => switcher.network_time(),
             Player::MatsLp(search) => search.stats().network_time,
         }
     }
@@ -40,6 +47,7 @@ impl LearnedPolicy {
     pub fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
         match &mut self.0 {
             Player::Network(network) => network.act(state),
+            Player::Switcher(switcher) => switcher.act(state),
             Player::MatsLp(search) => search.act(state),
         }
     }

@@ -15,6 +15,10 @@ use crate::policy::shipped::{self, ShippedWeights};
 words! {
     /// The policies that play with a network.
     pub enum LearnedName {
+        /// ASwitcher: RePlan's search, and EPOM's network where the search has no move.
+        ASwitcher = "aswitcher",
+        /// EPOM, whose network sees the obstacles that its agent remembers.
+        Epom = "epom",
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
         /// Tree search over the actions of nearby agents, guided by a network. It knows future goals.
@@ -33,6 +37,7 @@ pub struct Learned(Method);
 #[derive(Clone, Debug)]
 enum Method {
     Network(NetworkPolicy),
+    ASwitcher(NetworkPolicy),
     MatsLp(NetworkPrior, MatsLpParams),
 }
 
@@ -60,17 +65,18 @@ impl LearnedName {
         match self {
             Self::Follower => Some(shipped::FOLLOWER),
             Self::Qmix => Some(shipped::QMIX),
-            Self::MatsLp | Self::Network => None,
+            Self::ASwitcher | Self::Epom | Self::MatsLp | Self::Network => None,
         }
     }
 
     fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
+            Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),
             Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
             Self::MatsLp => {
                 NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
-            Self::Network | Self::Qmix => NetworkPolicy::new(network).map(Method::Network),
+            Self::Epom | Self::Network | Self::Qmix => NetworkPolicy::new(network).map(Method::Network),
         };
         method.map(Learned)
     }
@@ -94,6 +100,7 @@ impl Learned {
     ) -> Result<LearnedPolicy, Error> {
         match &self.0 {
             Method::Network(policy) => policy.begin(instance, config, seed),
+            Method::ASwitcher(policy) => policy.begin_switcher(instance, config, seed),
             Method::MatsLp(prior, params) => {
                 let mut search = MatsLp::new(prior, *params, threads)?.with_cancellation(cancelled);
                 search.begin(instance, config.on_goal);
@@ -102,10 +109,11 @@ impl Learned {
         }
     }
 
-    /// Returns the network that chooses the actions; `None` for MATS-LP, whose network only guides a search.
+    /// Returns the network that chooses actions, for ASwitcher those of some agents; `None` for MATS-LP, whose network
+    /// only guides a search.
     pub fn network(&self) -> Option<&NetworkPolicy> {
         match &self.0 {
-            Method::Network(policy) => Some(policy),
+            Method::Network(policy) | Method::ASwitcher(policy) => Some(policy),
             Method::MatsLp(..) => None,
         }
     }
@@ -116,7 +124,7 @@ impl Learned {
     /// [`Error::Argument`] for MATS-LP, if the number is out of range.
     pub fn check_threads(&self, threads: usize) -> Result<(), Error> {
         match &self.0 {
-            Method::Network(_) => Ok(()),
+            Method::Network(_) | Method::ASwitcher(_) => Ok(()),
             Method::MatsLp(prior, params) => MatsLp::new(prior, *params, threads).map(|_| ()),
         }
     }
@@ -126,12 +134,8 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which plays the most visited action.
     pub fn with_sampling(self, sampling: Sampling) -> Result<Self, Error> {
-        match self.0 {
-            Method::Network(policy) => Ok(Self(Method::Network(policy.with_sampling(sampling)))),
-            Method::MatsLp(..) => {
-                Err(Error::request("`mats-lp` does not sample actions, so `sampling` is not allowed"))
-            }
-        }
+        self.with_network(|policy| policy.with_sampling(sampling))
+            .map_err(|_| Error::request("`mats-lp` does not sample actions, so `sampling` is not allowed"))
     }
 
     /// Sets whether actions that lead into an obstacle or off the map are forbidden [default: as the network's JSON
@@ -140,12 +144,20 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which always forbids them.
     pub fn with_masks(self, masks_actions: bool) -> Result<Self, Error> {
-        match self.0 {
-            Method::Network(policy) => Ok(Self(Method::Network(policy.with_masks(masks_actions)))),
-            Method::MatsLp(..) if masks_actions => {
+        match self.with_network(|policy| policy.with_masks(masks_actions)) {
+            Err(_) if masks_actions => {
                 Err(Error::request("`mats-lp` never moves into obstacles, so `mask_actions` is not allowed"))
             }
-            Method::MatsLp(..) => Ok(self),
+            Ok(changed) | Err(changed) => Ok(changed),
+        }
+    }
+
+    /// Changes the network that chooses actions; returns MATS-LP unchanged as an error.
+    fn with_network(self, change: impl FnOnce(NetworkPolicy) -> NetworkPolicy) -> Result<Self, Self> {
+        match self.0 {
+            Method::Network(policy) => Ok(Self(Method::Network(change(policy)))),
+            Method::ASwitcher(policy) => Ok(Self(Method::ASwitcher(change(policy)))),
+            method @ Method::MatsLp(..) => Err(Self(method)),
         }
     }
 

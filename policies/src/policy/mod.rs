@@ -7,6 +7,7 @@ mod network;
 mod network_episode;
 mod sampler;
 mod shipped;
+mod switcher;
 
 pub use learned::LearnedPolicy;
 pub use method::{Learned, LearnedName};

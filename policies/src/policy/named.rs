@@ -11,6 +11,7 @@ use pogema_planners::{
 
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::method::{Learned, LearnedName};
+use crate::replan::ReplanPolicy;
 
 words! {
     /// The policies without a joint plan.
@@ -19,6 +20,8 @@ words! {
         Random = "random",
         /// POGEMA's own A* policy, one instance for each agent.
         Astar = "astar",
+        /// RePlan: for each agent, a search through cells in which it has seen no obstacle.
+        Replan = "replan",
         /// All agents stay.
         Stay = "stay",
     }
@@ -45,6 +48,7 @@ pub struct NamedPolicy(Kind);
 enum Kind {
     Random(Box<Generator>),
     Astar(AStarTeam),
+    Replan(Box<ReplanPolicy>),
     Stay,
     Planner(Box<PlannerPolicy>),
     Lifelong(Box<LifelongPolicy>),
@@ -120,6 +124,9 @@ impl NamedPolicy {
         Ok(Self(match SimplePolicy::of_word(name) {
             Some(SimplePolicy::Random) => Kind::Random(Box::new(generator)),
             Some(SimplePolicy::Astar) => Kind::Astar(pogema_team()),
+            Some(SimplePolicy::Replan) => {
+                Kind::Replan(Box::new(ReplanPolicy::begin(instance, config, planner_settings.seed)))
+            }
             Some(SimplePolicy::Stay) => Kind::Stay,
             None => return Err(Error::argument("policy", name, format!("one of {}", known().join(", ")))),
         }))
@@ -150,6 +157,7 @@ impl NamedPolicy {
         match &mut self.0 {
             Kind::Random(generator) => Ok(sample(generator, num_agents)),
             Kind::Astar(team) => team.act(PomapfObservations::of(episode)?.each()),
+            Kind::Replan(policy) => Ok(policy.act(episode.state())),
             Kind::Stay => Ok(vec![Action::Stay; num_agents]),
             Kind::Planner(policy) => policy.act(map, episode.state()),
             Kind::Lifelong(policy) => policy.act(map, episode.state()),

@@ -8,6 +8,7 @@ use crate::network::{Network, Sampling, SamplingConfig};
 use crate::policy::learned::LearnedPolicy;
 use crate::policy::network_episode::{NetworkEpisode, NetworkSettings};
 use crate::policy::sampler::NUM_ACTIONS;
+use crate::policy::switcher::Switcher;
 
 /// A network with everything that it needs to act.
 #[derive(Clone, Debug)]
@@ -94,5 +95,18 @@ impl NetworkPolicy {
     /// Currently none; the settings were checked.
     pub fn begin(&self, instance: &Instance, config: &Config, seed: u64) -> Result<LearnedPolicy, Error> {
         NetworkEpisode::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_network)
+    }
+
+    /// Starts an episode of ASwitcher, in which the network moves the agents for which RePlan has no move.
+    ///
+    /// # Errors
+    /// As for [`NetworkPolicy::begin`].
+    pub(crate) fn begin_switcher(
+        &self,
+        instance: &Instance,
+        config: &Config,
+        seed: u64,
+    ) -> Result<LearnedPolicy, Error> {
+        Switcher::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_switcher)
     }
 }

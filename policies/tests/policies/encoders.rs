@@ -92,7 +92,11 @@ impl Plain {
                     flags(&places, |place| path.contains(&place))
                 }
                 Channel::SeenObstacles => flags(&places, |place| self.seen[agent].contains(&place)),
-                Channel::Obstacles | Channel::Agents | Channel::Goal | Channel::FollowerPath => Vec::new(),
+                Channel::Obstacles
+                | Channel::Agents
+                | Channel::SeenAgents
+                | Channel::Goal
+                | Channel::FollowerPath => Vec::new(),
             };
             out.extend(values);
         }
@@ -294,6 +298,32 @@ fn memories_grow() {
 }
 
 #[test]
+fn seen_agents_are_the_agents_within_sight() {
+    let yaml = "{size: 9, density: 0.1, num_agents: 30, seed: 3, collision_system: soft, on_target: restart}";
+    for (radius, sight) in [(4, 2), (2, 4), (3, 3)] {
+        let mut episode = common::start(yaml).unwrap();
+        let settings =
+            EncoderSettings { sight, ..EncoderSettings::new(radius, [Channel::Agents, Channel::SeenAgents]) };
+        let area = settings.side() * settings.side();
+        let mut windows = vec![0.0; 30 * settings.window_len()];
+        let mut encoder = begin(settings, &episode).unwrap();
+        let mut generator = Generator::seeded(0);
+        for _ in 0..8 {
+            encoder.encode(episode.state(), &mut windows, &mut []).unwrap();
+            for of_agent in windows.chunks_exact(2 * area) {
+                let (agents, seen) = of_agent.split_at(area);
+                for ((row, col), (agent, seen)) in window((0, 0), radius as i32).zip(agents.iter().zip(seen))
+                {
+                    let is_seen = row.abs().max(col.abs()) <= sight as i32;
+                    assert_eq!(*seen, if is_seen { *agent } else { 0.0 }, "({row}, {col})");
+                }
+            }
+            episode.step(&pogema_planners::sample(&mut generator, 30)).unwrap();
+        }
+    }
+}
+
+#[test]
 fn a_gap_and_a_new_episode_start_anew() {
     let yaml = "{size: 6, density: 0.1, num_agents: 12, seed: 3, collision_system: soft, on_target: restart}";
     let mut episode = common::start(yaml).unwrap();
@@ -323,7 +353,7 @@ fn a_gap_and_a_new_episode_start_anew() {
 }
 
 /// Every channel.
-const ALL: [Channel; 9] = [
+const ALL: [Channel; 10] = [
     Channel::Obstacles,
     Channel::Agents,
     Channel::AllAgents,
@@ -332,6 +362,7 @@ const ALL: [Channel; 9] = [
     Channel::CostTracer,
     Channel::Path,
     Channel::FollowerPath,
+    Channel::SeenAgents,
     Channel::SeenObstacles,
 ];
 

@@ -1,0 +1,13 @@
+//! RePlan: each agent searches a path in every step, through cells in which it has seen no obstacle.
+//!
+//! Source: Skrynnik et al., "When to switch: planning and learning for partially observable multi-agent pathfinding",
+//! 2023; when-to-switch, `planning/replan_algo.py`, `planning/planner.cpp`
+
+mod planner;
+mod policy;
+mod search;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use planner::{Plan, ReplanVersion, Replanner};
+pub(crate) use policy::ReplanPolicy;

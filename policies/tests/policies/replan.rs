@@ -1,0 +1,89 @@
+//! RePlan as a policy, and as a part of a switcher.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pogema_core::{Action, Episode};
+use pogema_fast::Engine;
+use pogema_numpy::Generator;
+use pogema_planners::PlannerSettings;
+use pogema_policies::{LearnedName, NamedPolicy, PolicySettings};
+
+use crate::common;
+
+fn start(num_agents: usize, rules: &str) -> Episode<Engine> {
+    let yaml = format!(
+        "{{size: 12, density: 0.2, num_agents: {num_agents}, seed: 3, collision_system: soft, max_episode_steps: 96, \
+         {rules}}}"
+    );
+    common::start(&yaml).unwrap()
+}
+
+/// Plays an episode with RePlan and returns the actions of all steps.
+fn play(episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
+    let planner = PlannerSettings { seed, ..PlannerSettings::default() };
+    let settings = PolicySettings { planner, ..PolicySettings::default() };
+    let (config, instance) = (episode.config().clone(), episode.instance().unwrap().clone());
+    let mut policy = NamedPolicy::new("replan", &settings, &config, &instance, Generator::seeded(0)).unwrap();
+    let mut all = Vec::new();
+    while !episode.is_over() {
+        let actions = policy.act(episode).unwrap();
+        episode.step(&actions).unwrap();
+        all.push(actions);
+    }
+    all
+}
+
+#[test]
+fn a_lone_agent_reaches_its_goal() {
+    let mut episode = start(1, "on_target: finish");
+    let played = play(&mut episode, 0);
+    assert!(played.len() < 96, "the episode ended at its goal");
+}
+
+#[test]
+fn many_agents_reach_goals_and_a_seed_repeats() {
+    let mut episode = start(24, "on_target: restart");
+    let played = play(&mut episode, 0);
+    let metrics = episode.metrics();
+    assert!(metrics.avg_throughput.unwrap() > 0.5, "{metrics:?}");
+    assert_eq!(played, play(&mut start(24, "on_target: restart"), 0));
+    assert_ne!(played, play(&mut start(24, "on_target: restart"), 1));
+}
+
+/// Copies the small network, as one whose encoder has another sight.
+fn network(folder: &Path, sight: usize) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors");
+    let path = folder.join("descent.safetensors");
+    fs::copy(&source, &path).unwrap();
+    let json = fs::read_to_string(source.with_extension("json")).unwrap();
+    let mut config: serde_json::Value = serde_json::from_str(&json).unwrap();
+    config["encoder"]["sight"] = sight.into();
+    fs::write(path.with_extension("json"), config.to_string()).unwrap();
+    path
+}
+
+#[test]
+fn a_switcher_moves_as_planned_and_asks_the_network_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = network(folder.path(), 5);
+    let switcher = LearnedName::ASwitcher.read(&path).unwrap();
+    let network = LearnedName::Network.read(&path).unwrap();
+    let mut episode = start(24, "on_target: restart");
+    let begin = |learned: &pogema_policies::Learned, episode: &Episode<Engine>| {
+        learned.begin(episode.instance().unwrap(), episode.config(), 0, 1, None).unwrap()
+    };
+    let (mut switching, mut learned) = (begin(&switcher, &episode), begin(&network, &episode));
+    let (mut same, mut planned) = (0, 0);
+    while !episode.is_over() {
+        // The network saw the same states, so its draws are those of the switcher.
+        let actions = switching.act(episode.state()).unwrap();
+        for (action, other) in actions.iter().zip(learned.act(episode.state()).unwrap()) {
+            if *action == other { same += 1 } else { planned += 1 }
+        }
+        episode.step(&actions).unwrap();
+    }
+    assert!(same > 100 && planned > 100, "{same} and {planned}");
+    assert!(switching.network_time() > std::time::Duration::ZERO);
+    assert!(episode.metrics().avg_throughput.unwrap() > 0.5);
+}
