@@ -26,6 +26,8 @@ class Collector:
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], lanes: int, threads: int) -> None:
         self._config, self._map_size, self._lanes, self._threads = config, map_size, lanes, threads
         self._env: Optional[VecEnv[Any]] = None
+        #: The number of steps by which each agent was nearer to its goal before.
+        self._retreats = np.zeros((lanes, 0), dtype=np.float32)
 
     def play(self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act) -> tuple[Record, dict[str, float]]:
         """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
@@ -39,6 +41,7 @@ class Collector:
         obstacles = state["obstacles"]
         record.maps[:, : obstacles.shape[1], : obstacles.shape[2]] = obstacles
         is_over = np.zeros(self._lanes, dtype=np.bool_)
+        self._retreats = np.zeros(record.actions.shape[1:], dtype=np.float32)
         for step in range(len(record.actions)):
             if is_over.all():
                 break
@@ -105,11 +108,21 @@ class Collector:
         for weight, channel in ((weights.progress, "cost_to_go"), (weights.path, "follower_path")):
             if weight:
                 rewards += weight * self._at_next_cell(record, step, channel)
+        if weights.approach:
+            rewards += weights.approach * self._approaches(record, step)
         # A finished agent gets no reward.
         rewards *= record.active[step] & record.played[step][:, None]
         if weights.team:
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
         record.rewards[step] = rewards
+
+    def _approaches(self, record: Record, step: int) -> np.ndarray:
+        """Returns 1 for each agent that came nearer to its goal than ever before, else 0."""
+        ahead = self._at_next_cell(record, step, "cost_to_go") - self._retreats
+        self._retreats = np.maximum(-ahead, 0)
+        has_new_goal = (record.places[step + 1, ..., 2:] != record.places[step, ..., 2:]).any(axis=2)
+        self._retreats[has_new_goal] = 0
+        return np.asarray(np.maximum(ahead, 0))
 
     def _at_next_cell(self, record: Record, step: int, channel: str) -> np.ndarray:
         """Returns the value of a channel, as it was before the step, at the cell that each agent moved to; else 0.

@@ -47,6 +47,7 @@ class RewardConfig:
     team: bool = False
     goal: float = 1.0
     progress: float = 0.0
+    approach: float = 0.0
     path: float = 0.0
     step: float = 0.0
 
@@ -72,6 +73,8 @@ class QLearningConfig:
     epsilon_start: float = 1.0
     epsilon_end: float = 0.05
     epsilon_steps: int = 100_000
+    #: The trained network draws from the softmax of the values divided by this; 0 for the largest value.
+    temperature: float = 0.0
     replay: int = 5000
     batch: int = 32
     updates: int = 2
@@ -245,7 +248,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
     check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
     _check_learner(check, learner, schedule)
-    for part, channel in (("progress", "cost_to_go"), ("path", "follower_path")):
+    for part, channel in (("progress", "cost_to_go"), ("approach", "cost_to_go"), ("path", "follower_path")):
         needs = getattr(config.rewards, part) != 0 and channel not in config.encoder.channels
         check(not needs, f"rewards.{part}", f"0 without the channel {channel!r}")
 
@@ -253,7 +256,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
 def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], schedule: ScheduleConfig) -> None:
     if isinstance(learner, QLearningConfig):
         check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
-        check(learner.own_loss >= 0, "learner.own_loss", "at least 0")
+        for key in ("own_loss", "temperature"):
+            check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")

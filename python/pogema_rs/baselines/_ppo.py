@@ -54,6 +54,10 @@ class PPOLearner:
         """Returns what plays the episodes of an iteration."""
         return Actor(self.network, self._generator, None, self.masks)
 
+    def trained(self) -> AgentNetwork:
+        """Returns the network with logits for the rule of `sampling`."""
+        return self.network
+
     def judge(self, generator: torch.Generator) -> Actor:
         """Returns what plays the validation episodes."""
         return Actor(self.network, generator, None, self.masks)

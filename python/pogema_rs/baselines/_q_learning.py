@@ -26,9 +26,7 @@ class QLearner:
     constraint in cooperative multi-agent reinforcement learning", 2021
     """
 
-    #: The rule by which the trained network plays.
-    sampling = "greedy"
-    #: Whether it then never moves into obstacles.
+    #: Whether the trained network never moves into obstacles.
     masks = True
 
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
@@ -61,9 +59,24 @@ class QLearner:
         """Returns what plays the episodes of an iteration."""
         return Actor(self.network, self._generator, self.epsilon)
 
+    @property
+    def sampling(self) -> str:
+        """The rule by which the trained network plays."""
+        return "softmax" if self.learner.temperature else "greedy"
+
+    def trained(self) -> AgentNetwork:
+        """Returns the network with logits for the rule of `sampling`: the values, divided by the temperature."""
+        if not self.learner.temperature:
+            return self.network
+        network = copy.deepcopy(self.network)
+        with torch.no_grad():
+            for parameter in network.policy.parameters():
+                parameter /= self.learner.temperature
+        return network
+
     def judge(self, generator: torch.Generator) -> Actor:
         """Returns what plays the validation episodes."""
-        return Actor(self.network, generator, 0.0)
+        return Actor(self.trained(), generator, None if self.learner.temperature else 0.0)
 
     def learn(self, record: Record) -> dict[str, float]:
         """Adds the episodes to the replay and updates the networks; returns means of the updates."""

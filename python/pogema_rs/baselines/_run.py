@@ -204,7 +204,7 @@ class _Run:
         self.learner.network.load_state_dict(self.best_weights)
         path = self.folder / "weights.safetensors"
         rules: dict[str, Any] = {"sampling": self.learner.sampling, "mask_actions": self.learner.masks}
-        policies.export(self.learner.network, self.config.encoder, path, **rules)
+        policies.export(self.learner.trained(), self.config.encoder, path, **rules)
         self.learner.network.load_state_dict(last)
 
     def _describe(self, budget: Budget) -> None:
