@@ -8,10 +8,13 @@ import torch
 from pogema_rs import VecEnv
 from pogema_rs.baselines import load_config
 from pogema_rs.baselines._acting import Actor
+from pogema_rs.baselines._collector import parts
 from pogema_rs.baselines._episodes import Episodes
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
-PPO_METHODS = ("ippo", "mappo", "follower")
+PPO_METHODS = ("ippo", "mappo", "follower", "epom")
+#: The methods whose network has an output for the value.
+WITH_VALUE = ("ippo", "follower", "epom")
 
 _SMALL = (
     "environment.maps=[plain]",
@@ -60,14 +63,14 @@ def compare_play(policy, network, config, *, lanes, steps, masks=True):
     actor = Actor(network, torch.Generator(), 0.0, masks)
     configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
     env = VecEnv(configs, encoder=config.encoder, masks=True, autoreset_mode="Disabled")
-    windows, infos = env.reset(seed=seeds)
-    scalars = np.zeros((*windows.shape[:2], 0), dtype=np.float32)
+    seen, infos = env.reset(seed=seeds)
     moves, rng = 0, np.random.default_rng(0)
     for _ in range(steps):
+        windows, scalars = parts(seen)
         actions = actor(windows, scalars, infos["action_masks"])
         np.testing.assert_array_equal(policy.act(env), actions)
         moves += int((actions != 0).sum())
         random = rng.integers(5, size=actions.shape)
-        windows, _, _, _, infos = env.step(np.where(rng.random(actions.shape) < 0.5, random, actions))
+        seen, _, _, _, infos = env.step(np.where(rng.random(actions.shape) < 0.5, random, actions))
     env.close()
     return moves

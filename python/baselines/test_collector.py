@@ -9,7 +9,7 @@ from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._replay import Replay
 from small import small_config
 
-CHANNELS = "[obstacles, agents, all_agents, goal, cost_to_go, path, follower_path, seen_obstacles]"
+CHANNELS = "[obstacles, agents, all_agents, goal, cost_to_go, path, follower_path, seen_agents, seen_obstacles]"
 
 
 def played(config, iteration=0):
@@ -43,7 +43,7 @@ def test_bytes_hold_windows_exactly(radius):
 @pytest.mark.parametrize("on_target", ["nothing", "restart", "finish"])
 def test_rewards_and_ends_are_those_of_the_environment(on_target):
     changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=40", "schedule.lanes=16"]
-    rewards = ["rewards.goal=1.0", "rewards.progress=0.25", "rewards.step=-0.125"]
+    rewards = ["rewards.goal=1.0", "rewards.progress=0.25", "rewards.approach=0", "rewards.step=-0.125"]
     config = small_config("iql", *changes, *rewards, "learner.replay=16")
     record, seen, metrics, (configs, seeds) = played(config)
     env = VecEnv(configs, autoreset_mode="Disabled", encoder=config.encoder, masks=True)
@@ -68,6 +68,45 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
         windows, state = after.copy(), now
     assert rewarded > 5 and is_over.all()
     assert all(np.isfinite(value) for value in metrics.values())
+
+
+def costs_to(goal, obstacles):
+    """Returns the number of steps from each cell to a goal."""
+    known, queue = {goal: 0}, [goal]
+    for row, col in queue:
+        for near in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
+            inside = 0 <= near[0] < len(obstacles) and 0 <= near[1] < len(obstacles[0])
+            if inside and not obstacles[near] and near not in known:
+                known[near] = known[row, col] + 1
+                queue.append(near)
+    return known
+
+
+@pytest.mark.parametrize("on_target", ["nothing", "restart"])
+@pytest.mark.parametrize("channels", ["[obstacles, agents]", "[cost_to_go, agents]"])
+def test_approach_counts_each_nearest_cell_once(on_target, channels):
+    changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=40", f"encoder.channels={channels}"]
+    rewards = ["rewards.goal=0", "rewards.progress=0", "rewards.approach=1"]
+    config = small_config("iql", *changes, *rewards)
+    record, seen, _, _ = played(config)
+    assert seen[0][0].shape[2] == 2 and record.windows.shape[-1] == 2 * 11 * 11
+    approaches = returns = 0
+    places = record.places.astype(int)
+    for lane, agent in np.ndindex(record.actions.shape[1:]):
+        best = None
+        for step in range(len(record.actions)):
+            *_, row, col = places[step, lane, agent]
+            if step == 0 or (places[step - 1, lane, agent, 2:] != (row, col)).any():
+                best = None
+            costs = costs_to((row, col), record.maps[lane])
+            before, after = (costs[tuple(places[at, lane, agent, :2])] for at in (step, step + 1))
+            best = before if best is None else best
+            expected = float(after < best and record.played[step, lane])
+            assert record.rewards[step, lane, agent] == expected, (lane, agent, step)
+            approaches += expected
+            returns += after < before and not expected
+            best = min(best, after)
+    assert approaches > 5 and returns > 10
 
 
 def test_the_rules_of_goals_take_turns():

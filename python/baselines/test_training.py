@@ -16,7 +16,7 @@ from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, train
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
-from small import Q_METHODS, command, compare_play, run, small_config
+from small import PPO_METHODS, Q_METHODS, WITH_VALUE, command, compare_play, run, small_config
 
 
 def weights(folder):
@@ -36,7 +36,7 @@ def check_equal(first, second):
 
 
 def test_the_methods_are_covered():
-    assert set(METHODS) == {*Q_METHODS, "ippo", "mappo", "follower"}
+    assert set(METHODS) == {*Q_METHODS, *PPO_METHODS}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -57,12 +57,23 @@ def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")
     train(config, tmp_path, Budget(updates=4))
     assert (tmp_path / "weights.safetensors").stat().st_size <= 2**20
-    assert policies.load(tmp_path / "weights.safetensors").sampling == ("greedy" if method in Q_METHODS else "softmax")
-    network = AgentNetwork(config.encoder, config.network, has_value=method in ("ippo", "follower"))
+    assert policies.load(tmp_path / "weights.safetensors").sampling == "softmax"
+    network = AgentNetwork(config.encoder, config.network, has_value=method in WITH_VALUE)
     exported = load_file(tmp_path / "weights.safetensors")
     network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
     policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
     assert compare_play(policy, network, config, lanes=8, steps=32) > 20
+
+
+def test_logits_are_values_divided_by_the_temperature(tmp_path):
+    for name, temperature in (("greedy", 0.0), ("softmax", 0.5)):
+        config = small_config("iql", f"learner.temperature={temperature}")
+        train(config, tmp_path / name, Budget(updates=2), seed=3)
+        assert policies.load(tmp_path / name / "weights.safetensors").sampling == name
+    greedy, softmax = (weights(tmp_path / name) for name in ("greedy", "softmax"))
+    for name in ("policy.weight", "policy.bias"):
+        np.testing.assert_array_equal(softmax[f"last.{name}"], greedy[f"last.{name}"])
+        assert np.abs(softmax[name] - 2 * softmax[f"last.{name}"]).max() == 0
 
 
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, Optional
 
 import numpy as np
 
 from pogema_rs.baselines import _record
-from pogema_rs.baselines._config import TrainingConfig
+from pogema_rs.baselines._config import RewardConfig, TrainingConfig
 from pogema_rs.baselines._record import Record
 from pogema_rs.vec_env import AutoresetMode, VecEnv
 
@@ -26,6 +27,12 @@ class Collector:
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], lanes: int, threads: int) -> None:
         self._config, self._map_size, self._lanes, self._threads = config, map_size, lanes, threads
         self._env: Optional[VecEnv[Any]] = None
+        seen = config.encoder.channels
+        hidden = [one for one in _reward_channels(config.rewards) if one not in seen]
+        #: What the environments encode: what the network sees, and the channels that only the reward reads.
+        self._encoder = dataclasses.replace(config.encoder, channels=[*seen, *hidden])
+        #: The windows of the last state, as whole numbers.
+        self._shown = np.zeros(0, dtype=np.float32)
         #: The number of steps by which each agent was nearer to its goal before.
         self._retreats = np.zeros((lanes, 0), dtype=np.float32)
 
@@ -45,12 +52,13 @@ class Collector:
         for step in range(len(record.actions)):
             if is_over.all():
                 break
-            windows, scalars = self._parts(seen)
-            actions = act(windows, scalars, infos["action_masks"])
+            windows, scalars = parts(seen)
+            before = self._shown
+            actions = act(windows[:, :, : len(self._config.encoder.channels)], scalars, infos["action_masks"])
             record.actions[step], record.played[step] = actions, ~is_over
             seen, own, terminated, truncated, infos = env.step(actions)
             self._note(record, step + 1, seen, infos, env)
-            self._reward(record, step, own, configs[0]["on_target"])
+            self._reward(record, step, before, own, configs[0]["on_target"])
             record.terminated[step] = terminated
             is_over |= (terminated.all(axis=1)) | (truncated.all(axis=1))
             if "metrics" in infos:
@@ -73,31 +81,26 @@ class Collector:
                 autoreset_mode=AutoresetMode.DISABLED,
                 masks=True,
                 map_size=self._map_size,
-                encoder=self._config.encoder,
+                encoder=self._encoder,
             )
         else:
             self._env.set_configs(configs)
         return self._env
 
-    def _parts(self, seen: Any) -> tuple[np.ndarray, np.ndarray]:
-        if isinstance(seen, dict):
-            return seen["windows"], seen["scalars"]
-        lanes, agents = seen.shape[:2]
-        return seen, np.zeros((lanes, agents, 0), dtype=np.float32)
-
     def _note(self, record: Record, step: int, seen: Any, infos: dict[str, Any], env: VecEnv[Any]) -> dict[str, Any]:
         """Writes what agents see in a state into the record, and returns the global state."""
-        windows, scalars = self._parts(seen)
-        scaled = np.rint(windows * (2.0 * self._config.encoder.radius))
-        record.windows[step] = scaled.reshape(*windows.shape[:2], -1)
+        windows, scalars = parts(seen)
+        self._shown = np.rint(windows * (2.0 * self._config.encoder.radius))
+        seen_by_network = self._shown[:, :, : len(self._config.encoder.channels)]
+        record.windows[step] = seen_by_network.reshape(*windows.shape[:2], -1)
         record.scalars[step], record.masks[step] = scalars, infos["action_masks"]
         record.active[step] = infos["is_active"]
         state = env.state()
         record.places[step] = np.concatenate([state["positions"], state["goals"]], axis=2)
         return state
 
-    def _reward(self, record: Record, step: int, own: np.ndarray, on_target: str) -> None:
-        """Writes the rewards of a step into the record."""
+    def _reward(self, record: Record, step: int, before: np.ndarray, own: np.ndarray, on_target: str) -> None:
+        """Writes the rewards of a step into the record; `before` are the windows before the step."""
         config, weights = self._config, self._config.rewards
         rewards = np.full(own.shape, weights.step, dtype=np.float32)
         if on_target == "nothing":
@@ -107,37 +110,51 @@ class Collector:
             rewards += weights.goal * own
         for weight, channel in ((weights.progress, "cost_to_go"), (weights.path, "follower_path")):
             if weight:
-                rewards += weight * self._at_next_cell(record, step, channel)
+                rewards += weight * self._at_next_cell(record, step, before, channel)
         if weights.approach:
-            rewards += weights.approach * self._approaches(record, step)
+            rewards += weights.approach * self._approaches(record, step, before)
         # A finished agent gets no reward.
         rewards *= record.active[step] & record.played[step][:, None]
         if weights.team:
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
         record.rewards[step] = rewards
 
-    def _approaches(self, record: Record, step: int) -> np.ndarray:
+    def _approaches(self, record: Record, step: int, before: np.ndarray) -> np.ndarray:
         """Returns 1 for each agent that came nearer to its goal than ever before, else 0."""
-        ahead = self._at_next_cell(record, step, "cost_to_go") - self._retreats
+        ahead = self._at_next_cell(record, step, before, "cost_to_go") - self._retreats
         self._retreats = np.maximum(-ahead, 0)
         has_new_goal = (record.places[step + 1, ..., 2:] != record.places[step, ..., 2:]).any(axis=2)
         self._retreats[has_new_goal] = 0
         return np.asarray(np.maximum(ahead, 0))
 
-    def _at_next_cell(self, record: Record, step: int, channel: str) -> np.ndarray:
+    def _at_next_cell(self, record: Record, step: int, before: np.ndarray, channel: str) -> np.ndarray:
         """Returns the value of a channel, as it was before the step, at the cell that each agent moved to; else 0.
 
         For `cost_to_go` the unit is one step towards the goal.
         """
-        encoder = self._config.encoder
+        encoder = self._encoder
         _, side, _ = encoder.shape
         moves = record.places[step + 1, ..., :2].astype(np.int64) - record.places[step, ..., :2]
         cells = (moves[..., 0] + encoder.radius) * side + moves[..., 1] + encoder.radius
-        cells += encoder.channels.index(channel) * side * side
-        values = np.take_along_axis(record.windows[step], cells[..., None], axis=2)[..., 0].astype(np.float32)
+        window = before[:, :, encoder.channels.index(channel)].reshape(*moves.shape[:2], side * side)
+        values = np.take_along_axis(window, cells[..., None], axis=2)[..., 0]
         has_moved = moves.any(axis=2)
         scale = 1.0 if channel == "cost_to_go" else 2.0 * encoder.radius
         return np.asarray(has_moved * values / scale, dtype=np.float32)
+
+
+def parts(seen: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the windows and the scalars of observations."""
+    if isinstance(seen, dict):
+        return seen["windows"], seen["scalars"]
+    lanes, agents = seen.shape[:2]
+    return seen, np.zeros((lanes, agents, 0), dtype=np.float32)
+
+
+def _reward_channels(rewards: RewardConfig) -> list[str]:
+    """Returns the channels that the parts of the reward read."""
+    needs_costs = rewards.progress != 0 or rewards.approach != 0
+    return ["cost_to_go"] * needs_costs + ["follower_path"] * (rewards.path != 0)
 
 
 def _keep(metrics: dict[str, np.ndarray], found: dict[str, np.ndarray], ended: np.ndarray) -> None:

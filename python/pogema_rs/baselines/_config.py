@@ -15,12 +15,14 @@ from pogema_rs._encoder import Encoder
 from pogema_rs.toolbox._optional import required
 
 #: The methods that can be trained, by name.
-METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower")
+METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom")
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
 GOAL_RULES = ("nothing", "restart", "finish")
 #: Channels whose values are multiples of `1 / (2 * radius)`, so that a byte holds them exactly.
-CHANNELS = ("obstacles", "agents", "all_agents", "goal", "cost_to_go", "path", "follower_path", "seen_obstacles")
+CHANNELS = (
+    "obstacles", "agents", "all_agents", "goal", "cost_to_go", "path", "follower_path", "seen_agents", "seen_obstacles",
+)  # fmt: skip
 
 Section = TypeVar("Section")
 
@@ -248,9 +250,6 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
     check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
     _check_learner(check, learner, schedule)
-    for part, channel in (("progress", "cost_to_go"), ("approach", "cost_to_go"), ("path", "follower_path")):
-        needs = getattr(config.rewards, part) != 0 and channel not in config.encoder.channels
-        check(not needs, f"rewards.{part}", f"0 without the channel {channel!r}")
 
 
 def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], schedule: ScheduleConfig) -> None:
