@@ -13,10 +13,14 @@ from pogema_rs.baselines._config import TrainingConfig
 
 
 class Sum(nn.Module):
-    """Returns the sum of the agents' values, by TorchRL's mixer."""
+    """Returns the sum of the agents' values, by TorchRL's mixer, divided by their number.
+
+    The team's reward is the mean of the agents' rewards; without the division, the values would have to be their sum.
+    """
 
     def __init__(self, num_agents: int) -> None:
         super().__init__()
+        self.num_agents = num_agents
         self.mixer = VDNMixer(n_agents=num_agents, device="cpu")
 
     def forward(
@@ -24,7 +28,7 @@ class Sum(nn.Module):
     ) -> torch.Tensor:
         """Returns the team's value. Shape: `(..., agents)` to `(..., 1)`."""
         mixed: torch.Tensor = self.mixer(chosen.unsqueeze(-1))
-        return mixed
+        return mixed / self.num_agents
 
 
 def make_mixer(config: TrainingConfig, num_values: int) -> nn.Module:
