@@ -45,7 +45,7 @@ fn a_network_plays_and_its_trace_replays() {
 #[test]
 fn policies_with_weights_in_the_program_need_no_file() {
     let folder = folder();
-    for policy in ["follower", "qmix"] {
+    for policy in ["aswitcher", "epom", "follower", "iql", "qmix", "qplex", "vdn"] {
         let (summary, error, status) = run(folder.path(), &["--policy", policy]);
         assert_eq!((error.as_str(), status), ("", 0));
         let (other, error, status) =
@@ -83,11 +83,11 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "mats-lp"], "`--policy mats-lp` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs a learned policy: `--policy` with one of follower, mats-lp, network, qmix",
+            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--mask-actions"],
-            "`--mask-actions` needs a learned policy: `--policy` with one of follower, mats-lp, network, qmix",
+            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],

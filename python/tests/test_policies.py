@@ -269,7 +269,7 @@ def test_wrong_files_are_named(tmp_path):
 
 def test_wrong_arguments_are_refused():
     for arguments, error, message in [
-        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'follower', 'mats-lp', 'network', 'qmix'"),
+        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'"),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"seed": 1.5}, TypeError, "seed is 1.5"),
@@ -286,7 +286,7 @@ def test_wrong_arguments_are_refused():
         policy.logits(np.zeros((2, 1, 5, 5)))
 
 
-@pytest.mark.parametrize("name", ["follower", "qmix"])
+@pytest.mark.parametrize("name", sorted({*LEARNED} - {"network", "mats-lp"}))
 def test_weights_of_the_package_play_by_name(name):
     policy = load(name=name)
     assert name in LEARNED and repr(policy) == f"Policy({name!r})"

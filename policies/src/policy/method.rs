@@ -21,12 +21,18 @@ words! {
         Epom = "epom",
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
+        /// IQL, whose windows show costs to go.
+        Iql = "iql",
         /// Tree search over the actions of nearby agents, guided by a network. It knows future goals.
         MatsLp = "mats-lp",
         /// Any network whose JSON file names its encoder.
         Network = "network",
         /// QMIX, whose windows show costs to go.
         Qmix = "qmix",
+        /// QPLEX, whose windows show costs to go.
+        Qplex = "qplex",
+        /// VDN, whose windows show costs to go.
+        Vdn = "vdn",
     }
 }
 
@@ -63,9 +69,13 @@ impl LearnedName {
     /// Returns the weights that this crate contains for the policy.
     pub fn shipped_weights(self) -> Option<ShippedWeights> {
         match self {
+            Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
+            Self::Iql => Some(shipped::IQL),
             Self::Qmix => Some(shipped::QMIX),
-            Self::ASwitcher | Self::Epom | Self::MatsLp | Self::Network => None,
+            Self::Qplex => Some(shipped::QPLEX),
+            Self::Vdn => Some(shipped::VDN),
+            Self::MatsLp | Self::Network => None,
         }
     }
 
@@ -76,7 +86,9 @@ impl LearnedName {
             Self::MatsLp => {
                 NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
-            Self::Epom | Self::Network | Self::Qmix => NetworkPolicy::new(network).map(Method::Network),
+            Self::Epom | Self::Iql | Self::Network | Self::Qmix | Self::Qplex | Self::Vdn => {
+                NetworkPolicy::new(network).map(Method::Network)
+            }
         };
         method.map(Learned)
     }

