@@ -115,8 +115,24 @@ def test_the_rules_of_goals_take_turns():
     drawn = [episodes.of_iteration(iteration, 3)[0] for iteration in range(4)]
     rules = [{one["on_target"] for one in configs} for configs in drawn]
     assert rules == [{"restart"}, {"nothing"}, {"restart"}, {"nothing"}]
-    lifelong, one_shot = (episodes.of_validation(3, rule) for rule in ("restart", "nothing"))
+    lifelong, one_shot = (episodes.of_validation(3, (rule, 2)) for rule in ("restart", "nothing"))
     assert lifelong[1] == one_shot[1] and lifelong[0][0]["on_target"] == "restart"
+
+
+def test_crowds_take_turns_and_small_ones_fill_the_record():
+    config = small_config("iql", "environment.on_target=[restart, nothing]", "environment.num_agents=[2, 4]")
+    episodes = Episodes(config.environment, 1, 12)
+    drawn = [episodes.of_iteration(iteration, 3)[0][0] for iteration in range(5)]
+    kinds = [(one["on_target"], one["num_agents"]) for one in drawn]
+    assert kinds == [("restart", 2), ("nothing", 2), ("restart", 4), ("nothing", 4), ("restart", 2)]
+    small, large = (played(config, iteration) for iteration in (0, 2))
+    assert small[1][0][0].shape[1] == 2 and large[1][0][0].shape[1] == 4
+    for record, _, metrics, _ in (small, large):
+        assert record.actions.shape[2] == 4 and np.isfinite(metrics["reward"])
+    record = small[0]
+    assert record.active[:, :, :2].all() and not record.active[:, :, 2:].any()
+    assert record.terminated[:, :, 2:].all() and not record.terminated[:, :, :2].any()
+    assert not record.rewards[:, :, 2:].any() and not record.masks[:, :, 2:].any()
 
 
 def test_rewards_of_follower_are_moves_along_the_path():
@@ -180,4 +196,4 @@ def test_the_configs_of_the_package_play_an_episode():
     for method in ("qmix", "follower"):
         config = load_config(method, None, ["schedule.lanes=2", "environment.max_episode_steps=8"])
         record, _, metrics, _ = played(config)
-        assert record.shape == (8, 2, config.environment.num_agents) and metrics
+        assert record.shape == (8, 2, *config.environment.num_agents) and metrics

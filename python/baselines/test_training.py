@@ -108,6 +108,19 @@ def test_lifelong_and_one_shot_episodes_share_a_training(tmp_path):
     assert last and all(whole[name].tobytes() == part[name].tobytes() for name in last)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_crowds_of_two_sizes_share_a_training(method, tmp_path):
+    config = small_config(method, "environment.num_agents=[2, 3]")
+    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
+    rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
+    assert len(rows) == 2 and all(np.isfinite(float(value)) for row in rows for value in row.values())
+    values = json.loads((tmp_path / "whole" / "run.json").read_text())
+    assert values["config"]["environment"]["num_agents"] == [2, 3]
+    train(config, tmp_path / "part", Budget(updates=2), seed=3)
+    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    check_equal(tmp_path / "whole", tmp_path / "part")
+
+
 @pytest.mark.parametrize("method", ["qmix", "ippo"])
 def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
     assert run(method, tmp_path / "whole", "--updates", "120").returncode == 0

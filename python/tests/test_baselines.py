@@ -65,7 +65,7 @@ def test_episodes_depend_on_seed_and_iteration_and_validation_has_its_own():
 
 @pytest.mark.parametrize("kind", _config.MAP_KINDS)
 def test_every_map_fits_the_room(kind):
-    episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=(kind,), num_agents=4), 0, 64)
+    episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=(kind,), num_agents=(4,)), 0, 64)
     for number in range(5):
         configs, seeds = episodes.of_iteration(number, 16)
         env = VecEnv([GridConfig(**config) for config in configs], map_size=episodes.map_size)
@@ -94,6 +94,9 @@ WRONG = {
     "learner: {temperature: -1}": "learner.temperature is -1.0, expected at least 0",
     "learner: {replay: 3}": "learner.replay is 3, expected at least the 32 lanes",
     "environment: {maps: [cave]}": "environment.maps is ('cave',), expected names of random",
+    "environment: {num_agents: 0}": "environment.num_agents is (0,), expected numbers of at least 1",
+    "environment: {num_agents: [8, 1.5]}": "environment.num_agents is [8, 1.5], expected a list of whole numbers",
+    "environment: {num_agents: many}": "environment.num_agents is 'many', expected a whole number",
     "environment: {maps: random}": "environment.maps is 'random', expected a list of names",
     "environment: {on_target: [stop]}": "environment.on_target is ('stop',), expected names of nothing",
     "environment: {on_target: nothing}": "environment.on_target is 'nothing', expected a list of names",

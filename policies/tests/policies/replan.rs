@@ -23,7 +23,7 @@ fn start(num_agents: usize, rules: &str) -> Episode<Engine> {
 fn play(episode: &mut Episode<Engine>, seed: u64) -> Vec<Vec<Action>> {
     let planner = PlannerSettings { seed, ..PlannerSettings::default() };
     let settings = PolicySettings { planner, ..PolicySettings::default() };
-    let (config, instance) = (episode.config().clone(), episode.instance().unwrap().clone());
+    let (config, instance) = (*episode.config(), episode.instance().unwrap().clone());
     let mut policy = NamedPolicy::new("replan", &settings, &config, &instance, Generator::seeded(0)).unwrap();
     let mut all = Vec::new();
     while !episode.is_over() {

@@ -18,7 +18,7 @@ Act = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 class Collector:
-    """Plays one episode in each lane at a time with one rule of goals, and records it.
+    """Plays one episode in each lane at a time with one rule of goals and one number of agents, and records it.
 
     Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training can therefore
     resume from the number of its iteration, without the state of an environment.
@@ -30,7 +30,7 @@ class Collector:
         seen = config.encoder.channels
         hidden = [one for one in _reward_channels(config.rewards) if one not in seen]
         #: What the environments encode: what the network sees, and the channels that only the reward reads.
-        self._encoder = dataclasses.replace(config.encoder, channels=[*seen, *hidden])
+        self._encoder = dataclasses.replace(config.encoder, channels=(*seen, *hidden))
         #: The windows of the last state, as whole numbers.
         self._shown = np.zeros(0, dtype=np.float32)
         #: The number of steps by which each agent was nearer to its goal before.
@@ -40,7 +40,11 @@ class Collector:
         """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
         env = self._begin(configs)
         seen, infos = env.reset(seed=list(seeds))
-        record = _record.empty(self._config, self._map_size, self._lanes)
+        whole = _record.empty(self._config, self._map_size, self._lanes)
+        num_agents = configs[0]["num_agents"]
+        # Agents that this crowd lacks are inactive, and have no later reward.
+        whole.terminated[:, :, num_agents:] = True
+        record = _record.first_agents(whole, num_agents)
         metrics: dict[str, np.ndarray] = {}
         state = self._note(record, 0, seen, infos, env)
         # The engine's map is as large as the largest map so far; the rest of the record's map is obstacles.
@@ -65,7 +69,7 @@ class Collector:
                 _keep(metrics, infos["metrics"], infos["_metrics"])
         means = {name: float(values.mean()) for name, values in metrics.items()}
         acted = record.active[:-1] & record.played[:, :, None]
-        return record, {**means, "reward": float(record.rewards.sum() / max(1, acted.sum()))}
+        return whole, {**means, "reward": float(record.rewards.sum() / max(1, acted.sum()))}
 
     def close(self) -> None:
         """Frees the environments."""

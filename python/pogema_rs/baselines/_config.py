@@ -32,14 +32,19 @@ class EnvironmentConfig:
     """The episodes of the training."""
 
     maps: tuple[str, ...] = ("random",)
-    num_agents: int = 8
-    #: The rules of goals: each iteration plays one of them, in turn.
+    #: The sizes of crowds, and the rules of goals: each iteration plays one of each, in turn.
+    num_agents: tuple[int, ...] = (8,)
     on_target: tuple[str, ...] = ("nothing",)
     max_episode_steps: int = 128
     collision_system: str = "soft"
     obs_radius: int = 5
     size: int = 8
     density: float = 0.3
+
+    @property
+    def kinds(self) -> list[tuple[str, int]]:
+        """The kinds of episodes in the order in which iterations play them: rules of goals with numbers of agents."""
+        return [(rule, crowd) for crowd in self.num_agents for rule in self.on_target]
 
 
 @dataclass(frozen=True)
@@ -201,8 +206,11 @@ def _section(name: str, key: str, values: Any, kind: type[Section]) -> Section:
 def _value(place: str, value: Any, kind: Any) -> Any:
     if get_origin(kind) is tuple:
         word = get_args(kind)[0]
-        if not isinstance(value, (list, tuple)) or not value or not all(isinstance(one, word) for one in value):
-            raise TypeError(f"{place} is {value!r}, expected a list of names")
+        if word is int and not isinstance(value, (list, tuple)):
+            return (_value(place, value, int),)
+        is_right = isinstance(value, (list, tuple)) and value and all(type(one) is word for one in value)
+        if not is_right:
+            raise TypeError(f"{place} is {value!r}, expected a list of {'whole numbers' if word is int else 'names'}")
         return tuple(value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
@@ -236,7 +244,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names of {', '.join(MAP_KINDS)}")
     rules = f"names of {', '.join(GOAL_RULES)}"
     check(all(rule in GOAL_RULES for rule in environment.on_target), "environment.on_target", rules)
-    for key in ("num_agents", "max_episode_steps", "obs_radius", "size"):
+    check(min(environment.num_agents) >= 1, "environment.num_agents", "numbers of at least 1")
+    for key in ("max_episode_steps", "obs_radius", "size"):
         check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
     check(environment.size <= 255, "environment.size", "at most 255")
     known = all(channel in CHANNELS for channel in config.encoder.channels)

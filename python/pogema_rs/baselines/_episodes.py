@@ -38,34 +38,39 @@ class Episodes:
 
     def of_iteration(self, iteration: int, count: int) -> tuple[list[dict[str, Any]], list[int]]:
         """Returns the configs and the seeds of the training episodes of an iteration."""
-        rules = self._config.on_target
-        return self._draw(_TRAINING, iteration, count, rules[iteration % len(rules)])
+        kinds = self._config.kinds
+        return self._draw(_TRAINING, iteration, count, kinds[iteration % len(kinds)])
 
-    def of_validation(self, count: int, on_target: Optional[str] = None) -> tuple[list[dict[str, Any]], list[int]]:
-        """Returns the configs and the seeds of the validation episodes with a rule of goals [default: the first]."""
-        configs, seeds = self._draw(_VALIDATION, 0, count, on_target or self._config.on_target[0])
+    def of_validation(
+        self, count: int, kind: Optional[tuple[str, int]] = None
+    ) -> tuple[list[dict[str, Any]], list[int]]:
+        """Returns the configs and the seeds of the validation episodes of a kind [default: the first]."""
+        configs, seeds = self._draw(_VALIDATION, 0, count, kind or self._config.kinds[0])
         return [{**config, "max_episode_steps": self._validation_steps} for config in configs], seeds
 
-    def _draw(self, stream: int, number: int, count: int, on_target: str) -> tuple[list[dict[str, Any]], list[int]]:
+    def _draw(
+        self, stream: int, number: int, count: int, kind: tuple[str, int]
+    ) -> tuple[list[dict[str, Any]], list[int]]:
         sequence = np.random.SeedSequence(self._seed, spawn_key=(stream, number))
         drawn = sequence.generate_state(2 * count, np.uint64)
         seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[:count]]
         kinds = self._config.maps
         maps = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
-        return [self._environment(kinds[lane % len(kinds)], on_target, maps[lane]) for lane in range(count)], seeds
+        return [self._environment(kinds[lane % len(kinds)], kind, maps[lane]) for lane in range(count)], seeds
 
-    def _environment(self, kind: str, on_target: str, map_seed: int) -> dict[str, Any]:
+    def _environment(self, map_kind: str, kind: tuple[str, int], map_seed: int) -> dict[str, Any]:
         config = self._config
+        on_target, num_agents = kind
         fields: dict[str, Any] = {
-            "num_agents": config.num_agents,
+            "num_agents": num_agents,
             "on_target": on_target,
             "max_episode_steps": config.max_episode_steps,
             "collision_system": config.collision_system,
             "obs_radius": config.obs_radius,
         }
-        if kind == "plain":
+        if map_kind == "plain":
             return {**fields, "size": config.size, "density": config.density}
-        return {**fields, "map": map_text(kind, map_seed)}
+        return {**fields, "map": map_text(map_kind, map_seed)}
 
 
 def map_text(kind: str, seed: int) -> str:

@@ -40,5 +40,5 @@ def make_critic(config: TrainingConfig, map_size: tuple[int, int]) -> nn.Module:
     assert isinstance(config.learner, PPOConfig)
     network = config.network
     width = network.recurrent or network.hidden
-    num_values = num_state_values(config.environment.num_agents)
+    num_values = num_state_values(max(config.environment.num_agents))
     return GlobalCritic(num_values, width, config.learner.critic_hidden)

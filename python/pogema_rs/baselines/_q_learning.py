@@ -34,7 +34,7 @@ class QLearner:
         self.config, self.learner, self._generator = config, config.learner, generator
         self._map_size = map_size
         self.network = AgentNetwork(config.encoder, config.network, has_value=False)
-        num_values = _networks.num_state_values(config.environment.num_agents)
+        num_values = _networks.num_state_values(max(config.environment.num_agents))
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.mixer: nn.Module = module.make_mixer(config, num_values)
         self.target_network, self.target_mixer = copy.deepcopy(self.network), copy.deepcopy(self.mixer)

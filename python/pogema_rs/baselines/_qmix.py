@@ -30,4 +30,4 @@ class Monotone(nn.Module):
 def make_mixer(config: TrainingConfig, num_values: int) -> nn.Module:
     """Returns the mixer of the method."""
     assert isinstance(config.learner, QLearningConfig)
-    return Monotone(num_values, config.learner.mixer_hidden, config.environment.num_agents)
+    return Monotone(num_values, config.learner.mixer_hidden, max(config.environment.num_agents))

@@ -66,4 +66,4 @@ def make_mixer(config: TrainingConfig, num_values: int) -> nn.Module:
     """Returns the mixer of the method."""
     assert isinstance(config.learner, QLearningConfig)
     learner = config.learner
-    return Duplex(num_values, learner.mixer_hidden, config.environment.num_agents, learner.kernels)
+    return Duplex(num_values, learner.mixer_hidden, max(config.environment.num_agents), learner.kernels)

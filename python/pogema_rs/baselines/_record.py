@@ -46,7 +46,7 @@ class Record:
 
 def layout(config: TrainingConfig, map_size: tuple[int, int]) -> dict[str, tuple[tuple[int, ...], type]]:
     """Returns the shape of one episode in each array of a `Record`, without the axis of the lanes, and its dtype."""
-    steps, agents = config.environment.max_episode_steps, config.environment.num_agents
+    steps, agents = config.environment.max_episode_steps, max(config.environment.num_agents)
     channels, side, _ = config.encoder.shape
     return {
         "windows": ((steps + 1, agents, channels * side * side), np.int8),
@@ -80,6 +80,12 @@ def by_lane(record: Record) -> dict[str, np.ndarray]:
 def by_step(arrays: dict[str, np.ndarray]) -> Record:
     """Returns a record of arrays whose first axis is that of the lanes."""
     return Record(**{name: one if name == "maps" else one.swapaxes(0, 1) for name, one in arrays.items()})
+
+
+def first_agents(record: Record, count: int) -> Record:
+    """Returns the arrays of the first agents, which share the memory of the record."""
+    arrays = {one.name: getattr(record, one.name) for one in fields(record)}
+    return Record(**{name: one if name in ("maps", "played") else one[:, :, :count] for name, one in arrays.items()})
 
 
 def lanes_of(record: Record, lanes: np.ndarray) -> Record:

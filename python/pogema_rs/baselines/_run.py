@@ -100,13 +100,13 @@ class _Run:
         folder.mkdir(parents=True, exist_ok=True)
         self.learner.open(folder)
         size, schedule = self.episodes.map_size, config.schedule
-        # An environment keeps its rule of goals.
-        rules = config.environment.on_target
-        self.lanes = {rule: Collector(config, size, schedule.lanes, threads) for rule in rules}
+        # An environment keeps its rule of goals and its number of agents.
+        kinds = config.environment.kinds
+        self.lanes = {kind: Collector(config, size, schedule.lanes, threads) for kind in kinds}
         environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
         judged = dataclasses.replace(config, environment=environment)
         episodes = schedule.validation_episodes
-        self.judges = {rule: Collector(judged, size, episodes, threads) for rule in rules}
+        self.judges = {kind: Collector(judged, size, episodes, threads) for kind in kinds}
 
     def play(self, budget: Budget) -> dict[str, float]:
         """Trains until the budget is used up."""
@@ -139,7 +139,7 @@ class _Run:
     def _train_once(self) -> dict[str, float]:
         """Plays the episodes of one iteration, and learns from them."""
         configs, seeds = self.episodes.of_iteration(self.iteration, self.config.schedule.lanes)
-        lanes = self.lanes[configs[0]["on_target"]]
+        lanes = self.lanes[configs[0]["on_target"], configs[0]["num_agents"]]
         record, _ = lanes.play(configs, seeds, self.learner.actor())
         parts = self.learner.learn(record)
         self.iteration += 1
@@ -148,15 +148,15 @@ class _Run:
 
     def _validate(self, parts: dict[str, float]) -> None:
         """Plays the validation episodes, and keeps the weights if they are the best so far."""
-        metrics: dict[str, float] = {}
-        rewards = 0.0
-        for rule, judges in self.judges.items():
-            configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes, rule)
+        found_in: dict[str, list[float]] = {}
+        for kind, judges in self.judges.items():
+            configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes, kind)
             generator = torch.Generator().manual_seed(self.seed)
             _, found = judges.play(configs, seeds, self.learner.judge(generator))
-            rewards += found["reward"] / len(self.judges)
-            metrics.update(found)
-        metrics["reward"] = rewards
+            for name, value in found.items():
+                found_in.setdefault(name, []).append(value)
+        # Some metrics exist for one rule of goals only.
+        metrics = {name: sum(values) / len(values) for name, values in found_in.items()}
         if metrics[self.curve.score] > self.curve.best:
             self.best_weights = self._weights()
         row = {"iteration": self.iteration, "agent_steps": self.agent_steps, "minutes": self.seconds / 60}

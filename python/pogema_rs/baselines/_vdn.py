@@ -33,4 +33,4 @@ class Sum(nn.Module):
 
 def make_mixer(config: TrainingConfig, num_values: int) -> nn.Module:
     """Returns the mixer of the method."""
-    return Sum(config.environment.num_agents)
+    return Sum(max(config.environment.num_agents))
