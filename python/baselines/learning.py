@@ -6,13 +6,19 @@ import pytest
 from pogema_rs.baselines import METHODS, Budget, train
 from small import small_config
 
-#: The ISR that each method reaches on maps of 5x5 cells with two agents; agents at random reach about 0.1.
-LEAST = dict.fromkeys(METHODS, 0.9) | {"epom": 0.8}
+#: The rule of goals, the metric and the least value of each method, on maps of 5x5 cells with two agents.
+#: After 10 iterations, the first validation, they reach an ISR of 0.5 to 0.7 and Follower a throughput of 0.22.
+#: Follower is only rewarded for following its path, so it needs a next goal.
+AIMS = dict.fromkeys(METHODS, ("finish", "ISR", 0.9)) | {
+    "epom": ("finish", "ISR", 0.8),
+    "follower": ("restart", "avg_throughput", 0.4),
+}
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_minute_leads_two_agents_to_their_goals(method, tmp_path):
-    changes = ["environment.on_target=[finish]", "environment.max_episode_steps=24", "schedule.lanes=16"]
+    on_target, metric, least = AIMS[method]
+    changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=24", "schedule.lanes=16"]
     validation = ["schedule.validation_steps=32", "schedule.validation_episodes=128", "schedule.validate_every=10"]
     sizes = ["network.hidden=64", "schedule.checkpoint_every=100"]
     if "replay" in small_config(method).to_dict()["learner"]:
@@ -20,6 +26,6 @@ def test_a_minute_leads_two_agents_to_their_goals(method, tmp_path):
     config = small_config(method, *changes, *validation, *sizes)
     train(config, tmp_path, Budget(minutes=1))
     rows = list(csv.DictReader((tmp_path / "curve.csv").open(newline="")))
-    best = max(float(row["ISR"]) for row in rows)
-    print(f"{method}: ISR {best:.3f} after {rows[-1]['iteration']} iterations")
-    assert best >= LEAST[method]
+    best = max(float(row[metric]) for row in rows)
+    print(f"{method}: {metric} {best:.3f} after {rows[-1]['iteration']} iterations")
+    assert best >= least
