@@ -9,7 +9,8 @@ use pogema_policies::{Learned, LearnedName, LearnedPolicy, Sampling};
 
 use crate::common;
 
-fn descent() -> PathBuf {
+/// Returns the file of the small network.
+pub fn descent() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors")
 }
 

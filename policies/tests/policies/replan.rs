@@ -1,15 +1,13 @@
 //! RePlan as a policy, and as a part of a switcher.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
 use pogema_core::{Action, Episode};
 use pogema_fast::Engine;
 use pogema_numpy::Generator;
 use pogema_planners::PlannerSettings;
-use pogema_policies::{LearnedName, NamedPolicy, PolicySettings};
+use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings};
 
 use crate::common;
+use crate::learned::descent;
 
 fn start(num_agents: usize, rules: &str) -> Episode<Engine> {
     let yaml = format!(
@@ -51,26 +49,12 @@ fn many_agents_reach_goals_and_a_seed_repeats() {
     assert_ne!(played, play(&mut start(24, "on_target: restart"), 1));
 }
 
-/// Copies the small network, as one whose encoder has another sight.
-fn network(folder: &Path, sight: usize) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors");
-    let path = folder.join("descent.safetensors");
-    fs::copy(&source, &path).unwrap();
-    let json = fs::read_to_string(source.with_extension("json")).unwrap();
-    let mut config: serde_json::Value = serde_json::from_str(&json).unwrap();
-    config["encoder"]["sight"] = sight.into();
-    fs::write(path.with_extension("json"), config.to_string()).unwrap();
-    path
-}
-
 #[test]
 fn a_switcher_moves_as_planned_and_asks_the_network_otherwise() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = network(folder.path(), 5);
-    let switcher = LearnedName::ASwitcher.read(&path).unwrap();
-    let network = LearnedName::Network.read(&path).unwrap();
+    let switcher = LearnedName::ASwitcher.read(&descent()).unwrap();
+    let network = LearnedName::Network.read(&descent()).unwrap();
     let mut episode = start(24, "on_target: restart");
-    let begin = |learned: &pogema_policies::Learned, episode: &Episode<Engine>| {
+    let begin = |learned: &Learned, episode: &Episode<Engine>| {
         learned.begin(episode.instance().unwrap(), episode.config(), 0, 1, None).unwrap()
     };
     let (mut switching, mut learned) = (begin(&switcher, &episode), begin(&network, &episode));
