@@ -52,6 +52,18 @@ def test_a_seed_repeats_and_a_resumed_run_equals_an_uninterrupted_one(method, tm
     assert any(not np.array_equal(halfway[name], one) for name, one in weights(tmp_path / "other").items())
 
 
+@pytest.mark.parametrize("method", ("iql", "ippo"))
+def test_the_learning_rate_falls_to_half_and_a_resumed_run_goes_on_with_it(method, tmp_path):
+    config = small_config(method, "learner.half_life=2")
+    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
+    train(config, tmp_path / "part", Budget(updates=2), seed=3)
+    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    check_equal(tmp_path / "whole", tmp_path / "part")
+    learner = _checkpoint.load(tmp_path / "part" / "checkpoint.pt", method)["learner"]
+    rate = learner["modules"][-1]["param_groups"][0]["lr"]
+    assert rate == pytest.approx(config.learner.learning_rate / 4)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")

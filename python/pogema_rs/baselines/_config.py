@@ -76,6 +76,8 @@ class QLearningConfig:
     discount: float = 0.99
     td_lambda: float = 0.6
     learning_rate: float = 0.001
+    #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
+    half_life: int = 0
     max_gradient: float = 10.0
     epsilon_start: float = 1.0
     epsilon_end: float = 0.05
@@ -98,6 +100,8 @@ class PPOConfig:
     discount: float = 0.99
     gae_lambda: float = 0.95
     learning_rate: float = 0.0005
+    #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
+    half_life: int = 0
     max_gradient: float = 0.5
     clip: float = 0.2
     entropy: float = 0.01
@@ -258,6 +262,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
         check(getattr(schedule, one.name) >= 1, f"schedule.{one.name}", "at least 1")
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
     check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
+    check(learner.half_life >= 0, "learner.half_life", "at least 0")
     _check_learner(check, learner, schedule)
 
 

@@ -17,6 +17,7 @@ from torchrl.objectives import ClipPPOLoss
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import PPOConfig, TrainingConfig
+from pogema_rs.baselines._learning_rate import decay
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
 from pogema_rs.baselines._targets import advantages, last_steps
@@ -77,6 +78,7 @@ class PPOLearner:
                     parts = gains[:, lanes], returns[:, lanes], odds[:, lanes], played[:, lanes]
                     for name, value in self._update(lanes_of(record, lanes.numpy()), *parts).items():
                         sums[name] = sums.get(name, 0.0) + value / count
+        decay(self.optimizer, self.learner.half_life)
         return sums
 
     def _outputs(self, record: Record) -> tuple[torch.Tensor, torch.Tensor]:

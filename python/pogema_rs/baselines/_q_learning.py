@@ -13,6 +13,7 @@ from torch import nn
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig
+from pogema_rs.baselines._learning_rate import decay
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record
 from pogema_rs.baselines._replay import Replay
@@ -88,6 +89,7 @@ class QLearner:
             batch = min(self.learner.batch, len(self.replay))
             draws = torch.randint(len(self.replay), (batch,), generator=self._generator)
             losses.append(self._update(self.replay.sample(draws.numpy())))
+        decay(self.optimizer, self.learner.half_life)
         if self._episodes - self._copied >= self.learner.target_episodes:
             self.target_network.load_state_dict(self.network.state_dict())
             self.target_mixer.load_state_dict(self.mixer.state_dict())
