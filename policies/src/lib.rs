@@ -21,8 +21,7 @@ pub use network::{
     SamplingConfig, Workspace, softmax,
 };
 pub use policy::{
-    Learned, LearnedName, LearnedPolicy, NamedPolicy, NetworkPolicy, PolicySettings, ShippedWeights,
-    SimplePolicy,
+    Learned, LearnedName, LearnedPolicy, NamedPolicy, PolicySettings, ShippedWeights, SimplePolicy,
 };
 
 /// The README, whose example the tests compile and run.

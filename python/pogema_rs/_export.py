@@ -17,7 +17,6 @@ from pogema_rs._policy import load
 
 _Path = Union[str, "os.PathLike[str]"]
 _Encoder = Union[Encoder, Mapping[str, Any]]
-_NUM_ACTIONS = 5
 
 
 def save(
@@ -30,12 +29,15 @@ def save(
     value: Optional[str] = None,
     sampling: str = "softmax",
     mask_actions: bool = False,
+    name: str = "network",
 ) -> None:
     """Writes a network as a `.safetensors` file and the JSON file beside it.
 
     `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by the names that the layers
     use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
-    chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle.
+    chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle. `name` is
+    the policy in `LEARNED` that shall play the network. The network of `lswitcher` returns two values instead of logits,
+    and uses no `sampling` and `mask_actions`.
 
     Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not
     fit; OSError if a file cannot be written. After an error, the files are unchanged.
@@ -53,16 +55,23 @@ def save(
         architecture["value"] = value
     arrays = [(name, np.ascontiguousarray(array, dtype=np.float32)) for name, array in tensors.items()]
     config = _config(encoder, sampling, mask_actions, architecture=architecture)
-    _engine.write_network(target, json.dumps(config), arrays)
+    _engine.write_network(target, json.dumps(config), name, arrays)
 
 
 def export(
-    module: Any, encoder: _Encoder, path: _Path, *, sampling: str = "softmax", mask_actions: bool = False
+    module: Any,
+    encoder: _Encoder,
+    path: _Path,
+    *,
+    sampling: str = "softmax",
+    mask_actions: bool = False,
+    name: str = "network",
 ) -> None:
     """Writes a PyTorch module, so that it plays in Rust: as `.safetensors` or `.onnx`, with a JSON file beside it.
 
     `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
-    With `mask_actions`, no agent moves into an obstacle.
+    With `mask_actions`, no agent moves into an obstacle. `name` is the policy that shall play the network, as for
+    `save`.
 
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
     attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
@@ -79,7 +88,7 @@ def export(
     """
     encoder = read_encoder(encoder)
     if os.fspath(path).endswith(".onnx"):
-        _export_onnx(module, _target(path, ".onnx"), encoder, _config(encoder, sampling, mask_actions))
+        _export_onnx(module, _target(path, ".onnx"), encoder, _config(encoder, sampling, mask_actions), name)
         return
     target = _target(path, ".safetensors")
     from pogema_rs import _torch_layers
@@ -88,16 +97,17 @@ def export(
     names: dict[str, Any] = {"actions": parts.actions, "value": parts.value}
 
     def write(path: _Path) -> None:
-        save(path, encoder, parts.layers, parts.tensors, **names, sampling=sampling, mask_actions=mask_actions)
+        rules: dict[str, Any] = {"sampling": sampling, "mask_actions": mask_actions, "name": name}
+        save(path, encoder, parts.layers, parts.tensors, **names, **rules)
 
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.safetensors"
         write(trial)
-        _torch_layers.compare(parts, load(trial), encoder)
+        _torch_layers.compare(parts, load(trial, name=name), encoder)
     write(target)
 
 
-def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, Any]) -> None:
+def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, Any], name: str) -> None:
     from pogema_rs import _torch_layers
 
     text = json.dumps(config, indent=2) + "\n"
@@ -105,7 +115,7 @@ def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, A
         trial = Path(folder) / "trial.onnx"
         _torch_layers.write_onnx(module, encoder, str(trial))
         trial.with_suffix(".json").write_text(text)
-        load(trial)
+        load(trial, name=name)
         Path(target).write_bytes(trial.read_bytes())
     Path(target).with_suffix(".json").write_text(text)
 

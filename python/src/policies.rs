@@ -11,8 +11,7 @@ use numpy::{
 use pogema_core::{Action, Cell, Config, Environment, Error, GoalStream, Instance, Occupancy, State, Words};
 use pogema_fast::Engine;
 use pogema_policies::{
-    Inputs, Learned, LearnedName, LearnedPolicy, Network, NetworkConfig, NetworkPolicy, RecurrentState,
-    Sampling,
+    Inputs, Learned, LearnedName, LearnedPolicy, Network, NetworkConfig, RecurrentState, Sampling,
 };
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -91,12 +90,12 @@ impl Policy {
 
     /// Returns the JSON of the encoder, if the policy has one.
     fn encoder(&self) -> PyResult<Option<String>> {
-        Ok(self.learned.network().and_then(|policy| serde_json::to_string(policy.encoder()).ok()))
+        Ok(self.learned.encoder().and_then(|encoder| serde_json::to_string(encoder).ok()))
     }
 
     /// Returns the rule that chooses actions from logits, if the policy has one.
     fn sampling(&self) -> PyResult<Option<&'static str>> {
-        Ok(self.learned.network().map(|policy| policy.sampling().word()))
+        Ok(self.learned.sampling().map(Sampling::word))
     }
 
     /// Writes the actions of all agents of a batch.
@@ -153,19 +152,19 @@ impl Policy {
         acted.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Returns the logits of a batch of agents at the beginning of an episode.
+    /// Returns the outputs of the network for a batch of agents at the beginning of an episode.
     ///
-    /// Shape: `windows` and `scalars` are `(agents, values)`, the result is `(agents, 5)`
+    /// Shape: `windows` and `scalars` are `(agents, values)`, the result is `(agents, outputs)`
     fn logits<'py>(
         &self,
         py: Python<'py>,
         windows: PyReadonlyArray2<'_, f32>,
         scalars: PyReadonlyArray2<'_, f32>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let Some(policy) = self.learned.network() else {
+        let Some(network) = self.learned.network() else {
             return Err(PyValueError::new_err("`mats-lp` has no logits of single agents"));
         };
-        let (network, batch) = (policy.network(), windows.shape()[0]);
+        let batch = windows.shape()[0];
         let inputs = Inputs { windows: windows.as_slice()?, scalars: scalars.as_slice()?, batch };
         let forward = || {
             let (mut state, mut workspace) = (RecurrentState::new(network, batch), network.workspace());
@@ -336,11 +335,13 @@ fn other_environment() -> PyErr {
 guarded! {
 /// Writes a network with its encoder as a `.safetensors` file and the JSON beside it.
 ///
-/// `config` is the content of the JSON. An error leaves both files as they were.
+/// `config` is the content of the JSON, and `name` that of the policy that shall play the network. An error leaves both
+/// files as they were.
 #[pyfunction]
 pub fn write_network(
     path: PathBuf,
     config: &str,
+    name: &str,
     tensors: Vec<(String, PyReadonlyArrayDyn<'_, f32>)>,
 ) -> PyResult<()> {
     let read = |(name, array): (String, PyReadonlyArrayDyn<'_, f32>)| {
@@ -351,7 +352,7 @@ pub fn write_network(
         let wrong = |error: serde_json::Error| Error::Corrupt { what: "network".into(), reason: error.to_string() };
         let config: NetworkConfig = serde_json::from_str(config).map_err(wrong)?;
         let network = Network::from_tensors(config.clone(), tensors.iter().cloned())?;
-        NetworkPolicy::new(network)?;
+        <LearnedName as Words>::read("name", name)?.of_network(network)?;
         Network::write(&path, config, tensors)
     };
     write().map_err(|error| to_py_error(&error))

@@ -5,38 +5,40 @@ use std::time::Duration;
 use pogema_core::{Action, Error, State};
 
 use crate::mats_lp::MatsLp;
-use crate::policy::network_episode::NetworkEpisode;
-use crate::policy::switcher::Switcher;
 
 /// A learned policy that chooses the actions of all agents of one episode.
-pub struct LearnedPolicy(Player);
+pub struct LearnedPolicy(Box<dyn Player + Send>);
 
-enum Player {
-    Network(Box<NetworkEpisode>),
-    Switcher(Box<Switcher>),
-    MatsLp(Box<MatsLp>),
+/// What a learned policy does in one episode.
+pub(crate) trait Player {
+    /// Returns the time that networks have taken since the episode began, summed over threads.
+    fn network_time(&self) -> Duration;
+
+    /// Returns the actions of all agents in the next state of the episode; inactive agents stay.
+    ///
+    /// # Errors
+    /// Those of [`LearnedPolicy::act`].
+    fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error>;
+}
+
+impl Player for MatsLp {
+    fn network_time(&self) -> Duration {
+        self.stats().network_time
+    }
+
+    fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
+        Self::act(self, state)
+    }
 }
 
 impl LearnedPolicy {
-    pub(crate) fn of_network(network: NetworkEpisode) -> Self {
-        Self(Player::Network(Box::new(network)))
+    pub(crate) fn new(player: impl Player + Send + 'static) -> Self {
+        Self(Box::new(player))
     }
 
-    pub(crate) fn of_switcher(switcher: Switcher) -> Self {
-        Self(Player::Switcher(Box::new(switcher)))
-    }
-
-    pub(crate) fn of_search(search: MatsLp) -> Self {
-        Self(Player::MatsLp(Box::new(search)))
-    }
-
-    /// Returns the time that the network has taken since the episode began, summed over threads.
+    /// Returns the time that networks have taken since the episode began, summed over threads.
     pub fn network_time(&self) -> Duration {
-        match &self.0 {
-            Player::Network(network) => network.network_time(),
-            Player::Switcher(switcher) => switcher.network_time(),
-            Player::MatsLp(search) => search.stats().network_time,
-        }
+        self.0.network_time()
     }
 
     /// Returns the actions of all agents in the next state of the episode; inactive agents stay.
@@ -45,10 +47,6 @@ impl LearnedPolicy {
     /// [`Error::Length`] or [`Error::Agent`] for a state that does not fit the instance; [`Error::Corrupt`] with agent
     /// and step if the network returns a value that is not finite; for MATS-LP also those of [`MatsLp::act`].
     pub fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
-        match &mut self.0 {
-            Player::Network(network) => network.act(state),
-            Player::Switcher(switcher) => switcher.act(state),
-            Player::MatsLp(search) => search.act(state),
-        }
+        self.0.act(state)
     }
 }

@@ -6,10 +6,14 @@ use std::sync::atomic::AtomicBool;
 
 use pogema_core::{Config, Error, Instance, Words, words};
 
+use crate::encode::EncoderSettings;
 use crate::mats_lp::{MatsLp, MatsLpParams, NetworkPrior};
 use crate::network::{Network, Sampling};
+use crate::policy::aswitcher::ASwitcher;
 use crate::policy::learned::LearnedPolicy;
+use crate::policy::lswitcher::{Judge, LSwitcher};
 use crate::policy::network::NetworkPolicy;
+use crate::policy::network_player::NetworkPlayer;
 use crate::policy::shipped::{self, ShippedWeights};
 
 words! {
@@ -23,6 +27,8 @@ words! {
         Follower = "follower",
         /// IQL, whose windows show costs to go.
         Iql = "iql",
+        /// LSwitcher: RePlan or EPOM, whichever a network judges better.
+        LSwitcher = "lswitcher",
         /// Tree search over the actions of nearby agents, guided by a network. It knows future goals.
         MatsLp = "mats-lp",
         /// Any network whose JSON file names its encoder.
@@ -44,6 +50,7 @@ pub struct Learned(Method);
 enum Method {
     Network(NetworkPolicy),
     ASwitcher(NetworkPolicy),
+    LSwitcher(NetworkPolicy, Judge),
     MatsLp(NetworkPrior, MatsLpParams),
 }
 
@@ -69,20 +76,31 @@ impl LearnedName {
     /// Returns the weights that this crate contains for the policy.
     pub fn shipped_weights(self) -> Option<ShippedWeights> {
         match self {
+            // LSwitcher's network is that of its judge.
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
             Self::Iql => Some(shipped::IQL),
             Self::Qmix => Some(shipped::QMIX),
             Self::Qplex => Some(shipped::QPLEX),
             Self::Vdn => Some(shipped::VDN),
-            Self::MatsLp | Self::Network => None,
+            Self::LSwitcher | Self::MatsLp | Self::Network => None,
         }
     }
 
-    fn of_network(self, network: Network) -> Result<Learned, Error> {
+    /// Returns the policy with a network.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if the network does not fit the policy; [`Error::Config`] for invalid settings of its encoder.
+    pub fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
             Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),
             Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
+            Self::LSwitcher => {
+                let judge = Judge::new(network)?;
+                let ShippedWeights { config, tensors } = shipped::EPOM;
+                let epom = NetworkPolicy::new(Network::from_bytes(config, tensors)?);
+                epom.map(|epom| Method::LSwitcher(epom, judge))
+            }
             Self::MatsLp => {
                 NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
@@ -111,21 +129,48 @@ impl Learned {
         cancelled: Option<Arc<AtomicBool>>,
     ) -> Result<LearnedPolicy, Error> {
         match &self.0 {
-            Method::Network(policy) => policy.begin(instance, config, seed),
-            Method::ASwitcher(policy) => policy.begin_switcher(instance, config, seed),
+            Method::Network(policy) => {
+                NetworkPlayer::begin(policy.settings(), instance, config, seed).map(LearnedPolicy::new)
+            }
+            Method::ASwitcher(policy) => {
+                ASwitcher::begin(policy.settings(), instance, config, seed).map(LearnedPolicy::new)
+            }
+            Method::LSwitcher(policy, judge) => {
+                LSwitcher::begin(policy.settings(), judge, instance, config, seed).map(LearnedPolicy::new)
+            }
             Method::MatsLp(prior, params) => {
                 let mut search = MatsLp::new(prior, *params, threads)?.with_cancellation(cancelled);
                 search.begin(instance, config.on_goal);
-                Ok(LearnedPolicy::of_search(search))
+                Ok(LearnedPolicy::new(search))
             }
         }
     }
 
-    /// Returns the network that chooses actions, for ASwitcher those of some agents; `None` for MATS-LP, whose network
-    /// only guides a search.
-    pub fn network(&self) -> Option<&NetworkPolicy> {
+    /// Returns the network of the policy's weights: for ASwitcher the one that moves some agents, for LSwitcher the one
+    /// that chooses sides; `None` for MATS-LP, whose network only guides a search.
+    pub fn network(&self) -> Option<&Network> {
         match &self.0 {
-            Method::Network(policy) | Method::ASwitcher(policy) => Some(policy),
+            Method::Network(policy) | Method::ASwitcher(policy) => Some(policy.network()),
+            Method::LSwitcher(_, judge) => Some(judge.network()),
+            Method::MatsLp(..) => None,
+        }
+    }
+
+    /// Returns what the network of [`Learned::network`] sees.
+    pub fn encoder(&self) -> Option<&EncoderSettings> {
+        match &self.0 {
+            Method::Network(policy) | Method::ASwitcher(policy) => Some(policy.encoder()),
+            Method::LSwitcher(_, judge) => Some(judge.encoder()),
+            Method::MatsLp(..) => None,
+        }
+    }
+
+    /// Returns the rule that chooses actions from logits; `None` for MATS-LP.
+    pub fn sampling(&self) -> Option<Sampling> {
+        match &self.0 {
+            Method::Network(policy) | Method::ASwitcher(policy) | Method::LSwitcher(policy, _) => {
+                Some(policy.sampling())
+            }
             Method::MatsLp(..) => None,
         }
     }
@@ -136,7 +181,7 @@ impl Learned {
     /// [`Error::Argument`] for MATS-LP, if the number is out of range.
     pub fn check_threads(&self, threads: usize) -> Result<(), Error> {
         match &self.0 {
-            Method::Network(_) | Method::ASwitcher(_) => Ok(()),
+            Method::Network(_) | Method::ASwitcher(_) | Method::LSwitcher(..) => Ok(()),
             Method::MatsLp(prior, params) => MatsLp::new(prior, *params, threads).map(|_| ()),
         }
     }
@@ -169,6 +214,7 @@ impl Learned {
         match self.0 {
             Method::Network(policy) => Ok(Self(Method::Network(change(policy)))),
             Method::ASwitcher(policy) => Ok(Self(Method::ASwitcher(change(policy)))),
+            Method::LSwitcher(policy, judge) => Ok(Self(Method::LSwitcher(change(policy), judge))),
             method @ Method::MatsLp(..) => Err(Self(method)),
         }
     }

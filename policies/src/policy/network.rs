@@ -1,14 +1,12 @@
 //! Networks as policies: the settings with which a network acts.
 
-use pogema_core::{Config, Error, Instance};
+use pogema_core::Error;
 
 use crate::encode::EncoderSettings;
 use crate::follower::FollowerVersion;
 use crate::network::{Network, Sampling, SamplingConfig};
-use crate::policy::learned::LearnedPolicy;
-use crate::policy::network_episode::{NetworkEpisode, NetworkSettings};
+use crate::policy::network_player::NetworkSettings;
 use crate::policy::sampler::NUM_ACTIONS;
-use crate::policy::switcher::Switcher;
 
 /// A network with everything that it needs to act.
 #[derive(Clone, Debug)]
@@ -21,9 +19,7 @@ impl NetworkPolicy {
     /// [`Error::Request`] if the network has no encoder, or one of another shape; [`Error::Config`] for invalid
     /// settings.
     pub fn new(network: Network) -> Result<Self, Error> {
-        let Some(encoder) = network.config().encoder.clone() else {
-            return Err(Error::request("the network names no encoder, expected `encoder` in its JSON file"));
-        };
+        let encoder = encoder_of(&network)?;
         Self::with_encoder(network, encoder)
     }
 
@@ -32,15 +28,7 @@ impl NetworkPolicy {
     /// # Errors
     /// Those of [`NetworkPolicy::new`].
     pub fn with_encoder(network: Network, encoder: EncoderSettings) -> Result<Self, Error> {
-        encoder.check()?;
-        let (input, output) = (network.input_shape(), encoder.shape());
-        if input != output || network.num_scalars() != encoder.scalars_len() {
-            return Err(Error::request(format!(
-                "the encoder writes windows of shape {output:?} and {} scalars, the network expects {input:?} and {}",
-                encoder.scalars_len(),
-                network.num_scalars()
-            )));
-        }
+        check_encoder(&network, &encoder)?;
         if network.num_actions() != NUM_ACTIONS {
             let found = network.num_actions();
             return Err(Error::request(format!("the network has {found} logits, expected {NUM_ACTIONS}")));
@@ -89,24 +77,34 @@ impl NetworkPolicy {
         self
     }
 
-    /// Starts an episode. The same seed gives the same actions.
-    ///
-    /// # Errors
-    /// Currently none; the settings were checked.
-    pub fn begin(&self, instance: &Instance, config: &Config, seed: u64) -> Result<LearnedPolicy, Error> {
-        NetworkEpisode::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_network)
+    /// Returns everything that the network needs to act.
+    pub(crate) fn settings(&self) -> &NetworkSettings {
+        &self.0
     }
+}
 
-    /// Starts an episode of ASwitcher, in which the network moves the agents for which RePlan has no move.
-    ///
-    /// # Errors
-    /// As for [`NetworkPolicy::begin`].
-    pub(crate) fn begin_switcher(
-        &self,
-        instance: &Instance,
-        config: &Config,
-        seed: u64,
-    ) -> Result<LearnedPolicy, Error> {
-        Switcher::begin(&self.0, instance, config, seed).map(LearnedPolicy::of_switcher)
+/// Returns the encoder that a network names.
+///
+/// # Errors
+/// Those of [`NetworkPolicy::new`].
+pub(crate) fn encoder_of(network: &Network) -> Result<EncoderSettings, Error> {
+    let Some(encoder) = network.config().encoder.clone() else {
+        return Err(Error::request("the network names no encoder, expected `encoder` in its JSON file"));
+    };
+    check_encoder(network, &encoder)?;
+    Ok(encoder)
+}
+
+/// Checks that a network can read what an encoder writes.
+fn check_encoder(network: &Network, encoder: &EncoderSettings) -> Result<(), Error> {
+    encoder.check()?;
+    let (input, output) = (network.input_shape(), encoder.shape());
+    if input != output || network.num_scalars() != encoder.scalars_len() {
+        return Err(Error::request(format!(
+            "the encoder writes windows of shape {output:?} and {} scalars, the network expects {input:?} and {}",
+            encoder.scalars_len(),
+            network.num_scalars()
+        )));
     }
+    Ok(())
 }

@@ -10,6 +10,6 @@ mod learned;
 mod mats_lp;
 #[path = "../common/mod.rs"]
 mod recorded;
-mod replan;
 mod shipped;
 mod simd_variable;
+mod switchers;

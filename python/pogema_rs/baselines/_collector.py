@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, Optional
+from typing import Any, Optional, Union
 
 import numpy as np
 
 from pogema_rs.baselines import _record
 from pogema_rs.baselines._config import RewardConfig, TrainingConfig
 from pogema_rs.baselines._record import Record
+from pogema_rs.policies import Policy
 from pogema_rs.vec_env import AutoresetMode, VecEnv
 
-#: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`.
-Act = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+#: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`; or a policy
+#: that plays in Rust.
+Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 
 
 class Collector:
@@ -58,7 +60,10 @@ class Collector:
                 break
             windows, scalars = parts(seen)
             before = self._shown
-            actions = act(windows[:, :, : len(self._config.encoder.channels)], scalars, infos["action_masks"])
+            if isinstance(act, Policy):
+                actions = act.act(env)
+            else:
+                actions = act(windows[:, :, : len(self._config.encoder.channels)], scalars, infos["action_masks"])
             record.actions[step], record.played[step] = actions, ~is_over
             seen, own, terminated, truncated, infos = env.step(actions)
             self._note(record, step + 1, seen, infos, env)

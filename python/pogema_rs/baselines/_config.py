@@ -15,7 +15,7 @@ from pogema_rs._encoder import Encoder
 from pogema_rs.toolbox._optional import required
 
 #: The methods that can be trained, by name.
-METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom")
+METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom", "lswitcher")
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
 GOAL_RULES = ("nothing", "restart", "finish")
@@ -113,6 +113,30 @@ class PPOConfig:
 
 
 @dataclass(frozen=True)
+class ValueConfig:
+    """The hyperparameters of the method that learns the values of given policies."""
+
+    discount: float = 0.99
+    learning_rate: float = 0.001
+    #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
+    half_life: int = 0
+    max_gradient: float = 4.0
+    epochs: int = 1
+    minibatches: int = 4
+
+
+#: The hyperparameters of a learner.
+LearnerConfig = Union[QLearningConfig, PPOConfig, ValueConfig]
+
+
+def _learner_of(method: str) -> type[LearnerConfig]:
+    """Returns which hyperparameters a method has."""
+    if method == "lswitcher":
+        return ValueConfig
+    return QLearningConfig if method in ("iql", "vdn", "qmix", "qplex") else PPOConfig
+
+
+@dataclass(frozen=True)
 class ScheduleConfig:
     """What an iteration of the training plays, and how often it is validated and saved."""
 
@@ -129,7 +153,7 @@ class TrainingConfig:
 
     method: str
     encoder: Encoder
-    learner: Union[QLearningConfig, PPOConfig]
+    learner: LearnerConfig
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
     network: NetworkConfig = field(default_factory=NetworkConfig)
@@ -175,12 +199,11 @@ def read_config(values: Mapping[str, Any], method: str, name: str) -> TrainingCo
 
     Errors: ValueError or TypeError, see `load_config`.
     """
-    learner = QLearningConfig if method in ("iql", "vdn", "qmix", "qplex") else PPOConfig
     sections: dict[str, Any] = {
         "environment": EnvironmentConfig,
         "rewards": RewardConfig,
         "network": NetworkConfig,
-        "learner": learner,
+        "learner": _learner_of(method),
         "schedule": ScheduleConfig,
     }
     _check_keys(name, "", values, ["method", "encoder", *sections])
@@ -266,7 +289,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     _check_learner(check, learner, schedule)
 
 
-def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], schedule: ScheduleConfig) -> None:
+def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig) -> None:
     if isinstance(learner, QLearningConfig):
         check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
         for key in ("own_loss", "temperature"):
@@ -276,11 +299,13 @@ def _check_learner(check: Any, learner: Union[QLearningConfig, PPOConfig], sched
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
         for key in ("epsilon_steps", "batch", "updates", "target_episodes", "mixer_hidden", "kernels"):
             check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
-    else:
+        return
+    if isinstance(learner, PPOConfig):
         check(0 <= learner.gae_lambda <= 1, "learner.gae_lambda", "0 to 1")
         check(learner.clip > 0, "learner.clip", "more than 0")
-        for key in ("epochs", "minibatches", "critic_hidden"):
-            check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
+        check(learner.critic_hidden >= 1, "learner.critic_hidden", "at least 1")
+    for key in ("epochs", "minibatches"):
+        check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
 
 
 def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:

@@ -29,13 +29,13 @@ class Residual(nn.Module):
 
 
 class AgentNetwork(nn.Module):
-    """Windows and scalars to one number per action, and optionally to a value.
+    """Windows and scalars to one number per action or to other outputs, and optionally to a value.
 
     Its attributes `body`, `core`, `policy` and `value` are those that `pogema_rs.policies.export` reads: convolutions
     and residual blocks, a dense layer, a GRU, and the outputs.
     """
 
-    def __init__(self, encoder: Encoder, config: NetworkConfig, has_value: bool) -> None:
+    def __init__(self, encoder: Encoder, config: NetworkConfig, has_value: bool, num_outputs: int = NUM_ACTIONS) -> None:
         super().__init__()
         channels, side, _ = encoder.shape
         self.window = encoder.shape
@@ -59,7 +59,7 @@ class AgentNetwork(nn.Module):
                 core.append(nn.GRU(width, config.recurrent))
                 width = config.recurrent
             self.core = nn.Sequential(*core)
-        self.policy = nn.Linear(width, NUM_ACTIONS)
+        self.policy = nn.Linear(width, num_outputs)
         self.value = nn.Linear(width, 1) if has_value else None
         self.width = width
 

@@ -31,6 +31,8 @@ class PPOLearner:
 
     #: The rule by which the trained network plays.
     sampling = "softmax"
+    #: The policy that plays the trained network.
+    policy_name = "network"
 
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
         assert isinstance(config.learner, PPOConfig)

@@ -29,6 +29,8 @@ class QLearner:
 
     #: Whether the trained network never moves into obstacles.
     masks = True
+    #: The policy that plays the trained network.
+    policy_name = "network"
 
     def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
         assert isinstance(config.learner, QLearningConfig)

@@ -18,12 +18,16 @@ import torch
 from pogema_rs import __version__, policies
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
-from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, differences
+from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, differences
 from pogema_rs.baselines._curve import Curve, score_of, open_tensorboard
 from pogema_rs.baselines._episodes import Episodes
+from pogema_rs.baselines._lswitcher import ValueLearner
 from pogema_rs.baselines._ppo import PPOLearner
 from pogema_rs.baselines._progress import Progress
 from pogema_rs.baselines._q_learning import QLearner
+
+#: Learns from episodes.
+Learner = Union[QLearner, PPOLearner, ValueLearner]
 
 
 @dataclass(frozen=True)
@@ -90,8 +94,7 @@ class _Run:
         torch.manual_seed(seed)
         self.generator = torch.Generator().manual_seed(seed)
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
-        kind: Any = QLearner if isinstance(config.learner, QLearningConfig) else PPOLearner
-        self.learner: Union[QLearner, PPOLearner] = kind(config, self.episodes.map_size, self.generator)
+        self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator)
         self.curve = Curve(score_of(config.environment.on_target))
         self.iteration, self.seconds, self.agent_steps = 0, 0.0, 0
         self.best_weights = self._weights()
@@ -203,7 +206,8 @@ class _Run:
         last = self._weights()
         self.learner.network.load_state_dict(self.best_weights)
         path = self.folder / "weights.safetensors"
-        rules: dict[str, Any] = {"sampling": self.learner.sampling, "mask_actions": self.learner.masks}
+        learner = self.learner
+        rules: dict[str, Any] = {"sampling": learner.sampling, "mask_actions": learner.masks, "name": learner.policy_name}
         policies.export(self.learner.trained(), self.config.encoder, path, **rules)
         self.learner.network.load_state_dict(last)
 
@@ -226,6 +230,12 @@ class _Run:
             "config": self.config.to_dict(),
         }
         _checkpoint.write(self.folder / "run.json", (json.dumps(values, indent=2) + "\n").encode())
+
+
+def _learner_of(config: TrainingConfig) -> type[Learner]:
+    if isinstance(config.learner, ValueConfig):
+        return ValueLearner
+    return QLearner if isinstance(config.learner, QLearningConfig) else PPOLearner
 
 
 def _commit() -> Optional[str]:

@@ -1,0 +1,137 @@
+"""LSwitcher: the values of EPOM and of RePlan, in episodes that each of them plays alone.
+
+Source: Skrynnik et al., "When to switch: planning and learning for partially observable multi-agent pathfinding", 2023
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from pogema_rs import policies
+from pogema_rs._encoder import Encoder
+from pogema_rs.baselines import _networks
+from pogema_rs.baselines._config import TrainingConfig, ValueConfig
+from pogema_rs.baselines._learning_rate import decay
+from pogema_rs.baselines._networks import AgentNetwork
+from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._targets import lambda_returns, last_steps
+from pogema_rs.policies import Policy
+
+#: The outputs of the network: the value of EPOM, and that of RePlan.
+NUM_VALUES = 2
+
+
+class ValueLearner:
+    """Learns the discounted returns of two policies, of which one plays each iteration.
+
+    The policies are EPOM with the weights of the package, and RePlan. Both play by LSwitcher with a network that always
+    prefers the same side.
+    """
+
+    #: LSwitcher draws EPOM's actions.
+    sampling = "softmax"
+    masks = False
+    #: The policy that plays the trained network.
+    policy_name = "lswitcher"
+
+    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
+        assert isinstance(config.learner, ValueConfig)
+        self.config, self.learner, self._generator = config, config.learner, generator
+        self.network = AgentNetwork(config.encoder, config.network, has_value=False, num_outputs=NUM_VALUES)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), self.learner.learning_rate)
+        self._iteration = 0
+
+    @property
+    def side(self) -> int:
+        """The policy that plays the next iteration: each in turn in every kind of episodes."""
+        return self._iteration // len(self.config.environment.kinds) % NUM_VALUES
+
+    def open(self, folder: Path) -> None:
+        """Does nothing: no episode is kept."""
+
+    def save(self) -> None:
+        """Does nothing: no episode is kept."""
+
+    def actor(self) -> Policy:
+        """Returns what plays the episodes of an iteration."""
+        seed = int(torch.randint(2**31, (1,), generator=self._generator))
+        return _alone(self.side, seed)
+
+    def trained(self) -> AgentNetwork:
+        """Returns the network."""
+        return self.network
+
+    def judge(self, generator: torch.Generator) -> Policy:
+        """Returns what plays the validation episodes."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "values.safetensors"
+            policies.export(self.network, self.config.encoder, path, name=self.policy_name)
+            return policies.load(path, name=self.policy_name, seed=generator.initial_seed())
+
+    def learn(self, record: Record) -> dict[str, float]:
+        """Updates the network on the episodes; returns the mean loss of the updates."""
+        side, losses = self.side, []
+        parts = _networks.tensors(record)
+        counted = parts["active"][:-1] & parts["played"].unsqueeze(-1)
+        returns = self._returns(record, side)
+        for _ in range(self.learner.epochs):
+            order = torch.randperm(record.shape[1], generator=self._generator)
+            for lanes in torch.tensor_split(order, self.learner.minibatches):
+                if len(lanes):
+                    values = self._values(lanes_of(record, lanes.numpy()), side)[:-1]
+                    losses.append(self._update(values, returns[:, lanes], counted[:, lanes]))
+        decay(self.optimizer, self.learner.half_life)
+        self._iteration += 1
+        return {f"loss_{('epom', 'replan')[side]}": sum(losses) / len(losses)}
+
+    def _values(self, record: Record, side: int) -> torch.Tensor:
+        """Returns the values of all states of a record. Shape: `(steps + 1, lanes, agents)`."""
+        values: torch.Tensor = self.network.policy(self.network.of_record(record))[..., side]
+        return values
+
+    @torch.no_grad()
+    def _returns(self, record: Record, side: int) -> torch.Tensor:
+        """Returns the returns of a record, which continue after the last step with the value of the last state."""
+        parts = _networks.tensors(record)
+        rewards = parts["rewards"]
+        ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(rewards)
+        later = self._values(record, side)[1:]
+        return lambda_returns(self.learner.discount, 1.0, later, rewards, parts["terminated"], ended)
+
+    def _update(self, values: torch.Tensor, returns: torch.Tensor, counted: torch.Tensor) -> float:
+        loss = ((values - returns).square() * counted).sum() / counted.sum().clamp(min=1)
+        self.optimizer.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), self.learner.max_gradient)
+        self.optimizer.step()
+        return float(loss.detach())
+
+    def state(self) -> dict[str, Any]:
+        """Returns everything that a checkpoint must hold."""
+        modules: tuple[Any, ...] = (self.network, self.optimizer)
+        return {"modules": [one.state_dict() for one in modules], "iteration": self._iteration}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Restores what `state` returned."""
+        modules: tuple[Any, ...] = (self.network, self.optimizer)
+        for module, values in zip(modules, state["modules"]):
+            module.load_state_dict(values)
+        self._iteration = state["iteration"]
+
+
+def _alone(side: int, seed: int) -> Policy:
+    """Returns LSwitcher with a network that always prefers one side."""
+    encoder = Encoder(radius=1, channels=("obstacles",))
+    values = np.zeros(NUM_VALUES)
+    values[side] = 1
+    tensors = {"values.weight": np.zeros((NUM_VALUES, 9)), "values.bias": values}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "alone.safetensors"
+        policies.save(path, encoder, ["flatten"], tensors, actions="values", name="lswitcher")
+        return policies.load(path, name="lswitcher", seed=seed)
