@@ -83,11 +83,11 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "mats-lp"], "`--policy mats-lp` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, mats-lp, network, qmix, qplex, vdn",
+            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--mask-actions"],
-            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, mats-lp, network, qmix, qplex, vdn",
+            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],

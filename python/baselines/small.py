@@ -10,9 +10,13 @@ from pogema_rs.baselines import load_config
 from pogema_rs.baselines._acting import Actor
 from pogema_rs.baselines._collector import parts
 from pogema_rs.baselines._episodes import Episodes
+from pogema_rs.baselines._networks import AgentNetwork
+from safetensors.numpy import load_file
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
 PPO_METHODS = ("ippo", "mappo", "follower", "epom")
+#: The methods that learn the values of given policies.
+VALUE_METHODS = ("lswitcher",)
 #: The methods whose network has an output for the value.
 WITH_VALUE = ("ippo", "follower", "epom")
 
@@ -34,13 +38,21 @@ _SMALL = (
 def changes(method):
     """Returns the values that make a training small."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
-    recurrent = () if method == "follower" else ("network.recurrent=16",)
+    recurrent = () if method in ("follower", "lswitcher") else ("network.recurrent=16",)
     return (*_SMALL, *learner, *recurrent)
 
 
 def small_config(method, *others):
     """Returns the hyperparameters of a small training."""
     return load_config(method, None, [*changes(method), *others])
+
+
+def read_network(method, config, path):
+    """Returns the network of exported weights in PyTorch."""
+    outputs = {"num_outputs": 2} if method in VALUE_METHODS else {}
+    network = AgentNetwork(config.encoder, config.network, has_value=method in WITH_VALUE, **outputs)
+    network.load_state_dict({name: torch.from_numpy(one) for name, one in load_file(path).items()})
+    return network
 
 
 def command(method, folder, *arguments):
@@ -53,6 +65,23 @@ def command(method, folder, *arguments):
 def run(method, folder, *arguments):
     """Runs the command of a small training and returns its result."""
     return subprocess.run(command(method, folder, *arguments), capture_output=True, text=True, check=False)
+
+
+def compare_outputs(policy, network, config, *, lanes, steps):
+    """Checks that a policy in Rust and a network without memory in PyTorch return the same numbers."""
+    configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
+    env = VecEnv(configs, encoder=config.encoder, autoreset_mode="Disabled")
+    seen, _ = env.reset(seed=seeds)
+    for _ in range(steps):
+        windows, scalars = parts(seen)
+        rows = windows.shape[0] * windows.shape[1]
+        flat, beside = windows.reshape(rows, *config.encoder.shape), scalars.reshape(rows, -1)
+        with torch.no_grad():
+            features, _ = network.features(torch.from_numpy(flat).view(1, rows, -1), torch.from_numpy(beside)[None])
+            expected = network.policy(features[0]).numpy()
+        np.testing.assert_allclose(policy.logits(flat, beside), expected, atol=1e-4)
+        seen, *_ = env.step(policy.act(env))
+    env.close()
 
 
 def compare_play(policy, network, config, *, lanes, steps, masks=True):

@@ -14,9 +14,8 @@ import pytest
 import torch
 from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, train
-from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
-from small import PPO_METHODS, Q_METHODS, WITH_VALUE, command, compare_play, run, small_config
+from small import PPO_METHODS, Q_METHODS, VALUE_METHODS, command, compare_play, read_network, run, small_config
 
 
 def weights(folder):
@@ -36,7 +35,7 @@ def check_equal(first, second):
 
 
 def test_the_methods_are_covered():
-    assert set(METHODS) == {*Q_METHODS, *PPO_METHODS}
+    assert set(METHODS) == {*Q_METHODS, *PPO_METHODS, *VALUE_METHODS}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -64,15 +63,13 @@ def test_the_learning_rate_falls_to_half_and_a_resumed_run_goes_on_with_it(metho
     assert rate == pytest.approx(config.learner.learning_rate / 4)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*Q_METHODS, *PPO_METHODS])
 def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")
     train(config, tmp_path, Budget(updates=4))
     assert (tmp_path / "weights.safetensors").stat().st_size <= 2**20
     assert policies.load(tmp_path / "weights.safetensors").sampling == "softmax"
-    network = AgentNetwork(config.encoder, config.network, has_value=method in WITH_VALUE)
-    exported = load_file(tmp_path / "weights.safetensors")
-    network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
+    network = read_network(method, config, tmp_path / "weights.safetensors")
     policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
     assert compare_play(policy, network, config, lanes=8, steps=32) > 20
 
@@ -94,9 +91,7 @@ def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
     train(config, tmp_path, Budget(updates=1))
     policy = policies.load(tmp_path / "weights.safetensors")
     assert policy.encoder == config.encoder
-    network = AgentNetwork(config.encoder, config.network, has_value=False)
-    exported = load_file(tmp_path / "weights.safetensors")
-    network.load_state_dict({name: torch.from_numpy(one) for name, one in exported.items()})
+    network = read_network("iql", config, tmp_path / "weights.safetensors")
     rng = np.random.default_rng(0)
     windows = rng.integers(-1, 2, (64, *config.encoder.shape)).astype(np.float32)
     scalars = rng.uniform(-1, 1, (64, 2)).astype(np.float32)

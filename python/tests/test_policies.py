@@ -269,7 +269,7 @@ def test_wrong_files_are_named(tmp_path):
 
 def test_wrong_arguments_are_refused():
     for arguments, error, message in [
-        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'"),
+        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'lswitcher', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'"),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"seed": 1.5}, TypeError, "seed is 1.5"),
@@ -286,7 +286,7 @@ def test_wrong_arguments_are_refused():
         policy.logits(np.zeros((2, 1, 5, 5)))
 
 
-@pytest.mark.parametrize("name", sorted({*LEARNED} - {"network", "mats-lp"}))
+@pytest.mark.parametrize("name", sorted({*LEARNED} - {"lswitcher", "mats-lp", "network"}))
 def test_weights_of_the_package_play_by_name(name):
     policy = load(name=name)
     assert name in LEARNED and repr(policy) == f"Policy({name!r})"
@@ -302,6 +302,43 @@ def test_policies_without_weights_need_a_file():
     for name in ["network", "mats-lp"]:
         with pytest.raises(ValueError, match=f"`{name}` needs the weights of a network"):
             load(name=name)
+
+
+def save_judge(path, values):
+    """Writes a network of LSwitcher that returns the same values for every window."""
+    tensors = {"values.weight": np.zeros((len(values), 9)), "values.bias": np.array(values)}
+    save(path, Encoder(1, ["obstacles"]), ["flatten"], tensors, actions="values", name="lswitcher")
+
+
+def test_lswitcher_plays_the_side_that_its_network_prefers(tmp_path):
+    path = tmp_path / "judge.safetensors"
+    save_judge(path, [1.0, 0.0])
+    policy, epom = load(path, name="lswitcher"), load(name="epom")
+    np.testing.assert_array_equal(policy.logits(np.zeros((3, 1, 3, 3))), [[1, 0]] * 3)
+    env = VecEnv(CONFIG, 2)
+    env.reset(seed=0)
+    for _ in range(8):
+        actions = policy.act(env)
+        np.testing.assert_array_equal(actions, epom.act(env))
+        env.step(actions)
+    env.close()
+
+
+def test_networks_are_checked_for_the_policy_that_shall_play_them(tmp_path):
+    path = tmp_path / "judge.safetensors"
+    save_judge(path, [1.0, 0.0])
+    content = path.read_bytes()
+    message = "the network has 5 outputs, expected 2: the values of EPOM and of RePlan"
+    with pytest.raises(ValueError, match=message):
+        save_judge(path, [0.0] * 5)
+    with pytest.raises(ValueError, match="the network has 2 logits, expected 5"):
+        load(path)
+    with pytest.raises(ValueError, match=f"learned.safetensors: {message}"):
+        load(WEIGHTS.with_name("learned.safetensors"), name="lswitcher")
+    tensors = {"policy.weight": np.zeros((5, 9)), "policy.bias": np.zeros(5)}
+    with pytest.raises(ValueError, match="`name` is `lacam`, expected"):
+        save(path, Encoder(1, ["obstacles"]), ["flatten"], tensors, name="lacam")
+    assert path.read_bytes() == content
 
 
 def test_infinite_logits_name_the_agent(tmp_path):

@@ -46,6 +46,8 @@ class ValueLearner:
         self.network = AgentNetwork(config.encoder, config.network, has_value=False, num_outputs=NUM_VALUES)
         self.optimizer = torch.optim.Adam(self.network.parameters(), self.learner.learning_rate)
         self._iteration = 0
+        # The last loss of each policy.
+        self._losses: dict[int, float] = {}
 
     @property
     def side(self) -> int:
@@ -75,7 +77,7 @@ class ValueLearner:
             return policies.load(path, name=self.policy_name, seed=generator.initial_seed())
 
     def learn(self, record: Record) -> dict[str, float]:
-        """Updates the network on the episodes; returns the mean loss of the updates."""
+        """Updates the network on the episodes; returns the mean of the policies' last losses."""
         side, losses = self.side, []
         parts = _networks.tensors(record)
         counted = parts["active"][:-1] & parts["played"].unsqueeze(-1)
@@ -88,7 +90,8 @@ class ValueLearner:
                     losses.append(self._update(values, returns[:, lanes], counted[:, lanes]))
         decay(self.optimizer, self.learner.half_life)
         self._iteration += 1
-        return {f"loss_{('epom', 'replan')[side]}": sum(losses) / len(losses)}
+        self._losses[side] = sum(losses) / len(losses)
+        return {"loss": sum(self._losses.values()) / len(self._losses)}
 
     def _values(self, record: Record, side: int) -> torch.Tensor:
         """Returns the values of all states of a record. Shape: `(steps + 1, lanes, agents)`."""
@@ -115,14 +118,15 @@ class ValueLearner:
     def state(self) -> dict[str, Any]:
         """Returns everything that a checkpoint must hold."""
         modules: tuple[Any, ...] = (self.network, self.optimizer)
-        return {"modules": [one.state_dict() for one in modules], "iteration": self._iteration}
+        counts = {"iteration": self._iteration, "losses": self._losses}
+        return {"modules": [one.state_dict() for one in modules], **counts}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores what `state` returned."""
         modules: tuple[Any, ...] = (self.network, self.optimizer)
         for module, values in zip(modules, state["modules"]):
             module.load_state_dict(values)
-        self._iteration = state["iteration"]
+        self._iteration, self._losses = state["iteration"], dict(state["losses"])
 
 
 def _alone(side: int, seed: int) -> Policy:
