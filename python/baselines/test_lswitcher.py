@@ -78,6 +78,17 @@ def test_an_update_changes_the_value_of_its_side_alone_in_the_last_layer():
     assert changed.tolist() == [True, False]
 
 
+def test_updates_lower_the_loss():
+    config = small_config("lswitcher", "environment.on_target=[finish]", "learner.learning_rate=0.01")
+    learner = learner_of(config)
+    record = record_of(config, learner)
+    losses = []
+    for _ in range(40):
+        learner._iteration = 0
+        losses.append(learner.learn(record)["loss"])
+    assert losses[-1] < 0.3 * losses[0]
+
+
 def test_the_exported_network_returns_the_same_values_in_rust(tmp_path):
     config = small_config("lswitcher", "network.filters=4", "network.blocks=1")
     train(config, tmp_path, Budget(updates=4))
