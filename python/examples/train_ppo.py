@@ -98,7 +98,7 @@ class Trainer:
     def __init__(self, params: Params, seed: int) -> None:
         torch.manual_seed(seed)
         self.params = params
-        self.env = VecEnv(GridConfig(**CONFIG), params.num_envs, semantics="2.0", masks=True)
+        self.env = self.make_env()
         observations, infos = self.env.reset(seed=seed)
         self.seen, self.infos = self._flat(observations), infos
         self.num_agents = self.seen.shape[0]
@@ -106,6 +106,10 @@ class Trainer:
         self.optimizer = torch.optim.Adam(self.policy.parameters(), params.learning_rate, eps=1e-5)
         self.rollout = Rollout.empty(params, self.num_agents, tuple(self.seen.shape[1:]))
         self.seconds_in_env = 0.0
+
+    def make_env(self) -> VecEnv:
+        """Makes the environments of the training."""
+        return VecEnv(GridConfig(**CONFIG), self.params.num_envs, semantics="2.0", masks=True)
 
     def _flat(self, observations: np.ndarray) -> torch.Tensor:
         """Returns a view of the environments' memory, one row per agent."""

@@ -1,0 +1,48 @@
+"""Compares a whole training loop on three environments: `VecEnv`, POGEMA 1.4.0, and one that costs nothing.
+
+python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
+
+The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
+AsyncVectorEnv, one process for each environment. The environments take turns; each ratio is the median over the rounds of
+the ratios within a round. Installs PyTorch, POGEMA and the wheel below target/.
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+from workers import Worker, print_table
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+# Ours per second at least, as a multiple of the peer.
+BARS = {"free": 0.93, "pogema": 2.5}
+NAMES = {"free": "an environment that costs nothing", "pogema": "POGEMA 1.4.0 in AsyncVectorEnv"}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    python = subprocess.check_output([ROOT / "python/venv", "training_peers", HERE / "training.txt"], text=True).strip()
+    worker = Worker(python, HERE / "training_worker.py")
+    rounds = []
+    for number in range(arguments.rounds):
+        rounds.append({name: worker.time(name, arguments.seconds) for name in ("ours", *BARS)})
+        print(f"round {number + 1}: {rounds[-1]}", file=sys.stderr)
+    table = []
+    for name, bar in BARS.items():
+        theirs, own = (statistics.median(one[key] for one in rounds) for key in (name, "ours"))
+        times = statistics.median(one["ours"] / one[name] for one in rounds)
+        table.append({"work": f"agent steps, {NAMES[name]}", "peer": theirs, "ours": own, "times": times, "bar": bar})
+    if arguments.json:
+        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
+    print_table(table)
+
+
+main()
