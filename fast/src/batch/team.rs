@@ -1,8 +1,9 @@
 //! Work sharing between the calling thread and helper threads.
 
 use std::hint::spin_loop;
-use std::sync::atomic::{AtomicUsize, Ordering::Acquire, Ordering::Release};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::atomic::{AtomicUsize, Ordering::Acquire, Ordering::Relaxed, Ordering::Release};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use pogema_core::{Error, MAX_THREADS};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -12,13 +13,19 @@ const MAX_SPINS: usize = 1000;
 /// Number of further spins, in which the helpers leave the scope.
 const FINAL_SPINS: usize = 5;
 
+/// Time for which a helper waits awake for the next call: longer than a Python program needs between two steps if it
+/// does nothing else.
+const LINGER: Duration = Duration::from_micros(60);
+
 /// The calling thread and its helper threads.
 ///
-/// The caller works, too, and then spins for a while until the helpers are done. Handing a step to other threads,
-/// sleeping and waking up would take as long as the steps of some lanes.
+/// The caller works, too, and then spins for a while until the helpers are done. The helpers then spin for a while until
+/// the next call. Handing a step to other threads, sleeping and waking up would take as long as the steps of some lanes.
 #[derive(Debug)]
 pub struct Team {
     helpers: Option<ThreadPool>,
+    /// The number of calls that have begun.
+    calls: Arc<AtomicUsize>,
 }
 
 /// Nanoseconds of a step per agent, without observations.
@@ -47,7 +54,7 @@ impl Team {
         let helpers =
             (num_threads > 1).then(|| ThreadPoolBuilder::new().num_threads(num_threads - 1).build());
         let helpers = helpers.transpose().map_err(|error| Error::external("threads", error))?;
-        Ok(Self { helpers })
+        Ok(Self { helpers, calls: Arc::default() })
     }
 
     /// Returns the number of threads, the calling thread included.
@@ -61,6 +68,7 @@ impl Team {
     /// parts that no other thread has begun.
     pub fn share<P: Send, T: Send + Sync>(&self, parts: Vec<P>, work: impl Fn(P) -> T + Sync) -> Vec<T> {
         let Some(helpers) = &self.helpers else { return parts.into_iter().map(work).collect() };
+        let call = self.calls.fetch_add(1, Relaxed).wrapping_add(1);
         let (num_parts, num_threads) = (parts.len(), self.num_threads());
         let open: Vec<_> = parts.into_iter().map(|part| Mutex::new(Some(part))).collect();
         let done: Vec<_> = open.iter().map(|_| OnceLock::new()).collect();
@@ -85,6 +93,10 @@ impl Team {
             work_from(0);
             spin_until(|| num_working.load(Acquire) == 0);
         });
+        for _ in 1..num_threads {
+            let calls = Arc::clone(&self.calls);
+            helpers.spawn(move || linger(|| calls.load(Relaxed) != call));
+        }
         // INVARIANT: the scope ends after all parts are done.
         done.into_iter().filter_map(OnceLock::into_inner).collect()
     }
@@ -99,6 +111,14 @@ fn spin_until(is_done: impl Fn() -> bool) {
         spin_loop();
     }
     for _ in 0..FINAL_SPINS {
+        spin_loop();
+    }
+}
+
+/// Waits awake for the next call, so that the thread need not be woken for it.
+fn linger(has_next: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !has_next() && began.elapsed() < LINGER {
         spin_loop();
     }
 }
