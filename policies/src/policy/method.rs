@@ -50,7 +50,7 @@ pub struct Learned(Method);
 enum Method {
     Network(NetworkPolicy),
     ASwitcher(NetworkPolicy),
-    LSwitcher(NetworkPolicy, Judge),
+    LSwitcher(NetworkPolicy, Box<Judge>),
     MatsLp(NetworkPrior, MatsLpParams),
 }
 
@@ -96,7 +96,7 @@ impl LearnedName {
             Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),
             Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
             Self::LSwitcher => {
-                let judge = Judge::new(network)?;
+                let judge = Box::new(Judge::new(network)?);
                 let ShippedWeights { config, tensors } = shipped::EPOM;
                 let epom = NetworkPolicy::new(Network::from_bytes(config, tensors)?);
                 epom.map(|epom| Method::LSwitcher(epom, judge))
