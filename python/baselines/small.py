@@ -10,7 +10,8 @@ from pogema_rs.baselines import load_config
 from pogema_rs.baselines._acting import Actor
 from pogema_rs.baselines._collector import parts
 from pogema_rs.baselines._episodes import Episodes
-from pogema_rs.baselines._networks import AgentNetwork
+from pogema_rs.baselines._lswitcher import NUM_VALUES
+from pogema_rs.baselines._networks import NUM_ACTIONS, AgentNetwork
 from safetensors.numpy import load_file
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
@@ -49,8 +50,8 @@ def small_config(method, *others):
 
 def read_network(method, config, path):
     """Returns the network of exported weights in PyTorch."""
-    outputs = {"num_outputs": 2} if method in VALUE_METHODS else {}
-    network = AgentNetwork(config.encoder, config.network, has_value=method in WITH_VALUE, **outputs)
+    num_outputs = NUM_VALUES if method in VALUE_METHODS else NUM_ACTIONS
+    network = AgentNetwork(config.encoder, config.network, method in WITH_VALUE, num_outputs)
     network.load_state_dict({name: torch.from_numpy(one) for name, one in load_file(path).items()})
     return network
 
@@ -67,6 +68,14 @@ def run(method, folder, *arguments):
     return subprocess.run(command(method, folder, *arguments), capture_output=True, text=True, check=False)
 
 
+def outputs_of(network, windows, scalars):
+    """Returns the outputs of a network in PyTorch at the beginning of an episode. Shape: `(rows, outputs)`."""
+    rows = len(windows)
+    with torch.no_grad():
+        features, _ = network.features(torch.from_numpy(windows).view(1, rows, -1), torch.from_numpy(scalars)[None])
+        return network.policy(features[0]).numpy()
+
+
 def compare_outputs(policy, network, config, *, lanes, steps):
     """Checks that a policy in Rust and a network without memory in PyTorch return the same numbers."""
     configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
@@ -76,10 +85,7 @@ def compare_outputs(policy, network, config, *, lanes, steps):
         windows, scalars = parts(seen)
         rows = windows.shape[0] * windows.shape[1]
         flat, beside = windows.reshape(rows, *config.encoder.shape), scalars.reshape(rows, -1)
-        with torch.no_grad():
-            features, _ = network.features(torch.from_numpy(flat).view(1, rows, -1), torch.from_numpy(beside)[None])
-            expected = network.policy(features[0]).numpy()
-        np.testing.assert_allclose(policy.logits(flat, beside), expected, atol=1e-4)
+        np.testing.assert_allclose(policy.logits(flat, beside), outputs_of(network, flat, beside), atol=1e-4)
         seen, *_ = env.step(policy.act(env))
     env.close()
 

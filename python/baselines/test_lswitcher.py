@@ -41,7 +41,8 @@ def test_one_side_alone_plays_as_its_policy():
 
 
 def test_returns_follow_a_plain_loop():
-    config = small_config("lswitcher", "environment.on_target=[finish]", "environment.max_episode_steps=20")
+    changes = ["environment.on_target=[finish]", "environment.max_episode_steps=20", "schedule.lanes=16"]
+    config = small_config("lswitcher", *changes)
     learner = learner_of(config)
     record = record_of(config, learner)
     found = learner._returns(record, 1).numpy()
@@ -55,7 +56,7 @@ def test_returns_follow_a_plain_loop():
             later = values[last + 1, lane, agent]
             for step in range(last, -1, -1):
                 later = record.rewards[step, lane, agent] + 0.99 * later * ~record.terminated[step, lane, agent]
-                assert found[step, lane, agent] == np.float32(later) or abs(found[step, lane, agent] - later) < 1e-5
+                assert abs(found[step, lane, agent] - later) < 1e-5
                 seen += 1
     assert seen > 50 and record.rewards.any()
 

@@ -41,7 +41,7 @@ class Policy:
             settings["num_threads"], search,
         )  # fmt: skip
         encoder, self.sampling = self._policy.encoder(), self._policy.sampling()
-        #: What the network sees; None with `mats-lp`.
+        #: What the network of the weights sees; None with `mats-lp`.
         self.encoder: Optional[Encoder] = None if encoder is None else Encoder.from_dict(json.loads(encoder))
 
     @property
@@ -113,7 +113,7 @@ class Policy:
         The recurrent state is that at the beginning of an episode. No episode changes.
 
         Shape: `windows` `(batch, channels, side, side)`, `scalars` `(batch, 2 * len(encoder.scalars))`; the result is
-        `(batch, 5)`
+        `(batch, 5)`, or the two values `(batch, 2)` with `lswitcher`
 
         Errors: ValueError for arrays that do not fit the encoder, for a logit that is not finite, or with `mats-lp`.
         """
@@ -156,7 +156,7 @@ def load(
     """Reads a learned policy from a file of weights, `.safetensors` or `.onnx`, and the JSON file beside it.
 
     `name` is the name of a policy in `LEARNED`. Without a path, it plays the weights in this package, which
-    `network` and `mats-lp` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
+    `lswitcher`, `mats-lp` and `network` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
     `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle [default: as the
     JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of
     `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its

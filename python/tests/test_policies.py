@@ -299,7 +299,7 @@ def test_weights_of_the_package_play_by_name(name):
 
 
 def test_policies_without_weights_need_a_file():
-    for name in ["network", "mats-lp"]:
+    for name in ["lswitcher", "mats-lp", "network"]:
         with pytest.raises(ValueError, match=f"`{name}` needs the weights of a network"):
             load(name=name)
 

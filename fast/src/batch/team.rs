@@ -13,8 +13,8 @@ const MAX_SPINS: usize = 1000;
 /// Number of further spins, in which the helpers leave the scope.
 const FINAL_SPINS: usize = 5;
 
-/// Time for which a helper waits awake for the next call: longer than a Python program needs between two steps if it
-/// does nothing else.
+/// Time for which a helper waits awake for the next call. A Python program that does nothing else needs 7 to 50 µs between
+/// two steps of 64 environments of 64 agents.
 const LINGER: Duration = Duration::from_micros(60);
 
 /// The calling thread and its helper threads.

@@ -50,6 +50,7 @@ pub struct Learned(Method);
 enum Method {
     Network(NetworkPolicy),
     ASwitcher(NetworkPolicy),
+    // In a box, so that this enum is small enough for an `Err`.
     LSwitcher(NetworkPolicy, Box<Judge>),
     MatsLp(NetworkPrior, MatsLpParams),
 }
@@ -76,7 +77,6 @@ impl LearnedName {
     /// Returns the weights that this crate contains for the policy.
     pub fn shipped_weights(self) -> Option<ShippedWeights> {
         match self {
-            // LSwitcher's network is that of its judge.
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
             Self::Iql => Some(shipped::IQL),

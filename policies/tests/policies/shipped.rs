@@ -64,7 +64,7 @@ fn shipped_weights_tell_how_they_were_trained() {
 
 #[test]
 fn policies_without_weights_need_a_file() {
-    for name in ["network", "mats-lp"] {
+    for name in ["lswitcher", "mats-lp", "network"] {
         let error = LearnedName::of_word(name).unwrap().with_shipped_weights().unwrap_err();
         assert_eq!(error.to_string(), format!("`{name}` needs the weights of a network"));
     }
