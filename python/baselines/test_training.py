@@ -85,6 +85,21 @@ def test_logits_are_values_divided_by_the_temperature(tmp_path):
         assert np.abs(softmax[name] - 2 * softmax[f"last.{name}"]).max() == 0
 
 
+def test_the_average_of_the_networks_is_exported(tmp_path):
+    config = small_config("iql", "learner.averaging=0.75", "learner.temperature=0")
+    path = tmp_path / "checkpoint.pt"
+    found = []
+    for updates in (1, 2):
+        train(config, tmp_path, Budget(updates=updates), seed=3, resume=updates > 1)
+        modules = _checkpoint.load(path, "iql")["learner"]["modules"]
+        found.append([modules[place]["policy.weight"].numpy() for place in (0, 4)])
+        if updates == 1:
+            np.testing.assert_array_equal(weights(tmp_path)["policy.weight"], found[0][1])
+    (_, before), (network, average) = found
+    assert np.abs(network - before).max() > 1e-4
+    np.testing.assert_allclose(average, 0.75 * before + 0.25 * network, atol=1e-6)
+
+
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
     changes = ["network.filters=4", "network.blocks=1", "encoder.scalars=[goal_offset]", "learner.batch=2"]
     config = small_config("iql", *changes)

@@ -84,6 +84,8 @@ class QLearningConfig:
     epsilon_steps: int = 100_000
     #: The trained network draws from the softmax of the values divided by this; 0 for the largest value.
     temperature: float = 0.0
+    #: The trained network is a moving average, which keeps this share of itself in each iteration; 0 for the last network.
+    averaging: float = 0.0
     replay: int = 5000
     batch: int = 32
     updates: int = 2
@@ -296,6 +298,7 @@ def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig)
             check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
+        check(0 <= learner.averaging < 1, "learner.averaging", "at least 0, less than 1")
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
         for key in ("epsilon_steps", "batch", "updates", "target_episodes", "mixer_hidden", "kernels"):
             check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")

@@ -61,7 +61,7 @@ class ValueLearner:
         """Does nothing: no episode is kept."""
 
     def actor(self) -> Policy:
-        """Returns what plays the episodes of an iteration."""
+        """Returns the policy of the training episodes."""
         seed = int(torch.randint(2**31, (1,), generator=self._generator))
         return _alone(self.side, seed)
 
@@ -70,7 +70,7 @@ class ValueLearner:
         return self.network
 
     def judge(self, generator: torch.Generator) -> Policy:
-        """Returns what plays the validation episodes."""
+        """Returns the policy of the validation episodes."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "values.safetensors"
             policies.export(self.network, self.config.encoder, path, name=self.policy_name)

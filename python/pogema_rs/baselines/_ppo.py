@@ -54,7 +54,7 @@ class PPOLearner:
         """Does nothing: no episode is kept."""
 
     def actor(self) -> Actor:
-        """Returns what plays the episodes of an iteration."""
+        """Returns the actor of the training episodes."""
         return Actor(self.network, self._generator, None, self.masks)
 
     def trained(self) -> AgentNetwork:
@@ -62,7 +62,7 @@ class PPOLearner:
         return self.network
 
     def judge(self, generator: torch.Generator) -> Actor:
-        """Returns what plays the validation episodes."""
+        """Returns the actor of the validation episodes."""
         return Actor(self.network, generator, None, self.masks)
 
     def learn(self, record: Record) -> dict[str, float]:

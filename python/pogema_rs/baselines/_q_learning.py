@@ -41,6 +41,7 @@ class QLearner:
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.mixer: nn.Module = module.make_mixer(config, num_values)
         self.target_network, self.target_mixer = copy.deepcopy(self.network), copy.deepcopy(self.mixer)
+        self.average = copy.deepcopy(self.network)
         self._parameters = [*self.network.parameters(), *self.mixer.parameters()]
         self.optimizer = torch.optim.Adam(self._parameters, self.learner.learning_rate)
         self.replay: Any = None
@@ -59,7 +60,7 @@ class QLearner:
         return self.learner.epsilon_start + share * (self.learner.epsilon_end - self.learner.epsilon_start)
 
     def actor(self) -> Actor:
-        """Returns what plays the episodes of an iteration."""
+        """Returns the actor of the training episodes."""
         return Actor(self.network, self._generator, self.epsilon)
 
     @property
@@ -69,20 +70,20 @@ class QLearner:
 
     def trained(self) -> AgentNetwork:
         """Returns the network with logits for the rule of `sampling`: the values, divided by the temperature."""
+        network = copy.deepcopy(self.average)
         if not self.learner.temperature:
-            return self.network
-        network = copy.deepcopy(self.network)
+            return network
         with torch.no_grad():
             for parameter in network.policy.parameters():
                 parameter /= self.learner.temperature
         return network
 
     def judge(self, generator: torch.Generator) -> Actor:
-        """Returns what plays the validation episodes."""
+        """Returns the actor of the validation episodes."""
         return Actor(self.trained(), generator, None if self.learner.temperature else 0.0)
 
     def learn(self, record: Record) -> dict[str, float]:
-        """Adds the episodes to the replay and updates the networks; returns means of the updates."""
+        """Adds the episodes to the replay and updates the networks; returns the mean loss and epsilon."""
         self.replay.add(record)
         self._episodes = self.replay.count
         self._steps += int(record.played.sum())
@@ -92,6 +93,9 @@ class QLearner:
             draws = torch.randint(len(self.replay), (batch,), generator=self._generator)
             losses.append(self._update(self.replay.sample(draws.numpy())))
         decay(self.optimizer, self.learner.half_life)
+        with torch.no_grad():
+            for mean, parameter in zip(self.average.parameters(), self.network.parameters()):
+                mean.lerp_(parameter, 1 - self.learner.averaging)
         if self._episodes - self._copied >= self.learner.target_episodes:
             self.target_network.load_state_dict(self.network.state_dict())
             self.target_mixer.load_state_dict(self.mixer.state_dict())
@@ -107,7 +111,7 @@ class QLearner:
         return float(loss.detach())
 
     def loss(self, record: Record) -> torch.Tensor:
-        """Returns the mean squared error of the mixed values, and of the agents' own values if they have a weight."""
+        """Returns the mean squared error of the mixed values, plus `own_loss` times that of the agents' own values."""
         parts = _networks.tensors(record)
         states, active, actions = _networks.global_states(record), parts["active"], parts["actions"]
         values = self.network.policy(self.network.of_record(record))
@@ -116,7 +120,7 @@ class QLearner:
         with torch.no_grad():
             greedy = values.masked_fill(~parts["masks"], LEAST).argmax(dim=-1)
             later, later_best = self._next_values(record, greedy)
-            # A finished agent counts for nothing.
+            # The value of a finished agent is 0.
             later, later_best = later * active[1:], later_best * active[1:]
             mixed_later = self.target_mixer(later, later_best, greedy[1:], states[1:])
         mixed = self.mixer(chosen * active[:-1], best * active[:-1], actions, states[:-1])
@@ -150,18 +154,20 @@ class QLearner:
 
     def state(self) -> dict[str, Any]:
         """Returns everything that a checkpoint must hold, besides the replay's files."""
-        modules = (self.network, self.mixer, self.target_network, self.target_mixer, self.optimizer)
         return {
-            "modules": [module.state_dict() for module in modules],
+            "modules": [module.state_dict() for module in self._modules()],
             "counts": [self._steps, self._copied, self._episodes],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores what `state` returned."""
-        modules: tuple[Any, ...] = (self.network, self.mixer, self.target_network, self.target_mixer, self.optimizer)
-        for module, values in zip(modules, state["modules"]):
+        for module, values in zip(self._modules(), state["modules"]):
             module.load_state_dict(values)
         self._steps, self._copied, self._episodes = state["counts"]
+
+    def _modules(self) -> tuple[Any, ...]:
+        """Returns everything with a state of tensors."""
+        return self.network, self.mixer, self.target_network, self.target_mixer, self.average, self.optimizer
 
     def save(self) -> None:
         """Writes the replay to the disk."""

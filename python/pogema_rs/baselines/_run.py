@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 import platform
@@ -169,7 +170,7 @@ class _Run:
                 self.writer.add_scalar(name, value, self.agent_steps)
 
     def _weights(self) -> dict[str, torch.Tensor]:
-        return {name: values.clone() for name, values in self.learner.network.state_dict().items()}
+        return {name: values.clone() for name, values in self.learner.trained().state_dict().items()}
 
     def _save(self) -> None:
         """Writes a checkpoint, and the files that show the progress."""
@@ -203,13 +204,12 @@ class _Run:
 
     def _export(self) -> None:
         """Writes the best weights, as crate `pogema-policies` plays them."""
-        last = self._weights()
-        self.learner.network.load_state_dict(self.best_weights)
-        path = self.folder / "weights.safetensors"
         learner = self.learner
+        network = copy.deepcopy(learner.trained())
+        network.load_state_dict(self.best_weights)
+        path = self.folder / "weights.safetensors"
         rules: dict[str, Any] = {"sampling": learner.sampling, "mask_actions": learner.masks, "name": learner.policy_name}
-        policies.export(self.learner.trained(), self.config.encoder, path, **rules)
-        self.learner.network.load_state_dict(last)
+        policies.export(network, self.config.encoder, path, **rules)
 
     def _describe(self, budget: Budget) -> None:
         """Writes what made the run, and what it reached, as JSON."""
