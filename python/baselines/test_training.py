@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import torch
 from pogema_rs import policies
-from pogema_rs.baselines import METHODS, Budget, _checkpoint, train
+from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, train
+from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
 from small import PPO_METHODS, Q_METHODS, VALUE_METHODS, command, compare_play, outputs_of, read_network, run, small_config
 
@@ -98,6 +99,25 @@ def test_the_average_of_the_networks_is_exported(tmp_path):
     (_, before), (network, average) = found
     assert np.abs(network - before).max() > 1e-4
     np.testing.assert_allclose(average, 0.75 * before + 0.25 * network, atol=1e-6)
+
+
+def test_windows_pass_convolutions_in_parts(monkeypatch):
+    config = small_config("follower", "network.filters=4", "network.blocks=1")
+    torch.manual_seed(0)
+    network = AgentNetwork(config.encoder, config.network, has_value=True)
+    windows = torch.rand(3, 5, *config.encoder.shape)
+    found = []
+    for num_rows in (4096, 4, 1):
+        monkeypatch.setattr(_networks, "ROWS_AT_ONCE", num_rows)
+        features, _ = network.features(windows, torch.zeros(3, 5, 0))
+        network.zero_grad()
+        features.square().sum().backward()
+        found.append([features.detach(), *(parameter.grad.clone() for parameter in network.body.parameters())])
+    plain = network.body(windows.flatten(0, 1)).view(3, 5, -1)
+    torch.testing.assert_close(found[0][0], plain)
+    for others in zip(*found):
+        for other in others[1:]:
+            torch.testing.assert_close(other, others[0])
 
 
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):

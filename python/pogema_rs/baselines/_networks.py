@@ -13,6 +13,9 @@ from pogema_rs.baselines._record import Record
 
 NUM_ACTIONS = 5
 
+#: The number of windows that pass the convolutions together.
+ROWS_AT_ONCE = 4096
+
 
 class Residual(nn.Module):
     """Adds its input to the output of its layers."""
@@ -40,6 +43,7 @@ class AgentNetwork(nn.Module):
         channels, side, _ = encoder.shape
         self.window = encoder.shape
         self.scale = 2.0 * encoder.radius
+        self.has_convolutions = config.filters > 0
         layers: list[nn.Module] = []
         if config.filters:
             layers += [nn.Conv2d(channels, config.filters, 3, padding=1), nn.ReLU()]
@@ -72,7 +76,7 @@ class AgentNetwork(nn.Module):
         `(steps, rows, width)`
         """
         steps, rows = windows.shape[:2]
-        values = self.body(windows.reshape(steps * rows, *self.window)).view(steps, rows, -1)
+        values = self._of_windows(windows.reshape(steps * rows, *self.window)).view(steps, rows, -1)
         if self.core is None:
             return values, None
         if scalars.shape[-1]:
@@ -83,6 +87,15 @@ class AgentNetwork(nn.Module):
             else:
                 values = layer(values)
         return values, state
+
+    def _of_windows(self, windows: torch.Tensor) -> torch.Tensor:
+        """Returns the outputs of the layers before the scalars."""
+        if not self.has_convolutions:
+            whole: torch.Tensor = self.body(windows)
+            return whole
+        # Convolutions are three times as fast on parts that fit the cache, with the channels of a cell side by side.
+        parts = [part.contiguous(memory_format=torch.channels_last) for part in windows.split(ROWS_AT_ONCE)]
+        return torch.cat([self.body(part) for part in parts])
 
     def of_record(self, record: Record) -> torch.Tensor:
         """Returns the features of all states of a record.
