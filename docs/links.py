@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-# Written by other programs, which check their own links.
+# Folders of pages that other programs generate; those programs check their own links.
 GENERATED = ("rust", "python")
 # Pages without a next one: print.html repeats the others.
 SKIPPED = ("print.html", "404.html", "toc.html")
@@ -23,7 +23,8 @@ class Page(HTMLParser):
         super().__init__()
         self.links: list[str] = []
         self.names: set[str] = set()
-        self.feed(path.read_text(encoding="utf-8", errors="replace"))
+        self.text = path.read_text(encoding="utf-8", errors="replace")
+        self.feed(self.text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         for key, value in attrs:
@@ -45,12 +46,12 @@ def fault(site: Path, page: Path, link: str) -> str | None:
     if parts.scheme or parts.netloc:
         return None
     if parts.path.startswith("/"):
-        return "is absolute, and so breaks below another path"
+        return "is absolute, expected a relative link, because the site may lie below any path"
     target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
     if target.is_dir():
         target /= "index.html"
     if not target.is_relative_to(site) or not target.is_file():
-        return "leads to no file of the site"
+        return "leads to no file of the site, expected the path of an existing file"
     if parts.fragment and target.suffix == ".html" and target.relative_to(site).parts[0] not in GENERATED:
         if unquote(parts.fragment) not in read(target).names:
             return f"names no element of {target.relative_to(site)}"
@@ -69,9 +70,9 @@ def main() -> None:
             found = fault(site, page, link)
             if found:
                 faults.append(f"{name}: the link `{link}` {found}")
-        is_of_book = 'class="menu-title"' in page.read_text(encoding="utf-8", errors="replace")
-        if is_of_book and str(name) not in SKIPPED and "What next:" not in page.read_text(encoding="utf-8"):
-            faults.append(f"{name}: the page does not say what to read next")
+        is_of_book = 'class="menu-title"' in read(page).text
+        if is_of_book and str(name) not in SKIPPED and "What next:" not in read(page).text:
+            faults.append(f"{name}: the page has no next step, expected the text `What next:`")
     print("\n".join(faults) or f"{num_links} links on {len(pages)} pages are valid")
     sys.exit(1 if faults else 0)
 

@@ -1,12 +1,18 @@
-# Shared by the scripts in this folder, which source it from the root of the repository.
-cargo build --quiet --release
-pogema=${CARGO_TARGET_DIR:-target}/release/pogema
+# Shared by the scripts in this folder, which source it from the root of the repository. POGEMA is the program to use
+# [default: it is built].
+pogema=${POGEMA:-}
+if [ -z "$pogema" ]; then
+    cargo build --quiet --release
+    pogema=${CARGO_TARGET_DIR:-target}/release/pogema
+fi
 
 # Plays all suites of a setting, or continues an earlier run: play SETTING MAPS RESULTS [OPTION...]
+# SUITES is the folder with a folder of suites for each setting.
+SUITES=suites
 play() {
     local setting=$1 maps=$2 results=$3 suite name
     shift 3
-    for suite in suites/"$setting"/*.yaml; do
+    for suite in "$SUITES/$setting"/*.yaml; do
         name=$(basename "$suite" .yaml)
         echo "== $setting/$name" >&2
         "$pogema" evaluate "$suite" --maps "$maps" --out "$results/$name" --resume "$@" >&2

@@ -115,7 +115,8 @@ fn print_summary(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), 
         let files = suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key));
         let files: Vec<String> = files.filter(|name| folder.join(name).exists()).collect();
         let reason = format!(
-            "{num_failed} episodes could not be played; see {files:?} for the reasons; `--resume` tries them again"
+            "{num_failed} episodes could not be played; see {} for the reasons; `--resume` tries them again",
+            files.join(", ")
         );
         return Err(Error::io(folder, reason));
     }

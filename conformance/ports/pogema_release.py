@@ -29,7 +29,7 @@ ACCEPTS_SEQUENCES = FORECASTS_GOALS = hasattr(envs.PogemaLifeLong, "get_lifelong
 
 
 class Refusal(Exception):
-    """A question that is answered with an error, raised by POGEMA or by the port."""
+    """The error with which the port answers a question; POGEMA or the port raised it."""
 
 
 def choices(field: str) -> list[str]:
@@ -74,7 +74,7 @@ def claims(raw: bool) -> dict[str, Any]:
 
 
 def make(config: GridConfig, raw: bool, with_density: bool) -> Any:
-    """Returns an environment with the wrappers that POGEMA adds, or with `raw` without any."""
+    """Returns an environment with POGEMA's wrappers, and with the density wrapper if requested; if `raw`, without any."""
     if config.integration not in (None, "SampleFactory"):
         raise Refusal(f"`integration` is `{config.integration}`, expected none or `SampleFactory`")
     env = pogema_v0(grid_config=config)
@@ -176,7 +176,7 @@ def patch_grids(base: Any, instance: dict[str, Any]) -> None:
 
 
 def place_obstacles(grid: Any, instance: dict[str, Any]) -> None:
-    """Restores obstacles under starts and goals, which POGEMA clears, and outside the wall, which it draws."""
+    """Restores the obstacles under starts and goals, which POGEMA clears, and those outside the wall, which are random."""
     radius, outside = instance["config"]["radius"], instance.get("outside", "free")
     if outside != "free":
         wall = grid[radius - 1 : 1 - radius or None, radius - 1 : 1 - radius or None].copy()

@@ -162,8 +162,8 @@ fn check_text(path: &Path, expected: &str, wrong: &mut Vec<String>) {
 /// Generates the page with all rules.
 fn index(rules: &BTreeMap<String, Rule>) -> String {
     let mut text = String::from(
-        "# All rules\n\nThis page lists every rule with the source files that implement it and its number of cases. It is generated: \
-         `BLESS=1 ./check rules` writes it.\n\n\
+        "# All rules\n\nThis page lists, for every rule, the source files that implement it and the number of its cases. \
+         `BLESS=1 ./check rules` generates the page.\n\n\
          | rule | code | cases |\n| --- | --- | --- |\n",
     );
     for (id, rule) in rules {
@@ -172,7 +172,9 @@ fn index(rules: &BTreeMap<String, Rule>) -> String {
         let code: Vec<String> = rule.code.iter().map(|file| format!("`{file}`")).collect();
         let _ = writeln!(text, "| [{id}]({chapter}#{anchor}) | {} | {} |", code.join(" "), rule.cases.len());
     }
-    text.push_str("\n**What next:** [Config](config.md), or the chapter of the rule that you look for.\n");
+    text.push_str(
+        "\n**What next:** [Config](config.md), or the chapter of the rule that you are looking for.\n",
+    );
     text
 }
 

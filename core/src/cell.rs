@@ -31,6 +31,12 @@ impl Cell {
         let (down, right) = action.delta();
         (i32::from(self.row) + down, i32::from(self.col) + right)
     }
+
+    /// Returns the action that leads from this cell to another one, if any.
+    pub fn action_to(self, other: Self) -> Option<Action> {
+        let place = (i32::from(other.row), i32::from(other.col));
+        Action::ALL.into_iter().find(|&action| self.toward(action) == place)
+    }
 }
 
 impl From<[u16; 2]> for Cell {

@@ -13,10 +13,10 @@ pub use puzzles::PUZZLES;
 /// A small map with starts and goals, on which agents must make way for each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Puzzle {
-    /// Its name.
+    /// The name, with the prefix `puzzle-`.
     pub name: &'static str,
-    /// One sentence on what the agents have to do.
-    pub says: &'static str,
+    /// The task of the agents, in one sentence.
+    pub task: &'static str,
     /// The rows of the map with the start of each agent: `a` for agent 0, and so on.
     pub starts: [&'static str; 5],
     /// The rows of the map with the goal of each agent: `a` for agent 0, and so on.

@@ -13,10 +13,13 @@ const TOGETHER: [(&str, &str); 7] = [
     ("width: 5", "config: `width` is `5`, expected a height to go with it"),
     ("{height: 5, size: 5}", "config: `height` is `5`, expected a width to go with it"),
     ("{width: 5, height: null}", "config: `width` is `5`, expected a height to go with it"),
-    ("auto_reset: true", "config: `auto_reset` is `true`, expected the integration `SampleFactory`"),
+    (
+        "auto_reset: true",
+        "config: `auto_reset` is `true`, expected false, because only the integration `SampleFactory` resets automatically",
+    ),
     (
         "{auto_reset: true, integration: gymnasium}",
-        "config: `auto_reset` is `true`, expected the integration `SampleFactory`",
+        "config: `auto_reset` is `true`, expected false, because only the integration `SampleFactory` resets automatically",
     ),
     (
         "{map: aA, agents_xy: [[0, 0]], targets_xy: [[0, 1]]}",

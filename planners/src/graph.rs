@@ -73,7 +73,7 @@ impl Graph {
 
     /// Returns the action that leads from a vertex to itself or to a neighbour.
     pub fn action(&self, from: Vertex, to: Vertex) -> Action {
-        action_between(self.cell(from), self.cell(to)).unwrap_or(Action::Stay)
+        self.cell(from).action_to(self.cell(to)).unwrap_or(Action::Stay)
     }
 
     /// Converts one cell per agent to vertices; `what` names the cells in the error.
@@ -95,10 +95,4 @@ pub(crate) fn step_from(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
     let (row, col) = cell.toward(action);
     let cell = Cell { row: u16::try_from(row).ok()?, col: u16::try_from(col).ok()? };
     map.contains(cell).then_some(cell)
-}
-
-/// Returns the action that leads from one cell to another, if any.
-pub(crate) fn action_between(from: Cell, to: Cell) -> Option<Action> {
-    let place = (i32::from(to.row), i32::from(to.col));
-    Action::ALL.into_iter().find(|&action| from.toward(action) == place)
 }

@@ -28,7 +28,7 @@ pub struct PbsParams {
     pub seed: u64,
 }
 
-/// The planner PBS. It is incomplete, solves nearly all problems, and proves no problem impossible.
+/// The planner PBS. It is incomplete: its search proves no problem impossible, so only the checks before the search do.
 ///
 /// A node of its budget is one search for one agent.
 #[derive(Clone, Debug, Default)]
@@ -109,13 +109,13 @@ impl Search<'_> {
         Some(Node { priorities: Vec::new(), paths })
     }
 
-    /// Returns the child with one more priority, unless an agent has no path.
+    /// Returns the child with one more priority, unless the priorities form a cycle or an agent has no path.
     fn child(&mut self, node: &Node, pair: (usize, usize)) -> Option<Node> {
-        let (first, second) = pair;
+        let second = pair.1;
         let mut priorities = node.priorities.clone();
         priorities.push(pair);
         let order = PriorityOrder::new(self.team.starts.len(), &priorities);
-        if order.above(second).contains(&second) || order.above(first).contains(&second) {
+        if order.above(second).contains(&second) {
             return None;
         }
         let mut paths = node.paths.clone();

@@ -2,8 +2,6 @@
 
 use pogema_core::{Action, Cell, Error};
 
-use crate::graph::action_between;
-
 /// The cells of all agents at the start and after each step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -69,7 +67,7 @@ impl Plan {
         };
         let action = |(agent, (&from, &to)): (usize, (&Cell, &Cell))| {
             let jump = || Error::agent(agent, format!("{to} is not one step from {from}"));
-            action_between(from, to).ok_or_else(jump)
+            from.action_to(to).ok_or_else(jump)
         };
         now.iter().zip(next).enumerate().map(action).collect()
     }

@@ -19,7 +19,7 @@ pub(crate) fn main() -> Result<(), Error> {
     for step in 0..plan.num_steps() {
         episode.step(&plan.actions(step)?)?;
     }
-    assert!(episode.is_over(), "all agents are on their goals");
+    assert!(episode.is_over(), "an agent is not on its goal after the plan");
     let page = html::replay(&episode.trace()?, "Planned by LaCAM*")?;
     let path = std::env::temp_dir().join(format!("pogema-plan-{}.html", std::process::id()));
     std::fs::write(&path, page).map_err(|error| Error::io(&path, error))?;

@@ -25,7 +25,7 @@ def situations(num_agents):
         rows = [list(obstacles[:3]), list(obstacles[3:])]
         for starts in itertools.permutations(free, num_agents):
             for gone in itertools.product((False, True), repeat=num_agents):
-                if num_agents > 0 and all(gone):
+                if all(gone):
                     continue  # the episode has ended
                 far = [max(free, key=lambda cell, start=start: distance(cell, start)) for start in starts]
                 goals = [start if is_gone else goal for start, goal, is_gone in zip(starts, far, gone)]
@@ -82,7 +82,7 @@ def test_every_step_equals_that_of_the_fast_engine(num_agents, collision, semant
 
 
 def joined(pools):
-    """Returns the params of all instances of pools of one config and one instance each, without lifelong goals."""
+    """Merges pools of one instance each into params; their configs are equal and have no lifelong goals."""
     each = [pool.params for pool in pools]
     agents = each[0].config.num_agents
     arrays = pj.Pool(

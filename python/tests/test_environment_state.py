@@ -35,7 +35,7 @@ CONFIGS = {
     "one goal": {**SMALL, "on_target": "nothing", "observation_type": "MAPF", "empty_outside": False},
     "persistent": {**SMALL, "on_target": "restart", "persistent": True, "collision_system": "soft"},
     "persistent to the end": {**SMALL, "persistent": True, "seed": 1, "observation_type": "POMAPF"},
-    "one cell": {"width": 1, "height": 2, "density": 0.0, "seed": 2, "obs_radius": 1},
+    "two cells": {"width": 1, "height": 2, "density": 0.0, "seed": 2, "obs_radius": 1},
 }
 WAYS = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
 
@@ -172,7 +172,7 @@ def test_impossible_counts_are_rejected(place: tuple[str, ...]) -> None:
         _engine.restore_engine(json.dumps(state).encode())
 
 
-#: Environments that the first release saved after 7 steps, and the digest of its next 14 steps.
+#: Environments that the first release saved after 7 steps, with the digest of the next 14 steps of each.
 SAVED = {
     "restart-soft": "a0c1738a7284cc0024874198f582abeeddb29383763934dfe529854aabf215ec",
     "finish-priority": "6c1cad9be923b0f7944ac600f28e4e2f3dc6d946fa5f1bb6c5f565413204ddfc",
@@ -181,7 +181,8 @@ SAVED = {
 
 
 @pytest.mark.parametrize("name", SAVED)
-def test_environment_saved_by_the_first_release_continues(name):
+def test_environment_saved_by_the_first_release_continues(name: str) -> None:
+    """An environment that the first release saved plays the same steps as it did then."""
     env = pickle.loads((Path(__file__).parent / "saved" / f"{name}.pickle").read_bytes())
     rng = np.random.default_rng(1)
     rng.integers(5, size=(7, 10))

@@ -286,7 +286,7 @@ def test_wrong_arguments_are_refused():
         policy.logits(np.zeros((2, 1, 5, 5)))
 
 
-@pytest.mark.parametrize("name", sorted({*LEARNED} - {"lswitcher", "mats-lp", "network"}))
+@pytest.mark.parametrize("name", sorted({*LEARNED} - {"mats-lp", "network"}))
 def test_weights_of_the_package_play_by_name(name):
     policy = load(name=name)
     assert name in LEARNED and repr(policy) == f"Policy({name!r})"
@@ -299,7 +299,7 @@ def test_weights_of_the_package_play_by_name(name):
 
 
 def test_policies_without_weights_need_a_file():
-    for name in ["lswitcher", "mats-lp", "network"]:
+    for name in ["mats-lp", "network"]:
         with pytest.raises(ValueError, match=f"`{name}` needs the weights of a network"):
             load(name=name)
 

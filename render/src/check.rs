@@ -1,6 +1,6 @@
 //! Checks of traces before drawing.
 
-use pogema_core::{Action, Cell, Error, Snapshot, Trace, TraceStep};
+use pogema_core::{Cell, Error, Snapshot, Trace, TraceStep};
 
 /// Checks that a trace can be drawn: every list has one entry per agent, all agents and goals are on the map, and no
 /// agent moves farther than to a neighbouring cell in one step.
@@ -17,7 +17,7 @@ pub fn check(trace: &Trace) -> Result<(), Error> {
         check_step(step, num_agents)?;
         let cells = before.cells.iter().zip(&step.state.cells);
         let mut moves = cells.enumerate();
-        if let Some((agent, (from, to))) = moves.find(|(_, (from, to))| direction(**from, **to).is_none()) {
+        if let Some((agent, (from, to))) = moves.find(|(_, (from, to))| from.action_to(**to).is_none()) {
             let reason = format!("agent {agent} is on {to}, expected {from} or a cell next to it");
             return Err(Error::Trace { line, reason });
         }
@@ -44,12 +44,6 @@ fn check_step(step: &TraceStep, num_agents: usize) -> Result<(), Error> {
     Error::check_length("rewards", num_agents, step.rewards.len())?;
     Error::check_length("terminated", num_agents, step.terminated.len())?;
     Error::check_length("truncated", num_agents, step.truncated.len())
-}
-
-/// Returns the action that leads from one cell to another.
-pub(crate) fn direction(from: Cell, to: Cell) -> Option<Action> {
-    let to = (i32::from(to.row), i32::from(to.col));
-    Action::ALL.into_iter().find(|&action| from.toward(action) == to)
 }
 
 /// Checks that `agent` is less than `num_agents`.

@@ -60,7 +60,8 @@ impl VideoFormat {
 /// Units: `width` in pixels, rounded up to an even number.
 ///
 /// # Errors
-/// Those of [`crate::gif::encode`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`] if it fails.
+/// Those of [`crate::gif::encode`] and [`VideoFormat::of`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`] if
+/// it fails or the file cannot be written.
 pub fn write(
     trace: &Trace,
     style: &Style,

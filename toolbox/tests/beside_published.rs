@@ -114,6 +114,45 @@ fn with_episodes_costs_are_compared_on_the_instances_that_both_solve() {
 }
 
 #[test]
+fn ratios_have_a_column_for_each_algorithm_with_published_means() {
+    let folder = folder(MEANS, "01-random", &[]);
+    let mut results = results();
+    results.rows.push(row("03-warehouse", r#"{"num_agents": 2}"#, Some(4)));
+    let of_algorithm = |name: &str, cost| Row { algorithm: name.to_owned(), ..of(2, 0, Some(cost)) };
+    results.rows.extend([of_algorithm("DCC", 60), of_algorithm("PIBT", 7)]);
+    let fields = "{type: ratios, file: means.csv, setting: MAPF, metric: SoC}";
+    let shown = show(folder.path(), fields, &results).unwrap();
+    let expected = [
+        "Folder,Number of Agents,DCC,LaCAM",
+        "01-random,2,2,0.9",
+        "01-random,4,,1.4625",
+        "03-warehouse,2,,0.5",
+    ];
+    assert_eq!(csv(&shown), expected);
+    assert!(shown.tables[0].text(Format::Markdown).ends_with("SoC divided by the published mean, MAPF"));
+    assert_eq!(shown.notes, ["`PIBT`: no published means"]);
+    let shown = show(
+        folder.path(),
+        &fields.replace("metric: SoC", "metric: CSR, rename_fields: {num_agents: agents}"),
+        &results,
+    );
+    assert_eq!(csv(&shown.unwrap())[0], "Folder,agents,DCC,LaCAM");
+    for (fields, message) in [
+        (
+            fields.replace("MAPF, metric: SoC", "LMAPF"),
+            "has no LMAPF means of DCC, LaCAM, PIBT in these sets",
+        ),
+        (fields.replace("SoC", "ISR"), "`ISR`"),
+        (fields.replace("SoC", "runtime"), "means.csv: no column `runtime`"),
+        (fields.replace("means.csv", "absent.csv"), "absent.csv"),
+        (fields.replace("MAPF", "both"), "`both`"),
+    ] {
+        let error = show(folder.path(), &fields, &results).unwrap_err();
+        assert!(error.contains(message) && !error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
 fn folders_are_datasets_and_the_longest_time_is_shown() {
     let means = MEANS.replace("remark", "runtime").replace("none", "3");
     let folder = folder(&means, "01-random", &[]);
@@ -195,8 +234,8 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
     for (from, to, expected) in [
         ("dataset,", "data,", "means.csv: no column `dataset`; did you mean `data`?"),
         ("SoC", "soc", "means.csv: no column `SoC`; did you mean `soc`?"),
-        (",10,", ",ten,", "means.csv: line 2: `SoC` is `ten`, expected a number or nothing"),
-        (",10,", ",NaN,", "means.csv: line 2: `SoC` is `NaN`, expected a number or nothing"),
+        (",10,", ",ten,", "means.csv: line 2: `SoC` is `ten`, expected a number or an empty cell"),
+        (",10,", ",NaN,", "means.csv: line 2: `SoC` is `NaN`, expected a number or an empty cell"),
         (",10,,none", ",10", "means.csv: CSV error: record 1 (line: 2"),
     ] {
         assert!(MEANS.contains(from), "{from}");

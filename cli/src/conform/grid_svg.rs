@@ -11,7 +11,7 @@ const CELL: usize = 24;
 /// The longest side of a drawing; on larger ones no cell is recognisable. Units: cells.
 const MAX_CELLS: usize = 64;
 
-/// Draws a grid and highlights the cells that differ from `other`; returns `None` if the grid is too large.
+/// Draws a grid and highlights the cells that differ from `other`; returns `None` if the grid is empty or too large.
 pub fn drawing(title: &str, grid: &Grid, other: &Grid) -> Option<String> {
     let (height, width) = (grid.rows.len(), grid.rows.first()?.len());
     if height.max(width) > MAX_CELLS {

@@ -71,7 +71,7 @@ pub fn is_rule(row: &str) -> bool {
     row != PROTOCOL_ROW
 }
 
-/// Returns every rule that was played with any of the ports, or that one of them does not claim.
+/// Returns the rows of the table: the rules that were played with a port or that a port does not claim, and the protocol.
 pub fn rows(reports: &[PortReport]) -> BTreeSet<&str> {
     reports.iter().flat_map(|report| report.rules.keys()).map(String::as_str).collect()
 }
@@ -172,7 +172,7 @@ words! {
         Diverges = "diverges",
         /// The port breaks the protocol, and possibly rules.
         Misbehaves = "misbehaves",
-        /// Nothing that the port claims was played, or the run was interrupted before anything was found.
+        /// Nothing that the port claims was played, or the run was interrupted before a new cause was found.
         Unchecked = "nothing",
     }
 }
@@ -195,8 +195,9 @@ impl Score {
 pub fn verdict(report: &PortReport) -> String {
     let score = score(report);
     let Score { known, diverging, misbehaving, .. } = score;
-    let played = format!("{} cases, {} steps", report.num_played, report.num_steps);
-    let causes = |number: usize| format!("{number} cause{}", if number == 1 { "" } else { "s" });
+    let counted = |number: u64, noun: &str| format!("{number} {noun}{}", if number == 1 { "" } else { "s" });
+    let played = format!("{}, {}", counted(report.num_played, "case"), counted(report.num_steps, "step"));
+    let causes = |number: usize| counted(number as u64, "cause");
     let exception = if known == 0 { String::new() } else { format!(", except for {known} known") };
     match (diverging, misbehaving) {
         (0, 0) if score.is_cut_short => {

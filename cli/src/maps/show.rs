@@ -40,7 +40,7 @@ impl List {
                 text.map.num_free().to_string(),
                 agents,
                 puzzle.map_or_else(String::new, |puzzle| puzzle.sum_of_costs.to_string()),
-                puzzle.map_or_else(String::new, |puzzle| puzzle.says.to_owned()),
+                puzzle.map_or_else(String::new, |puzzle| puzzle.task.to_owned()),
             ]);
         }
         if let Some(task) = table.column_mut(6) {

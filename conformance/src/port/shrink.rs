@@ -14,11 +14,11 @@ use crate::runner::Watch;
 /// The remaining plays for shrinking the occurrences of one group.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
-    /// Requests played.
+    /// Requests that may still be played.
     plays: usize,
-    /// Misbehaviours, after each of which the port is started again.
+    /// Misbehaviours that may still occur; after each, the port is started again.
     restarts: usize,
-    /// Missing answers, each of which costs the time limit.
+    /// Missing answers that may still occur; each costs the time limit.
     hangs: usize,
 }
 
@@ -32,8 +32,8 @@ impl Budget {
     }
 }
 
-/// Shrinks an example as long as it shows the same cause. The result is the smallest only if the budget lasts and
-/// the run is not stopped.
+/// Shrinks an example while it shows the same cause. Ends if no simplification succeeds, the budget is spent or the run is
+/// stopped.
 pub fn shrink(worker: &mut Worker<'_>, example: &Example, budget: &mut Budget, watch: Watch<'_>) -> Example {
     let mut shrinker = Shrinker { worker, best: example.clone(), budget, watch };
     if let Some(op) = example.op() {

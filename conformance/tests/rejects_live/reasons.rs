@@ -40,7 +40,7 @@ const REASONS: [(&str, Holds); 21] = [
     ("a flag given as a number or word", |no| {
         no.is_about(&FLAGS, |value| value.is_number() || value.is_string())
     }),
-    ("a name that is a number", |no| {
+    ("a name that is a number or boolean", |no| {
         no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a text")
     }),
     ("a boolean given as a coordinate", |no| {

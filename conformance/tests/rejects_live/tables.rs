@@ -138,7 +138,7 @@ pub const REJECTED_BY_US: [(&str, &str); 39] = [
     ("a constant of another type", r#"{"OBSTACLE": 1.0}"#),
     ("a flag given as a number or word", r#"{"persistent": 1}"#),
     ("a flag given as a number or word", r#"{"empty_outside": "off"}"#),
-    ("a name that is a number", r#"{"map_name": 5}"#),
+    ("a name that is a number or boolean", r#"{"map_name": 5}"#),
     ("a boolean given as a coordinate", r#"{"agents_xy": [[true, false]]}"#),
     ("a boolean given as a coordinate", r#"{"targets_xy": [[[0, 0], [0, true]]]}"#),
     ("a pool that is not a list of cells", r#"{"possible_agents_xy": [5]}"#),
@@ -176,7 +176,7 @@ pub const REJECTED_BY_US: [(&str, &str); 39] = [
     ("a number given as text", r#"{"map": "..", "size": "8"}"#),
     ("a number given as text", r#"{"seed": "5"}"#),
     ("a flag given as a number or word", r#"{"auto_reset": 0}"#),
-    ("a name that is a number", r#"{"map_name": 1.5}"#),
+    ("a name that is a number or boolean", r#"{"map_name": 1.5}"#),
 ];
 
 /// Configs at the limits, which both accept.

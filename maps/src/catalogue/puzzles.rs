@@ -2,13 +2,13 @@
 
 use super::Puzzle;
 
-/// Builds a table of puzzles. Each entry holds the name without `puzzle-`, the optimal sum of costs, a description, and
-/// the rows of the map with the starts and with the goals.
+/// Builds a table of puzzles. Each entry holds the name without `puzzle-`, the optimal sum of costs, the task, and the
+/// rows of the map with the starts and with the goals.
 macro_rules! puzzles {
-    ($($name:literal, $sum_of_costs:literal, $says:literal: [$($starts:literal)+] => [$($goals:literal)+];)+) => {
+    ($($name:literal, $sum_of_costs:literal, $task:literal: [$($starts:literal)+] => [$($goals:literal)+];)+) => {
         [$(Puzzle {
             name: concat!("puzzle-", $name),
-            says: $says,
+            task: $task,
             starts: [$($starts),+],
             goals: [$($goals),+],
             sum_of_costs: $sum_of_costs,

@@ -17,11 +17,13 @@ impl GridConfig {
         }
         // In persistent mode POGEMA computes no metrics, so 0 is allowed there.
         if self.on_target == OnGoal::Restart && self.max_episode_steps == 0 && !self.persistent {
-            let expected = "a number other than 0 with on_target `restart`, whose throughput divides by it";
+            let expected =
+                "a number other than 0 with on_target `restart`, because the throughput is divided by it";
             return Err(Error::config("max_episode_steps", 0, expected));
         }
         if self.auto_reset == Some(true) && self.integration != Some(Integration::SampleFactory) {
-            return Err(Error::config("auto_reset", true, "the integration `SampleFactory`"));
+            let expected = "false, because only the integration `SampleFactory` resets automatically";
+            return Err(Error::config("auto_reset", true, expected));
         }
         if self.integration == Some(Integration::Rllib) {
             return Err(Error::config("integration", "rllib", "`PettingZoo`, which replaces it in POGEMA"));

@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 use pogema_core::{Action, Error};
 use pogema_numpy::Generator;
 
-use crate::policies::heapq::HeapQ;
+use crate::heapq::{HeapQ, Precedes};
 use crate::policies::observations::PomapfObservation;
 use crate::policies::pogema::random_action;
 
@@ -136,15 +136,17 @@ struct Node {
     estimate: i32,
 }
 
-/// POGEMA's comparison: by f-value, then by lower g-value, then by a relation that is not an order.
-fn is_before(one: &Node, other: &Node) -> bool {
-    if one.estimate != other.estimate {
-        return one.estimate < other.estimate;
+impl Precedes for Node {
+    /// POGEMA's comparison: by f-value, then by lower g-value, then by a relation that is not an order.
+    fn precedes(&self, other: &Self) -> bool {
+        if self.estimate != other.estimate {
+            return self.estimate < other.estimate;
+        }
+        if self.cost != other.cost {
+            return self.cost < other.cost;
+        }
+        self.place.0 < other.place.0 || self.place.1 < other.place.1
     }
-    if one.cost != other.cost {
-        return one.cost < other.cost;
-    }
-    one.place.0 < other.place.0 || one.place.1 < other.place.1
 }
 
 fn distance(one: Place, other: Place) -> i32 {
@@ -165,7 +167,7 @@ fn first_move(start: Place, goal: Place, obstacles: &HashSet<Place>) -> Action {
 /// Returns the predecessor and the move by which each cell was first reached.
 fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Place, Option<(Place, Action)>> {
     let mut came_from = HashMap::from([(start, None)]);
-    let mut open = HeapQ::new(is_before);
+    let mut open = HeapQ::default();
     open.push(Node { place: start, cost: 0, estimate: distance(start, goal) });
     for _ in 0..MAX_EXPANSIONS {
         let Some(node) = open.pop() else { break };

@@ -4,7 +4,6 @@
 
 mod astar;
 mod goal_forecast;
-mod heapq;
 mod lifelong_policy;
 mod observations;
 mod planner_policy;

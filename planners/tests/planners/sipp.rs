@@ -58,7 +58,13 @@ impl Others {
 }
 
 /// Returns the least cost of a path to the goal, or of a path within a window, by searching all cells step by step.
-fn least(graph: &Graph, start: Vertex, to_go: &[u32], others: &Others, window: Option<usize>) -> Option<u32> {
+fn least_cost(
+    graph: &Graph,
+    start: Vertex,
+    to_go: &[u32],
+    others: &Others,
+    window: Option<usize>,
+) -> Option<u32> {
     // The keys are cells and whether the agent has reached the goal; the values are the steps at which it did.
     let mut now: HashMap<(Vertex, bool), u32> = HashMap::new();
     if others.conflicts(None, start, 0) > 0 {
@@ -97,6 +103,7 @@ fn least(graph: &Graph, start: Vertex, to_go: &[u32], others: &Others, window: O
     best
 }
 
+/// Checks that a path is connected, and returns the number of its moves with conflicts.
 fn check_path(graph: &Graph, others: &Others, start: Vertex, path: &[Vertex]) -> usize {
     assert_eq!(path[0], start);
     let mut conflict_steps = HashSet::new();
@@ -117,7 +124,7 @@ fn check_against_full_search(window: Option<usize>) {
         let others = Others::random(&mut rng, &graph, (seed % 5) as usize, window.is_none() && seed % 2 == 0);
         let (start, goal) = (case.problem().starts[0], case.problem().goals[0]);
         let to_go = Distances::new(graph.clone(), 0).to(goal);
-        let expected = least(&graph, start, &to_go, &others, window);
+        let expected = least_cost(&graph, start, &to_go, &others, window);
         let reserved = others.reserved(&graph);
         let horizon = window.map_or(Horizon::Stay { max_steps: 60 }, |steps| Horizon::Window(steps as u32));
         let task = Task {

@@ -2,7 +2,7 @@
 //!
 //! Skrynnik et al., "Learn to Follow: Decentralized Lifelong Multi-agent Pathfinding via Planning and Learning", AAAI 2024
 
-mod heap;
+mod entry;
 mod planner;
 mod search;
 mod static_costs;

@@ -5,7 +5,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::follower::heap::{Entry, Heap};
+use pogema_planners::HeapQ;
+
+use crate::follower::entry::Entry;
 
 /// The cost of entering an obstacle. No path is that long.
 pub(crate) const OBSTACLE: f32 = f32::INFINITY;
@@ -18,7 +20,7 @@ const UNREACHED: f32 = 1e9;
 pub(crate) struct Search {
     stride: usize,
     nodes: Vec<Node>,
-    heap: Heap,
+    heap: HeapQ<Entry>,
     /// Number of the search; a node of an earlier one counts as unreached.
     now: u32,
 }
@@ -33,7 +35,7 @@ struct Node {
 impl Search {
     /// Creates the memory for a grid of `len` places.
     pub fn new(len: usize, stride: usize) -> Self {
-        Self { stride, nodes: vec![Node::default(); len], heap: Heap::default(), now: 0 }
+        Self { stride, nodes: vec![Node::default(); len], heap: HeapQ::default(), now: 0 }
     }
 
     /// Writes the path from start to goal, both included; nothing if there is no path or the start is the goal.

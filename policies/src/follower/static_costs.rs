@@ -2,6 +2,9 @@
 
 use pogema_planners::{Graph, Vertex};
 
+/// The side of the squares of cells from which searches begin together: 64 cells.
+const TILE: u16 = 8;
+
 /// Returns the static cost of entering each vertex: the largest mean distance of any vertex, divided by its own.
 ///
 /// The mean distance is that to all other vertices of the component. In a component of one vertex, the cost is NaN;
@@ -22,8 +25,14 @@ pub(crate) fn static_costs(graph: &Graph) -> Vec<f32> {
 fn mean_distances(graph: &Graph) -> Vec<f32> {
     let mut sums = vec![(0_u64, 0_u64); graph.num_vertices()];
     let mut search = Search::new(graph.num_vertices());
-    for first in (0..graph.num_vertices()).step_by(u64::BITS as usize) {
-        search.add_distances(graph, first, &mut sums);
+    // Searches from cells that are near to each other reach a cell in almost the same rounds.
+    let mut order: Vec<Vertex> = (0..graph.num_vertices() as Vertex).collect();
+    order.sort_by_key(|&vertex| {
+        let cell = graph.cell(vertex);
+        (cell.row / TILE, cell.col / TILE)
+    });
+    for sources in order.chunks(u64::BITS as usize) {
+        search.add_distances(graph, sources, &mut sums);
     }
     sums.into_iter().map(|(sum, count)| sum as f32 / count as f32).collect()
 }
@@ -43,14 +52,14 @@ impl Search {
         Self { reached: blank(), arriving: blank(), next: blank(), frontier: Vec::new() }
     }
 
-    /// Adds to each vertex the distances to 64 vertices, and their number. Distances are the same in both directions.
-    fn add_distances(&mut self, graph: &Graph, first: usize, sums: &mut [(u64, u64)]) {
+    /// Adds to each vertex the distances to at most 64 others, and their number. Distances are the same in both
+    /// directions.
+    fn add_distances(&mut self, graph: &Graph, sources: &[Vertex], sums: &mut [(u64, u64)]) {
         self.reached.fill(0);
-        let last = graph.num_vertices().min(first + u64::BITS as usize);
-        for (bit, vertex) in (first..last).enumerate() {
-            self.reached[vertex] = 1 << bit;
-            self.arriving[vertex] = 1 << bit;
-            self.frontier.push(vertex as Vertex);
+        for (bit, &vertex) in sources.iter().enumerate() {
+            self.reached[vertex as usize] = 1 << bit;
+            self.arriving[vertex as usize] = 1 << bit;
+            self.frontier.push(vertex);
         }
         let (mut distance, mut reached_now) = (0, Vec::new());
         while !self.frontier.is_empty() {

@@ -17,7 +17,7 @@ impl NetworkPrior {
     /// Accepts a network that reads two square windows and returns five logits, without recurrent layers.
     ///
     /// A network whose config names an encoder must read what MATS-LP writes: `all_agents` or `agents`, then
-    /// `cost_tracer`. Without an encoder, what the network was trained on is unknown.
+    /// `cost_tracer`. Without an encoder, the channels are not checked.
     ///
     /// # Errors
     /// [`Error::Argument`] that says how the network differs.
@@ -56,7 +56,7 @@ impl NetworkPrior {
             if !is_known || encoder.radius != height / 2 {
                 let names: Vec<&str> = encoder.channels.iter().map(|channel| channel.word()).collect();
                 let found = format!("{} with radius {}", names.join(", "), encoder.radius);
-                let expected = format!("all_agents, cost_tracer with radius {}", height / 2);
+                let expected = format!("all_agents or agents, then cost_tracer, with radius {}", height / 2);
                 return Err(Error::argument("encoder of the network", found, expected));
             }
         }

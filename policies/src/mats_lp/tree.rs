@@ -30,12 +30,12 @@ struct Node {
 /// The actions of one agent that the children of a node combine: bit `a` is set for action `a`.
 pub(super) type Choices = u8;
 
-/// What a search knows of a child of its root, which is a joint action of the group.
+/// The statistics of one child of the root. Each child is a joint action of the group.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RootChild {
     /// Number of expansions that passed through it.
     pub num_visits: u32,
-    /// Sum of the values that these expansions passed on to it.
+    /// Sum of the values that these expansions backed up to it.
     pub value_sum: f64,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct Tree {
     bounds: Bounds,
 }
 
-/// The smallest and the largest value that the backup of a search has passed on.
+/// The smallest and the largest value that a search has backed up.
 #[derive(Clone, Copy, Debug)]
 struct Bounds {
     min: f64,
@@ -67,7 +67,8 @@ impl Bounds {
         self.max = self.max.max(value);
     }
 
-    /// Maps a value from the bounds to 0 and 1. A value above the largest one exceeds 1.
+    /// Maps the smallest value to 0 and the largest to 1. Smaller values become 0, and larger ones exceed 1. If the bounds
+    /// are equal, values are not scaled.
     fn normalise(&self, value: f64) -> f64 {
         let value = value.max(self.min);
         if self.max > self.min { (value - self.min) / (self.max - self.min) } else { value }
@@ -111,7 +112,7 @@ impl Tree {
     /// Adds the children of a node, which combine the choices of the agents.
     ///
     /// The first agent's action varies fastest from child to child. An agent with a single choice contributes no
-    /// factor to the priors. Those of the root get the uniform share of the parameters.
+    /// factor to the priors. Those of the root's children are mixed with a uniform distribution.
     pub fn expand(&mut self, id: NodeId, choices: &[Choices], predictions: &[Prediction]) {
         let first_child = self.priors.len();
         self.priors.push(1.0);

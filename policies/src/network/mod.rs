@@ -34,7 +34,7 @@ use crate::simd::AGENTS;
 use file::Content;
 use program::{Layers, Program};
 use steps::Group;
-pub(crate) use tensors::Tensors;
+pub(crate) use tensors::{Tensors, check_num_values};
 
 /// A network with its weights, which any number of threads can share.
 #[derive(Clone, Debug)]

@@ -9,6 +9,15 @@ pub struct Tensor {
     pub values: Vec<f32>,
 }
 
+/// Checks that a tensor has as many values as its shape.
+pub(crate) fn check_num_values(name: &str, shape: &[usize], num_values: usize) -> Result<(), String> {
+    let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
+    if expected == Some(num_values) {
+        return Ok(());
+    }
+    Err(format!("tensor `{name}` has {num_values} values, expected those of shape {shape:?}"))
+}
+
 /// All tensors of a file that no layer has taken yet. Errors are messages that name the tensor.
 #[derive(Clone, Debug, Default)]
 pub struct Tensors(BTreeMap<String, Tensor>);
@@ -18,7 +27,7 @@ impl Tensors {
     pub fn insert(&mut self, name: &str, shape: &[usize], bytes: &[u8]) -> Result<(), String> {
         let (floats, rest) = bytes.as_chunks::<4>();
         if !rest.is_empty() {
-            return Err(format!("tensor `{name}` has {} bytes, expected floats of 4 bytes", bytes.len()));
+            return Err(format!("tensor `{name}` has {} bytes, expected a multiple of 4", bytes.len()));
         }
         let values = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         self.insert_values(name, shape.into(), values)
@@ -26,13 +35,7 @@ impl Tensors {
 
     /// Adds a tensor.
     pub fn insert_values(&mut self, name: &str, shape: Vec<usize>, values: Vec<f32>) -> Result<(), String> {
-        let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
-        if expected != Some(values.len()) {
-            return Err(format!(
-                "tensor `{name}` has {} values, expected those of shape {shape:?}",
-                values.len()
-            ));
-        }
+        check_num_values(name, &shape, values.len())?;
         if let Some(index) = values.iter().position(|value| !value.is_finite()) {
             let value = values[index];
             return Err(format!("tensor `{name}`: value {index} is `{value}`, expected a finite number"));

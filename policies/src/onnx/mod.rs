@@ -42,7 +42,10 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
     }
     let named = |names: &[&str]| graph.output.iter().find(|output| names.contains(&&*output.name));
     let ((Some(logits), _) | (None, [logits])) = (named(&LOGITS), &*graph.output) else {
-        return Err(format!("{} outputs, expected one of them to be called `logits`", graph.output.len()));
+        return Err(format!(
+            "{} outputs, expected one called `action_logits` or `logits`",
+            graph.output.len()
+        ));
     };
     match reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name)) {
         Ok((architecture, tensors)) => Ok(Graph::Layers(architecture, tensors)),

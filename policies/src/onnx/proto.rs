@@ -7,6 +7,8 @@
 
 use prost::Message;
 
+use crate::network::check_num_values;
+
 #[derive(Clone, PartialEq, Message)]
 pub struct Model {
     #[prost(message, optional, tag = "7")]
@@ -163,13 +165,13 @@ impl TensorProto {
         let (raw, rest) = self.raw_data.as_chunks::<4>();
         let mut values: Vec<f32> = raw.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         values.extend(&self.float_data);
-        let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
-        if expected != Some(values.len()) || !rest.is_empty() {
+        if !rest.is_empty() {
             return Err(format!(
-                "tensor `{name}` has {} values, expected those of shape {shape:?}",
-                values.len()
+                "tensor `{name}` has {} bytes, expected a multiple of 4",
+                self.raw_data.len()
             ));
         }
+        check_num_values(name, &shape, values.len())?;
         Ok((shape, values))
     }
 

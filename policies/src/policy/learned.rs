@@ -9,7 +9,7 @@ use crate::mats_lp::MatsLp;
 /// A learned policy that chooses the actions of all agents of one episode.
 pub struct LearnedPolicy(Box<dyn Player + Send>);
 
-/// What a learned policy does in one episode.
+/// The interface of a learned policy in one episode.
 pub(crate) trait Player {
     /// Returns the time that networks have taken since the episode began, summed over threads.
     fn network_time(&self) -> Duration;

@@ -80,10 +80,11 @@ impl LearnedName {
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
             Self::Iql => Some(shipped::IQL),
+            Self::LSwitcher => Some(shipped::LSWITCHER),
             Self::Qmix => Some(shipped::QMIX),
             Self::Qplex => Some(shipped::QPLEX),
             Self::Vdn => Some(shipped::VDN),
-            Self::LSwitcher | Self::MatsLp | Self::Network => None,
+            Self::MatsLp | Self::Network => None,
         }
     }
 

@@ -25,6 +25,8 @@ pub const EPOM: ShippedWeights = shipped!("epom");
 pub const FOLLOWER: ShippedWeights = shipped!("follower");
 /// IQL, see `weights/iql/run.json`.
 pub const IQL: ShippedWeights = shipped!("iql");
+/// The network of LSwitcher, see `weights/lswitcher/run.json`. It plays [`EPOM`], too.
+pub const LSWITCHER: ShippedWeights = shipped!("lswitcher");
 /// QMIX, see `weights/qmix/run.json`.
 pub const QMIX: ShippedWeights = shipped!("qmix");
 /// QPLEX, see `weights/qplex/run.json`.

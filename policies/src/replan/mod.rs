@@ -5,6 +5,7 @@
 
 mod planner;
 mod policy;
+mod reached;
 mod search;
 #[cfg(test)]
 mod tests;

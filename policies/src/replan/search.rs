@@ -1,21 +1,36 @@
 //! RePlan's A*, with the same order of steps as the authors' code.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use pogema_core::Action;
-use rustc_hash::FxHashMap;
+
+use crate::replan::reached::Reached;
 
 /// A cell of an unbounded grid: (row, column).
 pub(crate) type Place = (i32, i32);
 
 /// The memory of searches.
+///
+/// Cells are expanded in the order of total cost, cost so far, row and column. A heap is not needed: a neighbour has a
+/// cost of 1 more and a total cost of 0 or 2 more, so all cells of a total cost and a cost are known before the first of
+/// them is expanded.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
-    /// Cells to expand: total cost, cost so far, cell. Equal costs follow the rows and columns.
-    heap: BinaryHeap<Reverse<(u32, u32, Place)>>,
-    /// For each generated cell, the cell from which it was generated. The start is its own.
-    parents: FxHashMap<Place, Place>,
+    /// Cells of the present total cost, with their costs, that cells of smaller total costs generated.
+    level: Vec<(u32, Node)>,
+    /// The same of the next total cost.
+    next_level: Vec<(u32, Node)>,
+    /// Cells of the present total cost and cost.
+    group: Vec<Node>,
+    /// Cells of the present total cost and the next cost.
+    next_group: Vec<Node>,
+    reached: Reached,
+}
+
+/// A cell that a search has generated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Node {
+    place: Place,
+    /// The index of the first move of the path to the cell.
+    first_move: u8,
 }
 
 /// A search.
@@ -35,42 +50,78 @@ impl Search {
 
     /// Returns the first cell of a path to the goal.
     ///
-    /// A cell keeps the parent that generated it first, so the path is not always the shortest.
+    /// A cell keeps the path that generated it first, so the path is not always the shortest.
     pub fn first_step(&mut self, query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<Place> {
-        let Query { start, goal, moves, best_move } = query;
-        self.heap.clear();
-        self.parents.clear();
-        self.parents.insert(start, start);
-        self.heap.push(Reverse((distance(start, goal), 0, start)));
-        let mut best = (distance(start, goal), start);
-        for _ in 0..Self::MAX_EXPANSIONS {
-            let Some(Reverse((_, cost, place))) = self.heap.pop() else { break };
-            let left = distance(place, goal);
-            if left < best.0 {
-                best = (left, place);
-            }
-            if left == 0 {
-                break;
-            }
-            for action in moves {
-                let next = toward(place, action);
-                if !self.parents.contains_key(&next) && !is_blocked(next) {
-                    self.parents.insert(next, place);
-                    self.heap.push(Reverse((cost + 1 + distance(next, goal), cost + 1, next)));
-                }
-            }
-        }
-        let (left, end) = best;
-        ((left == 0 || best_move) && end != start).then(|| self.after_start(start, end))
+        let (left, first_move) = self.nearest(query, is_blocked)?;
+        (left == 0 || query.best_move).then(|| toward(query.start, query.moves[usize::from(first_move)]))
     }
 
-    /// Returns the first cell after the start on the path to another cell.
-    fn after_start(&self, start: Place, end: Place) -> Place {
-        let mut place = end;
-        while self.parents[&place] != start {
-            place = self.parents[&place];
+    /// Returns the distance from the goal of the expanded cell that is nearest to it, and the first move to this cell;
+    /// `None` if it is the start.
+    fn nearest(&mut self, query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<(u32, u8)> {
+        let Query { start, goal, moves, .. } = query;
+        let (mut best_left, mut best_move) = (distance(start, goal), None);
+        let mut num_left = Self::MAX_EXPANSIONS;
+        self.begin(start);
+        loop {
+            self.level.sort_unstable();
+            let (mut level, mut cost) = (self.level.iter().peekable(), 0);
+            loop {
+                if self.group.is_empty() {
+                    let Some(&&(next, _)) = level.peek() else { break };
+                    cost = next;
+                }
+                while let Some(&(_, node)) = level.next_if(|(other, _)| *other == cost) {
+                    self.group.push(node);
+                }
+                self.group.sort_unstable();
+                for node in self.group.drain(..) {
+                    if num_left == 0 {
+                        return best_move.map(|first_move| (best_left, first_move));
+                    }
+                    num_left -= 1;
+                    let left = distance(node.place, goal);
+                    if left < best_left {
+                        (best_left, best_move) = (left, Some(node.first_move));
+                    }
+                    if left == 0 {
+                        return best_move.map(|first_move| (0, first_move));
+                    }
+                    for (index, action) in (0..).zip(moves) {
+                        let place = toward(node.place, action);
+                        if self.reached.contains(place) || is_blocked(place) {
+                            continue;
+                        }
+                        self.reached.insert(place);
+                        let first_move = if node.place == start { index } else { node.first_move };
+                        let node = Node { place, first_move };
+                        if distance(place, goal) < left {
+                            self.next_group.push(node);
+                        } else {
+                            self.next_level.push((cost + 1, node));
+                        }
+                    }
+                }
+                std::mem::swap(&mut self.group, &mut self.next_group);
+                cost += 1;
+            }
+            if self.next_level.is_empty() {
+                return best_move.map(|first_move| (best_left, first_move));
+            }
+            self.level.clear();
+            std::mem::swap(&mut self.level, &mut self.next_level);
         }
-        place
+    }
+
+    /// Forgets the previous search.
+    fn begin(&mut self, start: Place) {
+        self.level.clear();
+        self.next_level.clear();
+        self.group.clear();
+        self.next_group.clear();
+        self.reached.clear_around(start);
+        self.reached.insert(start);
+        self.group.push(Node { place: start, first_move: 0 });
     }
 }
 
@@ -80,6 +131,7 @@ pub(crate) fn toward((row, col): Place, action: Action) -> Place {
     (row + down, col + right)
 }
 
-fn distance((row, col): Place, (goal_row, goal_col): Place) -> u32 {
+/// Returns the Manhattan distance.
+pub(crate) fn distance((row, col): Place, (goal_row, goal_col): Place) -> u32 {
     row.abs_diff(goal_row) + col.abs_diff(goal_col)
 }

@@ -1,9 +1,13 @@
 //! Tests of the search and of the memory of the agents.
 
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
 use pogema_core::{Action, Cell, GoalStream, Instance, Map, Occupancy, Outside, State};
+use proptest::prelude::*;
 
 use super::planner::{Plan, ReplanVersion, Replanner};
-use super::search::{Place, Query, Search};
+use super::search::{Place, Query, Search, distance, toward};
 use ReplanVersion::{Cpp, Python};
 
 const RIGHT_DOWN_UP_LEFT: [Action; 4] = [Action::Right, Action::Down, Action::Up, Action::Left];
@@ -72,6 +76,77 @@ fn a_goal_without_a_path_has_no_move_or_that_to_the_nearest_cell() {
     // The goal is occupied, and around it lie endless free cells.
     assert_eq!(step((0, 0), (5, 0), false, |place| place == (5, 0)), None);
     assert_eq!(step((0, 0), (5, 0), true, |place| place == (5, 0)), Some((1, 0)));
+}
+
+/// The search with a heap and a map of parents.
+fn plain_first_step(query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<Place> {
+    let Query { start, goal, moves, best_move } = query;
+    let mut heap = BinaryHeap::from([Reverse((distance(start, goal), 0, start))]);
+    let mut parents = HashMap::from([(start, start)]);
+    let mut best = (distance(start, goal), start);
+    for _ in 0..10_000 {
+        let Some(Reverse((_, cost, place))) = heap.pop() else { break };
+        let left = distance(place, goal);
+        if left < best.0 {
+            best = (left, place);
+        }
+        if left == 0 {
+            break;
+        }
+        for next in moves.map(|action| toward(place, action)) {
+            if !parents.contains_key(&next) && !is_blocked(next) {
+                parents.insert(next, place);
+                heap.push(Reverse((cost + 1 + distance(next, goal), cost + 1, next)));
+            }
+        }
+    }
+    let (left, mut end) = best;
+    if end == start || !(left == 0 || best_move) {
+        return None;
+    }
+    while parents[&end] != start {
+        end = parents[&end];
+    }
+    Some(end)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+    #[test]
+    fn searches_equal_those_with_a_heap(
+        obstacles in proptest::collection::vec(proptest::bool::weighted(0.35), 400),
+        ends in [(-2..22, -2..22), (-2..22, -2..22)],
+        has_walls in any::<bool>(),
+        best_move in any::<bool>(),
+        version in 0..2_usize,
+    ) {
+        let is_blocked = |(row, col): Place| {
+            if (0..20).contains(&row) && (0..20).contains(&col) {
+                return obstacles[(20 * row + col) as usize];
+            }
+            // With walls, most goals outside are out of reach, and some searches leave through a gap.
+            has_walls && (row, col) != (7, 20) && row.min(col) >= -1 && row.max(col) <= 20
+        };
+        let moves = [[Action::Right, Action::Down, Action::Up, Action::Left], [Action::Up, Action::Down, Action::Left, Action::Right]];
+        let query = Query { start: ends[0], goal: ends[1], moves: moves[version], best_move };
+        // The second search has the memory of the first.
+        let mut search = Search::default();
+        for query in [query, Query { start: query.goal, goal: query.start, ..query }] {
+            prop_assert_eq!(search.first_step(query, is_blocked), plain_first_step(query, is_blocked));
+        }
+    }
+}
+
+#[test]
+fn searches_far_from_the_start_equal_those_with_a_heap() {
+    // A corridor of two rows leads out of the cells that are fast.
+    let is_blocked = |(row, col): Place| !(0..2).contains(&row) || (row == 1 && col % 7 == 0);
+    for goal in [(0, 900), (1, -700), (1, 700), (5, 300)] {
+        let query = Query { start: (0, 3), goal, moves: RIGHT_DOWN_UP_LEFT, best_move: true };
+        let step = Search::default().first_step(query, is_blocked);
+        assert_eq!(step, plain_first_step(query, is_blocked), "{goal:?}");
+        assert!(step.is_some());
+    }
 }
 
 #[test]

@@ -143,7 +143,7 @@ fn the_network_of_a_search_reads_what_the_search_writes() {
         let error =
             read(&format!(r#", "encoder": {{"radius": {radius}, "channels": ["{names}"]}}"#)).unwrap_err();
         let expected = format!(
-            "`encoder of the network` is `{channels} with radius {radius}`, expected all_agents, cost_tracer with radius 1"
+            "`encoder of the network` is `{channels} with radius {radius}`, expected all_agents or agents, then cost_tracer, with radius 1"
         );
         assert!(error.contains(&expected), "{error}");
     }

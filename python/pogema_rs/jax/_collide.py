@@ -18,9 +18,9 @@ MOVES = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]], dtype=np.int32)
 
 
 class Moved(NamedTuple):
-    """The cells after the moves, which agents have their marks, and the cells that they aimed at.
+    """The cells after the moves; which agents have their marks, which moved, and which an obstacle blocked.
 
-    Shape: `cells` `(agents, 2)`, int32; `marked`, `moves` and `is_blocked` (by an obstacle) `(agents,)`, bool
+    Shape: `cells` `(agents, 2)`, int32; `marked`, `moves` and `is_blocked` `(agents,)`, bool
     """
 
     cells: jax.Array
@@ -30,9 +30,11 @@ class Moved(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """What each agent aims at. Cells are numbers on the grid; those of inactive agents are off it.
+    """The cell and the target of each agent, as numbers of grid cells. Inactive agents have the number after the last cell.
 
-    Shape: `(agents,)` each, but `board` `(cells,)`, the active agent on each cell, or the number of agents
+    `board` holds the active agent on each cell, or the number of agents if there is none.
+
+    Shape: `(agents,)` each; `board` `(cells,)`
     """
 
     here: jax.Array
@@ -101,7 +103,8 @@ def _softly(config: Config, state: State, aims: Aims) -> jax.Array:
 
     Rule: collide/soft, collide/soft/stay, collide/soft/swap, collide/soft/contest, collide/soft/chain
     """
-    # The occupant of a free cell is no agent, whose target no agent stands on. An agent that stays swaps with itself.
+    # A free cell has no occupant, so its entry is -1, which equals no cell. An agent that stays counts as a swap with
+    # itself.
     target_of_occupant = aims.there.at[aims.occupant].get(mode="fill", fill_value=-1)
     alone = state.active & ~aims.is_blocked & (target_of_occupant != aims.here)
     return _follow(config, aims, _lowest(config, aims, alone))

@@ -157,7 +157,10 @@ class SvgAnimation:
         return self._text
 
     def save(self, name: Union[str, PathLike]) -> None:
-        """Writes the SVG to a file, and makes the folders above it."""
+        """Writes the SVG to a file, and makes the folders above it.
+
+        Errors: `OSError` if the file cannot be written.
+        """
         write(name, self._text)
 
     def _repr_html_(self) -> str:
@@ -167,7 +170,10 @@ class SvgAnimation:
 
 
 def write(name: Union[str, PathLike], text: str) -> None:
-    """Writes a text to a file, and makes the folders above it."""
+    """Writes a text to a file, and makes the folders above it.
+
+    Errors: `OSError` if the file cannot be written.
+    """
     path = Path(name)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")

@@ -10,7 +10,7 @@ use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace
 use serde::Serialize;
 
 use crate::blocked_moves::{BlockedMove, Blocker, blocked_moves};
-use crate::check::{check, direction};
+use crate::check::check;
 
 /// Compression level; higher levels take longer and save almost nothing.
 const LEVEL: u8 = 7;
@@ -121,7 +121,7 @@ impl Parts {
         let after = &step.state;
         for (agent, &action) in step.actions.iter().enumerate() {
             // INVARIANT: the trace is checked, so each agent stays or moves to a neighbouring cell.
-            let moved = direction(before.cells[agent], after.cells[agent]).unwrap_or(Action::Stay);
+            let moved = before.cells[agent].action_to(after.cells[agent]).unwrap_or(Action::Stay);
             let flags = u8::from(after.active[agent]) << 6 | u8::from(after.on_goal[agent]) << 7;
             self.moves.push(action as u8 | (moved as u8) << 3 | flags);
             self.ended.push(u8::from(step.terminated[agent]) | u8::from(step.truncated[agent]) << 1);

@@ -82,7 +82,7 @@ impl CactusView {
                 .with_line_style(dashes.map_or(LineStyle::Solid, LineStyle::Custom));
             plots.push(Plot::Line(line));
             if self.style.has_markers {
-                // A marker at the end names the line in grey, too.
+                // A marker at the end identifies the line in greyscale, too.
                 let dot = ScatterPlot::new().with_data([(end, times.len() as f64)]).with_color(colour);
                 plots.push(Plot::Scatter(dot.with_size(self.style.line_width * 1.6).with_marker(marker)));
             }

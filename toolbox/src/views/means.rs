@@ -31,8 +31,9 @@ impl Means {
         if let Some(name) =
             KEYS.into_iter().chain(metrics()).find(|name| !head.iter().any(|one| one == *name))
         {
-            let hint = nearest(name, &head).unwrap_or_default();
-            return Err(Error::io(path, format!("no column `{name}`; did you mean `{hint}`?")));
+            let hint =
+                nearest(name, &head).map(|hint| format!("; did you mean `{hint}`?")).unwrap_or_default();
+            return Err(Error::io(path, format!("no column `{name}`{hint}")));
         }
         let mut rows = Vec::new();
         for record in reader.records() {
@@ -41,7 +42,8 @@ impl Means {
             if let Some(name) = metrics().find(|&name| !row[name].is_empty() && number(&row[name]).is_none())
             {
                 let (line, found) = (record.position().map_or(0, csv::Position::line), &row[name]);
-                let reason = format!("line {line}: `{name}` is `{found}`, expected a number or nothing");
+                let reason =
+                    format!("line {line}: `{name}` is `{found}`, expected a number or an empty cell");
                 return Err(Error::io(path, reason));
             }
             rows.push(row);

@@ -20,6 +20,7 @@ mod picture;
 mod plot;
 mod published;
 mod radar;
+mod ratios;
 mod seeds;
 mod series;
 mod style;
@@ -42,6 +43,7 @@ pub use picture::Picture;
 pub use plot::PlotView;
 pub use published::PublishedView;
 pub use radar::RadarView;
+pub use ratios::RatiosView;
 pub use seeds::SeedsView;
 pub use table::TableView;
 
@@ -56,7 +58,7 @@ use crate::tree::Node;
 const VIEWS: &str = "results_views";
 
 /// The types of views.
-const TYPES: [&str; 10] = [
+const TYPES: [&str; 11] = [
     "tabular",
     "plot",
     "multi-plot",
@@ -67,6 +69,7 @@ const TYPES: [&str; 10] = [
     "difference",
     "seeds",
     "published",
+    "ratios",
 ];
 
 /// One view of results.
@@ -90,6 +93,8 @@ pub enum View {
     Seeds(SeedsView),
     /// `type: published`
     Published(Box<PublishedView>),
+    /// `type: ratios`
+    Ratios(RatiosView),
 }
 
 /// The output of a view.
@@ -142,6 +147,7 @@ impl View {
             "difference" => DifferenceView::read(name, node).map(Self::Difference),
             "seeds" => SeedsView::read(name, node).map(Self::Seeds),
             "published" => PublishedView::read(name, node).map(|view| Self::Published(Box::new(view))),
+            "ratios" => RatiosView::read(name, node).map(Self::Ratios),
             other => {
                 let hint = nearest(other, TYPES).unwrap_or_default();
                 let types = TYPES.join(", ");
@@ -154,8 +160,11 @@ impl View {
     /// Resolves its paths relative to the folder of the file that holds it.
     #[must_use]
     pub fn beside(mut self, file: &Path) -> Self {
-        if let Self::Published(view) = &mut self {
-            view.beside(file.parent().unwrap_or(Path::new("")));
+        let folder = file.parent().unwrap_or(Path::new(""));
+        match &mut self {
+            Self::Published(view) => view.beside(folder),
+            Self::Ratios(view) => view.beside(folder),
+            _ => {}
         }
         self
     }
@@ -190,6 +199,7 @@ impl View {
             Self::Difference(view) => view.show(name, results),
             Self::Seeds(view) => view.show(name, results),
             Self::Published(view) => view.show(name, results),
+            Self::Ratios(view) => view.show(name, results),
         }
     }
 }

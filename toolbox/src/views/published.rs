@@ -122,13 +122,7 @@ impl PublishedView {
             means.check(name, keys)?;
             let published = self.published(name, dataset)?;
             published.as_deref().map_or(Ok(()), |published| check_columns(name, &rows, published))?;
-            let mut groups: BTreeMap<u64, Vec<&Row>> = BTreeMap::new();
-            for row in rows {
-                // A missing number of agents means POGEMA's default.
-                let num_agents = row.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1);
-                groups.entry(num_agents).or_default().push(row);
-            }
-            for (num_agents, rows) in groups {
+            for (num_agents, rows) in by_num_agents(rows) {
                 let pairing = published.as_deref().map(|published| pair(&rows, published));
                 let mean = |metric: &str| means.mean(keys, num_agents, metric);
                 let figures = self.metrics.iter().map(|metric| figure(metric, &rows, pairing.as_ref(), mean));
@@ -259,6 +253,17 @@ fn decision_times(row: &Row) -> Option<[Option<f64>; 2]> {
     Some(seconds.map(|seconds| Some(1e6 * seconds? / num_decisions)))
 }
 
+/// Groups rows by their number of agents.
+pub(super) fn by_num_agents<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeMap<u64, Vec<&'a Row>> {
+    let mut groups: BTreeMap<u64, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        // A missing number of agents means POGEMA's default.
+        let num_agents = row.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1);
+        groups.entry(num_agents).or_default().push(row);
+    }
+    groups
+}
+
 /// Returns the fields that vary in rows.
 fn varied<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeSet<&'a String> {
     rows.into_iter().flat_map(|row| row.settings.keys()).collect()
@@ -341,6 +346,7 @@ fn lower_bound(row: &Row) -> Option<f64> {
     row.proof.lower_bound.map(|bound| bound as f64)
 }
 
-fn ratio(ours: Option<f64>, published: Option<f64>) -> Option<f64> {
+/// Returns our figure divided by the published one, if both exist.
+pub(super) fn ratio(ours: Option<f64>, published: Option<f64>) -> Option<f64> {
     Some(ours? / published.filter(|&published| published != 0.0)?)
 }

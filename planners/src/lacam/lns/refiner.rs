@@ -88,19 +88,23 @@ impl<'a> Refiner<'a> {
         configurations_of(self.solution.paths())
     }
 
-    /// Replaces the plan with a better one, if its paths fit the time span.
+    /// Replaces the plan if the new one has less total delay and its paths fit the time span.
     pub fn replace(&mut self, plan: &[Vec<Vertex>]) {
         let paths = paths_of(plan);
         let span = self.solution.span() as usize;
         let delay =
             |(agent, path): (usize, &Path)| self.solution.delay_of(agent as Agent, path.len() as u32 - 1);
         let delays: u64 = paths.iter().enumerate().map(delay).sum();
-        if delays >= self.solution.total_delay() || paths.iter().any(|path| path.len() > span) {
+        if paths.iter().any(|path| path.len() > span) {
             return;
         }
         let all: Vec<Agent> = (0..paths.len() as Agent).collect();
         loop {
             self.apply_changes();
+            // Other workers may have found better paths since the new plan was begun.
+            if delays >= self.solution.total_delay() {
+                return;
+            }
             if let Some(seen) = self.log.publish(&all, &paths, self.num_applied) {
                 self.num_applied = seen;
                 break;
@@ -151,7 +155,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Replans the neighbourhood by prioritised planning in the order of `agents`. If that fails or the total delay
-    /// would grow, the agents keep their paths.
+    /// would grow, the agents keep their paths. Returns whether they have new ones.
     fn repair(&mut self, mut stop: impl FnMut() -> bool) -> bool {
         let mut left: u64 = self.agents.iter().map(|&agent| self.solution.delay(agent)).sum();
         if left == 0 {
@@ -172,7 +176,7 @@ impl<'a> Refiner<'a> {
         true
     }
 
-    /// Finds a path of an agent with at most a given delay.
+    /// Finds a path of an agent with at most a given delay; returns whether there is one.
     fn find(&mut self, agent: Agent, delay: u64, index: usize) -> bool {
         let (start, goal) = self.solution.ends(agent);
         let (costs, latest) = (self.solution.costs(agent), self.solution.latest(agent, delay));
@@ -181,8 +185,8 @@ impl<'a> Refiner<'a> {
         self.planner.find(self.solution.graph(), self.solution.table(), query, &mut self.new[index])
     }
 
-    /// Publishes the new paths. If other workers have changed the same agents or block the new paths, the old paths are
-    /// restored.
+    /// Publishes the new paths; returns whether that succeeded. If other workers have changed the same agents or block
+    /// the new paths, the old paths are restored.
     fn publish(&mut self) -> bool {
         let num_agents = self.agents.len();
         loop {
@@ -225,7 +229,7 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Exchanges the paths of the neighbourhood.
+    /// Replaces the paths of the neighbourhood with the given ones.
     fn exchange(&mut self, paths: &[Path]) {
         self.agents.iter().for_each(|&agent| self.solution.remove(agent));
         for (&agent, path) in self.agents.iter().zip(paths) {

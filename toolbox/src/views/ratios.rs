@@ -1,0 +1,102 @@
+//! One metric of all algorithms, divided by published means.
+
+use std::path::{Path, PathBuf};
+
+use pogema_core::Error;
+
+use super::grid::{Cell, Table};
+use super::means::Means;
+use super::options::{Common, NUM_AGENTS, Options};
+use super::published::{by_num_agents, ratio};
+use super::{Shown, known_column};
+use crate::bootstrap::mean_of;
+use crate::frame::values;
+use crate::results::Results;
+use crate::tree::Node;
+
+/// `type: ratios`: the mean of a metric divided by the published mean, with a row for each folder and number of agents,
+/// and a column for each algorithm.
+///
+/// `file` holds the published means of a `setting`; its datasets and algorithms have the names of the folders and
+/// algorithms of the results. `metric` is `avg_throughput` or `ISR` by default.
+#[derive(Clone, Debug)]
+pub struct RatiosView {
+    common: Common,
+    file: PathBuf,
+    setting: String,
+    metric: String,
+}
+
+impl RatiosView {
+    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
+        let options = Options::new(name, node, &["file", "setting", "metric"])?;
+        let setting = options.required("setting")?;
+        let usual = match options.choice("setting", &["MAPF", "LMAPF"])? {
+            Some("LMAPF") => "avg_throughput",
+            _ => "ISR",
+        };
+        Ok(Self {
+            common: Common::read(&options)?,
+            file: options.required("file")?.into(),
+            setting,
+            metric: options.text("metric")?.unwrap_or_else(|| usual.to_owned()),
+        })
+    }
+
+    /// Resolves the path of its file relative to a folder.
+    pub(super) fn beside(&mut self, folder: &Path) {
+        self.file = folder.join(&self.file);
+    }
+
+    /// Reads the published means and divides the results by them.
+    ///
+    /// # Errors
+    /// If the file cannot be read, if the results lack the metric, or if no algorithm has published means.
+    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
+        known_column(name, "metric", &self.metric, results)?;
+        let means = Means::read(&self.file, std::slice::from_ref(&self.metric))?;
+        let all = results.algorithms();
+        let mut lines = Vec::new();
+        for (folder, rows) in results.by_folder() {
+            for (num_agents, rows) in by_num_agents(rows) {
+                let of = |algorithm: &String| {
+                    let own = rows.iter().copied().filter(|row| row.algorithm == *algorithm);
+                    let published = means.mean([&self.setting, folder, algorithm], num_agents, &self.metric);
+                    ratio(mean_of(&values(&own.collect::<Vec<_>>(), &self.metric)), published)
+                };
+                lines.push((folder, num_agents, all.iter().map(of).collect::<Vec<_>>()));
+            }
+        }
+        let (known, unknown): (Vec<usize>, Vec<usize>) =
+            (0..all.len()).partition(|&at| lines.iter().any(|(.., ratios)| ratios[at].is_some()));
+        if known.is_empty() {
+            let (file, all) = (self.file.display(), all.join(", "));
+            let reason =
+                format!("view `{name}`: `{file}` has no {} means of {all} in these sets", self.setting);
+            return Err(Error::request(reason));
+        }
+        let notes = unknown.iter().map(|&at| format!("`{}`: no published means", all[at])).collect();
+        let has_folders = lines.iter().any(|line| line.0 != lines[0].0);
+        let mut head = Vec::new();
+        head.extend(has_folders.then(|| "Folder".to_owned()));
+        head.push(self.common.title(NUM_AGENTS));
+        head.extend(known.iter().map(|&at| all[at].clone()));
+        let rows = lines.iter().map(|(folder, num_agents, ratios)| {
+            let mut row = Vec::new();
+            row.extend(has_folders.then(|| Cell::Text((*folder).to_owned())));
+            row.push(Cell::Count(*num_agents as usize));
+            row.extend(known.iter().map(|&at| Cell::Ratio(ratios[at])));
+            row
+        });
+        let remark =
+            format!("{} divided by the published mean, {}", self.common.title(&self.metric), self.setting);
+        let table = Table {
+            head,
+            rows: rows.collect(),
+            digits: self.common.digits,
+            remark: Some(remark),
+            ..Table::default()
+        };
+        Ok(Shown { tables: vec![table], notes, ..Shown::default() })
+    }
+}
