@@ -145,7 +145,7 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
         (fields.replace("SoC", "ISR"), "`ISR`"),
         (fields.replace("SoC", "runtime"), "means.csv: no column `runtime`"),
         (fields.replace("means.csv", "absent.csv"), "absent.csv"),
-        (fields.replace("MAPF", "both"), "`both`"),
+        (fields.replace("MAPF", "both"), "expected one of MAPF, LMAPF"),
     ] {
         let error = show(folder.path(), &fields, &results).unwrap_err();
         assert!(error.contains(message) && !error.contains('\n'), "{error}");
