@@ -32,7 +32,7 @@ fn our_trace_conforms_and_an_altered_one_diverges() {
     let output = pogema(&["conform", "--trace", right.to_str().unwrap()]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{text}");
-    assert!(text.contains("conforms to all it claims: 1 cases, 20 steps"), "{text}");
+    assert!(text.contains("conforms to all it claims: 1 case, 20 steps"), "{text}");
 
     let output = pogema(&["conform", "--trace", right.to_str().unwrap(), wrong.to_str().unwrap()]);
     let text = String::from_utf8(output.stdout).unwrap();
