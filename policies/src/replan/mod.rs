@@ -3,6 +3,7 @@
 //! Source: Skrynnik et al., "When to switch: planning and learning for partially observable multi-agent pathfinding",
 //! 2023; when-to-switch, `planning/replan_algo.py`, `planning/planner.cpp`
 
+mod place;
 mod planner;
 mod policy;
 mod reached;

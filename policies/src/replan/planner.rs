@@ -3,7 +3,8 @@
 use pogema_core::{Action, Cell, Instance, Occupancy, State};
 
 use crate::grid::{Layout, Marks};
-use crate::replan::search::{Place, Query, Search, toward};
+use crate::replan::place::{Place, toward};
+use crate::replan::search::{Query, Search};
 
 /// The two versions of RePlan that its authors released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use crate::replan::search::Place;
+use crate::replan::place::Place;
 
 /// A set of cells of an unbounded grid, fast around one cell.
 #[derive(Clone, Debug)]

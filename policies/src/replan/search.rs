@@ -2,10 +2,8 @@
 
 use pogema_core::Action;
 
+use crate::replan::place::{Place, distance, toward};
 use crate::replan::reached::Reached;
-
-/// A cell of an unbounded grid: (row, column).
-pub(crate) type Place = (i32, i32);
 
 /// The memory of searches.
 ///
@@ -123,15 +121,4 @@ impl Search {
         self.reached.insert(start);
         self.group.push(Node { place: start, first_move: 0 });
     }
-}
-
-/// Returns the next cell in the direction of an action.
-pub(crate) fn toward((row, col): Place, action: Action) -> Place {
-    let (down, right) = action.delta();
-    (row + down, col + right)
-}
-
-/// Returns the Manhattan distance.
-pub(crate) fn distance((row, col): Place, (goal_row, goal_col): Place) -> u32 {
-    row.abs_diff(goal_row) + col.abs_diff(goal_col)
 }

@@ -6,8 +6,9 @@ use std::collections::{BinaryHeap, HashMap};
 use pogema_core::{Action, Cell, GoalStream, Instance, Map, Occupancy, Outside, State};
 use proptest::prelude::*;
 
+use super::place::{Place, distance, toward};
 use super::planner::{Plan, ReplanVersion, Replanner};
-use super::search::{Place, Query, Search, distance, toward};
+use super::search::{Query, Search};
 use ReplanVersion::{Cpp, Python};
 
 const RIGHT_DOWN_UP_LEFT: [Action; 4] = [Action::Right, Action::Down, Action::Up, Action::Left];
