@@ -219,7 +219,7 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
     folder = tmp_path / "run"
     assert run("iql", folder, "--updates", "2").returncode == 0
     content = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    config = "learner.discount is 0.9, not 0.5"
+    config = "learner.discount is 0.95, not 0.5"
     broken, missing = tmp_path / "broken", tmp_path / "missing"
     broken.mkdir()
     (broken / "checkpoint.pt").write_bytes(content[folder / "checkpoint.pt"][:-100])
