@@ -6,9 +6,10 @@ if [ -z "$pogema" ]; then
     pogema=${CARGO_TARGET_DIR:-target}/release/pogema
 fi
 
-# Plays all suites of a setting, or continues an earlier run: play SETTING MAPS RESULTS [OPTION...]
-# SUITES is the folder with a folder of suites for each setting.
+# The folder with a folder of suites for each setting.
 SUITES=suites
+
+# Plays all suites of a setting, or continues an earlier run: play SETTING MAPS RESULTS [OPTION...]
 play() {
     local setting=$1 maps=$2 results=$3 suite name
     shift 3

@@ -58,10 +58,10 @@ impl Search {
     /// `None` if it is the start.
     fn nearest(&mut self, query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<(u32, u8)> {
         let Query { start, goal, moves, .. } = query;
-        let (mut best_left, mut best_move) = (distance(start, goal), None);
-        let mut num_left = Self::MAX_EXPANSIONS;
+        let (mut best_left, mut best_first) = (distance(start, goal), None);
+        let mut num_expansions_left = Self::MAX_EXPANSIONS;
         self.begin(start);
-        loop {
+        'search: loop {
             self.level.sort_unstable();
             let (mut level, mut cost) = (self.level.iter().peekable(), 0);
             loop {
@@ -74,16 +74,16 @@ impl Search {
                 }
                 self.group.sort_unstable();
                 for node in self.group.drain(..) {
-                    if num_left == 0 {
-                        return best_move.map(|first_move| (best_left, first_move));
+                    if num_expansions_left == 0 {
+                        break 'search;
                     }
-                    num_left -= 1;
+                    num_expansions_left -= 1;
                     let left = distance(node.place, goal);
                     if left < best_left {
-                        (best_left, best_move) = (left, Some(node.first_move));
+                        (best_left, best_first) = (left, Some(node.first_move));
                     }
                     if left == 0 {
-                        return best_move.map(|first_move| (0, first_move));
+                        break 'search;
                     }
                     for (index, action) in (0..).zip(moves) {
                         let place = toward(node.place, action);
@@ -104,11 +104,12 @@ impl Search {
                 cost += 1;
             }
             if self.next_level.is_empty() {
-                return best_move.map(|first_move| (best_left, first_move));
+                break;
             }
             self.level.clear();
             std::mem::swap(&mut self.level, &mut self.next_level);
         }
+        best_first.map(|first_move| (best_left, first_move))
     }
 
     /// Forgets the previous search.
