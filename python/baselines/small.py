@@ -33,6 +33,7 @@ _SMALL = (
     "schedule.validation_steps=12",
     "schedule.checkpoint_every=2",
     "network.hidden=16",
+    "imitation.iterations=0",
 )
 
 

@@ -156,7 +156,7 @@ def load(
     """Reads a learned policy from a file of weights, `.safetensors` or `.onnx`, and the JSON file beside it.
 
     `name` is the name of a policy in `LEARNED`. Without a path, it plays the weights in this package, which
-    `lswitcher`, `mats-lp` and `network` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
+    `mats-lp` and `network` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
     `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle [default: as the
     JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of
     `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its

@@ -11,6 +11,7 @@ import numpy as np
 from pogema_rs.baselines import _record
 from pogema_rs.baselines._config import RewardConfig, TrainingConfig
 from pogema_rs.baselines._record import Record
+from pogema_rs.baselines._teacher import Teacher, cells_ahead
 from pogema_rs.policies import Policy
 from pogema_rs.vec_env import AutoresetMode, VecEnv
 
@@ -38,8 +39,13 @@ class Collector:
         #: The number of steps by which each agent was nearer to its goal before.
         self._retreats = np.zeros((lanes, 0), dtype=np.float32)
 
-    def play(self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act) -> tuple[Record, dict[str, float]]:
-        """Plays the episodes of the configs and seeds; returns them and the means of their metrics."""
+    def play(
+        self, configs: list[dict[str, Any]], seeds: Sequence[int], act: Act, teacher: Optional[Teacher] = None
+    ) -> tuple[Record, dict[str, float]]:
+        """Plays the episodes of the configs and seeds; returns them and the means of their metrics.
+
+        The teacher sees every state.
+        """
         env = self._begin(configs)
         seen, infos = env.reset(seed=list(seeds))
         whole = _record.empty(self._config, self._map_size, self._lanes)
@@ -60,6 +66,9 @@ class Collector:
                 break
             windows, scalars = parts(seen)
             before = self._shown
+            if teacher is not None:
+                positions, goals = record.places[step, ..., :2], record.places[step, ..., 2:]
+                teacher.advise(step, record.maps, positions, self._goals_ahead(positions, goals))
             if isinstance(act, Policy):
                 actions = act.act(env)
             else:
@@ -75,6 +84,12 @@ class Collector:
         means = {name: float(values.mean()) for name, values in metrics.items()}
         acted = record.active[:-1] & record.played[:, :, None]
         return whole, {**means, "reward": float(record.rewards.sum() / max(1, acted.sum()))}
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """The numbers of steps, lanes and agents of a record."""
+        environment = self._config.environment
+        return environment.max_episode_steps, self._lanes, max(environment.num_agents)
 
     def close(self) -> None:
         """Frees the environments."""
@@ -135,6 +150,16 @@ class Collector:
         has_new_goal = (record.places[step + 1, ..., 2:] != record.places[step, ..., 2:]).any(axis=2)
         self._retreats[has_new_goal] = 0
         return np.asarray(np.maximum(ahead, 0))
+
+    def _goals_ahead(self, positions: np.ndarray, goals: np.ndarray) -> np.ndarray:
+        """Returns the goals for a teacher: the cells ahead on Follower's paths, if the config asks for them."""
+        if self._config.imitation.ahead == 0:
+            return goals
+        window = self._shown[:, :, self._encoder.channels.index("follower_path")]
+        side = self._encoder.shape[1]
+        offsets = cells_ahead(window.reshape(*window.shape[:2], side, side) > 0, self._config.imitation.ahead)
+        has_path = offsets.any(axis=2, keepdims=True)
+        return np.where(has_path, positions + offsets, goals)
 
     def _at_next_cell(self, record: Record, step: int, before: np.ndarray, channel: str) -> np.ndarray:
         """Returns the value of a channel, as it was before the step, at the cell that each agent moved to; else 0.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pogema_rs._encoder import Encoder
+from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.toolbox._optional import required
 
 #: The methods that can be trained, by name.
@@ -127,6 +128,20 @@ class ValueConfig:
     minibatches: int = 4
 
 
+@dataclass(frozen=True)
+class ImitationConfig:
+    """The warm start of the methods that learn by PPO: first, the agents imitate a planner."""
+
+    #: A lifelong planner if goals restart, else a planner of whole plans.
+    planner: str = "pibt"
+    #: The planner's budget for each step.
+    nodes: int = 1000
+    #: The planner's goal of each agent is the cell that lies so many steps ahead on Follower's path; 0 for its own goal.
+    ahead: int = 0
+    #: The number of iterations before PPO begins.
+    iterations: int = 0
+
+
 #: The hyperparameters of a learner.
 LearnerConfig = Union[QLearningConfig, PPOConfig, ValueConfig]
 
@@ -159,6 +174,7 @@ class TrainingConfig:
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
     network: NetworkConfig = field(default_factory=NetworkConfig)
+    imitation: ImitationConfig = field(default_factory=ImitationConfig)
     schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
 
     def to_dict(self) -> dict[str, Any]:
@@ -206,6 +222,7 @@ def read_config(values: Mapping[str, Any], method: str, name: str) -> TrainingCo
         "rewards": RewardConfig,
         "network": NetworkConfig,
         "learner": _learner_of(method),
+        "imitation": ImitationConfig,
         "schedule": ScheduleConfig,
     }
     _check_keys(name, "", values, ["method", "encoder", *sections])
@@ -289,6 +306,26 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
     check(learner.half_life >= 0, "learner.half_life", "at least 0")
     _check_learner(check, learner, schedule)
+    _check_imitation(check, name, config)
+
+
+def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
+    imitation = config.imitation
+    check(imitation.nodes >= 1, "imitation.nodes", "at least 1")
+    for key in ("iterations", "ahead"):
+        check(getattr(imitation, key) >= 0, f"imitation.{key}", "at least 0")
+    sees_paths = "follower_path" in config.encoder.channels
+    check(imitation.ahead == 0 or sees_paths, "imitation.ahead", "0 without the channel 'follower_path'")
+    if imitation.iterations:
+        learns_a_policy = isinstance(config.learner, PPOConfig)
+        check(learns_a_policy, "imitation.iterations", f"0, because {config.method} learns no policy by PPO")
+        for rule in config.environment.on_target:
+            # A planner keeps clear of agents that have finished and left.
+            check(rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise such episodes")
+            try:
+                make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
+            except ValueError as error:
+                raise ValueError(f"{name}: imitation: {error}") from None
 
 
 def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
@@ -68,17 +70,33 @@ class PPOLearner:
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
         gains, returns, odds = self._judged(record)
-        played = torch.from_numpy(record.active[:-1] & record.played[..., None])
+        played = _acted(record)
         spread, mean = torch.std_mean(gains[played])
         gains = (gains - mean) / (spread + 1e-8)
+        return self._pass(record, self._update, (gains, returns, odds, played))
+
+    def imitate(self, record: Record, advice: np.ndarray) -> dict[str, float]:
+        """Updates the networks on the episodes, so that the agents do what they were advised to do.
+
+        The critic learns what it learns by PPO. Returns means of the updates.
+
+        Shape: `advice` `(steps, lanes, agents)`
+        """
+        _, returns, _ = self._judged(record)
+        return self._pass(record, self._copy, (torch.from_numpy(advice).long(), returns, _acted(record)))
+
+    def _pass(
+        self, record: Record, update: Callable[..., dict[str, float]], arrays: tuple[torch.Tensor, ...]
+    ) -> dict[str, float]:
+        """Calls an update with all minibatches of some lanes; returns the means of its results."""
         sums: dict[str, float] = {}
         count = self.learner.epochs * self.learner.minibatches
         for _ in range(self.learner.epochs):
             order = torch.randperm(record.shape[1], generator=self._generator)
             for lanes in torch.tensor_split(order, self.learner.minibatches):
                 if len(lanes):
-                    parts = gains[:, lanes], returns[:, lanes], odds[:, lanes], played[:, lanes]
-                    for name, value in self._update(lanes_of(record, lanes.numpy()), *parts).items():
+                    parts = [array[:, lanes] for array in arrays]
+                    for name, value in update(lanes_of(record, lanes.numpy()), *parts).items():
                         sums[name] = sums.get(name, 0.0) + value / count
         decay(self.optimizer, self.learner.half_life)
         return sums
@@ -120,12 +138,23 @@ class PPOLearner:
             batch_size=actions.shape,
         )
         losses = self._objective(batch)
-        loss = losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]
+        self._descend(losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"])
+        return {name: float(losses[f"loss_{name}"].detach()) for name in ("objective", "critic", "entropy")}
+
+    def _copy(
+        self, record: Record, advice: torch.Tensor, returns: torch.Tensor, acted: torch.Tensor
+    ) -> dict[str, float]:
+        logits, values = self._outputs(record)
+        imitation = nn.functional.cross_entropy(logits[:-1][acted], advice[acted])
+        critic = self.learner.value * (values[:-1][acted] - returns[acted]).square().mean()
+        self._descend(imitation + critic)
+        return {"imitation": float(imitation.detach()), "critic": float(critic.detach())}
+
+    def _descend(self, loss: torch.Tensor) -> None:
         self.optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._parameters, self.learner.max_gradient)
         self.optimizer.step()
-        return {name: float(losses[f"loss_{name}"].detach()) for name in ("objective", "critic", "entropy")}
 
     def state(self) -> dict[str, Any]:
         """Returns everything that a checkpoint must hold."""
@@ -136,6 +165,11 @@ class PPOLearner:
         modules: tuple[Any, ...] = (self.network, self.critic, self.optimizer)
         for module, values in zip(modules, state["modules"]):
             module.load_state_dict(values)
+
+
+def _acted(record: Record) -> torch.Tensor:
+    """Returns which agents acted. Shape: `(steps, lanes, agents)`, bool."""
+    return torch.from_numpy(record.active[:-1] & record.played[..., None])
 
 
 def _objective(learner: PPOConfig) -> ClipPPOLoss:

@@ -26,6 +26,7 @@ from pogema_rs.baselines._lswitcher import ValueLearner
 from pogema_rs.baselines._ppo import PPOLearner
 from pogema_rs.baselines._progress import Progress
 from pogema_rs.baselines._q_learning import QLearner
+from pogema_rs.baselines._teacher import Teacher
 
 #: Learns from episodes.
 Learner = Union[QLearner, PPOLearner, ValueLearner]
@@ -144,8 +145,15 @@ class _Run:
         """Plays the episodes of one iteration, and learns from them."""
         configs, seeds = self.episodes.of_iteration(self.iteration, self.config.schedule.lanes)
         lanes = self.lanes[configs[0]["on_target"], configs[0]["num_agents"]]
-        record, _ = lanes.play(configs, seeds, self.learner.actor())
-        parts = self.learner.learn(record)
+        imitation = self.config.imitation
+        if self.iteration < imitation.iterations:
+            assert isinstance(self.learner, PPOLearner)
+            teacher = Teacher(imitation.planner, imitation.nodes, configs[0]["on_target"], lanes.shape)
+            record, _ = lanes.play(configs, seeds, self.learner.actor(), teacher)
+            parts = self.learner.imitate(record, teacher.advice)
+        else:
+            record, _ = lanes.play(configs, seeds, self.learner.actor())
+            parts = self.learner.learn(record)
         self.iteration += 1
         self.agent_steps += int(record.active[:-1][record.played].sum())
         return parts
