@@ -1,9 +1,10 @@
-"""Compares a whole training loop on three environments: `VecEnv`, POGEMA 1.4.0, and one that costs nothing.
+"""Compares a whole training loop on `VecEnv` with others: on POGEMA 1.4.0, on an environment that costs nothing, and with
+Sample Factory and TorchRL on POGEMA 1.4.0.
 
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
-AsyncVectorEnv, one process for each environment. The environments take turns; each ratio is the median over the rounds of
+AsyncVectorEnv, one process for each environment; the frameworks get one process per core. All take turns; each ratio is the median over the rounds of
 the ratios within a round. Installs PyTorch, POGEMA and the wheel below target/.
 """
 
@@ -20,7 +21,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 # Ours per second at least, as a multiple of the peer.
 BARS = {"free": 0.93, "pogema": 2.5}
-NAMES = {"free": "an environment that costs nothing", "pogema": "POGEMA 1.4.0 in AsyncVectorEnv"}
+NAMES = {
+    "free": "an environment that costs nothing",
+    "pogema": "POGEMA 1.4.0 in AsyncVectorEnv",
+    "sample_factory": "Sample Factory on POGEMA 1.4.0",
+    "torchrl": "TorchRL on POGEMA 1.4.0",
+}
 
 
 def main():
@@ -33,13 +39,13 @@ def main():
     worker = Worker(python, HERE / "training_worker.py")
     rounds = []
     for number in range(arguments.rounds):
-        rounds.append({name: worker.time(name, arguments.seconds) for name in ("ours", *BARS)})
+        rounds.append({name: worker.time(name, arguments.seconds) for name in ("ours", *NAMES)})
         print(f"round {number + 1}: {rounds[-1]}", file=sys.stderr)
     table = []
-    for name, bar in BARS.items():
+    for name, title in NAMES.items():
         theirs, own = (statistics.median(one[key] for one in rounds) for key in (name, "ours"))
         times = statistics.median(one["ours"] / one[name] for one in rounds)
-        table.append({"work": f"agent steps, {NAMES[name]}", "peer": theirs, "ours": own, "times": times, "bar": bar})
+        table.append({"work": f"agent steps, {title}", "peer": theirs, "ours": own, "times": times, "bar": BARS.get(name)})
     if arguments.json:
         arguments.json.write_text(json.dumps(table, indent=2) + "\n")
     print_table(table)

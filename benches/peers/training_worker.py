@@ -1,22 +1,23 @@
-"""Times the loop of train_ppo.py: each line of JSON on stdin names an environment and a number of seconds, and the reply
-on stdout is the number of agent steps per second.
+"""Times the loop of train_ppo.py: each line of JSON on stdin names an environment or a framework, and a number of
+seconds. The reply on stdout is the number of agent steps per second.
 """
 
+import functools
 import json
+import os
 import sys
 import time
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import torch
 from gymnasium.vector import AsyncVectorEnv
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "python" / "examples"))
-import train_ppo
+sys.path.insert(0, __file__.rpartition("/")[0])
+import training_frameworks
+from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, train_ppo
 
-NUM_ENVS, NUM_AGENTS, SIDE = 64, 16, 11
-train_ppo.CONFIG.update(size=16, num_agents=NUM_AGENTS, on_target="restart", max_episode_steps=128)
+FRAMEWORKS = {"sample_factory": training_frameworks.sample_factory, "torchrl": training_frameworks.torchrl}
 
 
 class Team(gymnasium.Env):
@@ -31,7 +32,7 @@ class Team(gymnasium.Env):
     def __init__(self):
         import pogema
 
-        config = pogema.GridConfig(**train_ppo.CONFIG)
+        config = pogema.GridConfig(**CONFIG)
         self._moves = [(SIDE // 2 + down, SIDE // 2 + right) for down, right in config.MOVES]
         self._env = pogema.pogema_v0(grid_config=config)
 
@@ -86,7 +87,7 @@ class FreeEnvs:
     """Environments that return the same arrays in every step."""
 
     def __init__(self):
-        env = train_ppo.VecEnv(train_ppo.GridConfig(**train_ppo.CONFIG), NUM_ENVS, masks=True)
+        env = train_ppo.VecEnv(train_ppo.GridConfig(**CONFIG), NUM_ENVS, masks=True)
         self._first = env.reset(seed=0)
         env.close()
         shape = (NUM_ENVS, NUM_AGENTS)
@@ -108,11 +109,11 @@ class Trainer(train_ppo.Trainer):
 
     def __init__(self, name):
         self._name = name
-        super().__init__(train_ppo.Params(num_envs=NUM_ENVS), 0)
+        super().__init__(PARAMS, 0)
 
     def make_env(self):
         if self._name == "ours":
-            config = train_ppo.GridConfig(**train_ppo.CONFIG)
+            config = train_ppo.GridConfig(**CONFIG)
             return train_ppo.VecEnv(config, NUM_ENVS, masks=True)
         return PogemaEnvs() if self._name == "pogema" else FreeEnvs()
 
@@ -133,7 +134,11 @@ def agent_steps_per_second(name, seconds):
 
 
 if __name__ == "__main__":
+    # What the frameworks print must not reach the replies.
+    replies = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     torch.set_num_threads(2)
     for line in sys.stdin:
         name, seconds = json.loads(line)
-        print(json.dumps(agent_steps_per_second(name, seconds)), flush=True)
+        time_one = FRAMEWORKS.get(name) or functools.partial(agent_steps_per_second, name)
+        print(json.dumps(time_one(seconds)), file=replies, flush=True)

@@ -1,7 +1,7 @@
 //! `pogema`: runs, checks and inspects POGEMA episodes.
 
 #![forbid(unsafe_code)]
-// Every command prints through `output`, which escapes what it prints and never panics.
+// `println!` escapes nothing and panics if the output is closed. Commands print through `output` instead.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
@@ -55,7 +55,7 @@ enum Command {
     Render(render::Render),
     /// Check that all engines, or ports, follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
-    /// Serve a built-in engine as a port: answer the requests of `conform --port` on standard input
+    /// Serve a built-in engine as a port: read requests of `conform --port` from standard input, answer on standard output
     Port(port::Port),
     /// Measure the speed of the engine on this machine, optionally against POGEMA 1.4.0
     Bench(bench::Bench),
@@ -94,7 +94,7 @@ fn run() -> Result<ExitCode, Error> {
     }
 }
 
-/// Returns whether the arguments are wrong; requests for help or the version are not.
+/// Returns whether clap rejects the arguments. Help, the version and a missing subcommand are no usage errors.
 fn is_usage_error(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }
@@ -102,7 +102,7 @@ fn is_usage_error(error: &clap::Error) -> bool {
 /// Prints a help text or the version, and returns clap's exit status.
 fn print_help(help: &clap::Error) -> Result<ExitCode, Error> {
     match help.print() {
-        // The help on a command without its subcommand goes to standard error, see `output::tell`.
+        // A command without its subcommand prints help to standard error. If that fails, the text is lost, as in `tell`.
         _ if help.use_stderr() => {}
         printed => output::check_printed(printed)?,
     }

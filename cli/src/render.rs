@@ -23,7 +23,7 @@ pub struct Render {
     /// Play the episode in the terminal [default if no picture is requested]
     #[arg(long)]
     text: bool,
-    /// Draw only these steps, such as `10..20`; `--frame` then counts from the first of them [default: all]
+    /// Draw only the steps A to B, both included, such as `10..20`; `--frame` then counts from A [default: all]
     #[arg(long, value_name = "A..B")]
     steps: Option<Steps>,
     #[command(flatten)]
@@ -48,7 +48,7 @@ impl FromStr for Steps {
         let steps = ends.filter(|(first, last)| first <= last).map(|(first, last)| Self { first, last });
         steps.ok_or_else(|| {
             let found = shorten(text, Error::LONGEST_QUOTE);
-            Error::request(format!("found `{found}`, expected two steps such as `10..20`"))
+            Error::request(format!("found `{found}`, expected `A..B` with A at most B, such as `10..20`"))
         })
     }
 }

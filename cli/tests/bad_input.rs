@@ -177,7 +177,7 @@ const REJECTED: [(&str, &str); 61] = [
     ),
     (
         "render trace.jsonl --steps 3..1",
-        "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected two steps such as `10..20`",
+        "invalid value '3..1' for '--steps <A..B>': found `3..1`, expected `A..B` with A at most B, such as `10..20`",
     ),
     ("render trace.jsonl --steps 0..1", "`--steps` is `1`, expected 0 to 0"),
     (

@@ -52,7 +52,7 @@ mod observe;
 mod simd;
 mod step;
 
-pub use batch::{Autoreset, Batch, Firsts, Instances, suited_threads};
+pub use batch::{Autoreset, Batch, FirstInstances, Instances, suited_threads};
 pub use buffers::{ApartBuffers, GlobalBuffers, ObservationBuffers, Observations, Windows};
 pub use observe::words_per_agent;
 pub use pogema_core::SimdPath;

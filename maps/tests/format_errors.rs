@@ -38,7 +38,7 @@ fn invalid_movingai_maps() {
     assert_error(read("type octile\nheight two\nwidth 3\nmap\n"), &["line 2", "`two`"]);
     assert_error(read("type octile\nheight 0\nwidth 3\nmap\n"), &["line 2", "`0`"]);
     assert_error(read("type octile\nheight 2\nheight 2\nmap\n"), &["line 3"]);
-    assert_error(read(&format!("{HEADER}...\n")), &["line 6", "after 1 rows"]);
+    assert_error(read(&format!("{HEADER}...\n")), &["line 6", "row 2 is missing"]);
     assert_error(read(&format!("{HEADER}...\n..\n")), &["line 6, column 3", "2 cells"]);
     assert_error(read(&format!("{HEADER}....\n...\n")), &["line 5, column 4", "longer"]);
     assert_error(read(&format!("{HEADER}...\n.x.\n")), &["line 6, column 2", "`x`"]);

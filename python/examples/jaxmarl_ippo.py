@@ -3,9 +3,10 @@
     pip install jax
     python jaxmarl_ippo.py --updates 200
 
-`ByAgent` gives a `VecEnv` JaxMARL's interface: `reset` and `step` return dictionaries with one array `(envs, ...)` for
-each agent, and `dones["__all__"]`. Unlike JaxMARL's environments, it keeps its state itself and is stepped outside of
-`jit`, so no key is passed. All agents share one network. Only JAX is needed: the optimizer, Adam, is written out.
+`ByAgent` gives a `VecEnv` the dictionaries of JaxMARL: `reset` and `step` return one array `(envs, ...)` for each
+agent, and `dones["__all__"]`. In the place of JaxMARL's state they return which agents are active: the `VecEnv` keeps
+its own state, takes no key and is stepped outside of `jit`. All agents share one network. Besides pogema-rs, only JAX
+is needed: this file contains the optimizer, Adam.
 """
 
 import argparse
@@ -60,7 +61,7 @@ def unbatchify(values: np.ndarray, agents: list[str]) -> ByName:
 
 
 class Transition(NamedTuple):
-    """One step of all rows, or with a leading axis of steps a rollout."""
+    """One step of all agents of all environments (rows); with a leading axis of steps, a rollout."""
 
     obs: jax.Array
     active: jax.Array
@@ -93,7 +94,7 @@ def init(key: jax.Array, sizes: list[int]) -> Train:
 
 
 def forward(params: Params, obs: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Returns the logarithms of the odds of the 5 actions, and the value."""
+    """Returns the logarithms of the probabilities of the 5 actions, and the value."""
     hidden = obs.reshape(obs.shape[0], -1)
     for weights, bias in params[:-1]:
         hidden = jax.nn.relu(hidden @ weights + bias)
@@ -104,9 +105,9 @@ def forward(params: Params, obs: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 @jax.jit
 def act(params: Params, key: jax.Array, obs: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-    logits, value = forward(params, obs)
-    action = jax.random.categorical(key, logits)
-    return action, jnp.take_along_axis(logits, action[:, None], 1)[:, 0], value
+    log_probs, value = forward(params, obs)
+    action = jax.random.categorical(key, log_probs)
+    return action, jnp.take_along_axis(log_probs, action[:, None], 1)[:, 0], value
 
 
 def gae(rollout: Transition, last_value: jax.Array) -> jax.Array:
@@ -122,11 +123,11 @@ def gae(rollout: Transition, last_value: jax.Array) -> jax.Array:
 
 
 def loss(params: Params, batch: Transition, advantage: jax.Array, target: jax.Array) -> jax.Array:
-    logits, value = forward(params, batch.obs)
-    log_prob = jnp.take_along_axis(logits, batch.action[:, None], 1)[:, 0]
+    log_probs, value = forward(params, batch.obs)
+    log_prob = jnp.take_along_axis(log_probs, batch.action[:, None], 1)[:, 0]
     ratio = jnp.exp(log_prob - batch.log_prob)
     policy = -jnp.minimum(ratio * advantage, jnp.clip(ratio, 1 - CLIP, 1 + CLIP) * advantage)
-    entropy = -(jnp.exp(logits) * logits).sum(axis=1)
+    entropy = -(jnp.exp(log_probs) * log_probs).sum(axis=1)
     # Rows of finished agents do not count.
     each = policy + 0.5 * jnp.square(value - target) - ENTROPY * entropy
     return (each * batch.active).sum() / jnp.maximum(batch.active.sum(), 1)
@@ -165,8 +166,8 @@ def update(train: Train, rollout: Transition, last_obs: jax.Array, key: jax.Arra
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--updates", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--updates", type=int, default=200, help="number of rollouts, each with an update [default: 200]")
+    parser.add_argument("--seed", type=int, default=0, help="seed of episodes, network and actions [default: 0]")
     arguments = parser.parse_args()
     env = ByAgent(CONFIG, NUM_ENVS)
     key = jax.random.key(arguments.seed)

@@ -1,4 +1,4 @@
-"""The replay page responds to buttons, keys, pointers and addresses, and uses no network."""
+"""The replay page responds to buttons, keys, mouse, touch and deep links, and uses no network."""
 
 import time
 
@@ -78,7 +78,7 @@ def test_agents_glide_between_steps(world):
         page.uncheck("#goals")
         settle(page)
         page.click("#play")
-        # On machines of any speed, two pictures of the same step must differ.
+        # Waits for two different pictures of the same step, so the speed of the machine does not matter.
         page.evaluate("window.seen = []")
         wait(
             page,
@@ -90,10 +90,10 @@ def test_agents_glide_between_steps(world):
         )
 
 
-def test_goals_have_the_numbers_of_their_agents(world):
+def test_goals_show_numbers(world):
     with world.open("restart") as page:
-        def around(cell):
-            # The middle of the ring, without the ring.
+        def has_number(cell):
+            # Reads only the inside of the goal's ring, where its number is.
             x, y = page.evaluate("([row, col]) => replay.center(row, col)", cell)
             reach = page.evaluate("replay.scale") / 5
             return page.evaluate(
@@ -110,11 +110,11 @@ def test_goals_have_the_numbers_of_their_agents(world):
         free = [goal for goal in state["goals"] if goal not in state["cells"]]
         assert free
         for goal in free:
-            assert around(goal), f"no number at {goal}"
+            assert has_number(goal), f"no number at {goal}"
         page.uncheck("#numbers")
         settle(page)
         for goal in free:
-            assert not around(goal), f"a number at {goal}"
+            assert not has_number(goal), f"a number at {goal}"
 
 
 def test_the_list_of_agents_uses_the_free_space(world):
@@ -137,13 +137,13 @@ def test_zoom_pan_and_fit(world):
         settle(page)
         assert page.evaluate("replay.scale") > 1.5 * fitted
         near = on_screen(page, "replay", 3, 4)
-        assert abs(near[0] - x) < 1 and abs(near[1] - y) < 1, "the cell under the pointer stays in place"
+        assert abs(near[0] - x) < 1 and abs(near[1] - y) < 1, "the cell under the pointer moved"
         page.mouse.down()
         page.mouse.move(x + 60, y + 40, steps=4)
         page.mouse.up()
         moved = on_screen(page, "replay", 3, 4)
         assert abs(moved[0] - x - 60) < 1 and abs(moved[1] - y - 40) < 1, moved
-        assert page.evaluate("replay.agent") is None, "a drag selects no agent"
+        assert page.evaluate("replay.agent") is None, "the drag selected an agent"
         page.click("#fit")
         equal(page.evaluate("replay.scale"), fitted)
         for how in ("#zoom-in", "#zoom-out"):
@@ -158,7 +158,7 @@ def test_zoom_pan_and_fit(world):
 def test_touch(world):
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
     with world.open("restart", **phone) as page:
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
         box, fitted = stage(page), page.evaluate("replay.scale")
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         session = page.context.new_cdp_session(page)

@@ -1,6 +1,6 @@
 //! Pictures of episodes.
 //!
-//! Every picture is drawn from a [`pogema_core::Trace`], and a [`Style`] sets its appearance. Frame 0 is the state
+//! The crate draws every picture from a [`pogema_core::Trace`], and a [`Style`] sets its appearance. Frame 0 is the state
 //! after the reset, frame 1 the state after the first step.
 //!
 //! | module | output |

@@ -1,6 +1,7 @@
-"""Times POGEMA 1.4.0: reads a JSON list of configs from stdin, prints observations and resets per second of each.
+"""Prints POGEMA 1.4.0's observations and resets per second, for each config of a JSON list on stdin.
 
-Actions are sampled beforehand, so that only steps are timed; the fastest of several intervals counts.
+Actions are sampled beforehand, so the time of a step does not include sampling. The fastest of several intervals
+counts.
 """
 
 import json

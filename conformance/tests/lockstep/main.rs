@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
-mod happenings;
+mod event_counts;
 mod pair;
 mod plan;
 mod soak;
 
-use happenings::EventCounts;
+use event_counts::EventCounts;
 use pair::{Outcome, Pair};
 use plan::{Op, Plan, plans};
 use proptest::prelude::*;
@@ -55,7 +55,7 @@ proptest! {
 }
 
 #[test]
-fn plans_meet_every_kind_of_conflict() {
+fn plans_contain_every_kind_of_event() {
     let mut counts = EventCounts::default();
     let mut runner = TestRunner::deterministic();
     let plans = plans();

@@ -27,26 +27,26 @@ pub use team::suited_threads;
 /// The time at which a lane begins its next episode after the end of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Autoreset {
-    /// The next episode begins within the same step. Rewards and ends are those of the last step, and observations
-    /// are those of the new episode.
+    /// The next episode begins within the same step. Rewards, `terminated` and `truncated` are those of the last step,
+    /// and observations are those of the new episode.
     #[default]
     SameStep,
-    /// The next episode begins with the next step, which ignores the lane's actions. Rewards are 0, all ends are false,
-    /// and observations are those of the new episode.
+    /// The next episode begins with the next step, which ignores the lane's actions. Rewards are 0, no agent is terminated
+    /// or truncated, and observations are those of the new episode.
     NextStep,
-    /// The lane stays at the end until a reset. Further steps give rewards of 0 and repeat the ends of the last step.
+    /// The lane stays at the end until a reset. Further steps give rewards of 0 and repeat `terminated` and `truncated` of
+    /// the last step.
     Off,
 }
 
 /// Many environments (lanes) of one config, each with its own map and its own episodes.
 ///
-/// Every array has a leading axis `lanes`, and then an axis `agents` with the config's number of agents. An instance may
-/// have fewer: the other rows are then padding, with observations and rewards of 0, all ends true, and action masks that
-/// only allow staying.
+/// Every array has a leading axis `lanes`. All except the maps of global states then have an axis `agents` with the
+/// config's number of agents. An instance may have fewer: the other rows are then padding, with observations and rewards
+/// of 0, both flags `terminated` and `truncated` true, and action masks that only allow staying.
 ///
-/// An episode ends when all agents are terminated or all are truncated. The
-/// lane then continues according to [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next
-/// episode ends.
+/// An episode ends when all agents are terminated or all are truncated. The lane then continues according to
+/// [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next episode ends.
 ///
 /// Results do not depend on the number of threads. A step uses only the calling thread while measured times show that
 /// further threads do not make it faster.
@@ -68,8 +68,8 @@ impl Batch {
     /// Call `reset` before the first step.
     ///
     /// # Errors
-    /// If the config is out of range, if `num_lanes` is 0, if `num_threads` is not 1 to 1024, or if threads cannot be
-    /// started.
+    /// If the config is out of range, if `num_lanes` is 0, if `num_threads` is not 1 to 1024, if `POGEMA_SIMD` is not the
+    /// name of a path that this machine supports, or if threads cannot be started.
     pub fn new(
         config: Config,
         num_lanes: usize,
@@ -115,8 +115,9 @@ impl Batch {
     /// Begins the next episode of every lane; the first call begins episode 0.
     ///
     /// # Errors
-    /// If a lane has no next instance, or one that does not fit the config, such as one with more agents; every lane is
-    /// then unchanged. If there is not enough memory for a lane's map; that lane is then unchanged.
+    /// If a lane has no next instance, or its next instance does not fit the config, for example because it has more
+    /// agents: every episode is then unchanged. If there is not enough memory for a lane's map: that lane is then
+    /// unchanged.
     pub fn reset(&mut self) -> Result<(), Error> {
         self.reset_lanes(&vec![true; self.lanes.len()])
     }
@@ -160,8 +161,8 @@ impl Batch {
 
     /// Fetches the next instances of the lanes whose episodes reach their limit of steps in the next step.
     ///
-    /// That step then takes little time. Another thread may set `stop` to end the call soon. A lane without a next
-    /// instance fails only after its episode has ended.
+    /// That step then takes little time. With [`Autoreset::Off`], the function does nothing. Another thread may set `stop`
+    /// to end the call soon. A lane without a next instance fails only after its episode has ended.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if the call was stopped.
@@ -182,7 +183,7 @@ impl Batch {
     /// Begins episode 0 of another source in the chosen lanes, and leaves the current episodes of the others unchanged.
     ///
     /// The later episodes of the other lanes come from the new source, too, and their numbers continue. Only an episode
-    /// that is already prepared still comes from the old source.
+    /// whose instance the lane has already fetched still comes from the old source.
     ///
     /// # Errors
     /// As for [`Batch::reset_lanes`]; also if the thread of the source cannot be started.
@@ -202,7 +203,7 @@ impl Batch {
         source: impl Instances + 'static,
         chosen: &[bool],
         stop: &AtomicBool,
-    ) -> Result<Firsts, Error> {
+    ) -> Result<FirstInstances, Error> {
         self.check_chosen(chosen)?;
         let preparer = Preparer::new(Arc::new(source), self.lanes.len())?;
         let first = |lane: &mut Lane| {
@@ -210,16 +211,16 @@ impl Batch {
             lane.check_fits(&instance).map(|()| instance)
         };
         let instances = over_chosen(&self.team, &mut self.lanes, chosen, stop, first)?;
-        Ok(Firsts { preparer, instances })
+        Ok(FirstInstances { preparer, instances })
     }
 
     /// Begins the episodes whose instances [`Batch::fetch_with`] has fetched.
     ///
     /// # Errors
-    /// [`Error::Length`] for the instances of a batch of another size; if there is not enough memory for a lane's map,
-    /// which is then unchanged.
-    pub fn begin_with(&mut self, firsts: Firsts) -> Result<(), Error> {
-        let Firsts { preparer, instances } = firsts;
+    /// [`Error::Length`] if the instances belong to a batch of another size. If there is not enough memory for a lane's
+    /// map; that lane is then unchanged.
+    pub fn begin_with(&mut self, firsts: FirstInstances) -> Result<(), Error> {
+        let FirstInstances { preparer, instances } = firsts;
         Error::check_length("first instances", self.lanes.len(), instances.len())?;
         self.preparer = preparer;
         let mut begun = Ok(());
@@ -240,9 +241,9 @@ impl Batch {
     /// set `stop` to end the call soon.
     ///
     /// # Errors
-    /// If there is not one flag per lane. With [`Autoreset::NextStep`], if the source has no instance that fits for an
-    /// episode that begins with the next step; [`Error::Cancelled`] if the call was stopped. Every lane is then
-    /// unchanged. If there is not enough memory for such an episode; the step of this lane then fails, too.
+    /// If there is not one flag per lane. [`Error::Cancelled`] if the call was stopped. With [`Autoreset::NextStep`], if an
+    /// episode begins with the next step, but the new source has no fitting instance for it. In these cases, every lane
+    /// is unchanged. If there is not enough memory for such an episode; the next step then fails, too.
     pub fn replace_source(
         &mut self,
         source: impl Instances + 'static,
@@ -355,7 +356,8 @@ impl Batch {
         self.check_lane(lane).map(|lane| lane.is_over)
     }
 
-    /// Returns how many episodes a lane has begun. Unlike [`Batch::episode`], the number grows with every episode.
+    /// Returns how many episodes a lane has begun. Unlike [`Batch::episode`], the number does not restart
+    /// with a new source.
     ///
     /// # Errors
     /// If the lane does not exist.
@@ -429,12 +431,12 @@ impl Batch {
 }
 
 /// The first instances of another source, for some lanes of a batch.
-pub struct Firsts {
+pub struct FirstInstances {
     preparer: Preparer,
     instances: Vec<Option<Instance>>,
 }
 
-impl Firsts {
+impl FirstInstances {
     /// Returns the instance of a lane, if the lane was chosen.
     pub fn instance(&self, lane: usize) -> Option<&Instance> {
         self.instances.get(lane)?.as_ref()

@@ -22,8 +22,8 @@ words! {
 /// determines whether water (`W`) is free.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for an invalid header, a number or length of rows that contradicts it, and any
-/// other letter.
+/// [`Error::Map`] with line and column for an invalid header, a number or length of rows that contradicts it, or a
+/// letter that is not listed above.
 ///
 /// Source: MovingAI, "Benchmark problem sets for grid-based pathfinding", file formats; pogema-toolbox 0.1.1,
 /// `moving_ai_ingestion.py`, `map_to_grid`
@@ -35,7 +35,7 @@ pub fn read_movingai(text: &str, water: Water) -> Result<Map, Error> {
     let mut last_line = HEADER_LINES;
     for row in 0..height {
         let Some((line, letters)) = lines.next() else {
-            let reason = format!("the map ends after {row} rows, expected {height} as in its header");
+            let reason = format!("row {} is missing, expected {height} rows as in the header", row + 1);
             return Err(Error::Map { line: last_line + 1, column: 1, reason });
         };
         last_line = line;
@@ -130,8 +130,9 @@ pub fn write_movingai(map: &Map) -> String {
 pub fn without_ring(map: &Map) -> Result<Map, Error> {
     let (height, width) = (map.height(), map.width());
     if height < 3 || width < 3 {
-        let reason =
-            format!("the map has {height} x {width} cells, expected at least 3 x 3 to remove the outermost");
+        let reason = format!(
+            "the map has {height} x {width} cells, expected at least 3 x 3 to remove the outermost rows and columns"
+        );
         return Err(Error::instance(reason));
     }
     let rows = map.obstacles().chunks(width).skip(1).take(height - 2);

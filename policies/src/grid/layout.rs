@@ -2,7 +2,7 @@
 
 use pogema_core::{Cell, Error, Map, Outside};
 
-/// The shape of a padded grid, row-major.
+/// The shape of a padded grid in row-major order. A *place* is the index of a cell in the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     height: usize,
@@ -35,7 +35,7 @@ impl Layout {
         (self.height + 2 * self.margin) * self.stride()
     }
 
-    /// Returns the distance between two places of a column.
+    /// Returns the distance between the places of two vertically adjacent cells.
     pub fn stride(&self) -> usize {
         self.width + 2 * self.margin
     }
@@ -72,7 +72,7 @@ impl Layout {
         out: &mut [V],
         convert: impl Fn(T) -> V + Copy,
     ) {
-        // Loops over rows of a constant length take half the time. These are the usual radii: 2 to 5 and 7.
+        // A row length known at compile time halves the time. The arms are the areas of windows of radius 2 to 5 and 7.
         match out.len() {
             25 => self.map_rows::<5, _, _>(grid, place, out, convert),
             49 => self.map_rows::<7, _, _>(grid, place, out, convert),
@@ -100,7 +100,7 @@ impl Layout {
         let (rows, _) = out.as_chunks_mut::<SIDE>();
         for (row, first) in rows.iter_mut().zip(self.window_rows(place, SIDE / 2)) {
             if let Some(values) = grid[first..].first_chunk::<SIDE>() {
-                // Not `values.map`, whose loop has no vector instructions.
+                // `values.map` would compile to a loop without vector instructions.
                 row.iter_mut().zip(values).for_each(|(out, &value)| *out = convert(value));
             }
         }
@@ -108,8 +108,8 @@ impl Layout {
 
     /// Returns one value per place: 1 for an obstacle as POGEMA shows it, else 0.
     ///
-    /// A wall one cell thick surrounds the map. Beyond it lie free cells, or the noise of the instance as far as it
-    /// reaches.
+    /// A wall one cell thick surrounds the map. Beyond the wall, the noise of the instance determines the obstacles.
+    /// Without noise, and outside the area of the noise, all cells are free.
     ///
     /// Rule: border/ring, border/outside, border/noise
     pub fn obstacles(&self, map: &Map, outside: &Outside) -> Vec<f32> {

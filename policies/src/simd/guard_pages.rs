@@ -1,4 +1,4 @@
-//! Tests that no kernel reads or writes beyond its slices: access to a page around them ends the process.
+//! Tests that no kernel reads or writes beyond its slices: an access to a guard page beside them ends the process.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,7 +13,7 @@ impl Memory {
         Self(std::array::from_fn(|_| Guarded::new(32)))
     }
 
-    /// Places lists of these lengths next to guard pages, with values that do not repeat.
+    /// Returns slices of these lengths, each next to a guard page and filled with varying values.
     fn slices(&mut self, side: Side, lens: [usize; 5]) -> [&mut [f32]; 5] {
         let mut lens = lens.into_iter();
         self.0.each_mut().map(|memory| {
@@ -26,8 +26,8 @@ impl Memory {
     }
 }
 
-/// Runs a kernel next to both guard pages on every path, and compares the outputs with those of the scalar path. The
-/// lengths are those of the output, the input, the added values, the weights and the bias.
+/// Runs a kernel on every path with its slices next to each guard page in turn, and compares the outputs with those of
+/// the scalar path. `lens` holds the lengths of the output, the input, the added values, the weights and the bias.
 fn check(lens: [usize; 5], memory: &mut Memory, run: &dyn Fn(SimdPath, [&mut [f32]; 5])) {
     for side in [Side::Start, Side::End] {
         let mut expected: Option<Vec<f32>> = None;

@@ -1,4 +1,4 @@
-//! RePlan as a policy, and the switchers, which play it beside a network.
+//! Tests of RePlan as a policy, and of the switchers, which combine it with a network.
 
 use pogema_core::{Action, Episode, Error};
 use pogema_fast::Engine;
@@ -60,14 +60,14 @@ fn lswitcher(outputs: &[f32]) -> Result<Learned, Error> {
 }
 
 #[test]
-fn a_lone_agent_reaches_its_goal() {
+fn replan_leads_a_lone_agent_to_its_goal() {
     let mut episode = start(1, "on_target: finish");
     let played = play(&mut episode, 0);
-    assert!(played.len() < 96, "the episode ended at its goal");
+    assert!(played.len() < 96, "the agent did not reach its goal in {} steps", played.len());
 }
 
 #[test]
-fn many_agents_reach_goals_and_a_seed_repeats() {
+fn replan_leads_many_agents_to_goals_and_depends_on_the_seed() {
     let mut episode = start(24, "on_target: restart");
     let played = play(&mut episode, 0);
     let metrics = episode.metrics();
@@ -77,27 +77,27 @@ fn many_agents_reach_goals_and_a_seed_repeats() {
 }
 
 #[test]
-fn a_switcher_moves_as_planned_and_asks_the_network_otherwise() {
+fn aswitcher_follows_the_plan_and_otherwise_the_network() {
     let switcher = LearnedName::ASwitcher.read(&descent()).unwrap();
     let network = LearnedName::Network.read(&descent()).unwrap();
     let mut episode = start(24, "on_target: restart");
     let (mut switching, mut learned) = (begin(&switcher, &episode), begin(&network, &episode));
     let (mut same, mut planned) = (0, 0);
     while !episode.is_over() {
-        // The network saw the same states, so its draws are those of the switcher.
+        // Both see the same states with the same seed, so the network draws the same actions in both.
         let actions = switching.act(episode.state()).unwrap();
         for (action, other) in actions.iter().zip(learned.act(episode.state()).unwrap()) {
             if *action == other { same += 1 } else { planned += 1 }
         }
         episode.step(&actions).unwrap();
     }
-    assert!(same > 100 && planned > 100, "{same} and {planned}");
+    assert!(same > 100 && planned > 100, "{same} equal and {planned} different actions");
     assert!(switching.network_time() > std::time::Duration::ZERO);
     assert!(episode.metrics().avg_throughput.unwrap() > 0.5);
 }
 
 #[test]
-fn lswitcher_plays_the_side_with_the_larger_value() {
+fn lswitcher_plays_the_policy_with_the_larger_value() {
     let mut episode = start(24, "on_target: restart");
     let learned = LearnedName::Epom.with_shipped_weights().unwrap();
     let (mut learning, mut epom) =
@@ -112,7 +112,7 @@ fn lswitcher_plays_the_side_with_the_larger_value() {
 
     let planned = play(&mut start(24, "on_target: restart"), 0);
     let mut episode = start(24, "on_target: restart");
-    // Of equal values, that of RePlan counts.
+    // If the values are equal, LSwitcher plays RePlan.
     let mut planning = begin(&lswitcher(&[0.5, 0.5]).unwrap(), &episode);
     for expected in planned {
         let actions = planning.act(episode.state()).unwrap();

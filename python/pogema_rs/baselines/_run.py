@@ -1,4 +1,4 @@
-"""One training from a seed to weights: its loop, its budget and its files."""
+"""One training run from a seed to weights: its loop, its budget and its files."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ Learner = Union[QLearner, PPOLearner, ValueLearner]
 
 @dataclass(frozen=True)
 class Budget:
-    """The end of a training: a number of minutes, or of iterations, whichever is reached first."""
+    """The limits of a training run, in minutes and in iterations. The run ends at the first limit that it reaches."""
 
     minutes: Optional[float] = None
     updates: Optional[int] = None
 
     def share(self, seconds: float, iteration: int) -> float:
-        """Returns the share of the budget that is used up; 1 and more end the training."""
+        """Returns the used share of the budget; values of at least 1 end the training run."""
         shares = [0.0]
         if self.minutes is not None:
             shares.append(seconds / (60 * self.minutes))
@@ -60,13 +60,14 @@ def train(
     tensorboard: bool = False,
     draw: bool = True,
 ) -> dict[str, float]:
-    """Trains a method, writes everything into a folder, and returns the last row of the learning curve.
+    """Trains a method, writes the files of the run to a folder, and returns the last row of the learning curve.
 
-    With a budget of updates, the same config, seed and number of threads give the same weights on the same machine,
-    also if the training is killed and resumed.
+    If only the iterations are limited, the same config, seed and number of threads give the same weights on the same
+    machine, even if the run is killed and resumed.
 
-    Errors: FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError or ValueError if there
-    is no run of this config to resume; OSError if a file cannot be written.
+    Errors: FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError if there is no checkpoint
+    to resume; ValueError if the checkpoint is damaged or belongs to another method, config or seed; ImportError if
+    Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be written.
     """
     run = _Run(config, folder, seed, threads, resume)
     run.writer = open_tensorboard(folder) if tensorboard else None
@@ -78,7 +79,7 @@ def train(
 
 
 class _Run:
-    """A training that is going on."""
+    """A training run in progress."""
 
     writer: Any = None
     draw = True
@@ -86,7 +87,7 @@ class _Run:
     def __init__(self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool) -> None:
         self.config, self.folder, self.seed, self.threads = config, folder, seed, threads
         self.path = folder / "checkpoint.pt"
-        # Of the code that is loaded now: the checkout may change later.
+        # Read the commit now, because the checkout may change during the run.
         self.commit = _commit()
         if not resume and self.path.exists():
             raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
@@ -105,7 +106,7 @@ class _Run:
         folder.mkdir(parents=True, exist_ok=True)
         self.learner.open(folder)
         size, schedule = self.episodes.map_size, config.schedule
-        # An environment keeps its rule of goals and its number of agents.
+        # Each kind needs its own collector: an environment cannot change `on_target` or its number of agents.
         kinds = config.environment.kinds
         self.lanes = {kind: Collector(config, size, schedule.lanes, threads) for kind in kinds}
         environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
@@ -167,7 +168,7 @@ class _Run:
             _, found = judges.play(configs, seeds, self.learner.judge(generator))
             for name, value in found.items():
                 found_in.setdefault(name, []).append(value)
-        # Some metrics exist for one rule of goals only.
+        # Some metrics exist only for some values of `on_target`.
         metrics = {name: sum(values) / len(values) for name, values in found_in.items()}
         if metrics[self.curve.score] > self.curve.best:
             self.best_weights = self._weights()
@@ -211,7 +212,7 @@ class _Run:
         self.curve.rows, self.best_weights = saved["curve"], saved["best_weights"]
 
     def _export(self) -> None:
-        """Writes the best weights, as crate `pogema-policies` plays them."""
+        """Writes the best weights in the format that the crate `pogema-policies` reads."""
         learner = self.learner
         network = copy.deepcopy(learner.trained())
         network.load_state_dict(self.best_weights)
@@ -220,7 +221,7 @@ class _Run:
         policies.export(network, self.config.encoder, path, **rules)
 
     def _describe(self, budget: Budget) -> None:
-        """Writes what made the run, and what it reached, as JSON."""
+        """Writes the settings and the results of the run to `run.json`."""
         values = {
             "method": self.config.method,
             "seed": self.seed,
@@ -247,7 +248,7 @@ def _learner_of(config: TrainingConfig) -> type[Learner]:
 
 
 def _commit() -> Optional[str]:
-    """Returns the commit of the checkout that this package lies in; None for an installed package."""
+    """Returns the commit of the checkout that contains this package; None for an installed package or without git."""
     git = shutil.which("git")
     source = Path(__file__).resolve()
     if git is None or "site-packages" in source.parts:

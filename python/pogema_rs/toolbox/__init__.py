@@ -1,4 +1,4 @@
-"""Evaluations: plays the episodes of all algorithms of one YAML file, and resumes interrupted runs.
+"""Plays the episodes of all algorithms of a suite, which is one YAML file, and resumes interrupted runs.
 
     from pogema_rs.toolbox.evaluator import evaluation
     from pogema_rs.toolbox.registry import ToolboxRegistry

@@ -1,10 +1,11 @@
-//! The steps of an episode, and the way back.
+//! Steps back, the count of elapsed steps, and the history of the agents.
 
 use pogema_core::{Environment, Error, LARGEST_STEP, Snapshot};
 
 use super::Inner;
 
-/// Row, column, goal's row and column, step, whether the agent is active, whether the goal was drawn.
+/// A change of an agent: its row and column, the row and column of its goal, the step, whether it is active, and
+/// whether its goal was drawn.
 pub type Change = (u16, u16, u16, u16, u64, bool, bool);
 
 impl Inner {
@@ -26,13 +27,15 @@ impl Inner {
             return Ok(());
         }
         let state = self.episode.snapshot();
-        // No episode is longer, and later steps must not exceed what a saved state may count.
+        // No episode has more than half of `LARGEST_STEP` steps. The limit keeps the later steps of this one within
+        // `LARGEST_STEP`, the largest step that a saved state may hold.
         self.episode.engine_mut().restore(elapsed.min(LARGEST_STEP / 2), &state)
     }
 
     /// Returns for each agent its first state and each later state that differs from the one before.
     ///
-    /// The states are those that the episode keeps, or else its recording.
+    /// Reads the states that a persistent episode keeps, or else those of the recording; without either, the result is
+    /// empty.
     pub(super) fn history(&self) -> Vec<Vec<Change>> {
         let recorded = || -> Vec<Snapshot> {
             let recording = self.episode.recording();

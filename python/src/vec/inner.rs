@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use pogema::{EnvSource, Named, Seed};
 use pogema_core::{Action, Config, Error, Instance, Occupancy, StepOut};
-use pogema_fast::{Autoreset, Batch, Firsts, ObservationBuffers, suited_threads};
+use pogema_fast::{Autoreset, Batch, FirstInstances, ObservationBuffers, suited_threads};
 use pogema_maps::GridConfig;
 use pogema_policies::EncoderSettings;
 use pyo3::prelude::*;
@@ -41,7 +41,7 @@ pub type Room = (Option<usize>, Option<(usize, usize)>);
 pub struct Next {
     chosen: Vec<bool>,
     /// The source with new seeds, if there are any, and its first instances.
-    seeded: Option<(EnvSource, Firsts)>,
+    seeded: Option<(EnvSource, FirstInstances)>,
 }
 
 impl Inner {

@@ -28,7 +28,7 @@ def maps_dict_to_yaml(filename: Union[str, os.PathLike[str]], maps: Mapping[str,
 
 
 def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Callable[[int], str]) -> None:
-    """Writes the maps of some seeds to `<name_prefix>.yaml`; their names have the seeds with equal numbers of digits.
+    """Writes a map for each seed to `<name_prefix>.yaml`; zeros pad the seeds in the map names to equal length.
 
     Errors: `ValueError` if there is no seed.
     """
@@ -41,5 +41,5 @@ def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Cal
 
 
 def drawn_seed(seed: Optional[int]) -> int:
-    """Returns a seed, a random one for None."""
+    """Returns the given seed, or a random one if it is `None`."""
     return secrets.randbits(64) if seed is None else seed

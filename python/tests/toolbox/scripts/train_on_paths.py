@@ -1,8 +1,8 @@
-"""Trains one policy for all agents on shortest paths, in the three goal modes, with environments wrapped many times.
+"""Trains policies on shortest paths, one for each goal mode and collision system, shared by all agents.
 
-Uses POGEMA as the training of the public repository AIRI-Institute/learn-to-follow does: a config with a `GridConfig`
-in it, maps that a wrapper changes at each reset, observations that wrappers change in place, several environments
-behind one, and new episodes within a step.
+Uses POGEMA as the training of the public repository AIRI-Institute/learn-to-follow does: a config that contains a
+`GridConfig`, several wrappers per environment, one of which changes the map at each reset, observations that wrappers
+change in place, several environments that act as one, and steps that also begin the next episode.
 """
 
 import hashlib
@@ -45,7 +45,7 @@ class GlobalObstacles(gymnasium.Wrapper):
         return self.grid.get_agents_xy()
 
 
-class ChangesMap(gymnasium.Wrapper):
+class MapChanger(gymnasium.Wrapper):
     def __init__(self, env, pattern):
         super().__init__(env)
         self.configs = []
@@ -78,8 +78,8 @@ def path(obstacles, start, goal):
     return cells[::-1]
 
 
-class FollowsPaths(gymnasium.Wrapper):
-    """Draws each agent's path into its window and replaces the rewards."""
+class PathDrawer(gymnasium.Wrapper):
+    """Draws each agent's path into its window and adds a reward for each subgoal reached."""
 
     def __init__(self, env, config):
         super().__init__(env)
@@ -124,7 +124,7 @@ class FollowsPaths(gymnasium.Wrapper):
         return observations, rewards, terminated, truncated, infos
 
 
-class CutsWindows(gymnasium.ObservationWrapper):
+class WindowCropper(gymnasium.ObservationWrapper):
     def __init__(self, env, radius):
         super().__init__(env)
         side = self.env.observation_space["obstacles"].shape[0]
@@ -140,7 +140,7 @@ class CutsWindows(gymnasium.ObservationWrapper):
         return observations
 
 
-class JoinsWindows(gymnasium.ObservationWrapper):
+class WindowStacker(gymnasium.ObservationWrapper):
     def __init__(self, env):
         super().__init__(env)
         spaces = self.env.observation_space
@@ -157,7 +157,7 @@ class JoinsWindows(gymnasium.ObservationWrapper):
         return observations
 
 
-class ResetsItself(gymnasium.Wrapper):
+class AutoReset(gymnasium.Wrapper):
     def __init__(self, env):
         super().__init__(env)
         self.rng = np.random.default_rng(self.grid_config.seed)
@@ -172,13 +172,13 @@ class ResetsItself(gymnasium.Wrapper):
 def make_env(config, preprocessing):
     env = GlobalObstacles(pogema_v0(grid_config=config.grid_config))
     if config.maps:
-        env = ChangesMap(env, config.maps)
-    env = FollowsPaths(env, preprocessing)
-    return ResetsItself(JoinsWindows(CutsWindows(env, preprocessing.network_input_radius)))
+        env = MapChanger(env, config.maps)
+    env = PathDrawer(env, preprocessing)
+    return AutoReset(WindowStacker(WindowCropper(env, preprocessing.network_input_radius)))
 
 
 class ManyEnvs(gymnasium.Wrapper):
-    """Several environments behind one, with the agents of all of them."""
+    """Several environments that act as one, which has the agents of all."""
 
     def __init__(self, config, preprocessing):
         count = (config.target_num_agents or config.grid_config.num_agents) // config.grid_config.num_agents
@@ -206,7 +206,7 @@ class ManyEnvs(gymnasium.Wrapper):
 
 
 class Learner:
-    """Learns the values of actions in the cells next to an agent."""
+    """Learns the value of each action, given the 3 x 3 cells around an agent."""
 
     def __init__(self, seed):
         self.values = defaultdict(lambda: [0.0] * len(MOVES))
@@ -229,7 +229,7 @@ class Learner:
 
 
 def train(config, seed, num_steps=300):
-    """Trains in one environment and returns all that a training can read from it."""
+    """Trains one policy and returns what it read from the environments and the values that it learned."""
     env, learner = ManyEnvs(config, Preprocessing()), Learner(seed)
     observations, _ = env.reset(seed=seed)
     episodes, log, seen_bytes = [], [], hashlib.sha256()

@@ -3,16 +3,16 @@
 const WHY = {
   "move/actions": "an agent that aims at an obstacle or the wall stays",
   "collide/priority": "the cell was occupied",
-  "collide/priority/contest": "a lower index got the cell",
-  "collide/priority/follow": "a higher index had not left the cell yet",
-  "collide/priority/swap": "a swap or a ring of agents",
-  "collide/block-both": "the cell was occupied or requested by two agents",
+  "collide/priority/contest": "an agent with a lower index got the cell",
+  "collide/priority/follow": "an agent with a higher index had not left the cell yet",
+  "collide/priority/swap": "agents that swap or form a ring stay",
+  "collide/block-both": "the move was not possible",
   "collide/block-both/contest": "another agent requested the same cell",
   "collide/block-both/occupied": "the cell held an agent before the step",
   "collide/soft": "the move was not possible",
   "collide/soft/stay": "an agent that aims at an obstacle or the wall stays",
   "collide/soft/swap": "the two agents requested each other's cells",
-  "collide/soft/contest": "a lower index got the cell",
+  "collide/soft/contest": "an agent with a lower index got the cell",
   "collide/soft/chain": "the agent ahead stayed",
 };
 
@@ -25,7 +25,7 @@ function describeCause({ cause, cell, other }) {
 }
 
 class Panel {
-  // `choose(agent)` and `jump(step)` are called when an agent or a reverted move is selected.
+  // Selecting an agent calls `choose(agent)`, with null to deselect; selecting a reverted move calls `jump(step)`.
   constructor(film, choose, jump) {
     Object.assign(this, { film, jump, choose, chosen: null, reverted: [], shown: "" });
     this.order = Array.from({ length: film.numAgents }, (_, agent) => agent);
@@ -92,7 +92,7 @@ class Panel {
     this.moves.set(this.reverted.length, -1);
   }
 
-  // Called at every frame; draws only if the step or the agent has changed.
+  // Runs at every animation frame; draws only if the step, the agent or the colour theme has changed.
   draw(step) {
     const shown = `${step} ${this.chosen} ${theme.ground}`;
     if (this.chosen === null || shown === this.shown) return;
