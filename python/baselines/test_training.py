@@ -190,7 +190,13 @@ def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no SIGINT for another process")
 def test_an_interrupted_run_says_how_to_continue(tmp_path):
-    process = subprocess.Popen(command("iql", tmp_path, "--minutes", "5"), stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command("iql", tmp_path, "--minutes", "5"),
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell's background job would ignore SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     while not (tmp_path / "checkpoint.pt").exists():
         assert process.poll() is None
         time.sleep(0.05)

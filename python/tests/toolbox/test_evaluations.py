@@ -197,7 +197,7 @@ WRONG = [
     (lambda: list(generate_variants({"a": {"grid_search": "xy"}})), "`a.grid_search` is `'xy'`, expected a list"),
     (lambda: map_to_grid(io.BytesIO(b"")), "line 1, column 1: found ``, expected `type octile`"),
     (lambda: map_to_grid(io.BytesIO(b"type octile\nheight x\n")), "line 2, column 1: found `x`, expected a whole number"),
-    (lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")), "line 6, column 1: the map ends after 1 rows, expected 2"),
+    (lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")), "line 6, column 1: row 2 is missing, expected 2 rows"),
     (lambda: process_plot_view([], PlotView(x="a", y="b"), "plot.gif"), "expected a name that ends in `.pdf`"),
     (lambda: evaluation(SUITE, begin="resume"), "`eval_dir` is `None` and `begin` is `resume`, expected a folder"),
     (lambda: evaluation(SUITE, html="a.html"), "`html` is given and `begin` is `replace`, expected `new`"),
