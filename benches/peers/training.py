@@ -4,8 +4,9 @@ Sample Factory and TorchRL on POGEMA 1.4.0.
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
-AsyncVectorEnv, one process for each environment; the frameworks get one process per core. All take turns; each ratio is the median over the rounds of
-the ratios within a round. Installs PyTorch, POGEMA and the wheel below target/.
+AsyncVectorEnv, one process for each environment; the frameworks get one process per core. All take turns; each ratio is
+the median over the rounds of the ratios within a round. Installs PyTorch, the frameworks, POGEMA and the wheel below
+target/.
 """
 
 import argparse
@@ -27,6 +28,7 @@ NAMES = {
     "sample_factory": "Sample Factory on POGEMA 1.4.0",
     "torchrl": "TorchRL on POGEMA 1.4.0",
 }
+FRAMEWORKS = ("sample_factory", "torchrl")
 
 
 def main():
@@ -36,10 +38,11 @@ def main():
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     python = subprocess.check_output([ROOT / "python/venv", "training_peers", HERE / "training.txt"], text=True).strip()
-    worker = Worker(python, HERE / "training_worker.py")
+    loops, frameworks = (Worker(python, HERE / f"training_{name}.py") for name in ("worker", "frameworks"))
+    workers = {name: frameworks if name in FRAMEWORKS else loops for name in ("ours", *NAMES)}
     rounds = []
     for number in range(arguments.rounds):
-        rounds.append({name: worker.time(name, arguments.seconds) for name in ("ours", *NAMES)})
+        rounds.append({name: worker.time(name, arguments.seconds) for name, worker in workers.items()})
         print(f"round {number + 1}: {rounds[-1]}", file=sys.stderr)
     table = []
     for name, title in NAMES.items():

@@ -1,9 +1,11 @@
 """The training of train_ppo.py on POGEMA 1.4.0, as users of Sample Factory and of TorchRL would write it.
 
 Both get the environments, the network and the sizes of the rollout and of the minibatches of `training_worker.py`. Each
-function returns agent steps per second, without the time before the first update.
+function returns agent steps per second, without the time before the first update. See `training_task.serve`. This is a
+process of its own, because TorchRL changes how Python starts processes.
 """
 
+import sys
 import tempfile
 import time
 
@@ -26,7 +28,9 @@ from torchrl.envs import EnvBase, ParallelEnv, SerialEnv
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
-from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, train_ppo
+
+sys.path.insert(0, __file__.rpartition("/")[0])
+from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, serve, train_ppo
 
 SHAPE = (3, SIDE, SIDE)
 #: One process per core, as both frameworks recommend.
@@ -188,3 +192,8 @@ def learn(batch, gains, objective, optimizer):
             loss.backward()
             nn.utils.clip_grad_norm_(objective.parameters(), 0.5)
             optimizer.step()
+
+
+if __name__ == "__main__":
+    FRAMEWORKS = {"sample_factory": sample_factory, "torchrl": torchrl}
+    serve(lambda name, seconds: FRAMEWORKS[name](seconds))

@@ -1,10 +1,5 @@
-"""Times the loop of train_ppo.py: each line of JSON on stdin names an environment or a framework, and a number of
-seconds. The reply on stdout is the number of agent steps per second.
-"""
+"""Times the loop of train_ppo.py on an environment, see `training_task.serve`."""
 
-import functools
-import json
-import os
 import sys
 import time
 
@@ -14,10 +9,7 @@ import torch
 from gymnasium.vector import AsyncVectorEnv
 
 sys.path.insert(0, __file__.rpartition("/")[0])
-import training_frameworks
-from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, train_ppo
-
-FRAMEWORKS = {"sample_factory": training_frameworks.sample_factory, "torchrl": training_frameworks.torchrl}
+from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, serve, train_ppo
 
 
 class Team(gymnasium.Env):
@@ -134,11 +126,4 @@ def agent_steps_per_second(name, seconds):
 
 
 if __name__ == "__main__":
-    # What the frameworks print must not reach the replies.
-    replies = os.fdopen(os.dup(sys.stdout.fileno()), "w")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    torch.set_num_threads(2)
-    for line in sys.stdin:
-        name, seconds = json.loads(line)
-        time_one = FRAMEWORKS.get(name) or functools.partial(agent_steps_per_second, name)
-        print(json.dumps(time_one(seconds)), file=replies, flush=True)
+    serve(agent_steps_per_second)
