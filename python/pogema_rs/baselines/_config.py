@@ -136,7 +136,7 @@ class ImitationConfig:
     planner: str = "pibt"
     #: The planner's budget for each step.
     nodes: int = 1000
-    #: The planner's goal of each agent is the cell that lies so many steps ahead on Follower's path; 0 for its own goal.
+    #: If positive, the planner's goal of each agent is the cell this number of steps ahead on Follower's path.
     ahead: int = 0
     #: The number of iterations before PPO begins.
     iterations: int = 0

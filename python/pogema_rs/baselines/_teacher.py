@@ -38,7 +38,7 @@ class Teacher:
 
 
 def cells_ahead(paths: np.ndarray, steps: int) -> np.ndarray:
-    """Returns the offsets of the cells that lie so many steps ahead on the paths in the agents' windows.
+    """Returns the offsets of the cells `steps` steps ahead on the paths in the agents' windows.
 
     A path that is shorter ends at its last cell in the window. The offset is 0 without a path.
 
