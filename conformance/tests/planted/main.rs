@@ -72,7 +72,7 @@ const LARGER: [(Flaw, &str); 2] = [
     (Flaw::SoftNoRotation, "the smallest ring on a grid has four agents"),
     (
         Flaw::SoftChainStopsAfterOne,
-        "a chain of four: the blocked agent, two followers that stay and one that moves",
+        "a chain of four: an agent that blocks, the blocked one, its first follower, and a second one that moves",
     ),
 ];
 
