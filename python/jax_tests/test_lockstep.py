@@ -15,12 +15,16 @@ RULES = list(
         ("priority", "block_both", "soft"), ("finish", "nothing", "restart"), ("1.4.0", "2.0"), ("own", "shared")
     )
 )
-# Sides, agents, radius, noise, and room for more agents and cells.
+# Sides, agents, radius, noise, and room for more agents and cells. Observations of the third, the fifth and the last
+# shape are cut from the map, those of the others come from a table.
 SHAPES = [
     (8, 10, 2, False, None, None),
     (7, 8, 5, True, 16, (9, 7)),
     (40, 9, 17, False, 9, (40, 70)),
     (5, 1, 1, True, 3, (5, 5)),
+    (20, 3, 2, False, None, None),
+    (34, 60, 7, True, None, None),
+    (6, 4, 15, False, None, (7, 9)),
 ]
 
 
