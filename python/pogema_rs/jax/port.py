@@ -43,6 +43,9 @@ CLAIMS: Record = {
     "tells": ["on_goal", "occupied", "padded", "actions_after"],
     "max_radius": 128,
 }
+# JAX keeps all compiled functions, and each takes dozens of the 65,530 memory maps that Linux gives a process.
+MOST_SIZES = 64
+_compiled_for: set[Any] = set()
 
 
 class Refusal(Exception):
@@ -239,9 +242,9 @@ def _params(instance: Record, cells: np.ndarray) -> Params:
     rules = instance["config"]
     height, width = cells.shape
     config = Config(
-        num_agents=_room(rules["num_agents"], 4),
-        height=_room(height, 8),
-        width=_room(width, 8),
+        num_agents=_room(rules["num_agents"], 4, 4),
+        height=_room(height, 8, 4),
+        width=_room(width, 8, 4),
         radius=rules["radius"],
         collision=rules["collision"],
         on_goal=rules["on_goal"],
@@ -255,13 +258,25 @@ def _params(instance: Record, cells: np.ndarray) -> Params:
     grids = pack_grids(config, cells[None], noise)
     goals = np.array([goal for goals in instance["goals"] for goal in goals]).reshape(-1, 2)
     counts = np.array([[len(goals) for goals in instance["goals"]]])
-    pool = make_pool(config, grids, np.array([instance["starts"]]), goals, counts, _room(len(goals), 64))
+    pool = make_pool(config, grids, np.array([instance["starts"]]), goals, counts, _room(len(goals), 64, 16))
+    _forget(config, len(pool.goals))
     return make_params(config, rules["max_steps"], pool)
 
 
-def _room(size: int, least: int) -> int:
-    """Returns the least power of two that a size fits into."""
-    return max(least, 1 << (size - 1).bit_length())
+def _forget(*sizes: Any) -> None:
+    """Drops all compiled functions if they were compiled for too many sizes."""
+    _compiled_for.add(sizes)
+    if len(_compiled_for) > MOST_SIZES:
+        jax.clear_caches()
+        _compiled_for.clear()
+
+
+def _room(size: int, least: int, factor: int) -> int:
+    """Returns the first of `least`, `least * factor`, `least * factor**2` and so on that a size fits into."""
+    room = least
+    while room < size:
+        room *= factor
+    return room
 
 
 class Port:
