@@ -17,4 +17,4 @@ def test_the_guide_runs():
         printed.append(run.stdout)
     assert re.fullmatch(r"0\.\d\d goals per step\n", printed[0])
     # JaxMARL prints lines of its own when it is imported.
-    assert [text.splitlines()[-1] for text in printed[1:]] == ["(3, 11, 11) False"]
+    assert [text.splitlines()[-1] for text in printed[1:]] == ["(3, 11, 11) False", "(32, 8, 3, 11, 11) (32, 8)"]
