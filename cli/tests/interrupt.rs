@@ -109,9 +109,12 @@ fn an_interrupted_comparison_reports_what_it_checked() {
 /// A port that answers `hello` and nothing more, and makes a file at the first question that it leaves open.
 const MUTE_PORT: &str = r#"
 import json, sys
+hello = {
+    "protocol": "pogema-conform/1", "name": "mute", "profiles": ["core"], "collision": ["soft"], "on_goal": ["finish"],
+}
 for line in sys.stdin:
     if json.loads(line)["type"] == "hello":
-        print(json.dumps({"name": "mute", "version": "1", "profiles": ["core"]}), flush=True)
+        print(json.dumps(hello), flush=True)
     else:
         open("asked", "a").write("x")
 "#;
@@ -122,8 +125,9 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("port.py"), MUTE_PORT).unwrap();
-    let arguments =
-        ["conform", "--port", "python3 port.py", "--json", "report.json", "--html", "report.html"];
+    // Without the interrupt, the check would wait for a day.
+    let outputs = ["--json", "report.json", "--html", "report.html"];
+    let arguments = [&["conform", "--port", "python3 port.py", "--timeout", "86400"], &outputs[..]].concat();
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
     command.args(arguments).current_dir(at).process_group(0);
     let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

@@ -50,6 +50,15 @@ fn conform_whole(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, Stri
     status_and_text(&run(folder, &[&first, &files[..], more].concat()))
 }
 
+#[test]
+fn a_run_that_checks_nothing_fails() {
+    let folder = folder(&[]);
+    let nothing = ["--port", "python3.11 wrong.py", "--part", "cases", "--rules", "metrics*"];
+    let (status, text) = status_and_text(&run(folder.path(), &nothing));
+    assert!(text.contains("nothing was checked"), "{text}");
+    assert_eq!(status, Some(1));
+}
+
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
     command.arg("conform").args(arguments).current_dir(folder).output().unwrap()

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -35,7 +36,7 @@ pub struct Ports {
     /// Check only the rules that match a pattern, such as `collide/soft*` [default: all rules]
     #[arg(long, value_name = "PATTERN", requires = "commands", value_parser = rule_pattern)]
     rules: Option<glob::Pattern>,
-    /// Check only this profile; may be given several times [default: all profiles that the port claims]
+    /// Check only this profile, and `core`; may be given several times [default: all profiles that the port claims]
     #[arg(long = "profile", value_name = "PROFILE", requires = "commands", value_parser = word::<Profile>())]
     profiles: Vec<Profile>,
     /// Play only this part; may be given several times [default: all parts]
@@ -78,7 +79,7 @@ pub struct Shared<'a> {
     pub keep: &'a PathBuf,
     pub bar: &'a ProgressBar,
     /// Ctrl-C sets this.
-    pub stop: &'a AtomicBool,
+    pub stop: &'a Arc<AtomicBool>,
 }
 
 impl Ports {
@@ -105,7 +106,8 @@ impl Ports {
         let timeout = Duration::from_secs_f64(self.timeout);
         let commands =
             self.commands.iter().map(|text| Command::new(text, timeout)).collect::<Result<Vec<_>, _>>()?;
-        let subjects: Vec<Subject<'_>> = commands.iter().map(|command| self.subject(command)).collect();
+        let subjects: Vec<Subject<'_>> =
+            commands.iter().map(|command| self.subject(command, shared.stop)).collect();
         let plan = self.plan(shared);
         let watch = Watch { progress: &|| shared.bar.inc(1), stop: shared.stop };
         let mut reports = check_ports(&subjects, &plan, |total| shared.bar.set_length(total), watch)?;
@@ -143,7 +145,7 @@ impl Ports {
         }
     }
 
-    fn subject<'a>(&self, command: &'a Command) -> Subject<'a> {
+    fn subject<'a>(&self, command: &'a Command, stop: &'a Arc<AtomicBool>) -> Subject<'a> {
         let mut replay = ["pogema", "conform", "--port", &command.text].map(str::to_owned).to_vec();
         if self.timeout != DEFAULT_TIMEOUT {
             replay.extend(["--timeout".to_owned(), self.timeout.to_string()]);
@@ -151,7 +153,10 @@ impl Ports {
         Subject {
             command: command.text.clone(),
             replay,
-            start: Box::new(|| Process::start(command).map(|process| Box::new(process) as Box<dyn Link>)),
+            start: Box::new(|| {
+                let process = Process::start(command)?.stopped_by(Arc::clone(stop));
+                Ok(Box::new(process) as Box<dyn Link>)
+            }),
         }
     }
 }
@@ -159,7 +164,9 @@ impl Ports {
 fn exit_code(reports: &[PortReport], leftover: &Leftover) -> ExitCode {
     if reports.iter().any(|report| score(report).verdict() == Verdict::Misbehaves) {
         ExitCode::from(MISBEHAVES)
-    } else if reports.iter().any(PortReport::diverges) || !leftover.stopped.is_empty() {
+    } else if reports.iter().any(|report| report.diverges() || score(report).verdict() == Verdict::Unchecked)
+        || !leftover.stopped.is_empty()
+    {
         ExitCode::FAILURE
     } else {
         ExitCode::SUCCESS

@@ -199,9 +199,10 @@ fn leave_out(
         request.ops.retain(|op| *op != Op::Back);
     }
     leave_out_metrics(hello, config, request, &mut left_out);
-    if mode == Mode::Instance || !claims(Profile::Policies) {
-        let was_left_out = leave_out_policies(request, expected);
-        left_out.extend(was_left_out.filter(|_| !claims(Profile::Policies)));
+    let plays_policies = claims(Profile::Policies);
+    if mode == Mode::Instance || !plays_policies {
+        let was_left_out = leave_out_policies(request, expected, plays_policies);
+        left_out.extend(was_left_out.filter(|_| !plays_policies));
     }
     left_out
 }
@@ -237,8 +238,9 @@ fn leave_out_metrics(
     }
 }
 
-/// Replaces each policy operation with the actions that the policy chooses.
-fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Unclaimed> {
+/// Replaces each policy operation with the actions that the policy chooses. With `plays_astar`, replaces only the sampled
+/// actions, because their seed is that of a config.
+fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Option<Unclaimed> {
     // Records match operations one to one, up to the first error.
     let kept =
         expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
@@ -250,7 +252,7 @@ fn leave_out_policies(request: &mut Request, expected: &Response) -> Option<Uncl
         }
         let chosen = records.next().flatten();
         let rule = match op {
-            Op::Astar => "policy",
+            Op::Astar if !plays_astar => "policy",
             Op::Sample => "seed/actions",
             _ => continue,
         };

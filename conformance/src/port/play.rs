@@ -86,7 +86,9 @@ struct PortPlay<'l> {
     source: InstanceSource,
     request: &'l Request,
     expected: &'l Response,
-    plays_policies: bool,
+    plays_astar: bool,
+    /// Whether the port draws the actions that POGEMA samples; their seed is that of a config.
+    plays_samples: bool,
     has_begun: bool,
 }
 
@@ -104,8 +106,19 @@ impl<'l> PortPlay<'l> {
         let source = request.source(&config).map_err(Unplayable::Instance)?;
         let mut port = Port::new(link, hello, config.rules());
         port.set_padded_dtype(padded_dtype(&config));
-        let plays_policies = mode == Mode::Config && hello.profiles.contains(&Profile::Policies);
-        Ok(Self { port, mode, config, source, request, expected, plays_policies, has_begun: false })
+        let plays_astar = hello.profiles.contains(&Profile::Policies);
+        let plays_samples = plays_astar && mode == Mode::Config;
+        Ok(Self {
+            port,
+            mode,
+            config,
+            source,
+            request,
+            expected,
+            plays_astar,
+            plays_samples,
+            has_begun: false,
+        })
     }
 
     fn perform(&mut self, index: usize, op: &Op) -> Result<Record, Error> {
@@ -169,7 +182,11 @@ impl<'l> PortPlay<'l> {
     }
 
     fn act(&mut self, policy: Policy, index: usize, kind: Kind) -> Result<Record, Error> {
-        if self.plays_policies {
+        let plays = match policy {
+            Policy::Astar => self.plays_astar,
+            Policy::Sample => self.plays_samples,
+        };
+        if plays {
             return self.step(&Ask::Act { policy }, kind);
         }
         let chosen = self.expected.records.get(index).and_then(Record::step);

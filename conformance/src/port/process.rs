@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::Stdio;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -63,6 +64,7 @@ pub struct Process {
     has_more: bool,
     stderr_end: Arc<Mutex<VecDeque<u8>>>,
     timeout: Duration,
+    stop: Arc<AtomicBool>,
 }
 
 /// Output from the port's stdout.
@@ -106,7 +108,15 @@ impl Process {
         std::thread::spawn(move || write_all(stdin, &to_write));
         let (sender, output) = channel();
         std::thread::spawn(move || read_lines(BufReader::new(stdout), &sender));
-        Ok(Self { child, input: Some(input), output, has_more: false, stderr_end, timeout: command.timeout })
+        let (input, timeout, stop) = (Some(input), command.timeout, Arc::default());
+        Ok(Self { child, input, output, has_more: false, stderr_end, timeout, stop })
+    }
+
+    /// Waits for no answer once another thread sets the flag.
+    #[must_use]
+    pub fn stopped_by(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = stop;
+        self
     }
 
     fn exchange<T: DeserializeOwned>(&mut self, ask: &Ask) -> Result<T, Misbehaviour> {
@@ -157,7 +167,9 @@ impl Process {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(question, b"")),
                 // The port's children may keep its output open after it has ended.
                 Err(RecvTimeoutError::Timeout) if has_ended => return Err(self.ended(question, b"")),
-                Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
+                Err(RecvTimeoutError::Timeout)
+                    if Instant::now() >= until || self.stop.load(Ordering::Relaxed) =>
+                {
                     let kind = FaultKind::NoAnswer { question, limit_ms: timeout.as_millis() };
                     return Err(self.misbehaviour(kind, ""));
                 }

@@ -1,6 +1,6 @@
 //! A session with a port about one config.
 
-use pogema_core::{Cell, Config, Error, Instance, Observed, Snapshot, TraceHeader};
+use pogema_core::{Cell, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader};
 
 use super::link::{FaultKind, Link, Misbehaviour};
 use super::observations;
@@ -76,6 +76,15 @@ impl<'l> Port<'l> {
         if is_drawn {
             self.require("map", reply.map.as_ref())?;
             self.check_num_agents(&reply)?;
+            if self.tells(Told::Derived) {
+                self.require("derived", reply.derived.as_ref())?;
+            }
+            if self.tells(Told::Foretold) && self.config.on_goal == OnGoal::Restart {
+                self.require("foretold", (!reply.foretold.is_left_out()).then_some(&()))?;
+            }
+        }
+        if self.tells(Told::Padded) {
+            self.require("padded", reply.padded.as_ref())?;
         }
         self.check_state(&reply)?;
         self.observed = None;

@@ -11,7 +11,7 @@ use pogema_conformance::port::{
     check_ports, play_on_port,
 };
 use pogema_conformance::{NamedEngine, Op, Request, Watch};
-use pogema_core::{Collision, Observation, OnGoal};
+use pogema_core::{Collision, Observation, OnGoal, Words};
 use serde_json::json;
 
 use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
@@ -118,6 +118,38 @@ fn a_claimed_key_must_be_present() {
     assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
     let report = check(|hello| hello.tells.retain(|key| *key != Key::Occupied), forgets);
     assert_eq!(cause_names(&report), [""; 0]);
+}
+
+#[test]
+fn every_told_key_must_be_present_at_a_reset() {
+    let keys: [(Key, fn(&Ask, &mut Reply)); 3] = [
+        (Key::Padded, |_, reply| reply.padded = None),
+        (Key::Derived, |_, reply| reply.derived = None),
+        (Key::Foretold, |_, reply| reply.foretold = Default::default()),
+    ];
+    for (key, forgets) in keys {
+        let report = check(|_| (), forgets);
+        let expected = format!("left `{}` out of an answer that needs it", key.word());
+        assert_eq!(report.causes[0].what, expected);
+    }
+}
+
+/// No other question asks for the actions of a policy.
+#[test]
+fn a_port_that_claims_policies_without_seeding_plays_astar_from_instances() {
+    fn no_seeding(hello: &mut Hello) {
+        hello.profiles.retain(|profile| *profile != Profile::Seeding);
+    }
+    fn waits(ask: &Ask, reply: &mut Reply) {
+        if let (Ask::Act { .. }, Some(actions)) = (ask, &mut reply.actions) {
+            actions.fill(0);
+        }
+    }
+    let report = check(no_seeding, |_, _| ());
+    assert_eq!(cause_names(&report), [""; 0]);
+    assert!(report.rules["policy/astar"].passed > 0);
+    let report = check(no_seeding, waits);
+    assert!(report.rules["policy/astar"].failed > 0, "{:?}", cause_names(&report));
 }
 
 /// The reference gives the answers that docs/PORTING.md shows.
