@@ -239,13 +239,6 @@ impl Player {
 
     fn metrics(&self) -> Option<Metrics> {
         let metrics = self.episode.is_over().then(|| self.episode.metrics())?;
-        // POGEMA's persistent environments do not report its own metrics; only the optional metrics remain.
-        let metrics = if self.config.persistent {
-            let Metrics { avg_agents_density, a_collisions, o_collisions, .. } = metrics;
-            Metrics { avg_agents_density, a_collisions, o_collisions, ..Metrics::default() }
-        } else {
-            metrics
-        };
         (metrics != Metrics::default()).then_some(metrics)
     }
 

@@ -311,13 +311,15 @@ impl<E: Environment> Episode<E> {
 
     /// Returns the metrics so far.
     ///
-    /// POGEMA's own metrics are present if the last step ended the episode, the others if they are measured.
+    /// POGEMA's own metrics are present if the last step ended the episode and the config keeps no steps, the others if
+    /// they are measured.
     pub fn metrics(&self) -> Metrics {
         let Meters { density, collisions, .. } = &self.meters;
         let counted = collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));
         let (a_collisions, o_collisions) = counted.unzip();
         let avg_agents_density = density.as_ref().map(DensityMeter::mean);
-        Metrics { avg_agents_density, a_collisions, o_collisions, ..self.final_metrics.unwrap_or_default() }
+        let own = self.final_metrics.filter(|_| !self.config().persistent).unwrap_or_default();
+        Metrics { avg_agents_density, a_collisions, o_collisions, ..own }
     }
 
     /// Returns the meters.
