@@ -239,7 +239,7 @@ fn wrong_input_is_reported_with_file_and_position() {
     reject(&["maps", "stats", "row.txt", "--scenario", "loop.yaml"], &["loop.yaml", "targets_xy", "(7, 0)"]);
     reject(&["maps", "export", "pools.yaml", "--to", "text"], &["possible_agents_xy", "(9, 9)"]);
     reject(&["run", "five.yaml"], &["map_name", "`5`"]);
-    reject(&["maps", "tiles", "row.txt", "--side", "3"], &["`3`", "1 rows and 4 columns"]);
+    reject(&["maps", "tiles", "row.txt", "--side", "3"], &["`3`", "1 row and 4 columns"]);
     reject(&["maps", "stats", "row.txt", "--num-agents", "9", "--seed", "1"], &["num_agents"]);
     reject(&["maps", "stats", "two.yaml", "--scenario", "far.scen"], &["2 maps"]);
     reject(&["maps", "generate", "validation-maze"], &["`validation-mazes`"]);

@@ -22,7 +22,8 @@ pub enum Error {
     #[error(
         "{}",
         one_line(format_args!(
-            "config: `{field}` is `{cell}`, expected cells inside the map of {height} rows and {width} columns"
+            "config: `{field}` is `{cell}`, expected cells inside the map of {}",
+            rows_and_columns(*height, *width)
         ))
     )]
     CellOutside { field: String, cell: String, height: usize, width: usize },
@@ -165,6 +166,13 @@ fn of_agent(agent: Option<usize>) -> String {
     agent.map(|index| format!(" of agent {index}")).unwrap_or_default()
 }
 
+/// Returns the size of a map for a message, such as `1 row and 3 columns`.
+pub fn rows_and_columns(rows: usize, columns: usize) -> String {
+    let counted =
+        |number: usize, noun: &str| format!("{number} {noun}{}", if number == 1 { "" } else { "s" });
+    format!("{} and {}", counted(rows, "row"), counted(columns, "column"))
+}
+
 fn wrong_field(field: &str, value: &str, expected: &str) -> String {
     format!("`{field}` is `{value}`, expected {expected}")
 }
@@ -231,7 +239,7 @@ impl Error {
         height: usize,
         width: usize,
     ) -> Self {
-        Self::agent(agent, format!("{what} {cell} is outside the map of {height} rows and {width} columns"))
+        Self::agent(agent, format!("{what} {cell} is outside the map of {}", rows_and_columns(height, width)))
     }
 
     /// Creates an error about a file.

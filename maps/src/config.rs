@@ -25,7 +25,7 @@ pub(crate) use read::read_targets;
 pub struct GridConfig {
     /// What happens when an agent reaches its goal.
     pub on_target: OnGoal,
-    /// Seed of every random stream. If `None`, each reset takes a fresh seed from the operating system.
+    /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system at each reset.
     pub seed: Option<u64>,
     /// Number of columns.
     pub width: usize,

@@ -147,8 +147,9 @@ impl Reader {
     /// Reads a row; an error holds the column, counted from 0.
     fn read_row(&mut self, row: &str) -> Result<(), (usize, Fault)> {
         let coordinate = |number: usize, col: usize| {
-            let reason = |_| format!("the map has more than {} rows or columns", u16::MAX);
-            u16::try_from(number).map_err(reason).map_err(|reason| (col, Fault::Other(reason)))
+            let reason = || format!("the map has more than {} rows or columns", Map::LONGEST_SIDE);
+            let fits = number < Map::LONGEST_SIDE;
+            fits.then_some(number as u16).ok_or_else(|| (col, Fault::Other(reason())))
         };
         for (col, character) in row.chars().enumerate() {
             let cell = Cell::new(coordinate(self.height, col)?, coordinate(col, col)?);

@@ -1,6 +1,6 @@
 //! Cuts large maps into tiles.
 
-use pogema_core::{Error, Map};
+use pogema_core::{Error, Map, rows_and_columns};
 
 use crate::formats::NamedMap;
 use crate::text::MapText;
@@ -17,7 +17,7 @@ pub const PUBLISHED_TILE: usize = 64;
 pub fn tiles(name: &str, map: &Map, side: usize) -> Result<Vec<NamedMap>, Error> {
     let (height, width) = (map.height(), map.width());
     if side == 0 || height % side != 0 || width % side != 0 {
-        let expected = format!("a side that divides the {height} rows and {width} columns of `{name}`");
+        let expected = format!("a side that divides the {} of `{name}`", rows_and_columns(height, width));
         return Err(Error::config("side", side, expected));
     }
     let num_across = width / side;

@@ -191,7 +191,7 @@ proptest! {
 fn maps_of_many_short_rows_are_rejected_quickly() {
     let text = ". ".repeat(200_000);
     let error = parse_map_text(&text).unwrap_err().to_string();
-    assert_eq!(error, "map: line 1, column 131073: the map has more than 65535 rows or columns");
+    assert_eq!(error, "map: line 1, column 130559: the map has more than 65279 rows or columns");
 }
 
 #[test]

@@ -10,9 +10,9 @@ use pogema_maps::{GridConfig, InstanceSource};
 
 /// Fields that require or exclude each other.
 const TOGETHER: [(&str, &str); 7] = [
-    ("width: 5", "config: `width` is `5`, expected a height to go with it"),
-    ("{height: 5, size: 5}", "config: `height` is `5`, expected a width to go with it"),
-    ("{width: 5, height: null}", "config: `width` is `5`, expected a height to go with it"),
+    ("width: 5", "config: `width` is `5`, expected the field `height`, too"),
+    ("{height: 5, size: 5}", "config: `height` is `5`, expected the field `width`, too"),
+    ("{width: 5, height: null}", "config: `width` is `5`, expected the field `height`, too"),
     (
         "auto_reset: true",
         "config: `auto_reset` is `true`, expected false, because only the integration `SampleFactory` resets automatically",
@@ -102,7 +102,7 @@ const POSITIONS: [(&str, &str); 17] = [
     ),
     (
         "{map: '..', agents_xy: [[1, 0]]}",
-        "config: `agents_xy` is `(1, 0)`, expected cells inside the map of 1 rows and 2 columns",
+        "config: `agents_xy` is `(1, 0)`, expected cells inside the map of 1 row and 2 columns",
     ),
     (
         "targets_xy: [[9, 9]]",

@@ -122,7 +122,7 @@ def test_errors_are_reported_with_line_and_column(world):
         ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
         ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: duplicate key "map"'),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: found agents_xy without targets_xy, expected both"),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 rows and 2 columns"),
+        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 row and 2 columns"),
         ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
         ("bad.yaml", "map: |\n  ..\nno field\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
         ("bad.json", '{"map": "..", "seed": 9007199254740993}', "bad.json: line 1, column 1: seed has too many digits to be read exactly from JSON, expected a config in YAML"),

@@ -1,6 +1,6 @@
 //! Checks of traces before drawing.
 
-use pogema_core::{Cell, Error, Snapshot, Trace, TraceStep};
+use pogema_core::{Cell, Error, Snapshot, Trace, TraceStep, rows_and_columns};
 
 /// Checks that a trace can be drawn: every list has one entry per agent, all agents and goals are on the map, and no
 /// agent moves farther than to a neighbouring cell in one step.
@@ -33,7 +33,7 @@ fn check_state(trace: &Trace, frame: usize, state: &Snapshot, num_agents: usize)
     let map = &trace.header.map;
     let is_off = |cell: &&Cell| !map.contains(**cell);
     if let Some(cell) = state.cells.iter().chain(&state.goals).find(is_off) {
-        let expected = format!("a cell of the map of {} rows and {} columns", map.height(), map.width());
+        let expected = format!("a cell of the map of {}", rows_and_columns(map.height(), map.width()));
         return Err(Error::out_of_range(&format!("a cell of frame {frame}"), cell, expected));
     }
     Ok(())

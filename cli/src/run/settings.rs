@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use pogema_core::{Collision, Error, Map, OnGoal, Words};
+use pogema_core::{Collision, Error, Map, OnGoal, Words, rows_and_columns};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, nearest};
@@ -119,7 +119,7 @@ impl Settings {
                 Error::argument(&flag, value, expected)
             }
             (Error::CellOutside { cell, height, width, .. }, Some((_, flag, _)), _) => {
-                let expected = format!("cells inside the map of {height} rows and {width} columns");
+                let expected = format!("cells inside the map of {}", rows_and_columns(height, width));
                 Error::argument(&flag, cell, expected)
             }
             (error @ (Error::Io { .. } | Error::Argument { .. }), ..) => error,

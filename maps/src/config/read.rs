@@ -77,8 +77,8 @@ impl GridConfig {
             (None, None) => (size, size),
             // A map sets both sides itself.
             _ if fields.optional("map").is_some() => (size, size),
-            (Some(width), None) => return Err(Error::config("width", width, "a height to go with it")),
-            (None, Some(height)) => return Err(Error::config("height", height, "a width to go with it")),
+            (Some(width), None) => return Err(Error::config("width", width, "the field `height`, too")),
+            (None, Some(height)) => return Err(Error::config("height", height, "the field `width`, too")),
         };
         self.size = self.width.max(self.height);
         self.density = fields.number("density", 0.0..=1.0, 0.3)?;

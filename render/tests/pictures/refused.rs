@@ -41,7 +41,7 @@ fn invalid_parts_of_an_episode() {
 fn agents_off_the_map_and_lists_of_wrong_length() {
     let trace = still(&[".."], &[([0, 5], [0, 1])]);
     let text = refused(&trace, Style::default());
-    assert_eq!(text, "a cell of frame 0 is `(0, 5)`, expected a cell of the map of 1 rows and 2 columns");
+    assert_eq!(text, "a cell of frame 0 is `(0, 5)`, expected a cell of the map of 1 row and 2 columns");
     let mut trace = still(&[".."], &[([0, 0], [0, 1])]);
     trace.start.state.active.clear();
     assert_eq!(refused(&trace, Style::default()), "active has length 0, expected 1");

@@ -137,7 +137,9 @@ function pairLists(map, startsBlock, goalsBlock) {
       throw new ParseError(block.line, block.column + 1, reason);
     }
     if (cell[0] < map.height && cell[1] < map.width) return cell;
-    const reason = `${block.name} has ${place(cell)}, which is outside the map of ${map.height} rows and ${map.width} columns`;
+    const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
+    const size = `${counted(map.height, "row")} and ${counted(map.width, "column")}`;
+    const reason = `${block.name} has ${place(cell)}, which is outside the map of ${size}`;
     throw new ParseError(block.line, block.column + 1, reason);
   };
   const starts = parseList(startsBlock, "a list of [row, col]").map((cell) => check(startsBlock, cell));
