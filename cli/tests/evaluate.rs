@@ -202,6 +202,15 @@ fn a_torn_last_line_is_played_again_and_other_damage_is_reported() {
 }
 
 #[test]
+fn a_wrong_view_is_refused_before_play() {
+    let folder =
+        folder_with(&format!("{SUITE}\nresults_views:\n  Costs: {{type: plot, x: num_agents, z: SoC}}\n"));
+    let (_, error, status) = run(folder.path(), &EVALUATE);
+    assert!(error.contains("suite.yaml: line 18: unknown key `z` in view `Costs`"), "{error}");
+    assert_eq!((status, folder.path().join("out").exists()), (2, false));
+}
+
+#[test]
 fn a_folder_with_foreign_files_is_left_unchanged() {
     let folder = folder_with(SUITE);
     let out = folder.path().join("out");

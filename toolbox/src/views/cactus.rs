@@ -44,7 +44,9 @@ impl CactusView {
     /// If the results lack a metric, or no instance was solved.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "x", &self.x, results)?;
-        known_column(name, "solved", SOLVED, results)?;
+        if !results.metric_columns().iter().any(|column| column == SOLVED) {
+            return Err(Error::request(format!("view `{name}`: the results lack the metric `{SOLVED}`")));
+        }
         let times = |algorithm: &String| {
             let own = results.rows.iter().filter(|row| row.algorithm == *algorithm);
             let solved = own.filter(|row| row.metric(SOLVED).is_some_and(|share| share > 0.0));
