@@ -37,7 +37,7 @@ pub struct Run {
     planner_args: PlannerArgs,
     #[command(flatten)]
     learned_args: LearnedArgs,
-    /// Provide future goals to `--policy rhcr`
+    /// Provide future goals to `--policy rhcr`, `rhcr-pbs` or `rhcr-ecbs`
     #[arg(long)]
     future_goals: bool,
     /// Draw every step in the terminal

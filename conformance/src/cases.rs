@@ -1,6 +1,6 @@
 //! Hand-written cases: small, readable examples of one rule each.
 //!
-//! A case is a YAML file in the folder of its rule:
+//! A case is a YAML file whose path begins with the name of its rule:
 //!
 //! ```yaml
 //! rule: collide/priority/contest

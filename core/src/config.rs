@@ -73,7 +73,7 @@ crate::words! {
         ///
         /// Rule: observe/pomapf
         Pomapf = "POMAPF",
-        /// The arrays of POMAPF, and the whole map.
+        /// The arrays of POMAPF, the absolute positions of the agent and its goal, and the whole map.
         ///
         /// Rule: observe/mapf
         Mapf = "MAPF",

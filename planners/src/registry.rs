@@ -18,7 +18,7 @@ use crate::rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub struct PlannerSettings {
     /// Seed of all random choices.
     pub seed: u64,
-    /// Maximum number of threads. Only LaCAM* uses more than one, and its plans then differ from run to run.
+    /// Maximum number of threads. Of the planners, only LaCAM* uses more than one, and its plans then differ from run to run.
     pub threads: usize,
 }
 

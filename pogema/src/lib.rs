@@ -34,7 +34,7 @@
 //!
 //! | feature | adds |
 //! | --- | --- |
-//! | `planners` | [`planners`]: LaCAM*, CBS, RHCR, PIBT and POGEMA's own policies |
+//! | `planners` | [`planners`]: LaCAM*, CBS, ECBS, PBS, RHCR, PIBT and POGEMA's own policies |
 //! | `policies` | [`policies`]: encoders, networks and learned policies |
 //! | `render` | [`render`]: SVG, PNG, GIF, video and replay pages |
 //! | `reference` | [`reference`](mod@reference): the rules as plain code, for comparison with other engines |

@@ -37,7 +37,7 @@ def test_windows_become_tensors(params, states, dtype):
     tensor = torch.from_dlpack(windows)
     assert tensor.dtype == getattr(torch, windows.dtype.name)
     assert address(tensor) == address(windows)
-    np.testing.assert_array_equal(tensor.numpy(), windows)
+    np.testing.assert_array_equal(tensor.cpu().numpy(), windows)
 
 
 def test_rows_and_masks_become_tensors(params, states):
@@ -45,7 +45,7 @@ def test_rows_and_masks_become_tensors(params, states):
         array = over_envs(function, params, states)
         tensor = torch.from_dlpack(array)
         assert address(tensor) == address(array)
-        np.testing.assert_array_equal(tensor.numpy(), array)
+        np.testing.assert_array_equal(tensor.cpu().numpy(), array)
 
 
 def test_a_tensor_outlives_its_array(params, states):
@@ -54,7 +54,7 @@ def test_a_tensor_outlives_its_array(params, states):
     del windows
     gc.collect()
     over_envs(pj.observe, params, states).block_until_ready()
-    np.testing.assert_array_equal(tensor.numpy(), expected)
+    np.testing.assert_array_equal(tensor.cpu().numpy(), expected)
 
 
 @pytest.mark.parametrize("dtype", [torch.int32, torch.int8, torch.uint8])

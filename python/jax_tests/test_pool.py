@@ -1,4 +1,4 @@
-"""Tests the instances of pools against those of `VecEnv`, and what their functions need."""
+"""Tests pools, their goals and refills, and the functions that compute numbers exactly, against `VecEnv` and NumPy."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""POGEMA, the multi-agent pathfinding environment, with bit-identical results and hundreds of times faster.
+"""POGEMA, the multi-agent pathfinding environment, with bit-identical results, tens to hundreds of times faster.
 
 Change one import, and all results stay the same:
 

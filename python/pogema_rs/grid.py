@@ -328,7 +328,7 @@ def foretold_goals(grid: Grid, ignore_borders: bool) -> list:
     radius = grid.config.obs_radius
     goals = grid._engine.foretold_goals()
     if goals is None:
-        raise StateError("the list of goals would never end: possible_targets_xy holds only one cell")
+        raise StateError("the list of goals would never end: only the goal just reached can be drawn again")
     shift = 0 if ignore_borders else radius
     first = grid.get_targets_xy(ignore_borders=ignore_borders)
     return [

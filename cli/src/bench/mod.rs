@@ -33,7 +33,7 @@ pub struct Bench {
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
     oracle_folder: PathBuf,
     /// Measure only the rows whose names contain this text [default: all rows]
-    #[arg(long, value_name = "TEXT", default_value = "")]
+    #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     rows: String,
     /// Time per figure except POGEMA's, in seconds
     #[arg(long, value_name = "S", default_value_t = 0.1)]

@@ -19,10 +19,10 @@ pub struct PlannerArgs {
     /// gives the same plan [default: no limit]
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
-    /// Maximum number of threads of the planner; LaCAM refines plans on all of them
+    /// Maximum number of threads; LaCAM refines plans on all of them, and the policy MATS-LP searches on them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = number_of_threads())]
     threads: usize,
-    /// Seed of the planner, or of the actions that a network draws
+    /// Seed of the planner; in `run`, also of the actions that a network draws
     #[arg(long, value_name = "S", default_value_t = 0)]
     planner_seed: u64,
 }

@@ -15,7 +15,7 @@ pub struct NetworkConfig {
     /// The layers. An ONNX file has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub architecture: Option<Architecture>,
-    /// What the network sees. If absent, the policy that plays the network determines it.
+    /// What the network sees. If absent, Follower and MATS-LP use their own encoder; all other policies require it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<EncoderSettings>,
     /// How an action is chosen from the logits.

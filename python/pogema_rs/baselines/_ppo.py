@@ -1,4 +1,4 @@
-"""PPO on whole episodes, with TorchRL's loss: IPPO, MAPPO and Follower."""
+"""PPO on whole episodes, with TorchRL's loss: IPPO, MAPPO, Follower and EPOM."""
 
 from __future__ import annotations
 

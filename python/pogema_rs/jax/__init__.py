@@ -3,15 +3,17 @@
 All functions play one environment; `jax.vmap` plays many, with `(None, 0, 0)` as the axes of params, state and
 actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 
-| file | phase |
+| file | content |
 | --- | --- |
-| `_config`, `_pool` | static sizes and rules; the instances, made in Rust |
+| `_config`, `_pool`, `_pack` | static sizes and rules; the instances, made in Rust; their maps as rows of bits |
 | `_state` | the state and its beginning |
-| `_step` | the order of the phases in a step; the next episode |
+| `_step`, `_checked` | the order of the phases in a step; the next episode; steps that check actions |
 | `_collide` | conflicting moves |
-| `_goals` | the effects of reaching a goal: rewards, ends and next goals |
+| `_goals`, `_division` | the effects of reaching a goal: rewards, ends and next goals; exact quotients for rewards |
 | `_observe`, `_unpack` | observations |
 | `_metrics` | the metrics of an episode |
+| `_cost_to_go` | steps to the goals, and the windows on them |
+| `port` | the functions as a port of the conformance kit |
 """
 
 from __future__ import annotations

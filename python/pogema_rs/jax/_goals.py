@@ -44,7 +44,7 @@ def pay(config: Config, state: State) -> jax.Array:
 
 
 def terminate(config: Config, state: State) -> jax.Array:
-    """Returns which agents are terminated; padding is.
+    """Returns which agents are terminated; padding counts as terminated.
 
     Shape: `(agents,)`, bool
 
@@ -61,7 +61,7 @@ def terminate(config: Config, state: State) -> jax.Array:
 
 
 def truncate(params: Params, state: State) -> jax.Array:
-    """Returns which agents are truncated; padding is.
+    """Returns which agents are truncated; padding counts as truncated.
 
     Shape: `(agents,)`, bool
 

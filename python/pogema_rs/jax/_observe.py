@@ -79,7 +79,7 @@ def marks(config: Config, state: State) -> jax.Array:
 def global_state(params: Params, state: State) -> GlobalState:
     """Returns the map without its border, and the cells, goals and flags of all agents.
 
-    Beyond the rows and columns of a smaller map, `obstacles` holds its wall and what lies outside it. No agent can
+    Beyond the rows and columns of a smaller map, `obstacles` holds its wall and the area outside. No agent can
     enter these cells.
     """
     config = params.config

@@ -111,8 +111,8 @@ class InstancePool:
         """Replaces all instances, and returns the new `params`.
 
         The arrays keep their shapes, so nothing is compiled again, unless the goals need more room than the first
-        ones and an eighth. Current episodes continue with the old `params`; with the new ones, lifelong agents continue with goals
-        of the new instances. After an error the old instances stay.
+        ones and an eighth. Current episodes continue with the old `params`; with the new ones, lifelong agents
+        continue with goals of the new instances. After an error the old instances stay.
         """
         self.params = self._make(seeds)
         return self.params

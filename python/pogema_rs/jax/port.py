@@ -1,7 +1,7 @@
 """Serves `pogema_rs.jax` to the conformance kit: `python -m pogema_rs.jax.port`.
 
-The port pads instances to a few sizes, so that few functions are compiled, and keeps them in a folder of compiled
-functions: `--cache FOLDER` [default: none].
+The port pads instances to a few sizes, so that few functions are compiled. `--cache FOLDER` keeps the compiled functions
+in a folder [default: none].
 """
 
 from __future__ import annotations
