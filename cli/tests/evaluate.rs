@@ -364,10 +364,10 @@ fn only_one_shot_planners_accept_a_single_attempt() {
     let folder = folder_with(&SUITE.replace("{name: random}", "{name: random, single_attempt: true}"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
     assert!(
-        error.contains("`random` does not support a single attempt; only one-shot planners do"),
+        error.contains("`Dice.single_attempt`, expected false, because only a one-shot planner uses it"),
         "{error}"
     );
-    assert_eq!(status, 2);
+    assert_eq!((status, folder.path().join("out").exists()), (2, false));
     let cbs = "{name: cbs, nodes: 1, single_attempt: true}";
     let folder = folder_with(&SUITE.replace("{name: random}", cbs).replace("[3, 1, 2]", "[3]"));
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);

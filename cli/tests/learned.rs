@@ -173,6 +173,14 @@ fn wrong_suites_name_file_line_and_key() {
         ),
         ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
         (
+            "{name: lacam, future_goals: true}",
+            "`Descent.future_goals`, expected false, because only a lifelong planner uses it",
+        ),
+        (
+            "{name: rhcr, single_attempt: true}",
+            "`Descent.single_attempt`, expected false, because only a one-shot planner uses it",
+        ),
+        (
             "{name: network, weight: descent.safetensors}",
             "unknown parameter `Descent.weight`; did you mean `weights`?",
         ),

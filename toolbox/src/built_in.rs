@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use pogema_core::{Error, MAX_THREADS, Words};
 use pogema_maps::nearest;
-use pogema_planners::Budget;
+use pogema_planners::{Budget, LifelongName, PlannerName};
 use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling, ShippedWeights};
 
 use crate::suite::{Algorithm, wrong};
@@ -135,11 +135,19 @@ impl BuiltIn {
                 let expected = format!("1 to {MAX_THREADS}");
                 settings.planner.threads = threads.ok_or_else(|| wrong(node, path, &expected))? as usize;
             }
-            "future_goals" => settings.future_goals = flag()?,
-            "single_attempt" => settings.single_attempt = flag()?,
+            "future_goals" => {
+                settings.future_goals = flag()?;
+                let is_used = LifelongName::of_word(&self.name).is_some();
+                return allowed(settings.future_goals, is_used, path, node, "a lifelong planner");
+            }
+            "single_attempt" => {
+                settings.single_attempt = flag()?;
+                let is_used = PlannerName::of_word(&self.name).is_some();
+                return allowed(settings.single_attempt, is_used, path, node, "a one-shot planner");
+            }
             ignored if IGNORED.contains(&ignored) => {}
             _ => {
-                let hint = nearest(key, PARAMETERS).unwrap_or_default();
+                let hint = nearest(key, PARAMETERS.into_iter().chain(IGNORED)).unwrap_or_default();
                 let reason =
                     format!("line {}: unknown parameter `{path}`; did you mean `{hint}`?", node.line);
                 return Err(Error::Syntax { reason });
@@ -147,6 +155,14 @@ impl BuiltIn {
         }
         Ok(())
     }
+}
+
+/// Returns an error if a flag is set that no policy of the algorithm uses.
+fn allowed(is_set: bool, is_used: bool, path: &str, node: &Node, user: &str) -> Result<(), Error> {
+    if !is_set || is_used {
+        return Ok(());
+    }
+    Err(wrong(node, path, &format!("false, because only {user} uses it")))
 }
 
 /// Returns the name of the policy that an algorithm names, in lower case.
