@@ -18,7 +18,8 @@ use crate::rhcr::{Rhcr, RhcrParams, WindowSolver};
 pub struct PlannerSettings {
     /// Seed of all random choices.
     pub seed: u64,
-    /// Maximum number of threads. Of the planners, only LaCAM* uses more than one, and its plans then differ from run to run.
+    /// Maximum number of threads. Of the planners, only LaCAM* uses more than one, and its plans then differ
+    /// from run to run.
     pub threads: usize,
 }
 

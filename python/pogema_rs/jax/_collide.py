@@ -33,7 +33,7 @@ class Aims(NamedTuple):
     """The cell and the target of each agent, as numbers of grid cells. Inactive agents have the number after the last cell.
 
     `board` holds the active agent on each cell, or the number of agents if there is none; `occupant` is its value at the
-    target. `is_blocked` tells whether the target is an obstacle.
+    target. `is_blocked`: whether the target is an obstacle.
 
     Shape: `(agents,)` each; `board` `(cells,)`
     """
