@@ -10,7 +10,7 @@ use indicatif::{HumanDuration, ProgressBar};
 use pogema_core::Error;
 use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
-use pogema_toolbox::views::read_views;
+use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
     Begin, EpisodeConfigs, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
 };
@@ -53,10 +53,7 @@ impl Evaluate {
             suite = suite.with_algorithms(path)?;
         }
         built_in(&suite)?;
-        // A wrong view must not be found only after hours of play.
-        if !suite.views.is_empty() {
-            read_views(&self.suite)?;
-        }
+        check_views(&suite)?;
         let environments = environments(&suite, &self.sources)?;
         let named = self.html.as_ref().and_then(|named| named.first());
         named.map_or(Ok(()), |path| check_writable(path))?;

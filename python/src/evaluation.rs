@@ -9,6 +9,7 @@ use pogema_core::{Error, Words};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
+use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
     Algorithm, Begin, BuiltIn, Done, EpisodeConfigs, Event, Failed, Pairs, Progress, Results, Running, Store,
     Suite, run_one,
@@ -57,6 +58,7 @@ impl Evaluation {
                 Some(text) => Suite::parse(&path, text)?,
                 None => Suite::read(&path)?,
             };
+            check_views(&suite)?;
             let environments = environments(&suite, maps, &files)?;
             Ok((suite, environments, Begin::read("begin", begin)?))
         };

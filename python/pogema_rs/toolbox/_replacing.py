@@ -26,6 +26,8 @@ _BACKENDS: dict[str, Callable[..., list[dict[str, Any]]]] = {
     "balanced_multiprocessing": _chunks.balanced_multiprocess_backend,
     "balanced_dask": _chunks.balanced_dask_backend,
 }
+# The views of pogema-toolbox. The engine draws all other types.
+_VIEWS: dict[str, Callable[..., Any]] = {"tabular": TabularView, "plot": PlotView, "multi-plot": MultiPlotView}
 
 
 def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) -> _Rows:
@@ -105,11 +107,13 @@ def run_views(
 
 
 def _check_views(evaluation_config: Mapping[str, Any]) -> None:
-    """Raises the error of a missing package before the first episode, not after the last one."""
-    views = evaluation_config.get("results_views", {}).values()
-    if any(view["type"] == "tabular" and view.get("print_results") for view in views):
-        for package in ("pandas", "tabulate"):
-            required(package, "a view of type `tabular` with `print_results`")
+    """Raises the error of a wrong view or a missing package before the first episode, not after the last one."""
+    for fields in evaluation_config.get("results_views", {}).values():
+        if fields["type"] in _VIEWS:
+            _VIEWS[fields["type"]](**fields)
+        if fields["type"] == "tabular" and fields.get("print_results"):
+            for package in ("pandas", "tabulate"):
+                required(package, "a view of type `tabular` with `print_results`")
 
 
 def _write(path: Path, text: str) -> None:

@@ -220,6 +220,18 @@ def test_nearest_map_is_named():
         create_env_base(Environment(map_name="hal"))
 
 
+@pytest.mark.parametrize(
+    "begin, wrong, message",
+    [("new", {"z": "SoC"}, "suite.yaml: line 1: unknown key `z` in view `Costs`"), ("replace", {"width": "wide"}, "width")],
+)
+def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
+    ToolboxRegistry.register_algorithm("Policy", Broken)
+    views = {"Costs": {"type": "plot", "x": "num_agents", **wrong}}
+    with pytest.raises(ValueError, match=message):
+        evaluation({**SUITE, "results_views": views}, tmp_path / "out", begin=begin)
+    assert not (tmp_path / "out").exists()
+
+
 def test_views_of_the_engine_are_drawn_too(tmp_path, caplog):
     rows = [
         {"metrics": {"CSR": 1.0, "SoC": 8 + seed}, "env_grid_search": {"seed": seed}, "algorithm": name}

@@ -51,7 +51,7 @@ use crate::manifest::Manifest;
 use crate::results::Results;
 use crate::six::Definition;
 use crate::store::SUITE;
-use crate::suite::{in_file, wrong};
+use crate::suite::{Suite, in_file, wrong};
 use crate::tree::Node;
 
 /// The field of a file that holds the views by name.
@@ -126,6 +126,17 @@ pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
     let origin = original.as_deref().unwrap_or(path);
     let views = fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?.beside(origin))));
     views.collect::<Result<_, _>>().map_err(in_file)
+}
+
+/// Checks the views of a suite, so that a wrong one is not found only after hours of play.
+///
+/// # Errors
+/// One line with the file, the line and the key of the error.
+pub fn check_views(suite: &Suite) -> Result<(), Error> {
+    for (name, node) in &suite.views {
+        View::read(name, node).map_err(|error| suite.in_file(error))?;
+    }
+    Ok(())
 }
 
 impl View {
