@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -36,7 +37,8 @@ def collect(
     File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
     and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. With a
     budget of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
-    if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out.
+    if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out. Ctrl-C ends
+    the call at once; plans that have begun go on in the background, but nothing more is written.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
     side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;
@@ -55,16 +57,25 @@ def collect(
     target.mkdir(parents=True, exist_ok=True)
     planning = {"planner": planner, "seconds": seconds, "nodes": nodes}
     starts = range(0, num_episodes, episodes_per_file)
+    has_stopped = threading.Event()
 
     def write(first: int) -> Path:
         path = target / f"episodes-{first // episodes_per_file:06}.npz"
         if not path.exists():
-            numbers = range(first, min(first + episodes_per_file, num_episodes))
-            _write(path, [_play(grid_config, seed, number, semantics, planning) for number in numbers])
+            episodes = []
+            for number in range(first, min(first + episodes_per_file, num_episodes)):
+                episodes.append(_play(grid_config, seed, number, semantics, planning))
+                if has_stopped.is_set():
+                    return path
+            _write(path, episodes)
         return path
 
-    with ThreadPoolExecutor(num_workers) as workers:
+    workers = ThreadPoolExecutor(num_workers)
+    try:
         yield from workers.map(write, starts)
+    finally:
+        has_stopped.set()
+        workers.shutdown(wait=False, cancel_futures=True)
 
 
 def episode_seed(seed: int, episode: int) -> int:

@@ -36,11 +36,14 @@ fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if let Ok(flag) = object.cast::<PyBool>() {
         return Ok(flag.is_true().into());
     }
-    if object.is_instance_of::<PyInt>() {
-        return Ok(object.extract::<i64>().map_or_else(|_| shown(object), Value::from));
+    if object.is_instance_of::<PyInt>()
+        && let Ok(whole) = object.extract::<i64>()
+    {
+        return Ok(whole.into());
     }
-    if object.is_instance_of::<PyFloat>() {
-        return Ok(Number::from_f64(object.extract()?).map_or_else(|| shown(object), Value::Number));
+    if object.is_instance_of::<PyInt>() || object.is_instance_of::<PyFloat>() {
+        let number = object.extract().ok().and_then(Number::from_f64);
+        return Ok(number.map_or_else(|| shown(object), Value::Number));
     }
     if let Ok(text) = object.cast::<PyString>() {
         return Ok(text.to_str()?.into());

@@ -21,6 +21,7 @@ from pogema_rs._engine import restore_engine
 from pogema_rs._vec_configs import _engine_config
 from pogema_rs.errors import NotResetError
 from pogema_rs.planners import PlannerAgents, plan
+from pogema_rs.imitation import collect
 from pogema_rs.policies import Encoder, load, save
 from pogema_rs.toolbox.evaluator import evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
@@ -357,6 +358,22 @@ def process_pool():
 def one_episode():
     config = json.dumps(suite(1, name="rhcr", seconds=100.0, nodes=10**9))
     interrupt("play_built_in", lambda: _engine.play_built_in(config, []), is_abandoned=True)
+
+
+@interrupts()
+def expert_episodes():
+    config = GridConfig(size=48, density=0.0, num_agents=576, seed=5, max_episode_steps=200, collision_system="soft")
+    timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    began = time.monotonic()
+    try:
+        list(collect(config, "episodes", 64, planner="cbs", seconds=2.0))
+        raise AssertionError("all episodes were collected before the interrupt")
+    except KeyboardInterrupt:
+        print(f"collect ended after {time.monotonic() - began:.3f} s", file=sys.stderr)
+    has_begun = [path.name for path in Path("episodes").iterdir()]
+    assert not has_begun, has_begun
+    assert len(list(collect(config, "episodes", 2, planner="cbs", nodes=1))) == 1
 
 
 @interrupts("show_views")

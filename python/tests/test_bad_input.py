@@ -260,6 +260,11 @@ def test_validation_error_names_the_field(fields, place):
     assert not error["msg"].startswith("config")
 
 
+def test_number_beyond_64_bits_is_shown_as_a_number():
+    with pytest.raises(ValidationError, match="`max_episode_steps` is `1.18"):
+        GridConfig(max_episode_steps=2**70)
+
+
 def test_assigned_fields_may_hold_numpy_values():
     env = started(num_agents=2)
     env.grid_config.seed = np.int64(5)

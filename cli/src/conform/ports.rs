@@ -19,6 +19,7 @@ use super::known::Leftover;
 use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, nearest_rule, rule_names, score};
+use crate::input::Input;
 use crate::output::{check_writable, print_line, write_json};
 use crate::words::word;
 
@@ -54,6 +55,8 @@ pub struct Ports {
     /// Check traces that a port wrote, instead of running a port
     #[arg(long = "trace", value_name = "FILE", num_args = 1.., conflicts_with = "commands")]
     traces: Vec<PathBuf>,
+    #[command(flatten)]
+    input: Input,
     #[command(flatten)]
     outputs: Outputs,
 }
@@ -94,7 +97,7 @@ impl Ports {
 
     fn run_traces(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
         shared.json.map_or(Ok(()), |path| check_writable(path))?;
-        let reports = [check_traces(&self.traces)?];
+        let reports = [check_traces(&self.traces, self.input.limit())?];
         let leftover = Leftover::default();
         shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
         print_line(&port_table::report_text(&reports, &leftover))?;

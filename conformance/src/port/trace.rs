@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use pogema_core::{Error, Trace};
+use pogema_core::{Error, InputLimit, Trace};
 
 use super::claims::{Mode, Scope};
 use super::judge::Judged;
@@ -17,14 +17,16 @@ use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, num
 
 /// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
+/// `limit` bounds each file.
+///
 /// # Errors
 /// [`Error::Trace`] or [`Error::Io`] for a file that is not a trace.
-pub fn check_traces(paths: &[impl AsRef<Path>]) -> Result<PortReport, Error> {
+pub fn check_traces(paths: &[impl AsRef<Path>], limit: InputLimit) -> Result<PortReport, Error> {
     let mut report = PortReport { command: format!("{} traces", paths.len()), ..PortReport::default() };
     let plan = Plan::default();
     for path in paths {
         let path = path.as_ref();
-        let trace = Trace::read(files::open(path)?).map_err(|error| Error::io(path, error))?;
+        let trace = Trace::read(files::open_within(path, limit)?).map_err(|error| Error::io(path, error))?;
         let judged = judge_trace(&trace).map_err(|error| Error::io(path, error))?;
         let result = ItemResult {
             subject: 0,

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use pogema_conformance::port::check_traces;
-use pogema_core::{Action, Cell, Environment, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep};
+use pogema_core::{
+    Action, Cell, Environment, InputLimit, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
+};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
@@ -55,10 +57,10 @@ fn a_correct_trace_passes_and_an_altered_one_fails() {
     let mut wrong = right.clone();
     wrong.steps[7].state.cells[2] = Cell::new(0, 0);
     let paths = [write_trace(&right, &folder, "right.jsonl"), write_trace(&wrong, &folder, "wrong.jsonl")];
-    let report = check_traces(&paths[..1]).unwrap();
+    let report = check_traces(&paths[..1], InputLimit::default()).unwrap();
     assert!(!report.diverges() && report.num_steps == 12);
     assert!(report.rules["collide/soft"].passed == 1 && report.rules["reward/own"].passed == 1);
-    let report = check_traces(&paths).unwrap();
+    let report = check_traces(&paths, InputLimit::default()).unwrap();
     assert_eq!(report.causes.len(), 1);
     let found = report.causes[0].example.divergence.as_ref().unwrap();
     assert_eq!(
@@ -73,7 +75,7 @@ fn invalid_traces_are_rejected_with_their_path() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("not-a-trace");
     std::fs::write(&path, "{}\n").unwrap();
-    let error = check_traces(&[&path]).unwrap_err().to_string();
+    let error = check_traces(&[&path], InputLimit::default()).unwrap_err().to_string();
     assert!(error.contains("not-a-trace") && error.contains("line 1"), "{error}");
-    assert!(check_traces(&[folder.path().join("missing")]).is_err());
+    assert!(check_traces(&[folder.path().join("missing")], InputLimit::default()).is_err());
 }
