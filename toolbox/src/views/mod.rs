@@ -7,6 +7,7 @@ mod boxes;
 mod cactus;
 mod compare;
 mod compose;
+mod decisions;
 mod difference;
 mod gallery;
 mod grid;

@@ -11,10 +11,10 @@ use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
-use super::{Shown, known_column};
+use super::{Shown, decisions, known_column};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::frame::{shown, values};
-use crate::results::{NETWORK_TIME, RUNTIME, Results, Row, SOLVED};
+use crate::results::{RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
 
@@ -29,7 +29,7 @@ const COST: &str = "SoC";
 /// it, only if both solve all instances.
 ///
 /// `show_std` adds half of the 95 % interval to each of our means but that of the sums of costs. `decision_times` adds
-/// the time of a decision of one agent in lifelong results, split into planner and network.
+/// the columns of [`decisions`].
 #[derive(Clone, Debug)]
 pub struct PublishedView {
     common: Common,
@@ -224,9 +224,9 @@ impl PublishedView {
             }
         }
         if self.shows_decisions {
-            for (title, part) in [("planner µs", 0), ("network µs", 1)] {
+            for (part, title) in decisions::TITLES.into_iter().enumerate() {
                 let times = |line: &Line<'_>| {
-                    line.rows.iter().filter_map(|row| decision_times(row)?[part]).collect::<Vec<_>>()
+                    line.rows.iter().filter_map(|row| decisions::times(row)[part]).collect::<Vec<_>>()
                 };
                 add(title, &|line| Cell::Number(mean_of(&times(line))));
             }
@@ -241,16 +241,6 @@ impl PublishedView {
 /// Returns the mean of a metric with its 95 % interval.
 fn interval(line: &Line<'_>, metric: &str) -> Option<Estimate> {
     Estimate::of(&values(&line.rows, metric), Spread::Bootstrap { level: 95.0 }, line.num_agents)
-}
-
-/// Returns the time that a decision of one agent took in a lifelong episode, outside and inside of the network. Such an
-/// episode has as many steps as its config says. Units: microseconds.
-fn decision_times(row: &Row) -> Option<[Option<f64>; 2]> {
-    row.metric("avg_throughput")?;
-    let num_decisions = row.field("max_episode_steps")?.as_f64()? * row.field(NUM_AGENTS)?.as_f64()?;
-    let (all, network) = (row.metric(RUNTIME)?, row.metric(NETWORK_TIME));
-    let seconds = [Some(all - network.unwrap_or(0.0)), network];
-    Some(seconds.map(|seconds| Some(1e6 * seconds? / num_decisions)))
 }
 
 /// Groups rows by their number of agents.

@@ -4,10 +4,10 @@ use pogema_core::Error;
 
 use super::grid::{Cell, Format, Table};
 use super::options::{Common, Options};
-use super::{Shown, named};
+use super::{Shown, decisions, named};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread};
 use crate::frame::{Group, compare, group_by, lacking, values};
-use crate::results::Results;
+use crate::results::{NETWORK_TIME, RUNTIME, Results};
 use crate::tree::Node;
 
 /// The names of pogema-toolbox's table formats that select each of our formats.
@@ -30,20 +30,30 @@ const FORMATS: [(Format, &str); 4] = [
 /// Rows with equal values in all columns except metrics and `drop_keys` form a group. Metrics are in the order of their
 /// first appearance in any row; pogema-toolbox takes only those of the first row, and groups by the others.
 ///
+/// With `decision_times`, the columns of [`decisions`] replace the run times of episodes.
+///
 /// Source: pogema-toolbox 0.1.1, `view_tabular.py`
 #[derive(Clone, Debug)]
 pub struct TableView {
     common: Common,
     spread: Spread,
     skips_zero: bool,
+    shows_decisions: bool,
     /// The format that the view requests.
     pub(super) format: Format,
 }
 
 impl TableView {
     pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
-        let known =
-            ["print_results", "table_format", "show_std", "skip_zero_std", "error_method", "error_level"];
+        let known = [
+            "print_results",
+            "table_format",
+            "show_std",
+            "skip_zero_std",
+            "error_method",
+            "error_level",
+            "decision_times",
+        ];
         let options = Options::new(name, node, &known)?;
         // Checked but ignored: the table is always shown.
         options.flag("print_results")?;
@@ -64,6 +74,7 @@ impl TableView {
             common: Common::read(&options)?,
             spread,
             skips_zero: options.flag("skip_zero_std")?.unwrap_or(false),
+            shows_decisions: options.flag("decision_times")?.unwrap_or(false),
             format: format.map_or(Format::Terminal, |(format, _)| *format),
         })
     }
@@ -78,16 +89,25 @@ impl TableView {
         };
         let (keys, metrics) = (kept(results.key_columns()), kept(results.metric_columns()));
         let keys: Vec<String> = keys.into_iter().filter(|key| !metrics.contains(key)).collect();
+        let is_shown =
+            |metric: &String| !self.shows_decisions || ![RUNTIME, NETWORK_TIME].contains(&metric.as_str());
+        let metrics: Vec<String> = metrics.into_iter().filter(is_shown).collect();
+        let parts = if self.shows_decisions { 0..decisions::TITLES.len() } else { 0..0 };
         let mut lines: Vec<Line<'_>> = Vec::new();
         for (number, group) in group_by(&results.rows, &keys).into_iter().enumerate() {
             // One number for the whole group, so that metrics with equal values have equal intervals.
-            let estimate = |metric| Estimate::of(&values(&group.rows, metric), self.spread, number as u64);
-            let estimates = metrics.iter().map(|metric| estimate(metric)).collect();
+            let estimate = |values: &[f64]| Estimate::of(values, self.spread, number as u64);
+            let of_metrics = metrics.iter().map(|metric| estimate(&values(&group.rows, metric)));
+            let of_part = |part: usize| group.rows.iter().filter_map(move |row| decisions::times(row)[part]);
+            let of_decisions = parts.clone().map(|part| estimate(&of_part(part).collect::<Vec<_>>()));
+            let estimates = of_metrics.chain(of_decisions).collect();
             lines.push(Line { group, estimates });
         }
-        self.sort(name, &mut lines, &keys, &metrics)?;
-        let table = self.table(&lines, &keys, &metrics);
         let notes = lacking(&results.rows, &metrics);
+        let titles = parts.map(|part| decisions::TITLES[part].to_owned());
+        let columns: Vec<String> = metrics.into_iter().chain(titles).collect();
+        self.sort(name, &mut lines, &keys, &columns)?;
+        let table = self.table(&lines, &keys, &columns);
         Ok(Shown { tables: vec![table], notes, ..Shown::default() })
     }
 
@@ -189,6 +209,32 @@ mod tests {
         let text = shown(fields).unwrap().tables[0].text(Format::Markdown);
         assert!(text.contains("| 16               | Best      | 0.5 ± 0.5 |"), "{text}");
         assert!(text.ends_with("95 % interval of the means of 1000 samples with replacement"), "{text}");
+    }
+
+    #[test]
+    fn decision_times_replace_run_times() {
+        let rows = r#"[
+            {"metrics": {"SoC": 9, "ep_length": 5, "runtime": 4e-4, "network_time": 1e-4},
+             "env_grid_search": {"num_agents": 2}, "algorithm": "A"},
+            {"metrics": {"avg_throughput": 1, "ep_length": 7, "runtime": 8e-4},
+             "env_grid_search": {"num_agents": 2, "max_episode_steps": 8}, "algorithm": "B"},
+            {"metrics": {"ISR": 1, "ep_length": 7, "runtime": 8e-4},
+             "env_grid_search": {"num_agents": 2, "max_episode_steps": 9}, "algorithm": "C"}
+        ]"#;
+        let results = Results { rows: serde_json::from_str(rows).unwrap(), notes: Vec::new() };
+        let fields = "{type: tabular, show_std: False, decision_times: True, drop_keys: [num_agents, max_episode_steps]}";
+        let view = View::read("Table1", &Node::parse(fields).unwrap()).unwrap();
+        let text = view.show("Table1", &results, None).unwrap().tables[0].text(Format::Markdown);
+        let lines: Vec<Vec<&str>> = text
+            .lines()
+            .map(|line| line.split('|').map(str::trim).filter(|cell| !cell.is_empty()).collect())
+            .collect();
+        assert_eq!(
+            lines[0],
+            ["Algorithm", "SoC", "ep_length", "Average Throughput", "ISR", "planner µs", "network µs"]
+        );
+        let times: Vec<&[&str]> = lines[2..5].iter().map(|line| &line[line.len() - 2..]).collect();
+        assert_eq!(times, [["30.00", "10.00"], ["50.00", "-"], ["-", "-"]]);
     }
 
     #[test]
