@@ -76,6 +76,8 @@ fn compressed_zeros_and_blank_lines_are_rejected() {
     let file = "the input is larger than 4 MiB, 4 times the input limit of 1 MiB";
     assert_rejected(at, r#""$0" render blank.jsonl.zst --input-limit 1"#, file);
     assert_rejected(at, r#""$0" conform --trace blank.jsonl.zst --input-limit 1"#, file);
+    let (error, status) = within_memory(at, r#""$0" conform --input-limit 1"#);
+    assert!(error.contains("--trace <FILE>") && status == Some(2), "{error}");
     let (error, status) = within_memory(at, r#""$0" render long.jsonl.zst --input-limit 1"#);
     assert_eq!((error.as_str(), status), ("", Some(0)));
 }

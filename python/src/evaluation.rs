@@ -133,11 +133,12 @@ impl Evaluation {
         Ok(to_do)
     }
 
-    /// Stores an episode: its metrics in JSON, the policy's time in seconds, and the machine that played it.
-    fn keep(&self, index: usize, metrics: &str, runtime: f64, machine: String) -> PyResult<()> {
-        let metrics: Pairs = read_json(metrics)?;
+    /// Stores an episode, given in JSON: `index`, `metrics`, `runtime` and, as `play_built_in` returns them,
+    /// `network_time` and `proof`. `machine` is the one that played it.
+    fn keep(&self, episode: &str, machine: String) -> PyResult<()> {
+        let episode: Done = read_json(episode)?;
         let machine = (machine != pogema_toolbox::machine()).then_some(machine);
-        self.with(|progress| progress.keep(Done { index, metrics, runtime, machine, ..Done::default() }))
+        self.with(|progress| progress.keep(Done { machine, ..episode }))
     }
 
     /// Records an episode that failed.
@@ -309,19 +310,17 @@ pub fn machine() -> PyResult<&'static str> {
 }
 
 guarded! {
-/// Plays one episode of a built-in algorithm; returns its metrics in JSON and its time in seconds.
+/// Plays one episode of a built-in algorithm; returns it in JSON, in the form that `Evaluation.keep` takes.
 ///
 /// `suite` contains that episode alone, and `maps` are map texts by name.
 #[pyfunction]
-pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<(String, f64)> {
+pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -> PyResult<String> {
     let suite = suite.to_owned();
     let play = move || {
         let suite = Suite::parse(std::path::Path::new("suite.yaml"), &suite)?;
         let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?);
-        let (played, runtime) = suite.play_one(&environments)?;
-        let played = serde_json::to_string(&played)
-            .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })?;
-        Ok((played, runtime.as_secs_f64()))
+        serde_json::to_string(&suite.play_one(&environments)?)
+            .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
     };
     interrupt::detach(py, play)?.map_err(|error: Error| to_py_error(&error))
 }

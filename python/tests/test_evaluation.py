@@ -139,6 +139,7 @@ def test_command_line_plays_built_in_algorithms_on_a_scheduler(tmp_path):
     on_dask = {"name": "LaCAM", "nodes": 200, "parallel_backend": "balanced_dask"}
     content = suite(num_seeds=2, **{"On Dask": on_dask, "Here": {"name": "LaCAM", "nodes": 200}})
     content["algorithms"]["A star"]["parallel_backend"] = "balanced_dask"
+    content["algorithms"]["IQL"] = {"name": "iql", "parallel_backend": "dask"}
     write(tmp_path, content)
     (tmp_path / "policies.py").write_text(f"import runpy\nrunpy.run_path({str(SCRIPT)!r})['register']()\n")
     run = [sys.executable, "-B", "-m", "pogema_rs.toolbox", "suite.yaml", "--out", "out", "--register", "policies.py"]
@@ -148,6 +149,8 @@ def test_command_line_plays_built_in_algorithms_on_a_scheduler(tmp_path):
     of = {key: json.loads(results(tmp_path, key)) for key in ("On Dask", "Here")}
     assert [row["metrics"] for row in of["On Dask"]] == [row["metrics"] for row in of["Here"]]
     assert len(of["Here"]) == len(json.loads(results(tmp_path))) == 8
+    episodes = json.loads((tmp_path / "out" / "IQL.episodes.json").read_text())
+    assert all(0 < episode["network_seconds"] <= episode["seconds"] for episode in episodes)
     again = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert again.returncode == 1
     assert again.stderr.startswith("error: out: has results already"), again.stderr

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 use pogema_core::{Error, Trace};
 
@@ -11,8 +10,9 @@ use crate::built_in::BuiltIn;
 use crate::episode_configs::EpisodeConfigs;
 use crate::manifest::Manifest;
 use crate::play::{play, record};
+use crate::progress::Done;
 use crate::results::{Pairs, Row, figure};
-use crate::run::measured;
+use crate::run::{done, measured};
 use crate::store::{ALGORITHMS, SUITE};
 use crate::suite::{Algorithm, Suite};
 
@@ -61,15 +61,15 @@ impl Suite {
         Ok((measured(&played), trace))
     }
 
-    /// Plays the first episode of its first algorithm, and returns the metrics and the runtime.
+    /// Plays the first episode of its first algorithm.
     ///
     /// # Errors
     /// If the episode cannot be played, or the algorithm is not built in.
-    pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<(Pairs, Duration), Error> {
+    pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<Done, Error> {
         let algorithm = self.algorithms.first();
         let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
         let played = play(&environments.at(0)?.config, &self.built_in(algorithm)?)?;
-        Ok((measured(&played), played.runtime))
+        Ok(done(0, played))
     }
 
     fn built_in(&self, algorithm: &Algorithm) -> Result<BuiltIn, Error> {

@@ -170,7 +170,7 @@ fn played(index: usize, environments: &EpisodeConfigs, built_in: &BuiltIn) -> Re
     play(&environment.config, built_in).map_err(|error| failed(error, environment.config.to_value()))
 }
 
-fn done(index: usize, played: Played) -> Done {
+pub(crate) fn done(index: usize, played: Played) -> Done {
     let (metrics, runtime) = (measured(&played), played.runtime.as_secs_f64());
     let network_time = played.network_time.map(|time| time.as_secs_f64());
     Done { index, metrics, runtime, network_time, proof: played.proof, ..Done::default() }

@@ -29,7 +29,7 @@ const MISBEHAVES: u8 = 3;
 const DEFAULT_TIMEOUT: f64 = 10.0;
 
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Ports")]
+#[command(next_help_heading = "Ports", mut_arg("mib", |limit| limit.requires("traces")))]
 pub struct Ports {
     /// Check the port that this command line starts, instead of the built-in engines; may be given several times
     #[arg(long = "port", value_name = "COMMAND")]

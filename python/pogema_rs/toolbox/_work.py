@@ -37,6 +37,8 @@ class Outcome:
     runtime: float = 0.0
     #: The machine that played it.
     machine: str = ""
+    #: The time of the network and what the planner proved, of a built-in algorithm.
+    of_planner: dict[str, Any] = field(default_factory=dict)
     error: str = ""
     traceback: str = ""
     #: The episode, packed for a page that replays it, if requested.
@@ -77,8 +79,9 @@ def play_with(state: dict[str, Any], task: Task) -> Outcome:
 def _play(task: Task, is_filmed: bool) -> Outcome:
     if task.is_built_in:
         content = {"environment": task.environment, "algorithms": {task.algorithm: task.settings}}
-        metrics_json, runtime = play_built_in(json.dumps(content), list(task.maps.items()))
-        return Outcome(task.index, json.loads(metrics_json), runtime, machine())
+        played = json.loads(play_built_in(json.dumps(content), list(task.maps.items())))
+        of_planner = {name: played[name] for name in ("network_time", "proof") if name in played}
+        return Outcome(task.index, played["metrics"], played["runtime"], machine(), of_planner=of_planner)
     ToolboxRegistry.register_maps(task.maps)
     algorithm, settings = _algorithm(task)
     env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)

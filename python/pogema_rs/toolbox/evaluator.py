@@ -219,7 +219,8 @@ def _run(
                 num_failed += 1
                 suite.note(outcome.index, suite.environment(outcome.index), outcome.error, outcome.traceback)
             else:
-                suite.keep(outcome.index, json.dumps(outcome.metrics), outcome.runtime, outcome.machine)
+                episode = {"index": outcome.index, "metrics": outcome.metrics, "runtime": outcome.runtime}
+                suite.keep(json.dumps({**episode, **outcome.of_planner}), outcome.machine)
             progress.step(outcome.index, outcome.error)
     suite.finish()
     return num_failed
@@ -260,6 +261,8 @@ def _results(folder: Path, key: str) -> list[dict[str, Any]]:
     rows, episodes = json.loads(path.read_text()), json.loads((folder / f"{key}.episodes.json").read_text())
     for row, episode in zip(rows, episodes):
         row["metrics"].setdefault("runtime", episode["seconds"])
+        if "network_seconds" in episode:
+            row["metrics"].setdefault("network_time", episode["network_seconds"])
     return rows
 
 

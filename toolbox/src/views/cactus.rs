@@ -1,7 +1,6 @@
 //! Cactus plots: the number of instances that each algorithm solves within a time.
 
 use kuva::plot::line::{LinePlot, LineStyle};
-use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
@@ -10,7 +9,7 @@ use super::legend::Legend;
 use super::options::{Common, Options};
 use super::page::{framed, single};
 use super::picture::Picture;
-use super::series::{Series, signs};
+use super::series::{Series, dots, signs};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column};
 use crate::frame::lacking;
@@ -75,7 +74,7 @@ impl CactusView {
             let mut points: Vec<(f64, f64)> =
                 times.iter().enumerate().map(|(count, &time)| (time, count as f64 + 1.0)).collect();
             points.push((end, times.len() as f64));
-            let (colour, marker, dashes) = signs(number, &self.style);
+            let (colour, _, dashes) = signs(number, &self.style);
             let line = LinePlot::new()
                 .with_data(points)
                 .with_step()
@@ -85,8 +84,7 @@ impl CactusView {
             plots.push(Plot::Line(line));
             if self.style.has_markers {
                 // A marker at the end identifies the line in greyscale, too.
-                let dot = ScatterPlot::new().with_data([(end, times.len() as f64)]).with_color(colour);
-                plots.push(Plot::Scatter(dot.with_size(self.style.line_width * 1.6).with_marker(marker)));
+                plots.extend(dots(&[(end, times.len() as f64)], number, &self.style));
             }
             entries.push(Series::entry(number, self.common.algorithm(name), &self.style));
         }

@@ -114,7 +114,7 @@ pub(super) fn means(
 impl Series {
     /// Returns the elements that the library draws for the line.
     pub fn plots(&self, style: &Style) -> Vec<Plot> {
-        let (colour, marker, dashes) = signs(self.number, style);
+        let (colour, _, dashes) = signs(self.number, style);
         let ends = self.points.iter().map(|(_, found)| found.interval.unwrap_or((found.mean, found.mean)));
         let (low, high): (Vec<f64>, Vec<f64>) = ends.unzip();
         let x: Vec<f64> = self.points.iter().map(|(x, _)| *x).collect();
@@ -136,8 +136,7 @@ impl Series {
         plots.push(Plot::Line(line));
         // A line with a single point is invisible, so it has a marker.
         if style.has_markers || points.len() == 1 {
-            let dots = ScatterPlot::new().with_data(points).with_color(colour);
-            plots.push(Plot::Scatter(dots.with_size(style.line_width * 1.6).with_marker(marker)));
+            plots.extend(dots(&points, self.number, style));
         }
         plots
     }
@@ -152,6 +151,20 @@ impl Series {
         }
         Entry { label, sign }
     }
+}
+
+/// Returns the markers at points of the line with an index. Where shapes and colours repeat, they have a white dot.
+pub(super) fn dots(points: &[(f64, f64)], number: usize, style: &Style) -> Vec<Plot> {
+    let (colour, marker, _) = signs(number, style);
+    let of = |colour: &str, share: f64| {
+        let dots = ScatterPlot::new().with_data(points.to_vec()).with_color(colour);
+        dots.with_size(style.line_width * 1.6 * share)
+    };
+    let mut plots = vec![Plot::Scatter(of(colour, 1.0).with_marker(marker))];
+    if (number / MARKERS.len()) % 2 == 1 {
+        plots.push(Plot::Scatter(of("#FFFFFF", 0.5)));
+    }
+    plots
 }
 
 /// Returns colour, marker and dash pattern of the line with an index.
