@@ -99,16 +99,21 @@ impl RadarView {
 
     fn draw(&self, all: &[Six], known: &[usize]) -> Picture {
         let names: Vec<String> = known.iter().map(|&at| self.common.title(Metric::NAMES[at])).collect();
-        let line = |(number, six): (usize, &Six)| {
-            let values = known.iter().map(|&at| six.values[at].unwrap_or(0.0).min(1.0));
-            let points = values.enumerate().map(|(at, value)| polar(at, known.len(), value));
+        let of = |(number, six): (usize, &Six)| {
+            let values: Vec<Option<f64>> =
+                known.iter().map(|&at| six.values[at].map(|value| value.min(1.0))).collect();
             let estimate = |(x, mean)| (x, Estimate { mean, interval: None, count: 1 });
-            Series { number, points: closed(points.collect()).into_iter().map(estimate).collect() }
+            let series = move |points: Vec<(f64, f64)>| Series {
+                number,
+                points: points.into_iter().map(estimate).collect(),
+            };
+            runs(&values).into_iter().map(series)
         };
-        let lines: Vec<Series> = all.iter().enumerate().map(line).collect();
-        let entries = lines.iter().zip(all).map(|(line, six)| {
-            Series::entry(line.number, self.common.algorithm(&six.algorithm), &self.style)
-        });
+        let lines: Vec<Series> = all.iter().enumerate().flat_map(of).collect();
+        let entries = all
+            .iter()
+            .enumerate()
+            .map(|(number, six)| Series::entry(number, self.common.algorithm(&six.algorithm), &self.style));
         let legend = Legend {
             title: None,
             entries: entries.collect(),
@@ -126,6 +131,18 @@ impl RadarView {
 fn polar(spoke: usize, spokes: usize, value: f64) -> (f64, f64) {
     let angle = TAU * spoke as f64 / spokes as f64;
     (value * angle.sin(), value * angle.cos())
+}
+
+/// Returns the lines through the known values: one closed line, or one from gap to gap.
+fn runs(values: &[Option<f64>]) -> Vec<Vec<(f64, f64)>> {
+    let count = values.len();
+    let point = |spoke: usize| Some(polar(spoke, count, values[spoke]?));
+    let Some(gap) = values.iter().position(Option::is_none) else {
+        return vec![closed((0..count).filter_map(point).collect())];
+    };
+    let around: Vec<_> = (gap..gap + count).map(|spoke| point(spoke % count)).collect();
+    let known = around.split(Option::is_none).filter(|run| !run.is_empty());
+    known.map(|run| run.iter().flatten().copied().collect()).collect()
 }
 
 fn closed(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
@@ -187,5 +204,21 @@ fn in_two(name: &str) -> Vec<&str> {
     match name.rfind(['-', ' ']).filter(|_| name.chars().count() > 12) {
         Some(end) => vec![&name[..=end], &name[end + 1..]],
         None => vec![name],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_value_opens_the_line() {
+        let lengths = |values: &[Option<f64>]| runs(values).iter().map(Vec::len).collect::<Vec<_>>();
+        let known = Some(0.5);
+        assert_eq!(lengths(&[known; 4]), [5]);
+        assert_eq!(lengths(&[known, known, None, known]), [3]);
+        assert_eq!(lengths(&[known, None, known, None]), [1, 1]);
+        assert!(lengths(&[None; 3]).is_empty());
+        assert_eq!(runs(&[known, known, None, known])[0][0], polar(3, 4, 0.5));
     }
 }
