@@ -38,7 +38,7 @@ def collect(
     and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. With a
     budget of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
     if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out. Ctrl-C ends
-    the call at once; plans that have begun go on in the background, but nothing more is written.
+    the call at once; plans that have begun go on in the background, but no further file is begun.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
     side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;

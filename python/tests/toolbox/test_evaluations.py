@@ -232,6 +232,16 @@ def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_returned_rows_tell_the_time_of_the_network(tmp_path):
+    algorithms = {"IQL": {"name": "iql"}, "Stay": {"name": "stay"}}
+    rows = evaluation({**SUITE, "algorithms": algorithms}, tmp_path / "out", begin="new")
+    assert len(rows) == 8
+    for row in rows:
+        metrics = row["metrics"]
+        assert ("network_time" in metrics) == (row["algorithm"] == "IQL")
+        assert 0 <= metrics.get("network_time", 0) <= metrics["runtime"]
+
+
 def test_views_of_the_engine_are_drawn_too(tmp_path, caplog):
     rows = [
         {"metrics": {"CSR": 1.0, "SoC": 8 + seed}, "env_grid_search": {"seed": seed}, "algorithm": name}

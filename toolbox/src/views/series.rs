@@ -190,6 +190,9 @@ mod tests {
             let (_, marker, dashes) = signs(number, &style);
             (format!("{marker:?}"), dashes)
         };
+        // From the ninth line on, markers have a white dot.
+        let layers = |number| dots(&[(0.0, 0.0)], number, &style).len();
+        assert_eq!((layers(7), layers(8), layers(15), layers(16)), (1, 2, 2, 1));
         // Markers and dash patterns have periods without a common divisor.
         let count = DASHES.len() * MARKERS.len();
         assert_eq!((0..count).map(sign).collect::<HashSet<_>>().len(), count);
