@@ -229,7 +229,11 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
     assert!(error.contains("`--resume` continues them, `--force` deletes them"), "{error}");
     for (from, to, expected) in [
         ("density: 0.2", "density: 0.3", "results of other environments"),
-        ("nodes: 500", "nodes: 400", "results of `LaCAM` with other parameters"),
+        (
+            "nodes: 500",
+            "nodes: 400",
+            "whose parameters have changed: `LaCAM`; choose another folder, or delete `LaCAM.*`",
+        ),
     ] {
         fs::write(folder.path().join("suite.yaml"), SUITE.replace(from, to)).unwrap();
         let (_, error, status) = run(folder.path(), &RESUME);
@@ -337,7 +341,11 @@ fn algorithms_from_another_file_replace_those_of_the_suite() {
     let (text, notes, status) = run(folder.path(), &["replay", "out", "Quick", "1"]);
     assert_eq!((notes.as_str(), status), ("", 0), "{text}");
     for (from, to, expected) in [
-        ("nodes: 100", "nodes: 200", "results of `Quick` with other parameters"),
+        (
+            "nodes: 100",
+            "nodes: 200",
+            "whose parameters have changed: `Quick`; choose another folder, or delete `Quick.*`",
+        ),
         ("nodes", "nods", "quick.yaml: line 2: unknown parameter `Quick.nods`; did you mean `nodes`?"),
         ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
         ("true", "often", "quick.yaml: line 2: `Quick.single_attempt`, expected true or false"),

@@ -198,8 +198,8 @@ fn a_run_with_other_weights_is_not_continued() {
     let folder = folder();
     let evaluate = || pogema(folder.path(), &["evaluate", "descent.yaml", "--out", "out", "--resume"]);
     assert_eq!(evaluate().2, 0);
-    let expected = "error: out: has results of `Descent` with other weights than its files hold now; choose another \
-                    folder, or delete the results with `--force`";
+    let expected = "error: out: has results of algorithms whose weights have changed: `Descent`, `Greedy`; choose \
+                    another folder, or delete `Descent.*`, `Greedy.*` and play again";
     for name in ["descent.safetensors", "descent.json"] {
         let path = folder.path().join(name);
         let original = fs::read(&path).unwrap();
@@ -215,6 +215,18 @@ fn a_run_with_other_weights_is_not_continued() {
         fs::write(&path, original).unwrap();
         assert_eq!(evaluate().2, 0);
     }
+    // The message's advice is followed.
+    let weights = folder.path().join("descent.safetensors");
+    let mut changed = fs::read(&weights).unwrap();
+    *changed.last_mut().unwrap() ^= 2;
+    fs::write(&weights, changed).unwrap();
+    assert_eq!(evaluate().2, 2);
+    for name in ["Descent.json", "Descent.episodes.json", "Greedy.json", "Greedy.episodes.json"] {
+        fs::remove_file(folder.path().join("out").join(name)).unwrap();
+    }
+    let (text, error, status) = evaluate();
+    assert!(text.contains("episodes played; all results are complete"), "{text}{error}");
+    assert_eq!(status, 0);
     // Results of earlier releases do not name their weights.
     let about = folder.path().join("out/about.json");
     let mut manifest: serde_json::Value = serde_json::from_slice(&fs::read(&about).unwrap()).unwrap();

@@ -82,18 +82,22 @@ impl Manifest {
     /// The difference, if the earlier results are of other environments or parameters; nothing is changed then.
     pub(crate) fn continue_from(&mut self, known: Self) -> Result<(), String> {
         if known.environment != self.environment {
-            return Err("has results of other environments than the suite's".into());
+            let reason = "has results of other environments than the suite's; choose another folder, or delete the \
+                          results with `--force`";
+            return Err(reason.into());
         }
-        if let Some(key) = first_difference(&known.algorithms, &self.algorithms) {
-            return Err(format!("has results of `{key}` with other parameters than the suite's"));
-        }
-        if let Some(key) = first_difference(&known.weights, &self.weights) {
-            return Err(format!("has results of `{key}` with other weights than its files hold now"));
-        }
+        check_same("parameters", &known.algorithms, &self.algorithms)?;
+        check_same("weights", &known.weights, &self.weights)?;
         self.algorithms.extend(known.algorithms);
         self.weights.extend(known.weights);
         self.runs = known.runs;
         Ok(())
+    }
+
+    /// Forgets the algorithms for which `keep` is false.
+    pub(crate) fn retain(&mut self, keep: impl Fn(&str) -> bool) {
+        self.algorithms.retain(|key, _| keep(key));
+        self.weights.retain(|key, _| keep(key));
     }
 }
 
@@ -122,12 +126,27 @@ pub fn machine() -> &'static str {
     &MACHINE
 }
 
-/// Returns the first key with different values in both maps.
-fn first_difference<'a>(
-    known: &'a BTreeMap<String, String>,
+/// Checks that the fingerprints of the algorithms in both maps are equal.
+///
+/// # Errors
+/// The algorithms for which they differ, and how to play only these anew.
+fn check_same(
+    what: &str,
+    known: &BTreeMap<String, String>,
     now: &BTreeMap<String, String>,
-) -> Option<&'a String> {
-    known.iter().find(|(key, known)| now.get(*key).is_some_and(|now| now != *known)).map(|(key, _)| key)
+) -> Result<(), String> {
+    let differ = known.iter().filter(|(key, known)| now.get(*key).is_some_and(|now| now != *known));
+    let keys: Vec<_> = differ.map(|(key, _)| key).collect();
+    if keys.is_empty() {
+        return Ok(());
+    }
+    let list =
+        |ending: &str| keys.iter().map(|key| format!("`{key}{ending}`")).collect::<Vec<_>>().join(", ");
+    Err(format!(
+        "has results of algorithms whose {what} have changed: {}; choose another folder, or delete {} and play again",
+        list(""),
+        list(".*")
+    ))
 }
 
 /// Returns a short hash of a network's tensors and of its JSON, which may be absent.

@@ -146,8 +146,9 @@ impl Store {
 fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option<Manifest>), Error> {
     let mut manifest = Manifest::of(suite)?;
     match (begin, Manifest::read(folder)?) {
-        (Begin::Resume, Some(known)) => {
-            manifest.continue_from(known).map_err(|what| refused(folder, &what))?;
+        (Begin::Resume, Some(mut known)) => {
+            known.retain(|key| files_of(folder, key).any(|path| path.exists()));
+            manifest.continue_from(known).map_err(|what| Error::io(folder, what))?;
             Ok((manifest, None))
         }
         (Begin::Anew, Some(known)) => Ok((manifest, Some(known))),
@@ -159,18 +160,16 @@ fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option
     }
 }
 
-fn refused(folder: &Path, what: &str) -> Error {
-    Error::io(folder, format!("{what}; choose another folder, or delete the results with `--force`"))
-}
-
 /// Deletes the results that an evaluation wrote, and nothing else.
 fn delete(folder: &Path, known: &Manifest) -> Result<(), Error> {
-    for key in known.algorithms.keys() {
-        for ending in [RESULTS, EPISODES, LINES, FAILED] {
-            remove(&folder.join(format!("{key}{ending}")))?;
-        }
-    }
+    let mut files = known.algorithms.keys().flat_map(|key| files_of(folder, key));
+    files.try_for_each(|path| remove(&path))?;
     remove(&folder.join(REPORT))
+}
+
+/// Returns the paths of all files that an evaluation may write for one algorithm.
+fn files_of(folder: &Path, key: &str) -> impl Iterator<Item = PathBuf> {
+    [RESULTS, EPISODES, LINES, FAILED].into_iter().map(move |ending| folder.join(format!("{key}{ending}")))
 }
 
 /// Removes the unfinished files of killed runs. The lock guarantees that no other process is writing them.
