@@ -86,19 +86,55 @@ def test_logits_are_values_divided_by_the_temperature(tmp_path):
         assert np.abs(softmax[name] - 2 * softmax[f"last.{name}"]).max() == 0
 
 
-def test_the_average_of_the_networks_is_exported(tmp_path):
-    config = small_config("iql", "learner.averaging=0.75", "learner.temperature=0")
+@pytest.mark.parametrize("method, sets", [("iql", ["learner.temperature=0"]), ("ippo", [])])
+def test_the_average_of_the_networks_is_exported(method, sets, tmp_path):
+    config = small_config(method, "learner.averaging=0.75", "learner.learning_rate=0.01", *sets)
     path = tmp_path / "checkpoint.pt"
     found = []
     for updates in (1, 2):
         train(config, tmp_path, Budget(updates=updates), seed=3, resume=updates > 1)
-        modules = _checkpoint.load(path, "iql")["learner"]["modules"]
-        found.append([modules[place]["policy.weight"].numpy() for place in (0, 4)])
+        modules = _checkpoint.load(path, method)["learner"]["modules"]
+        # The network, and the last module before the optimizer: the average.
+        found.append([modules[place]["policy.weight"].numpy() for place in (0, -2)])
         if updates == 1:
             np.testing.assert_array_equal(weights(tmp_path)["policy.weight"], found[0][1])
     (_, before), (network, average) = found
     assert np.abs(network - before).max() > 1e-4
     np.testing.assert_allclose(average, 0.75 * before + 0.25 * network, atol=1e-6)
+
+
+def test_a_training_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
+    def settings():
+        return (
+            torch.get_num_threads(),
+            torch.are_deterministic_algorithms_enabled(),
+            torch.utils.deterministic.fill_uninitialized_memory,
+            torch.get_rng_state().tolist(),
+        )
+
+    torch.manual_seed(5)
+    before = settings()
+    train(small_config("iql"), tmp_path / "done", Budget(updates=1), threads=before[0] + 1)
+    assert settings() == before
+    with pytest.raises(ValueError):
+        train(small_config("iql", "environment.num_agents=90"), tmp_path / "failed", Budget(updates=1))
+    assert settings() == before
+
+
+@pytest.mark.parametrize("method", ("iql", "ippo"))
+def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(method, tmp_path):
+    too_many = small_config(method, "environment.num_agents=90")
+    folder = tmp_path / "run"
+    with pytest.raises(ValueError):
+        train(too_many, folder, Budget(updates=1))
+    assert not folder.exists()
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError):
+        train(too_many, folder, Budget(updates=1))
+    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+    train(small_config(method), folder, Budget(updates=1))
+    assert (folder / "weights.safetensors").exists()
 
 
 def test_windows_pass_convolutions_in_parts(monkeypatch):

@@ -71,15 +71,21 @@ class NetworkConfig:
 
 
 @dataclass(frozen=True)
-class QLearningConfig:
-    """The hyperparameters of the methods that learn values of actions."""
+class DescentConfig:
+    """The hyperparameters that all learners have."""
 
     discount: float = 0.99
-    td_lambda: float = 0.6
     learning_rate: float = 0.001
     #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
     half_life: int = 0
     max_gradient: float = 10.0
+
+
+@dataclass(frozen=True)
+class QLearningConfig(DescentConfig):
+    """The hyperparameters of the methods that learn values of actions."""
+
+    td_lambda: float = 0.6
     epsilon_start: float = 1.0
     epsilon_end: float = 0.05
     epsilon_steps: int = 100_000
@@ -97,32 +103,27 @@ class QLearningConfig:
 
 
 @dataclass(frozen=True)
-class PPOConfig:
+class PPOConfig(DescentConfig):
     """The hyperparameters of the methods that learn a policy by PPO."""
 
-    discount: float = 0.99
-    gae_lambda: float = 0.95
     learning_rate: float = 0.0005
-    #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
-    half_life: int = 0
     max_gradient: float = 0.5
+    gae_lambda: float = 0.95
     clip: float = 0.2
     entropy: float = 0.01
     value: float = 0.5
     epochs: int = 3
     minibatches: int = 4
+    #: As for `QLearningConfig`.
+    averaging: float = 0.0
     masks: bool = True
     critic_hidden: int = 256
 
 
 @dataclass(frozen=True)
-class ValueConfig:
+class ValueConfig(DescentConfig):
     """The hyperparameters of the method that learns the values of given policies."""
 
-    discount: float = 0.99
-    learning_rate: float = 0.001
-    #: The number of iterations in which the learning rate falls to half; 0 for a constant rate.
-    half_life: int = 0
     max_gradient: float = 4.0
     epochs: int = 1
     minibatches: int = 4
@@ -329,13 +330,14 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
 
 
 def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig) -> None:
+    if isinstance(learner, (QLearningConfig, PPOConfig)):
+        check(0 <= learner.averaging < 1, "learner.averaging", "at least 0, less than 1")
     if isinstance(learner, QLearningConfig):
         check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
         for key in ("own_loss", "temperature"):
             check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
-        check(0 <= learner.averaging < 1, "learner.averaging", "at least 0, less than 1")
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
         for key in ("epsilon_steps", "batch", "updates", "target_episodes", "mixer_hidden", "kernels"):
             check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")

@@ -17,9 +17,9 @@ from pogema_rs import policies
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._config import TrainingConfig, ValueConfig
-from pogema_rs.baselines._learning_rate import decay
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._schedules import decay
 from pogema_rs.baselines._targets import lambda_returns, last_steps
 from pogema_rs.policies import Policy
 

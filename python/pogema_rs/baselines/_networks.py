@@ -14,7 +14,7 @@ from pogema_rs.baselines._record import Record
 NUM_ACTIONS = 5
 
 #: The number of windows that pass the convolutions together.
-ROWS_AT_ONCE = 4096
+ROWS_AT_ONCE = 2048
 
 
 class Residual(nn.Module):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 from collections.abc import Callable
 from pathlib import Path
@@ -19,9 +20,9 @@ from torchrl.objectives import ClipPPOLoss
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import PPOConfig, TrainingConfig
-from pogema_rs.baselines._learning_rate import decay
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._schedules import decay, move_average
 from pogema_rs.baselines._targets import advantages, last_steps
 
 
@@ -45,6 +46,7 @@ class PPOLearner:
         self.critic: nn.Module = module.make_critic(config, map_size)
         self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE)
         nn.init.orthogonal_(self.network.policy.weight, 0.01)
+        self.average = copy.deepcopy(self.network)
         self._parameters = [*self.network.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(self._parameters, self.learner.learning_rate, eps=1e-5)
         self._objective = _objective(self.learner)
@@ -61,11 +63,11 @@ class PPOLearner:
 
     def trained(self) -> AgentNetwork:
         """Returns the network with logits for the rule of `sampling`."""
-        return self.network
+        return self.average
 
     def judge(self, generator: torch.Generator) -> Actor:
         """Returns the actor of the validation episodes."""
-        return Actor(self.network, generator, None, self.masks)
+        return Actor(self.average, generator, None, self.masks)
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
@@ -99,6 +101,7 @@ class PPOLearner:
                     for name, value in update(lanes_of(record, lanes.numpy()), *parts).items():
                         sums[name] = sums.get(name, 0.0) + value / count
         decay(self.optimizer, self.learner.half_life)
+        move_average(self.average, self.network, self.learner.averaging)
         return sums
 
     def _outputs(self, record: Record) -> tuple[torch.Tensor, torch.Tensor]:
@@ -158,13 +161,16 @@ class PPOLearner:
 
     def state(self) -> dict[str, Any]:
         """Returns everything that a checkpoint must hold."""
-        return {"modules": [one.state_dict() for one in (self.network, self.critic, self.optimizer)]}
+        return {"modules": [module.state_dict() for module in self._modules()]}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores what `state` returned."""
-        modules: tuple[Any, ...] = (self.network, self.critic, self.optimizer)
-        for module, values in zip(modules, state["modules"]):
+        for module, values in zip(self._modules(), state["modules"]):
             module.load_state_dict(values)
+
+    def _modules(self) -> tuple[Any, ...]:
+        """Returns everything with a state of tensors."""
+        return self.network, self.critic, self.average, self.optimizer
 
 
 def _acted(record: Record) -> torch.Tensor:

@@ -13,10 +13,10 @@ from torch import nn
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig
-from pogema_rs.baselines._learning_rate import decay
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record
 from pogema_rs.baselines._replay import Replay
+from pogema_rs.baselines._schedules import decay, move_average
 from pogema_rs.baselines._targets import lambda_returns, last_steps
 
 
@@ -93,9 +93,7 @@ class QLearner:
             draws = torch.randint(len(self.replay), (batch,), generator=self._generator)
             losses.append(self._update(self.replay.sample(draws.numpy())))
         decay(self.optimizer, self.learner.half_life)
-        with torch.no_grad():
-            for mean, parameter in zip(self.average.parameters(), self.network.parameters()):
-                mean.lerp_(parameter, 1 - self.learner.averaging)
+        move_average(self.average, self.network, self.learner.averaging)
         if self._episodes - self._copied >= self.learner.target_episodes:
             self.target_network.load_state_dict(self.network.state_dict())
             self.target_mixer.load_state_dict(self.mixer.state_dict())

@@ -10,6 +10,8 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional, Union
@@ -69,13 +71,37 @@ def train(
     to resume; ValueError if the checkpoint is damaged or belongs to another method, config or seed; ImportError if
     Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be written.
     """
-    run = _Run(config, folder, seed, threads, resume)
-    run.writer = open_tensorboard(folder) if tensorboard else None
-    run.draw = draw
-    try:
-        return run.play(budget)
-    finally:
-        run.close()
+    with _settings(seed, threads):
+        run = _Run(config, folder, seed, threads, resume)
+        run.writer = open_tensorboard(folder) if tensorboard else None
+        run.draw = draw
+        try:
+            return run.play(budget)
+        except BaseException:
+            if run.iteration == 0:
+                run.remove()
+            raise
+        finally:
+            run.close()
+
+
+@contextmanager
+def _settings(seed: int, threads: int) -> Iterator[None]:
+    """Gives PyTorch the settings of a training, and the caller's afterwards."""
+    before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled())
+    warns, fills = torch.is_deterministic_algorithms_warn_only_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    with torch.random.fork_rng(devices=[]):
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(True)
+        # No result reads memory that was never written.
+        torch.utils.deterministic.fill_uninitialized_memory = False
+        torch.manual_seed(seed)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(before[0])
+            torch.use_deterministic_algorithms(before[1], warn_only=warns)
+            torch.utils.deterministic.fill_uninitialized_memory = fills
 
 
 class _Run:
@@ -92,9 +118,6 @@ class _Run:
         if not resume and self.path.exists():
             raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
         saved = _checkpoint.load(self.path, config.method) if resume else None
-        torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(True)
-        torch.manual_seed(seed)
         self.generator = torch.Generator().manual_seed(seed)
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
         self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator)
@@ -134,6 +157,14 @@ class _Run:
         self._export()
         self._describe(budget)
         return self.curve.rows[-1] if self.curve.rows else {}
+
+    def remove(self) -> None:
+        """Deletes the files of the run, so that its folder can be used again."""
+        for name in ("checkpoint.pt", "run.json", "curve.csv", "curve.svg"):
+            (self.folder / name).unlink(missing_ok=True)
+        shutil.rmtree(self.folder / "replay", ignore_errors=True)
+        if not any(self.folder.iterdir()):
+            self.folder.rmdir()
 
     def close(self) -> None:
         """Frees the environments."""

@@ -1,0 +1,24 @@
+"""What changes after each iteration of a training, besides the network: the learning rate and the averaged network."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+from torch.optim import Optimizer
+
+
+def decay(optimizer: Optimizer, half_life: int) -> None:
+    """Lowers the learning rate as after one iteration of `half_life`, in which it falls to half; 0 leaves it.
+
+    A checkpoint needs nothing more than the optimizer's state, which holds the rate.
+    """
+    if half_life:
+        for group in optimizer.param_groups:
+            group["lr"] *= 0.5 ** (1 / half_life)
+
+
+@torch.no_grad()
+def move_average(average: nn.Module, network: nn.Module, averaging: float) -> None:
+    """Moves an averaged network towards the network; it keeps the share `averaging` of itself."""
+    for mean, parameter in zip(average.parameters(), network.parameters()):
+        mean.lerp_(parameter, 1 - averaging)
