@@ -19,7 +19,7 @@ Config = tuple[dict[str, Any], Optional[str]]
 Room = tuple[Optional[int], Optional[tuple[int, int]]]
 
 
-def _engine_config(config: Any, reward: str) -> Config:
+def engine_config(config: Any, reward: str) -> Config:
     """Returns the fields that the engine reads, and the text of the map that the config names."""
     if not isinstance(config, GridConfig):
         config = GridConfig(**_fields(config))
@@ -45,10 +45,10 @@ def read_configs(
     if not isinstance(grid_config, (list, tuple)):
         num_envs = 1 if num_envs is None else num_envs
         check_whole("num_envs", num_envs)
-        return [_engine_config(grid_config, reward)], None, min(int(num_envs), sys.maxsize)
+        return [engine_config(grid_config, reward)], None, min(int(num_envs), sys.maxsize)
     if num_envs not in (None, len(grid_config)):
         raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-    configs = [_engine_config(config, reward) for config in grid_config]
+    configs = [engine_config(config, reward) for config in grid_config]
     if not configs:
         raise ValueError("num_envs is 0, expected at least 1")
     # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
@@ -72,7 +72,7 @@ def read_changes(
     if len(set(chosen)) != len(chosen):
         raise ValueError(f"envs is {chosen}, expected each environment once")
     if not isinstance(configs, (list, tuple)):
-        return [_engine_config(configs, reward)], None, chosen
+        return [engine_config(configs, reward)], None, chosen
     if len(configs) != len(chosen):
         raise ValueError(f"configs holds {len(configs)} configs, expected {len(chosen)}, one per environment")
     if not chosen:

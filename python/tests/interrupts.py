@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from pogema_rs import AnimationMonitor, GridConfig, _engine, pogema_v0
 from pogema_rs._engine import restore_engine
-from pogema_rs._vec_configs import _engine_config
+from pogema_rs._vec_configs import engine_config
 from pogema_rs.errors import NotResetError
 from pogema_rs.planners import PlannerAgents, plan
 from pogema_rs.imitation import collect
@@ -404,7 +404,7 @@ def maps():
 
 @interrupts("make_instances")
 def instances():
-    fields, registered = _engine_config(GridConfig(size=16, num_agents=8, on_target="restart"), "own")
+    fields, registered = engine_config(GridConfig(size=16, num_agents=8, on_target="restart"), "own")
     interrupt("make_instances", lambda: _engine.make_instances(fields, registered, list(range(100_000)), 10_000), 0.05)
 
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pogema_rs import _engine
-from pogema_rs._vec_configs import _engine_config
+from pogema_rs._vec_configs import engine_config
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.jax._config import Config, check_whole
 from pogema_rs.jax._pack import Array, pack_grids
@@ -84,7 +84,7 @@ class InstancePool:
             raise ValueError(f"semantics is {semantics!r}, expected {' or '.join(map(repr, known))}")
         if not isinstance(config, GridConfig):
             config = GridConfig(**config)
-        self._fields, self._registered = _engine_config(config, "own")
+        self._fields, self._registered = engine_config(config, "own")
         limit = config.max_episode_steps if num_steps is None else num_steps
         self.num_steps = check_whole("num_steps", limit, 0)
         occupancy = "exact" if Semantics(semantics).occupancy_is_exact else "as_released"
