@@ -25,7 +25,7 @@ pub struct Render {
     text: bool,
     /// Draw only the steps A to B, both included, such as `10..20`; `--frame` then counts from A [default: all]
     #[arg(long, value_name = "A..B")]
-    steps: Option<Steps>,
+    steps: Option<FrameRange>,
     #[command(flatten)]
     input: Input,
     #[command(flatten)]
@@ -34,12 +34,12 @@ pub struct Render {
 
 /// A range of frames; both ends are included.
 #[derive(Clone, Copy, Debug)]
-struct Steps {
+struct FrameRange {
     first: usize,
     last: usize,
 }
 
-impl FromStr for Steps {
+impl FromStr for FrameRange {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
@@ -60,7 +60,9 @@ impl Render {
         check(&trace).map_err(|error| Error::io(&self.trace, error))?;
         self.pictures.check(trace.header.config.num_agents)?;
         let (first, trace) = match self.steps {
-            Some(Steps { first, last }) => (first, trace.part(first..=last).map_err(flagged("--steps"))?),
+            Some(FrameRange { first, last }) => {
+                (first, trace.part(first..=last).map_err(flagged("--steps"))?)
+            }
             None => (0, trace),
         };
         let name = self.trace.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

@@ -1,7 +1,7 @@
 //! `pogema bench`: measures steps, observations and resets per second, against filling memory and against POGEMA.
 
-mod bars;
 mod show;
+mod targets;
 mod timing;
 mod work;
 
@@ -21,7 +21,7 @@ use serde_json::Value;
 use crate::interrupt::exit_on_ctrl_c;
 use crate::output::{check_writable, print_line, progress_bar, write_json};
 
-use bars::{Bar, bars};
+use targets::{Target, targets};
 use work::{Speed, Work};
 
 #[derive(Args, Clone, Debug)]
@@ -86,7 +86,7 @@ struct Report {
     machine: String,
     path: String,
     rows: Vec<Row>,
-    bars: Vec<Bar>,
+    bars: Vec<Target>,
 }
 
 /// The largest number of agents for which POGEMA is timed; with more, its resets take minutes.
@@ -144,7 +144,8 @@ impl Bench {
 
     fn report(&self, rows: Vec<Row>) -> Result<(), Error> {
         let path = pogema_fast::SimdPath::from_environment()?.to_string();
-        let report = Report { machine: pogema_toolbox::machine().to_owned(), path, bars: bars(&rows), rows };
+        let report =
+            Report { machine: pogema_toolbox::machine().to_owned(), path, bars: targets(&rows), rows };
         print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))?;
         self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))
     }

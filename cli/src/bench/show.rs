@@ -5,15 +5,15 @@ use pogema_toolbox::fitted;
 
 use crate::output::markdown_table;
 
-use super::{Bar, Row};
+use super::{Row, Target};
 
 /// Returns the table of speeds and the table of targets as Markdown.
-pub fn tables(machine: &str, path: &str, rows: &[Row], bars: &[Bar]) -> String {
-    let (speeds, bars) = (fitted(speeds(rows)), fitted(bar_table(bars)));
+pub fn tables(machine: &str, path: &str, rows: &[Row], targets: &[Target]) -> String {
+    let (speeds, targets) = (fitted(speeds(rows)), fitted(target_table(targets)));
     format!(
         "{machine}; observations by the {path} path; windows of 11 x 11, density 0.3, random actions\n\n\
          Millions per second: agent steps, observations, both; buffers filled with zeros\n\n{speeds}\n\n\
-         {bars}"
+         {targets}"
     )
 }
 
@@ -45,17 +45,17 @@ fn speeds(rows: &[Row]) -> Table {
     table
 }
 
-fn bar_table(bars: &[Bar]) -> Table {
+fn target_table(targets: &[Target]) -> Table {
     let mut table = markdown_table("target | required | measured | met");
-    for bar in bars {
-        let sign = if bar.is_limit { "at most" } else { "at least" };
-        let met = match bar.is_met() {
+    for target in targets {
+        let sign = if target.is_limit { "at most" } else { "at least" };
+        let met = match target.is_met() {
             Some(true) => "yes",
             Some(false) => "no",
             None => "not measured",
         };
-        let got = bar.got.map_or_else(String::new, figure);
-        table.add_row([bar.name.clone(), format!("{sign} {}", bar.want), got, met.into()]);
+        let got = target.got.map_or_else(String::new, figure);
+        table.add_row([target.name.clone(), format!("{sign} {}", target.want), got, met.into()]);
     }
     table
 }

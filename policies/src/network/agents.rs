@@ -3,7 +3,7 @@
 
 use pogema_core::SimdPath;
 
-use super::steps::{FlatStep, Group, Heads, PlaneStep, Steps, add, write};
+use super::steps::{Chunk, FlatStep, Heads, LayerSteps, PlaneStep, add, write};
 
 /// The buffers of 8 or 16 agents.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub struct AgentBuffers {
 }
 
 impl AgentBuffers {
-    pub fn new(steps: &Steps, heads: &Heads, num_agents: usize) -> Self {
+    pub fn new(steps: &LayerSteps, heads: &Heads, num_agents: usize) -> Self {
         let zeros = |num_values: usize| vec![0.0; num_agents * num_values];
         Self {
             num_agents,
@@ -35,20 +35,20 @@ impl AgentBuffers {
     }
 }
 
-impl Steps {
+impl LayerSteps {
     /// Computes the outputs of at most as many agents as the buffers hold. The lanes of missing agents hold values of
     /// an earlier call.
     pub fn run_agents(
         &self,
         path: SimdPath,
-        group: Group<'_>,
+        chunk: Chunk<'_>,
         heads: &Heads,
         states: &mut [f32],
         buffers: &mut AgentBuffers,
     ) {
         let num_agents = buffers.num_agents;
         let [rows, cols, channels] = [self.planes[0].rows, self.planes[0].cols, self.planes[0].channels];
-        for (agent, window) in group.windows.chunks_exact(rows * cols * channels).enumerate() {
+        for (agent, window) in chunk.windows.chunks_exact(rows * cols * channels).enumerate() {
             for (channel, values) in window.chunks_exact(rows * cols).enumerate() {
                 let to = buffers.planes[0].chunks_exact_mut(channels * num_agents);
                 to.zip(values).for_each(|(pixel, value)| pixel[channel * num_agents + agent] = *value);
@@ -59,7 +59,7 @@ impl Steps {
             run_planes(path, step, buffers);
         }
         for step in &self.of_flats {
-            self.run_flats_of_agents(path, step, group, buffers);
+            self.run_flats_of_agents(path, step, chunk, buffers);
         }
         for (agent, state) in states.chunks_exact_mut(self.state_size.max(1)).enumerate() {
             let from = buffers.states.chunks_exact(num_agents);
@@ -72,7 +72,7 @@ impl Steps {
         &self,
         path: SimdPath,
         step: &FlatStep,
-        group: Group<'_>,
+        chunk: Chunk<'_>,
         buffers: &mut AgentBuffers,
     ) {
         let AgentBuffers { num_agents, flats, states, scratch, .. } = buffers;
@@ -92,7 +92,7 @@ impl Steps {
                 to.copy_from_slice(state);
             }),
             FlatStep::Scalars { output } => {
-                interleave(group.scalars, self.num_scalars, num_agents, &mut flats[*output]);
+                interleave(chunk.scalars, self.num_scalars, num_agents, &mut flats[*output]);
             }
             FlatStep::Join { inputs, output } => write(flats, *output, |flats, to| {
                 let (one, other) = to.split_at_mut(flats[inputs[0]].len());

@@ -4,7 +4,7 @@ use super::architecture::{Architecture, Layer};
 use super::gru::Gru;
 use super::layers::{Activation, Convolution, Dense, Flat, Piece};
 use super::slots;
-use super::steps::{FlatStep, Heads, PlaneStep, Steps};
+use super::steps::{FlatStep, Heads, LayerSteps, PlaneStep};
 use super::tensors::Tensors;
 use crate::simd::Plane;
 
@@ -15,12 +15,12 @@ const MOST_VALUES: usize = 1 << 24;
 const MOST_DEPTH: usize = 16;
 
 /// Builds the steps of a network. Errors are messages that name the layer or the tensor.
-pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Steps, Heads), String> {
+pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(LayerSteps, Heads), String> {
     let [channels, rows, cols] = architecture.window;
     let margin = margin_of(&architecture.layers, 0)?;
     let plane = Plane { rows, cols, channels, stride: channels, margin };
     check_size(&plane, "the window")?;
-    let steps = Steps { num_scalars: architecture.scalars, ..Steps::default() };
+    let steps = LayerSteps { num_scalars: architecture.scalars, ..LayerSteps::default() };
     let mut builder = Builder { tensors, steps, margin, held: Vec::new() };
     let input = builder.new_plane(plane);
     let last = builder.add_layers(&architecture.layers, Value::Plane(input))?;
@@ -75,7 +75,7 @@ enum Value {
 
 struct Builder<'a> {
     tensors: &'a mut Tensors,
-    steps: Steps,
+    steps: LayerSteps,
     margin: usize,
     /// Values that a later layer still needs.
     held: Vec<Value>,

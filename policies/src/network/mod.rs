@@ -33,7 +33,7 @@ pub use softmax::softmax;
 use crate::simd::AGENTS;
 use file::Content;
 use program::{Layers, Program};
-use steps::Group;
+use steps::Chunk;
 pub(crate) use tensors::{Tensors, check_num_values};
 
 /// A network with its weights, which any number of threads can share.
@@ -275,13 +275,13 @@ impl Network {
         workspace.values.clear();
         for first in (0..inputs.batch).step_by(AGENTS) {
             let num_agents = AGENTS.min(inputs.batch - first);
-            let group = Group {
+            let chunk = Chunk {
                 num_agents,
                 windows: &inputs.windows[first * window..][..num_agents * window],
                 scalars: &inputs.scalars[first * scalars..][..num_agents * scalars],
             };
             let states = &mut state.values[first * size..][..num_agents * size];
-            self.0.program.run(group, states, workspace).map_err(ForwardError::Runtime)?;
+            self.0.program.run(chunk, states, workspace).map_err(ForwardError::Runtime)?;
         }
         let actions = self.num_actions();
         let logits =

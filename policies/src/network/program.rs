@@ -5,7 +5,7 @@ use pogema_core::SimdPath;
 use super::agents::AgentBuffers;
 use super::architecture::Architecture;
 use super::build;
-use super::steps::{Buffers, GROUP, Group, Heads, Steps};
+use super::steps::{Buffers, CHUNK, Chunk, Heads, LayerSteps};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
@@ -14,7 +14,7 @@ use crate::simd::{AGENTS, HALF};
 /// The layers of a network, packed for a path.
 #[derive(Debug)]
 pub struct Layers {
-    pub steps: Steps,
+    pub steps: LayerSteps,
     pub heads: Heads,
     path: SimdPath,
 }
@@ -26,24 +26,24 @@ impl Layers {
     }
 
     /// Appends the logits and values of up to 16 agents.
-    fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) {
+    fn run(&self, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Workspace) {
         let Self { steps, heads, path } = self;
         let Workspace { buffers, logits, values } = workspace;
         let Some(LayerBuffers { apart, half, agents, heads: outputs }) = buffers else { return };
         let num_outputs = heads.dense.num_outputs;
-        if group.num_agents > steps.most_apart() {
-            let agents = if group.num_agents > HALF { agents } else { half };
-            steps.run_agents(*path, group, heads, states, agents);
-            for agent in 0..group.num_agents {
+        if chunk.num_agents > steps.most_apart() {
+            let agents = if chunk.num_agents > HALF { agents } else { half };
+            steps.run_agents(*path, chunk, heads, states, agents);
+            for agent in 0..chunk.num_agents {
                 logits.extend((0..heads.num_actions).map(|output| agents.output(agent, output)));
                 values.extend((heads.num_actions..num_outputs).map(|output| agents.output(agent, output)));
             }
             return;
         }
-        steps.run(*path, group, states, apart);
+        steps.run(*path, chunk, states, apart);
         let rows = steps.rows(heads.input, &apart.flats);
-        heads.dense.run(*path, group.num_agents, rows, false, outputs);
-        for row in outputs.chunks_exact(heads.dense.stride()).take(group.num_agents) {
+        heads.dense.run(*path, chunk.num_agents, rows, false, outputs);
+        for row in outputs.chunks_exact(heads.dense.stride()).take(chunk.num_agents) {
             logits.extend(&row[..heads.num_actions]);
             values.extend(&row[heads.num_actions..num_outputs]);
         }
@@ -109,7 +109,7 @@ impl Program {
                 apart: Buffers::new(&layers.steps),
                 half: AgentBuffers::new(&layers.steps, &layers.heads, HALF),
                 agents: AgentBuffers::new(&layers.steps, &layers.heads, AGENTS),
-                heads: vec![0.0; GROUP * layers.heads.dense.stride()],
+                heads: vec![0.0; CHUNK * layers.heads.dense.stride()],
             }),
             #[cfg(feature = "onnx")]
             Self::Runtime(_) => None,
@@ -119,16 +119,16 @@ impl Program {
 
     /// Appends the outputs of up to 16 agents. Only a runtime fails. Errors are messages without the path.
     #[cfg_attr(not(feature = "onnx"), allow(clippy::unnecessary_wraps, reason = "layers cannot fail"))]
-    pub fn run(&self, group: Group<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
+    pub fn run(&self, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
         match self {
             Self::Layers(layers) => {
-                layers.run(group, states, workspace);
+                layers.run(chunk, states, workspace);
                 Ok(())
             }
             #[cfg(feature = "onnx")]
-            Self::Runtime(runtime) => group
+            Self::Runtime(runtime) => chunk
                 .windows
-                .chunks_exact(group.windows.len() / group.num_agents)
+                .chunks_exact(chunk.windows.len() / chunk.num_agents)
                 .try_for_each(|window| runtime.run(window, &mut workspace.logits)),
         }
     }

@@ -1,6 +1,6 @@
 //! Assigns the same slot to values that are not needed at the same time, so that the slots fit the cache.
 
-use super::steps::{FlatStep, Heads, PlaneStep, Steps};
+use super::steps::{FlatStep, Heads, LayerSteps, PlaneStep};
 
 /// The slots that a step reads and writes.
 trait Slots {
@@ -49,7 +49,7 @@ impl Slots for FlatStep {
 }
 
 /// Renumbers the slots of all steps.
-pub fn share(steps: &mut Steps, heads: &mut Heads) {
+pub fn share(steps: &mut LayerSteps, heads: &mut Heads) {
     // The list that `flatten` writes and the input of the heads are needed from the first step to the last.
     let mut kept = vec![heads.input];
     kept.extend(steps.of_planes.iter().filter_map(|step| match step {

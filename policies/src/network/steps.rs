@@ -7,7 +7,7 @@ use super::layers::{Activation, Convolution, Dense, Flat, Rows};
 use crate::simd::{BLOCK, Plane};
 
 /// Room for agents that are computed one after the other.
-pub const GROUP: usize = 12;
+pub const CHUNK: usize = 12;
 
 /// A step on the windows of one agent. Numbers are slots of the workspace.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ pub enum PlaneStep {
     },
 }
 
-/// A step on the lists of a group of agents.
+/// A step on the lists of a chunk of agents.
 #[derive(Debug)]
 pub enum FlatStep {
     Dense { dense: Dense, input: usize, relu: bool, output: usize },
@@ -48,7 +48,7 @@ pub enum FlatStep {
 
 /// The layers of a network as a list of steps. Slot 0 of the planes is the window.
 #[derive(Debug, Default)]
-pub struct Steps {
+pub struct LayerSteps {
     pub planes: Vec<Plane>,
     pub flats: Vec<Flat>,
     pub of_planes: Vec<PlaneStep>,
@@ -66,26 +66,26 @@ pub struct Heads {
     pub num_actions: usize,
 }
 
-/// The inputs of a group of agents.
+/// The inputs of a chunk of agents.
 #[derive(Clone, Copy, Debug)]
-pub struct Group<'a> {
+pub struct Chunk<'a> {
     pub num_agents: usize,
     pub windows: &'a [f32],
     pub scalars: &'a [f32],
 }
 
-impl Steps {
-    /// Computes all lists of a group of agents.
-    pub fn run(&self, path: SimdPath, group: Group<'_>, states: &mut [f32], workspace: &mut Buffers) {
-        let num_values = group.windows.len() / group.num_agents;
-        for (agent, window) in group.windows.chunks_exact(num_values).enumerate() {
+impl LayerSteps {
+    /// Computes all lists of a chunk of agents.
+    pub fn run(&self, path: SimdPath, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Buffers) {
+        let num_values = chunk.windows.len() / chunk.num_agents;
+        for (agent, window) in chunk.windows.chunks_exact(num_values).enumerate() {
             load(&self.planes[0], window, &mut workspace.planes[0]);
             for step in &self.of_planes {
                 self.run_planes(path, step, agent, workspace);
             }
         }
         for step in &self.of_flats {
-            self.run_flats(path, step, group, states, workspace);
+            self.run_flats(path, step, chunk, states, workspace);
         }
     }
 
@@ -117,12 +117,12 @@ impl Steps {
         &self,
         path: SimdPath,
         step: &FlatStep,
-        group: Group<'_>,
+        chunk: Chunk<'_>,
         states: &mut [f32],
         buffers: &mut Buffers,
     ) {
         let Buffers { flats, scratch, .. } = buffers;
-        let num_agents = group.num_agents;
+        let num_agents = chunk.num_agents;
         match step {
             FlatStep::Dense { dense, input, relu, output } => write(flats, *output, |flats, to| {
                 dense.run(path, num_agents, self.rows(*input, flats), *relu, to);
@@ -139,7 +139,7 @@ impl Steps {
             }),
             FlatStep::Scalars { output } => {
                 let stride = self.flats[*output].stride();
-                let rows = group.scalars.chunks_exact(self.num_scalars);
+                let rows = chunk.scalars.chunks_exact(self.num_scalars);
                 for (row, scalars) in flats[*output].chunks_exact_mut(stride).zip(rows) {
                     row[..scalars.len()].copy_from_slice(scalars);
                 }
@@ -170,7 +170,7 @@ impl Steps {
         };
         // Interpolated between measurements with 4 and 8 agents: if a block is not full, about 5 agents one by one take
         // as long as 8 side by side.
-        if self.of_planes.iter().all(fills_blocks) { GROUP } else { 5 }
+        if self.of_planes.iter().all(fills_blocks) { CHUNK } else { 5 }
     }
 
     /// Returns the number of floats of scratch space that any step needs for an agent.
@@ -188,7 +188,7 @@ impl Steps {
     }
 }
 
-/// The buffers of one group: a window for each plane, and a list for each agent and flat.
+/// The buffers of one chunk: a window for each plane, and a list for each agent and flat.
 #[derive(Clone, Debug)]
 pub struct Buffers {
     planes: Vec<Vec<f32>>,
@@ -197,11 +197,11 @@ pub struct Buffers {
 }
 
 impl Buffers {
-    pub fn new(steps: &Steps) -> Self {
+    pub fn new(steps: &LayerSteps) -> Self {
         Self {
             planes: steps.planes.iter().map(|plane| vec![0.0; plane.len()]).collect(),
-            flats: steps.flats.iter().map(|flat| vec![0.0; GROUP * flat.stride()]).collect(),
-            scratch: vec![0.0; GROUP * steps.scratch()],
+            flats: steps.flats.iter().map(|flat| vec![0.0; CHUNK * flat.stride()]).collect(),
+            scratch: vec![0.0; CHUNK * steps.scratch()],
         }
     }
 }

@@ -6,7 +6,7 @@
 //! sign of a zero sum, and the final `+ 0.0` removes that sign.
 
 use super::kernels::Convolve;
-use super::lanes::Lanes;
+use super::vector::Vector;
 use super::{BLOCK, CHAINS, LANES, Shape};
 
 /// Computes `C` output channels together at each pixel. `N` vectors `V` hold one value of every agent. The slices hold
@@ -16,7 +16,7 @@ use super::{BLOCK, CHAINS, LANES, Shape};
 /// `super::convolve_agents` checked the job, and the instruction set of `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut Convolve<'_>) {
+pub unsafe fn convolve<V: Vector, const N: usize, const C: usize>(job: &mut Convolve<'_>) {
     let Shape { output, input, kernel, .. } = job.shape;
     let taps = kernel[0] * kernel[1] * input.channels;
     for first in (0..output.channels).step_by(C) {
@@ -38,7 +38,7 @@ pub unsafe fn convolve<V: Lanes, const N: usize, const C: usize>(job: &mut Convo
 /// As for `convolve`.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-unsafe fn convolve_pixel<V: Lanes, const N: usize, const C: usize>(
+unsafe fn convolve_pixel<V: Vector, const N: usize, const C: usize>(
     job: &mut Convolve<'_>,
     weights: *const f32,
     width: usize,
@@ -102,7 +102,7 @@ pub struct MultiplyAgents<'a> {
 /// `super::multiply_agents` checked the job, and the instruction set of `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn multiply<V: Lanes, const N: usize, const C: usize>(job: &mut MultiplyAgents<'_>) {
+pub unsafe fn multiply<V: Vector, const N: usize, const C: usize>(job: &mut MultiplyAgents<'_>) {
     let num_agents = N * V::COUNT;
     let (num_inputs, num_outputs) = (job.input.len() / num_agents, job.output.len() / num_agents);
     for first in (0..num_outputs).step_by(C) {

@@ -7,7 +7,7 @@ use std::arch::x86_64::{
 
 use super::agents::{self, MultiplyAgents};
 use super::kernels::{self, Convolve, Multiply};
-use super::lanes::Lanes;
+use super::vector::Vector;
 
 #[derive(Clone, Copy)]
 struct Avx2(__m256);
@@ -16,7 +16,7 @@ struct Avx2(__m256);
 // pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
 #[allow(clippy::undocumented_unsafe_blocks, reason = "the reason stands above")]
-impl Lanes for Avx2 {
+impl Vector for Avx2 {
     const COUNT: usize = 8;
 
     #[inline(always)]

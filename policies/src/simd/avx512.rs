@@ -7,7 +7,7 @@ use std::arch::x86_64::{
 
 use super::agents::{self, MultiplyAgents};
 use super::kernels::Convolve;
-use super::lanes::Lanes;
+use super::vector::Vector;
 
 #[derive(Clone, Copy)]
 struct Avx512(__m512);
@@ -15,7 +15,7 @@ struct Avx512(__m512);
 // SAFETY of all blocks: the functions below enable AVX-512 F, and only they use this type. Callers pass valid pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
 #[allow(clippy::undocumented_unsafe_blocks, reason = "the reason stands above")]
-impl Lanes for Avx512 {
+impl Vector for Avx512 {
     const COUNT: usize = 16;
 
     #[inline(always)]

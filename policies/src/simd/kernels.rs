@@ -3,7 +3,7 @@
 //! Vectors hold adjacent output channels. Each output is a sum of its own, whose terms are added in a fixed order. It
 //! therefore depends neither on the width of the vectors, nor on the size of a batch. `agents` has the same sums.
 
-use super::lanes::Lanes;
+use super::vector::Vector;
 use super::{BLOCK, CHAINS, LANES, Shape};
 
 /// A convolution of one window, or of several agents (see `agents`). The slices hold rows of pixels of channels.
@@ -36,7 +36,7 @@ struct Row {
 /// `super::convolve` checked the job, and the instruction set of `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn convolve<V: Lanes>(job: &mut Convolve<'_>) {
+pub unsafe fn convolve<V: Vector>(job: &mut Convolve<'_>) {
     let shape = job.shape;
     let [taps, kernel_cols] = shape.kernel;
     let mut first = 0;
@@ -77,7 +77,7 @@ pub unsafe fn convolve<V: Lanes>(job: &mut Convolve<'_>) {
 /// As for `convolve`.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-unsafe fn convolve_row<V: Lanes, const N: usize>(row: &Row, shape: &Shape, relu: bool) {
+unsafe fn convolve_row<V: Vector, const N: usize>(row: &Row, shape: &Shape, relu: bool) {
     let cols = shape.output.cols;
     let longest = 12 / N;
     let num_parts = cols.div_ceil(longest);
@@ -118,7 +118,7 @@ impl Part {
     /// As for `convolve`.
     #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
     #[inline(always)]
-    unsafe fn run<V: Lanes, const P: usize, const N: usize>(&self, shape: &Shape) {
+    unsafe fn run<V: Vector, const P: usize, const N: usize>(&self, shape: &Shape) {
         let row = &self.row;
         let (pixel, channels) = (shape.input.stride, shape.input.channels);
         // SAFETY: the job was checked; see `convolve`.
@@ -179,7 +179,7 @@ pub struct Multiply<'a> {
 /// `super::multiply` checked the job, and the instruction set of `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn multiply<V: Lanes>(job: &mut Multiply<'_>) {
+pub unsafe fn multiply<V: Vector>(job: &mut Multiply<'_>) {
     const MOST: usize = 3;
     for first in (0..job.bias.len()).step_by(V::COUNT) {
         let mut row = 0;
@@ -203,7 +203,7 @@ pub unsafe fn multiply<V: Lanes>(job: &mut Multiply<'_>) {
 /// As for `multiply`.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-unsafe fn multiply_rows<V: Lanes, const P: usize>(job: &mut Multiply<'_>, row: usize, first: usize) {
+unsafe fn multiply_rows<V: Vector, const P: usize>(job: &mut Multiply<'_>, row: usize, first: usize) {
     let (num_inputs, stride) = (job.num_inputs, job.input_stride);
     // SAFETY: the job was checked.
     unsafe {

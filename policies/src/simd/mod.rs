@@ -20,7 +20,7 @@ mod guarded;
 #[allow(unsafe_code, reason = "pointers that the jobs' checks cover")]
 mod kernels;
 #[allow(unsafe_code, reason = "vectors read and write through pointers")]
-mod lanes;
+mod vector;
 
 use pogema_core::SimdPath;
 
@@ -112,7 +112,7 @@ pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     // SAFETY: the asserts above: with `padding` inside the margins, each tap lies inside its row, and the kernels skip
     // the rows outside the input. `Network::new` checked that the machine supports the path.
     match path {
-        SimdPath::Scalar => unsafe { kernels::convolve::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::convolve::<vector::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
         SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::convolve(&mut job) },
         #[cfg(not(target_arch = "x86_64"))]
@@ -137,8 +137,8 @@ pub fn convolve_agents(path: SimdPath, mut job: Convolve<'_>) {
     // SAFETY: the asserts above; the kernels skip the pixels outside the input. `Network::new` checked that the machine
     // supports the path.
     match (path, num_agents) {
-        (SimdPath::Scalar, HALF) => unsafe { agents::convolve::<lanes::Portable, 1, 4>(&mut job) },
-        (SimdPath::Scalar, _) => unsafe { agents::convolve::<lanes::Portable, 2, 4>(&mut job) },
+        (SimdPath::Scalar, HALF) => unsafe { agents::convolve::<vector::Portable, 1, 4>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::convolve::<vector::Portable, 2, 4>(&mut job) },
         #[cfg(target_arch = "x86_64")]
         (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::convolve_half(&mut job) },
         #[cfg(target_arch = "x86_64")]
@@ -175,7 +175,7 @@ pub fn multiply(path: SimdPath, mut job: Multiply<'_>) {
     assert!(job.output.len() >= job.num_rows * num_outputs);
     // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
     match path {
-        SimdPath::Scalar => unsafe { kernels::multiply::<lanes::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::multiply::<vector::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
         SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::multiply(&mut job) },
         #[cfg(not(target_arch = "x86_64"))]
@@ -196,8 +196,8 @@ pub fn multiply_agents(path: SimdPath, mut job: MultiplyAgents<'_>) {
     assert_eq!(job.weights.len(), job.bias.len() * num_inputs);
     // SAFETY: the asserts above, and `Network::new` checked that the machine supports the path.
     match (path, num_agents) {
-        (SimdPath::Scalar, HALF) => unsafe { agents::multiply::<lanes::Portable, 1, 1>(&mut job) },
-        (SimdPath::Scalar, _) => unsafe { agents::multiply::<lanes::Portable, 2, 1>(&mut job) },
+        (SimdPath::Scalar, HALF) => unsafe { agents::multiply::<vector::Portable, 1, 1>(&mut job) },
+        (SimdPath::Scalar, _) => unsafe { agents::multiply::<vector::Portable, 2, 1>(&mut job) },
         #[cfg(target_arch = "x86_64")]
         (SimdPath::Avx2 | SimdPath::Avx512, HALF) => unsafe { avx2::multiply_half(&mut job) },
         #[cfg(target_arch = "x86_64")]

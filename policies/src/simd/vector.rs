@@ -7,7 +7,7 @@
 /// # Safety
 /// An implementation with intrinsics may only be used where its instruction set is enabled and available. Pointers must
 /// be valid for `COUNT` floats.
-pub trait Lanes: Copy {
+pub trait Vector: Copy {
     const COUNT: usize;
 
     unsafe fn splat(value: f32) -> Self;
@@ -34,7 +34,7 @@ fn mul_add(a: f32, b: f32, c: f32) -> f32 {
     }
 }
 
-impl Lanes for Portable {
+impl Vector for Portable {
     const COUNT: usize = 8;
 
     unsafe fn splat(value: f32) -> Self {

@@ -6,7 +6,7 @@ use super::Row;
 
 /// A speed target, and the value that this run reached.
 #[derive(Clone, Debug, Serialize)]
-pub struct Bar {
+pub struct Target {
     pub name: String,
     pub want: f64,
     /// Absent if a figure was not measured.
@@ -15,14 +15,14 @@ pub struct Bar {
     pub is_limit: bool,
 }
 
-impl Bar {
+impl Target {
     pub fn is_met(&self) -> Option<bool> {
         self.got.map(|got| if self.is_limit { got <= self.want } else { got >= self.want })
     }
 }
 
 /// Returns all speed targets.
-pub fn bars(rows: &[Row]) -> Vec<Bar> {
+pub fn targets(rows: &[Row]) -> Vec<Target> {
     let times = |row: &Row| Some(row.speed.step_f32 / row.pogema?.observations);
     let crowd = |row: &Row| is_paper(row) && row.work.num_agents >= 32;
     let large = |threads| find(rows, 1_000_000, 3072, threads);
@@ -33,8 +33,8 @@ pub fn bars(rows: &[Row]) -> Vec<Bar> {
         row.map(|row| row.speed.step_f32)
     };
     let cost = |num_agents, size| find(rows, num_agents, size, 1).map(|row| 1.0 / row.speed.step_f32);
-    let least = |name: &str, want, got| Bar { name: name.into(), want, got, is_limit: false };
-    let most = |name: &str, want, got| Bar { name: name.into(), want, got, is_limit: true };
+    let least = |name: &str, want, got| Target { name: name.into(), want, got, is_limit: false };
+    let most = |name: &str, want, got| Target { name: name.into(), want, got, is_limit: true };
     vec![
         least(
             "step + f32, the paper's rows from 32 agents on: times POGEMA",
