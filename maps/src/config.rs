@@ -27,25 +27,25 @@ pub struct GridConfig {
     pub on_target: OnGoal,
     /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system at each reset.
     pub seed: Option<u64>,
-    /// Number of columns.
+    /// Number of columns. If absent, that of the map, else `size`.
     pub width: usize,
-    /// Number of rows.
+    /// Number of rows. If absent, that of the map, else `size`.
     pub height: usize,
-    /// The larger of width and height.
+    /// Number of rows and columns; afterwards the larger of both.
     pub size: usize,
     /// Share of obstacles: the requested share, or that of the given map.
     pub density: f64,
     /// Number of cells that an agent sees in each direction.
     pub obs_radius: usize,
-    /// Explicit starts.
+    /// Explicit starts. If absent, starts are drawn.
     pub agents_xy: Option<Vec<Cell>>,
-    /// Explicit goals.
+    /// Explicit goals. If absent, goals are drawn.
     pub targets_xy: Option<Targets>,
-    /// Number of agents.
+    /// Number of agents. If absent, the number of explicit starts, else 1. Start letters in the map take precedence.
     pub num_agents: usize,
-    /// Cells that starts are drawn from.
+    /// Cells that starts are drawn from. If absent, those that the map marks, if any.
     pub possible_agents_xy: Option<Vec<Cell>>,
-    /// Cells that goals are drawn from.
+    /// Cells that goals are drawn from. If absent, those that the map marks, if any.
     pub possible_targets_xy: Option<Vec<Cell>>,
     /// How conflicts are resolved.
     pub collision_system: Collision,
@@ -53,7 +53,7 @@ pub struct GridConfig {
     pub persistent: bool,
     /// What agents observe.
     pub observation_type: Observation,
-    /// An explicit map.
+    /// An explicit map. If absent, that of `map_name`, else a random one.
     pub map: Option<Map>,
     /// Name of a registered map.
     pub map_name: Option<String>,
@@ -61,7 +61,7 @@ pub struct GridConfig {
     pub integration: Option<Integration>,
     /// Maximum length of an episode. Units: steps.
     pub max_episode_steps: i64,
-    /// Whether the `SampleFactory` wrapper resets automatically.
+    /// Whether the `SampleFactory` wrapper resets automatically. If absent, it does.
     pub auto_reset: Option<bool>,
     /// Whether the cells beyond the wall are free rather than random obstacles.
     pub empty_outside: bool,

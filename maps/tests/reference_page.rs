@@ -55,7 +55,8 @@ fn page() -> String {
     let mut page = String::from(
         "# Configuration fields\n\n\
          This page is generated from the code: `BLESS=1 cargo test -p pogema-maps --test reference_page` writes it. \
-         [Config](../spec/config.md) states how the fields depend on each other.\n\n\
+         [Config](../spec/config.md) states how the fields depend on each other. A field without a default may be \
+         absent: `None` in Python, `null` in YAML.\n\n\
          | field | default | values | meaning |\n| --- | --- | --- | --- |\n",
     );
     for name in FIELDS.into_iter().filter(|name| !CONSTANTS.contains(name)) {
