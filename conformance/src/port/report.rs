@@ -10,6 +10,7 @@ use super::judge::Judged;
 use super::plan::Plan;
 use super::protocol::Hello;
 use crate::compare::Divergence;
+use crate::rules::statement_of;
 
 /// The name of the table row for violations of the protocol.
 pub const PROTOCOL_ROW: &str = "(protocol)";
@@ -89,7 +90,8 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
     for (mode, judged) in result.judged {
         for unclaimed in &judged.not_claimed {
             *report.not_claimed.entry(unclaimed.what.clone()).or_default() += 1;
-            if result.case_rule.is_none() {
+            // A prefix of several rules gets no row.
+            if result.case_rule.is_none() && statement_of(unclaimed.rule).is_some() {
                 report.row(unclaimed.rule).not_claimed += 1;
             }
         }

@@ -10,19 +10,23 @@ use pogema_conformance::port::{
     Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
     check_ports, play_on_port,
 };
-use pogema_conformance::{NamedEngine, Op, Request, Watch};
+use pogema_conformance::{NamedEngine, Op, Request, Watch, rules};
 use pogema_core::{Collision, Observation, OnGoal};
 use serde_json::json;
 
 use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
 
 fn check(hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
+    check_part(Part::Cases, hello, reply)
+}
+
+fn check_part(part: Part, hello: fn(&mut Hello), reply: fn(&Ask, &mut Reply)) -> PortReport {
     let subject = Subject {
         command: "altered".into(),
         replay: Vec::new(),
         start: Box::new(move || Ok(AlteredPort::boxed(hello, reply))),
     };
-    let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
+    let plan = Plan { parts: vec![part], num_cases: 40, ..Plan::default() };
     check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0)
 }
 
@@ -106,6 +110,12 @@ fn unclaimed_features_are_listed_and_never_requested() {
         assert!(row.not_claimed > 0 && row.passed + row.failed + row.errors == 0, "{rule}: {row:?}");
     }
     assert!(report.rules["collide/priority/swap"].passed > 0);
+    // Random episodes leave out whole families of rules.
+    let drawn = check_part(Part::Drawn, modest, |_, _| ());
+    assert!(drawn.not_claimed.contains_key("profile history"), "{:?}", drawn.not_claimed);
+    for rule in drawn.rules.keys() {
+        assert!(rules::statement_of(rule).is_some(), "{rule} is no rule");
+    }
 }
 
 #[test]
