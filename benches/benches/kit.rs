@@ -25,6 +25,7 @@ fn request() -> Request {
     Request { config, ops: ops.collect(), ..Request::default() }
 }
 
+/// Checks a port by a request. The measured time includes that of the reference, which gives the expected answer.
 fn check(link: &mut dyn Link, request: &Request) {
     let hello = link.hello().unwrap();
     let judged = judge(link, &hello, Mode::Instance, request, &play(request));
@@ -41,7 +42,7 @@ fn kit(criterion: &mut Criterion) {
         bencher.iter(|| check(&mut Server::with("fast", make), &request));
     });
     let template = concat!(env!("CARGO_MANIFEST_DIR"), "/../conformance/ports/template.py");
-    let command = Command::new(&format!("python3 {template}"), Duration::from_secs(10)).unwrap();
+    let command = Command::new(&format!("python3 '{template}'"), Duration::from_secs(10)).unwrap();
     let mut process = Process::start(&command).unwrap();
     group.bench_function("over a pipe", |bencher| bencher.iter(|| check(&mut process, &request)));
     group.finish();

@@ -126,7 +126,7 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
     let at = folder.path();
     fs::write(at.join("port.py"), MUTE_PORT).unwrap();
     // Without the interrupt, the check would wait for a day.
-    let outputs = ["--json", "report.json", "--html", "report.html"];
+    let outputs = ["--json", "report.json", "--html", "report.html", "--badge", "badge.svg"];
     let arguments = [&["conform", "--port", "python3 port.py", "--timeout", "86400"], &outputs[..]].concat();
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
     command.args(arguments).current_dir(at).process_group(0);
@@ -142,4 +142,28 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
     for file in ["report.json", "report.html"] {
         assert!(at.join(file).exists(), "{file}");
     }
+    assert!(fs::read_to_string(at.join("badge.svg")).unwrap().contains("interrupted 0/"));
+}
+
+/// Ctrl-C in a terminal reaches POGEMA's process, too. Its end must not lose the report.
+#[test]
+fn an_interrupted_comparison_with_pogema_reports_what_it_checked() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let python = folder.path().join("python");
+    fs::write(&python, "#!/bin/sh\ntouch asked\nexec sleep 86400\n").unwrap();
+    fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
+    command.args(["conform", "--cases", "20", "--oracle", "--json", "report.json"]).current_dir(&folder);
+    command.env("POGEMA_ORACLE_PYTHON", &python).process_group(0);
+    let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_until(&mut process, |id| handles_ctrl_c(id) && folder.path().join("asked").exists());
+    let group = format!("-{}", process.id());
+    assert!(Command::new("kill").args(["-INT", "--", &group]).status().unwrap().success());
+    let output = process.wait_with_output().unwrap();
+    let (text, error) =
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!((output.status.code(), error.as_str()), (Some(130), ""), "{text}");
+    assert!(text.contains("interrupted: only the cases above were checked"), "{text}");
+    assert!(folder.path().join("report.json").exists());
 }

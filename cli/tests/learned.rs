@@ -87,11 +87,13 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "mats-lp"], "`--policy mats-lp` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, mats-lp, network, qmix, qplex, vdn",
+            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, \
+             mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--mask-actions"],
-            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, mats-lp, network, qmix, qplex, vdn",
+            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, \
+             lswitcher, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],
@@ -100,7 +102,8 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "network", "--weights", "text.safetensors"], "text.safetensors: "),
         (
             &["--policy", "network", "--weights", "wide.safetensors"],
-            "wide.safetensors: the encoder writes windows of shape [1, 5, 5] and 0 scalars, the network expects [1, 3, 3] and 0",
+            "wide.safetensors: the encoder writes windows of shape [1, 5, 5] and 0 scalars, the network expects \
+             [1, 3, 3] and 0",
         ),
         (
             &["--policy", "network", "--weights", "blind.safetensors"],
@@ -141,6 +144,7 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     assert!(results.iter().all(|result| *result == results[0]), "{results:#?}");
     assert_ne!(results[0][0], results[0][1]);
     let (text, error, status) = pogema(folder.path(), &["views", "1"]);
+    assert_eq!(status, 0, "{error}");
     assert!(text.contains("Descent") && text.contains("Network Time (seconds)"), "{text}");
     for (name, has_network) in [("Descent", true), ("Random", false)] {
         let path = folder.path().join("1").join(format!("{name}.episodes.json"));
@@ -151,7 +155,6 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
             assert!(network.is_none_or(|time| time > 0.0 && time < episode["seconds"].as_f64().unwrap()));
         }
     }
-    assert_eq!(status, 0, "{error}");
     let replay = ["replay", "1", "Descent", "2", "--trace", "replay.jsonl"];
     let (_, error, status) = pogema(folder.path(), &replay);
     assert_eq!(status, 0, "{error}");
@@ -204,7 +207,7 @@ fn a_run_with_other_weights_is_not_continued() {
         let path = folder.path().join(name);
         let original = fs::read(&path).unwrap();
         let mut changed = original.clone();
-        // A bit of the last weight, or the line break at the end.
+        // Changes a bit of the last weight, or adds a line break to the JSON file.
         *changed.last_mut().unwrap() ^= 2;
         fs::write(&path, if name.ends_with("json") { [&original[..], b"\n"].concat() } else { changed })
             .unwrap();
@@ -215,7 +218,7 @@ fn a_run_with_other_weights_is_not_continued() {
         fs::write(&path, original).unwrap();
         assert_eq!(evaluate().2, 0);
     }
-    // The message's advice is followed.
+    // Deletes the files that the message names.
     let weights = folder.path().join("descent.safetensors");
     let mut changed = fs::read(&weights).unwrap();
     *changed.last_mut().unwrap() ^= 2;

@@ -122,6 +122,15 @@ mod videos {
     }
 
     #[test]
+    fn an_ffmpeg_that_cannot_run_is_refused_before_play() {
+        let [programs, work] = folders(Some("exit 127"));
+        let play = "run --map four-rooms --num-agents 2 --policy random --steps 2 --video a.mp4";
+        let error = error_of(work.path(), programs.path(), play);
+        assert_eq!(error, "error: ffmpeg: `-version` failed (exit status: 127)");
+        assert_eq!(names(work.path()), ["t.jsonl"]);
+    }
+
+    #[test]
     fn an_ffmpeg_that_writes_nothing_is_an_error() {
         let [programs, work] = folders(Some("cat > /dev/null"));
         let error = error_of(work.path(), programs.path(), "render t.jsonl --video a.mp4");

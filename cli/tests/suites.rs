@@ -1,4 +1,4 @@
-//! The script that writes the page of results, on a few steps of each set.
+//! Tests of the script that writes the page of results, on a few steps of each set.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -11,7 +11,7 @@ use std::process::Command;
 const SETS: [&str; 6] =
     ["01-random", "02-mazes", "03-warehouse", "04-movingai", "05-puzzles", "06-pathfinding"];
 
-/// Writes maps with the names of those that the program does not contain.
+/// Writes small maps under the names of the maps that the program does not contain.
 fn write_maps(folder: &Path) {
     let open = "  ........................\n";
     let maps = [
@@ -56,11 +56,12 @@ fn all_suites_play_and_the_page_of_results_is_written() {
     let heads =
         page.lines().filter(|line| line.starts_with("| Folder") && line.ends_with("| agents |   QMIX |"));
     assert_eq!(heads.count(), 2, "{page}");
-    for picture in page.lines().filter_map(|line| line.strip_prefix("![")?.split_once("](results/")) {
-        let file = picture.1.trim_end_matches(')');
+    let pictures = page.lines().filter_map(|line| line.strip_prefix("![")?.split_once("](results/"));
+    let files: Vec<_> = pictures.map(|(_, file)| file.trim_end_matches(')')).collect();
+    for file in &files {
         assert!(folder.path().join("out/page/results").join(file).exists(), "{file}");
     }
-    assert!(page.matches("![").count() > 10, "{page}");
+    assert!(files.len() > 10 && page.matches("![").count() == files.len(), "{page}");
     // A further call plays nothing again.
     assert_eq!(run(), page);
 }

@@ -49,7 +49,8 @@ def pack(name: str, windows: list[Array], shape: tuple[int, ...], odd: list[str]
     values = np.concatenate(windows).reshape(len(windows), -1)
     bits = values != 0
     if not same(bits.astype(FLOAT32), values):
-        unexpected = [(i, set(row.tolist()) - {0.0, 1.0}) for i, row in enumerate(values)]
+        # As texts, because -0.0 equals 0.0.
+        unexpected = [(i, set(map(repr, row.tolist())) - {"0.0", "1.0"}) for i, row in enumerate(values)]
         odd.extend(f"{name}[{i}] has values {sorted(found)}" for i, found in unexpected if found)
     packed = np.packbits(bits, axis=1)
     text, size = packed.tobytes().hex(), 2 * packed.shape[1]
@@ -86,7 +87,7 @@ class Episodes:
             case ["reset", seed]:
                 return self.reset(seed)
             case ["step", list(actions)]:
-                return self.step("step", list(actions))
+                return self.step("step", actions)
             case ["astar"]:
                 self.planner = self.planner or BatchAStarAgent()
                 return self.step("astar", self.planner.act(self.observations))
@@ -143,7 +144,7 @@ class Episodes:
         return {"op": "history", "full": rows(self.env.get_full_history()), "changes": rows(self.env.get_history())}
 
     def state(self) -> Record:
-        """Returns the cells of all agents, and the occupied cells, which may differ."""
+        """Returns the state of all agents, and the occupied cells, which may differ from the cells of the agents."""
         grid = self.base.grid
         return {
             "cells": unpad(grid.positions_xy, self.radius),
@@ -191,7 +192,7 @@ class Episodes:
         return {"dtype": str(first.dtype), "rows": draw(first)}
 
     def goal_lists(self) -> Record:
-        """Returns the future goals, or null and the reason: on some pools POGEMA never terminates."""
+        """Returns the future goals; null for long episodes, null and the reason if POGEMA fails or never terminates."""
         if self.config.max_episode_steps > MAX_GOAL_LIST_STEPS:
             return {"goal_lists": None}
         try:

@@ -103,13 +103,15 @@ pub fn folder() -> PathBuf {
 /// Reads one case.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read or is not a case.
+/// [`Error::Io`] if the file cannot be read or is not a case, or if a step has an unknown action or operation.
 pub fn read(path: &Path) -> Result<Case, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    serde_saphyr::from_str(&text).map_err(|error| {
+    let case: Case = serde_saphyr::from_str(&text).map_err(|error| {
         let text = error.to_string();
         Error::io(path, text.lines().next().unwrap_or("unreadable"))
-    })
+    })?;
+    case.request().map_err(|error| Error::io(path, error))?;
+    Ok(case)
 }
 
 impl Case {

@@ -55,15 +55,14 @@ fn broken_in_state(
             format!("agent {agent} shares cell {} with another active agent", state.cells[agent]),
         ));
     }
-    let occupied: HashSet<_> = state.occupied.iter().copied().collect();
-    if let Some(cell) = occupied.iter().find(|cell| !seen.contains(cell)) {
+    if let Some(cell) = state.occupied.iter().find(|cell| !seen.contains(cell)) {
         return Some((
             families.occupancy,
             format!("cell {cell} is marked as occupied without an active agent"),
         ));
     }
     let shows_all = config.collision_system != Collision::Soft || config.occupancy == Occupancy::Exact;
-    if shows_all && occupied.len() != seen.len() {
+    if shows_all && state.occupied.iter().collect::<HashSet<_>>().len() != seen.len() {
         return Some((families.occupancy, "the occupancy grid does not show every active agent".into()));
     }
     if config.on_target != OnGoal::Finish && active().count() != state.cells.len() {
@@ -85,8 +84,13 @@ fn broken_in_step(
         if distance > u16::from(before.active[agent]) {
             return Some(("move/actions", format!("agent {agent} moved from {from} to {to} in one step")));
         }
-        if from != to && obstacles[usize::from(to.row)][usize::from(to.col)] == b'#' {
-            return Some((families.collide, format!("agent {agent} entered the obstacle at {to}")));
+        let row = obstacles.get(usize::from(to.row));
+        match row.and_then(|row| row.get(usize::from(to.col))) {
+            None => return Some((families.collide, format!("agent {agent} left the map to {to}"))),
+            Some(b'#') if from != to => {
+                return Some((families.collide, format!("agent {agent} entered the obstacle at {to}")));
+            }
+            Some(_) => {}
         }
         if after.active[agent] && !before.active[agent] {
             return Some((families.goal, format!("agent {agent} became active again")));

@@ -40,6 +40,10 @@ impl Literal {
         Ok(Self { config, ..Self::default() })
     }
 
+    fn check_reset(&self) -> Result<(), Error> {
+        if self.obstacles.is_empty() { Err(Error::NotReset) } else { Ok(()) }
+    }
+
     fn pad(&self, cell: Cell) -> Place {
         (usize::from(cell.row) + self.config.radius, usize::from(cell.col) + self.config.radius)
     }
@@ -110,6 +114,7 @@ impl Environment for Literal {
     }
 
     fn step(&mut self, actions: &[Action], out: StepOut<'_>) -> Result<(), Error> {
+        self.check_reset()?;
         Error::check_length("actions", self.config.num_agents, actions.len())?;
         out.check(self.config.num_agents)?;
         match self.config.collision {
@@ -158,10 +163,8 @@ impl Environment for Literal {
 
     fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         let border = 2 * self.config.radius;
+        self.check_reset()?;
         let (height, width) = (self.obstacles.len(), self.obstacles.first().map_or(0, Vec::len));
-        if height == 0 {
-            return Err(Error::NotReset);
-        }
         state.check_fits(self.config.num_agents, (height - border, width - border))?;
         self.places = state.cells.iter().map(|&cell| self.pad(cell)).collect();
         self.goals = state.goals.iter().map(|&cell| self.pad(cell)).collect();
@@ -190,7 +193,9 @@ impl Environment for Literal {
     }
 
     fn observe(&self, out: &mut [f32]) -> Result<(), Error> {
+        self.check_reset()?;
         let (side, radius) = (self.config.side(), self.config.radius as i64);
+        Error::check_length("observations", self.config.num_agents * 3 * side * side, out.len())?;
         for (agent, channels) in out.chunks_mut(3 * side * side).enumerate() {
             let clamped =
                 |own: usize, goal: usize| (goal as i64 - own as i64).clamp(-radius, radius) + radius;
@@ -204,6 +209,9 @@ impl Environment for Literal {
     }
 
     fn observe_map(&self, out: &mut [u8]) -> Result<(), Error> {
+        self.check_reset()?;
+        let num_cells = self.obstacles.iter().map(Vec::len).sum();
+        Error::check_length("map", num_cells, out.len())?;
         let values = self.obstacles.iter().flatten();
         out.iter_mut().zip(values).for_each(|(value, &flag)| *value = flag);
         Ok(())

@@ -85,6 +85,12 @@ impl Watch<'_> {
     pub fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
+
+    /// Returns `None` after `stop`, because the key that stops the run also reaches the processes of the workers, which
+    /// may then fail.
+    fn unless_stopped<T>(&self, result: Result<T, Error>) -> Result<Option<T>, Error> {
+        if self.is_stopped() { Ok(None) } else { result.map(Some) }
+    }
 }
 
 /// The result of one case.
@@ -162,7 +168,7 @@ impl Report {
     /// Checks an engine against the cases of a folder.
     ///
     /// # Errors
-    /// If a file cannot be read.
+    /// Those of [`cases::read`].
     pub fn check_cases(&mut self, part: &str, folder: &Path, engine: NamedEngine) -> Result<(), Error> {
         let mut results = Vec::new();
         for path in golden::files(folder, ".yaml")? {
@@ -178,10 +184,11 @@ impl Report {
         Ok(())
     }
 
-    /// Checks the engines against each other, and the first one against the invariants, on random cases.
+    /// Checks the engines against each other, and the first one against the invariants, on random cases. Writes failed
+    /// cases to the folder `keep`.
     ///
     /// # Errors
-    /// If a worker fails.
+    /// If the threads cannot be started.
     pub fn check_fresh(
         &mut self,
         engines: &[NamedEngine],
@@ -211,10 +218,10 @@ impl Report {
         Ok(())
     }
 
-    /// Checks engines against POGEMA itself on random cases.
+    /// Checks engines against POGEMA itself on random cases. Writes failed cases to the folder `keep`.
     ///
     /// # Errors
-    /// If POGEMA cannot be started or ends.
+    /// If POGEMA or the threads cannot be started, or if POGEMA ends or gives an unreadable answer.
     pub fn check_oracle(
         &mut self,
         engines: &[NamedEngine],
@@ -242,12 +249,17 @@ impl Report {
         Ok(())
     }
 
-    /// Checks the cases of a folder against POGEMA itself.
+    /// Checks the cases of a folder against POGEMA itself. After `watch.stop`, the other cases are left out.
     ///
     /// # Errors
-    /// If a file cannot be read, or POGEMA cannot be started or ends.
-    pub fn check_cases_with_oracle(&mut self, folder: &Path, python: &Path) -> Result<(), Error> {
-        let mut oracle = Oracle::start(python)?;
+    /// Those of [`cases::read`], or if POGEMA cannot be started, ends or gives an unreadable answer.
+    pub fn check_cases_with_oracle(
+        &mut self,
+        folder: &Path,
+        python: &Path,
+        watch: Watch<'_>,
+    ) -> Result<(), Error> {
+        let Some(mut oracle) = watch.unless_stopped(Oracle::start(python))? else { return Ok(()) };
         let mut results = Vec::new();
         for path in golden::files(folder, ".yaml")? {
             let case = cases::read(&path)?;
@@ -256,7 +268,7 @@ impl Report {
             }
             let name = path.display().to_string();
             let request = case.request()?;
-            let expected = oracle.ask(&request)?;
+            let Some(expected) = watch.unless_stopped(oracle.ask(&request))? else { break };
             let got = crate::play(&request);
             let agreed = check("cases with oracle", &name, &request, &expected, &got);
             // If the case is a deviation by decision, POGEMA must really differ.
@@ -320,19 +332,16 @@ pub(crate) fn on_workers<W: Send, T: Send>(
     let idle = Mutex::new(Vec::new());
     let locked = || idle.lock().unwrap_or_else(PoisonError::into_inner);
     let run_case = |case| {
-        if watch.is_stopped() {
-            return None;
-        }
         let taken = locked().pop();
         let mut worker = match taken.map_or_else(&make_worker, Ok) {
             Ok(worker) => worker,
-            Err(error) => return Some(Err(error)),
+            Err(error) => return watch.unless_stopped(Err(error)).transpose(),
         };
         let result = run(&mut worker, case);
         locked().push(worker);
         (watch.progress)();
-        // The key that stops the run also reaches the processes of the workers, which may then fail.
-        (!watch.is_stopped()).then_some(result)
+        watch.unless_stopped(result).transpose()
     };
-    pool.install(|| (0..num_cases).into_par_iter().filter_map(run_case).collect())
+    let cases = (0..num_cases).into_par_iter().take_any_while(|_| !watch.is_stopped());
+    pool.install(|| cases.filter_map(run_case).collect())
 }

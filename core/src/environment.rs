@@ -36,7 +36,7 @@ pub trait Environment: Send {
     /// Goal streams and [`State::on_goal`] stay as they are, so repeating a step can lead to other goals.
     ///
     /// # Errors
-    /// Before the first reset, or [`Error::ForeignState`] for a state of another episode.
+    /// Before the first reset, or [`Error::ForeignState`] for a state that does not fit the map and its agents.
     ///
     /// Rule: history/step-back
     fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error>;
@@ -160,7 +160,7 @@ pub struct StepOut<'a> {
 }
 
 impl StepOut<'_> {
-    /// Splits every buffer after some agents.
+    /// Splits every buffer after the first `num_agents` entries.
     pub fn split_at(self, num_agents: usize) -> (Self, Self) {
         let (rewards, other_rewards) = self.rewards.split_at_mut(num_agents);
         let (terminated, other_terminated) = self.terminated.split_at_mut(num_agents);

@@ -1,4 +1,4 @@
-//! An episode: the only code that plays, measures and records.
+//! An episode: plays the steps of an engine, and measures and records them.
 
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +57,13 @@ pub struct Recording {
     pub start: Snapshot,
     /// Every step, undone steps included.
     pub steps: Vec<TraceStep>,
+}
+
+impl Recording {
+    /// Returns the state after the reset and after each step.
+    fn states(&self) -> impl Iterator<Item = &Snapshot> {
+        std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.state))
+    }
 }
 
 /// Buffers that are reused in every step to avoid allocations.
@@ -147,8 +154,11 @@ impl<E: Environment> Episode<E> {
 
     /// Continues an episode whose engine is already in the right state. `past` holds the kept states.
     ///
+    /// The meters and the results of the last step stay as they are.
+    ///
     /// # Errors
-    /// [`Error::ForeignState`] if a state does not fit the instance.
+    /// [`Error::ForeignState`] if a state does not fit the instance, or if `past` does not hold the states after the
+    /// start and after each step with `persistent` in the config, and none without it.
     pub fn resume(
         &mut self,
         instance: Instance,
@@ -157,7 +167,12 @@ impl<E: Environment> Episode<E> {
         recording: Option<Recording>,
     ) -> Result<(), Error> {
         let size = (instance.map().height(), instance.map().width());
-        past.iter().try_for_each(|state| state.check_fits(self.config().num_agents, size))?;
+        let recorded = recording.iter().flat_map(Recording::states);
+        past.iter().chain(recorded).try_for_each(|state| state.check_fits(self.config().num_agents, size))?;
+        let num_kept = if self.config().persistent { num_steps.checked_add(1) } else { Some(0) };
+        if num_kept != Some(past.len() as u64) {
+            return Err(Error::ForeignState);
+        }
         self.instance = Some(instance);
         self.num_steps = num_steps;
         self.past = past;
@@ -229,7 +244,8 @@ impl<E: Environment> Episode<E> {
 
     /// Undoes the last step and returns whether there was one.
     ///
-    /// Requires `persistent` in the config. The metrics and the recording keep the step.
+    /// Requires `persistent` in the config. The metrics, the results, [`Episode::is_over`] and the recording keep the
+    /// step.
     ///
     /// # Errors
     /// Before the start, or [`Error::StepsNotKept`].

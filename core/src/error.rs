@@ -217,7 +217,7 @@ impl Error {
         match self {
             Self::Config { field, value, expected } => one_line(wrong_field(field, value, expected)),
             Self::Syntax { reason } => one_line(reason),
-            other => other.to_string(),
+            other => other.to_string().trim_start_matches("config: ").to_owned(),
         }
     }
 
@@ -258,6 +258,9 @@ impl Error {
     }
 
     /// Checks the length of a list or buffer.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the two lengths differ.
     pub fn check_length(what: &'static str, want: usize, got: usize) -> Result<(), Self> {
         if want == got { Ok(()) } else { Err(Self::Length { what, want, got }) }
     }
@@ -268,7 +271,7 @@ pub fn unknown_letter(letter: char) -> String {
     format!("unknown character `{letter}`, expected one of `.#@$!`, a-z or A-Z")
 }
 
-/// Returns the beginning of a text, for a message that quotes it.
+/// Returns the first `longest` characters of a text, for a message that quotes it; `…` marks a longer text.
 pub fn shorten(text: &str, longest: usize) -> String {
     match text.char_indices().nth(longest) {
         Some((end, _)) => format!("{}…", &text[..end]),

@@ -87,6 +87,15 @@ impl GoalStream {
         self.first
     }
 
+    /// Returns all goals that are known: the first one and, of a sequence, all others.
+    pub fn known(&self) -> impl Iterator<Item = Cell> {
+        let rest = match &self.rest {
+            Rest::Cycle { cells, .. } => &cells[..],
+            Rest::Same | Rest::Drawn(_) => &[],
+        };
+        std::iter::once(self.first).chain(rest.iter().copied())
+    }
+
     /// Returns the length of a cyclic sequence and the index of the current goal in it, or `None` for other goals.
     pub fn turn(&self) -> Option<(usize, usize)> {
         match &self.rest {

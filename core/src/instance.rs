@@ -20,6 +20,21 @@ pub enum Outside {
     Noise(Map),
 }
 
+impl Outside {
+    /// Checks that noise is as large as the map with its border.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for its rows or columns.
+    pub fn check_fits(&self, map: &Map, config: &Config) -> Result<(), Error> {
+        if let Self::Noise(noise) = self {
+            let border = 2 * config.radius;
+            Error::check_length("rows of noise", map.height() + border, noise.height())?;
+            Error::check_length("columns of noise", map.width() + border, noise.width())?;
+        }
+        Ok(())
+    }
+}
+
 /// A map, its surroundings, and the start and goals of each agent.
 ///
 /// Engines rely on the checks of [`Instance::new`], so the parts of an instance are read-only.
@@ -35,14 +50,19 @@ impl Instance {
     /// Creates an instance and checks it.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many goal streams as starts. [`Error::Agent`] if a start or first goal
-    /// lies outside the map, or if two agents have the same start.
+    /// [`Error::Length`] if there are not as many goal streams as starts. [`Error::Agent`] if a start, a first
+    /// goal or a goal of a sequence lies outside the map, or if two agents have the same start.
     ///
     /// Rule: place/explicit
     pub fn new(map: Map, outside: Outside, starts: Vec<Cell>, goals: Vec<GoalStream>) -> Result<Self, Error> {
         Error::check_length("goals", starts.len(), goals.len())?;
-        check_inside(&map, "start", starts.iter().copied())?;
-        check_inside(&map, "goal", goals.iter().map(GoalStream::first))?;
+        check_inside(&map, "start", starts.iter().copied().enumerate())?;
+        let known = goals.iter().enumerate();
+        check_inside(
+            &map,
+            "goal",
+            known.flat_map(|(agent, stream)| stream.known().map(move |cell| (agent, cell))),
+        )?;
         let mut seen = FxHashMap::with_capacity_and_hasher(starts.len(), FxBuildHasher);
         for (agent, &start) in starts.iter().enumerate() {
             if let Some(other) = seen.insert(start, agent) {
@@ -85,12 +105,7 @@ impl Instance {
     /// [`Error::Length`] naming the part that does not fit.
     pub fn check_fits(&self, config: &Config) -> Result<(), Error> {
         Error::check_length("starts", config.num_agents, self.starts.len())?;
-        if let Outside::Noise(noise) = &self.outside {
-            let border = 2 * config.radius;
-            Error::check_length("rows of noise", self.map.height() + border, noise.height())?;
-            Error::check_length("columns of noise", self.map.width() + border, noise.width())?;
-        }
-        Ok(())
+        self.outside.check_fits(&self.map, config)
     }
 
     /// Returns the first goal of each agent.
@@ -99,8 +114,8 @@ impl Instance {
     }
 }
 
-fn check_inside(map: &Map, what: &str, cells: impl Iterator<Item = Cell>) -> Result<(), Error> {
-    for (agent, cell) in cells.enumerate() {
+fn check_inside(map: &Map, what: &str, cells: impl Iterator<Item = (usize, Cell)>) -> Result<(), Error> {
+    for (agent, cell) in cells {
         if !map.contains(cell) {
             return Err(Error::outside(agent, what, cell, map.height(), map.width()));
         }

@@ -28,12 +28,7 @@ impl Map {
         if height == 0 || width == 0 {
             return Err(Error::instance("the map has no cells"));
         }
-        if height > Self::LONGEST_SIDE || width > Self::LONGEST_SIDE {
-            let longest = Self::LONGEST_SIDE;
-            return Err(Error::instance(format!(
-                "the map has {height} x {width} cells, expected at most {longest} per side"
-            )));
-        }
+        check_sides(height, width)?;
         Error::check_length("obstacles", height * width, obstacles.len())?;
         Ok(Self { height, width, obstacles })
     }
@@ -41,10 +36,13 @@ impl Map {
     /// Creates a map from lines of `.` (free) and `#` (obstacle).
     ///
     /// # Errors
-    /// [`Error::Map`] with line and column for any other character or a line of another length.
+    /// [`Error::Map`] with line and column for any other character or a line of another length. Those of
+    /// [`Map::new`].
     pub fn from_rows<S: AsRef<str>>(rows: &[S]) -> Result<Self, Error> {
         let width = rows.first().map_or(0, |row| row.as_ref().chars().count());
-        let mut obstacles = Vec::with_capacity(rows.len() * width);
+        check_sides(rows.len(), width)?;
+        // No room is reserved for the cells: a few bytes of text can claim billions of them.
+        let mut obstacles = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             for (column, character) in row.as_ref().chars().enumerate() {
                 match character {
@@ -100,7 +98,7 @@ impl Map {
         self.obstacles.iter().filter(|&&obstacle| !obstacle).count()
     }
 
-    /// Returns the index of a cell in [`Map::obstacles`].
+    /// Returns the index in [`Map::obstacles`] of a cell of the map.
     pub fn index(&self, cell: Cell) -> usize {
         usize::from(cell.row) * self.width + usize::from(cell.col)
     }
@@ -115,6 +113,14 @@ impl Map {
         let line = |row: &[bool]| row.iter().map(|&obstacle| if obstacle { '#' } else { '.' }).collect();
         self.obstacles.chunks(self.width).map(line).collect()
     }
+}
+
+fn check_sides(height: usize, width: usize) -> Result<(), Error> {
+    let longest = Map::LONGEST_SIDE;
+    if height.max(width) <= longest {
+        return Ok(());
+    }
+    Err(Error::instance(format!("the map has {height} x {width} cells, expected at most {longest} per side")))
 }
 
 /// Checks that row `index` is as long as the first row.

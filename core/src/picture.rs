@@ -39,7 +39,8 @@ pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
     marks
 }
 
-/// Draws the agents: `.` is free, `#` an obstacle, `a` agent 0, `A` its goal, and so on.
+/// Draws the agents: `.` is free, `#` an obstacle, `a` agent 0, `A` its goal, and so on. From agent 26 on, a goal has
+/// the same character as its agent.
 pub fn picture(map: &Map, snapshot: &Snapshot) -> String {
     let letter = |mark: &Mark| match *mark {
         Mark::Free => '.',

@@ -180,8 +180,7 @@ impl TraceHeader {
     /// Checks that an engine can play the config and instance of the header.
     fn check(&self) -> Result<(), Error> {
         self.config.check()?;
-        Error::check_length("starts", self.config.num_agents, self.starts.len())?;
-        self.instance().map(|_| ())
+        self.instance()?.check_fits(&self.config)
     }
 }
 

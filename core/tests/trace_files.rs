@@ -6,7 +6,7 @@
 mod mutate;
 
 use mutate::{assert_one_line, mutated, odd_value};
-use pogema_core::Trace;
+use pogema_core::{Map, Trace};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -23,7 +23,7 @@ const TOKENS: [&str; 16] = [
 ];
 
 /// A part of the valid trace, its replacement, and the message that the result is rejected with.
-const REJECTED: [(&str, &str, &str); 18] = [
+const REJECTED: [(&str, &str, &str); 20] = [
     (
         "pogema-trace/1",
         "pogema-trace/3",
@@ -57,6 +57,12 @@ const REJECTED: [(&str, &str, &str); 18] = [
         "[[0,0],[1,1]],\"goals\":[[[0,1]]",
         "[[0,0],[0,0]],\"goals\":[[[0,1]]",
         "trace: line 1: instance: agent 1: start (0, 0) is the start of agent 0 too",
+    ),
+    ("\"noise\":[\"....\",", "\"noise\":[", "trace: line 1: rows of noise has length 3, expected 4"),
+    (
+        "[[0,0],[1,1]]]}",
+        "[[0,0],[2,1]]]}",
+        "trace: line 1: instance: agent 1: goal (2, 1) is outside the map of 2 rows and 2 columns",
     ),
     ("\"goals\":[[[0,1]]", "\"goals\":[[]", "trace: line 1: instance: agent 0: has no goal"),
     ("\"goals\":[[[0,1]],", "\"goals\":[", "trace: line 1: goals has length 1, expected 2"),
@@ -216,4 +222,15 @@ proptest! {
     fn an_almost_valid_trace_is_accepted_or_rejected(text in almost_valid()) {
         check(&text)?;
     }
+}
+
+#[test]
+fn a_map_that_claims_more_cells_than_its_text_has_takes_no_memory() {
+    let rows: Vec<String> = std::iter::once(".".repeat(60_000)).chain(vec![String::new(); 60_000]).collect();
+    let error = Map::from_rows(&rows).unwrap_err().to_string();
+    assert_eq!(error, "map: line 2, column 1: the line has 0 cells, expected 60000 as in line 1");
+    let rows: Vec<String> =
+        std::iter::once(".".repeat(400_000)).chain(vec![String::new(); 400_000]).collect();
+    let error = Map::from_rows(&rows).unwrap_err().to_string();
+    assert!(error.contains("400001 x 400000 cells, expected at most"), "{error}");
 }

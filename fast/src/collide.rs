@@ -21,7 +21,7 @@ pub(crate) const CHUNK: usize = 4096;
 const CONTESTED: u32 = NO_AGENT - 1;
 /// Largest number of squares of a board that stays in the cache.
 const MOST_NEAR: usize = 1 << 16;
-/// How many agents ahead of the current one the squares are prefetched.
+/// Number of agents from the current one to the one whose square is prefetched.
 const AHEAD: usize = 32;
 
 /// The way in which a step processes the agents.
@@ -291,7 +291,7 @@ fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, targ
     let other = if there < FREE { there } else { agent };
     let stays = there == OBSTACLE
         || requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]);
-    // An agent that claims nothing writes its number to the corner of the wall, which no agent requests.
+    // With one thread, an agent that claims nothing writes to the corner of the wall, which no agent requests.
     let claim = &requests.board.square(if stays { 0 } else { target }).claim;
     if !W::SHARED {
         claim.store(claim.load(Relaxed).min(agent), Relaxed);

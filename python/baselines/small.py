@@ -1,4 +1,4 @@
-"""Small trainings, which take seconds."""
+"""Small trainings, which take seconds, and comparisons of networks in PyTorch with policies in Rust."""
 
 import subprocess
 import sys
@@ -38,7 +38,7 @@ _SMALL = (
 
 
 def changes(method):
-    """Returns the values that make a training small."""
+    """Returns the changes to the hyperparameters that make a training small, in the form of `--set`."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
     recurrent = () if method in ("follower", "lswitcher") else ("network.recurrent=16",)
     return (*_SMALL, *learner, *recurrent)

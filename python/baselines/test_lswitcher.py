@@ -29,7 +29,7 @@ def test_one_side_alone_plays_as_its_policy():
     env = VecEnv(config, 2)
     alone, epom, planned = _alone(0, 7), policies.load(name="epom", seed=7), _alone(1, 7)
     env.reset(seed=3)
-    # A policy plays one environment; its actions in a state do not change the environment.
+    # `act` does not change the environment, so all three policies can choose actions in each state.
     others = 0
     for _ in range(32):
         actions = alone.act(env)

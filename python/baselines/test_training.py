@@ -14,6 +14,7 @@ import pytest
 import torch
 from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, train
+from pogema_rs.baselines.__main__ import main
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
 from small import PPO_METHODS, Q_METHODS, VALUE_METHODS, command, compare_play, outputs_of, read_network, run, small_config
@@ -233,12 +234,16 @@ def test_an_interrupted_run_says_how_to_continue(tmp_path):
         # A shell's background job would ignore SIGINT.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    while not (tmp_path / "checkpoint.pt").exists():
+    path = tmp_path / "checkpoint.pt"
+    # The checkpoint before the first iteration vanishes with a run that ends in this iteration.
+    while not path.exists() or _checkpoint.load(path, "iql")["progress"][0] == 0:
         assert process.poll() is None
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (130, "stopped; --resume continues from the last checkpoint\n")
+    reached = _checkpoint.load(path, "iql")["progress"][0]
+    assert run("iql", tmp_path, "--updates", str(reached + 2), "--resume").returncode == 0
 
 
 def test_a_run_writes_its_files(tmp_path):
@@ -278,6 +283,37 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
         assert expected in done.stderr and done.stderr.startswith(f"train {method}: {where}")
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == content
     assert not missing.exists()
+
+
+def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
+    path = tmp_path / "checkpoint.pt"
+    _checkpoint.save(path, {"method": "iql", "numbers": torch.arange(64)})
+    content, num_refused = path.read_bytes(), 0
+    for place in range(0, len(content), 3):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 0x3A]) + content[place + 1 :])
+        try:
+            numbers = _checkpoint.load(path, "iql")["numbers"]
+        except ValueError as error:
+            num_refused += 1
+            assert str(error).startswith(f"{path}: ")
+        else:
+            assert torch.equal(numbers, torch.arange(64)), place
+    assert num_refused > len(content) // 6
+
+
+@pytest.mark.parametrize(
+    "arguments, expected",
+    [
+        (["--set", "learner.discount=["], "config iql: --set 'learner.discount=[': "),
+        (["--config", "binary.yaml"], "config iql: binary.yaml: "),
+    ],
+)
+def test_unreadable_values_are_one_line(tmp_path, monkeypatch, capsys, arguments, expected):
+    monkeypatch.chdir(tmp_path)
+    Path("binary.yaml").write_bytes(b"method: \xff")
+    assert main(["config", "iql", *arguments]) == 1
+    errors = capsys.readouterr().err
+    assert errors.startswith(expected) and errors.count("\n") == 1
 
 
 def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):

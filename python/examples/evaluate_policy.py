@@ -66,7 +66,7 @@ def evaluate(policy: Policy, config: dict[str, Any], seeds: Iterable[int]) -> di
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=100, help="number of episodes")
+    parser.add_argument("--seeds", type=int, default=100, help="number of episodes [default: 100]")
     arguments = parser.parse_args()
     config = {
         "size": 16,

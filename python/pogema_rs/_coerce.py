@@ -1,4 +1,4 @@
-"""Coerces the values of a config as POGEMA 1.4.0 does, which accepts for example numbers as strings."""
+"""Coerces the values of a config as POGEMA 1.4.0 does, for example strings to numbers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 import numbers
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from pogema_rs.errors import NoCellError, OutsideMapError, RefusedConfigError
 
@@ -45,9 +47,12 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "map":
             result[name] = _map(name, value)
         elif name == "map_name":
+            value = _decoded(value)
             result[name] = value if isinstance(value, str) else str(value)
-        else:
+        elif isinstance(value, (str, numbers.Number, list, tuple, Mapping)):
             result[name] = value
+        else:
+            raise _refused(name, value, "a text")
     return result
 
 
@@ -56,6 +61,11 @@ def _refused(name: str, value: Any, expected: str) -> RefusedConfigError:
     shown = text if len(text) <= 60 else text[:57] + "..."
     reason = f"`{name}` is `{shown}`, expected {expected}"
     return RefusedConfigError(f"config: {reason}", name, reason)
+
+
+def _decoded(value: Any) -> Any:
+    """Returns the text of bytes, and any other value as it is."""
+    return value.decode(errors="replace") if isinstance(value, bytes) else value
 
 
 def _whole(name: str, value: Any) -> int:
@@ -76,11 +86,12 @@ def _number(name: str, value: Any) -> float:
 
 
 def _flag(name: str, value: Any) -> bool:
-    key = value.lower() if isinstance(value, str) else value
-    if isinstance(key, (str, numbers.Number)) or type(key).__name__ == "bool_":
-        if any(key == known for known in _TRUE):
+    key = _decoded(value)
+    key = key.lower() if isinstance(key, str) else key
+    if isinstance(key, (str, numbers.Number, np.bool_)):
+        if key in _TRUE:
             return True
-        if any(key == known for known in _FALSE):
+        if key in _FALSE:
             return False
     raise _refused(name, value, "true or false")
 
@@ -92,13 +103,14 @@ def _listed(name: str, value: Any) -> list:
 
 
 def _cell(name: str, value: Any) -> Any:
-    """Returns a pair of integers in the container it was given in."""
+    """Returns a pair of integers: a plain list as a list, any other pair as a tuple."""
     is_pair = isinstance(value, (list, tuple)) and len(value) == 2
     if not is_pair or not all(isinstance(number, numbers.Integral) for number in value):
         raise _refused(name, value, "a pair (row, col) of whole numbers")
-    if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST for number in value):
-        raise OutsideMapError(f"config: `{name}` has the cell {tuple(value)}, expected cells inside the map")
-    return type(value)(int(number) for number in value) if type(value) in (list, tuple) else tuple(value)
+    cell = (list if type(value) is list else tuple)(int(number) for number in value)
+    if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST for number in cell):
+        raise OutsideMapError(f"config: `{name}` has the cell {tuple(cell)}, expected cells inside the map")
+    return cell
 
 
 def _cells(name: str, value: Any) -> list:
@@ -117,10 +129,16 @@ def _targets(name: str, value: Any) -> list:
 
 
 def _map(name: str, value: Any) -> Any:
+    value = _decoded(value)
     if isinstance(value, (str, numbers.Number)):
-        return str(value)
+        return value if isinstance(value, str) else str(value)
     rows = value.tolist() if hasattr(value, "tolist") else value
-    rows = _listed(name, rows)
-    if any(number not in (0, 1) for row in rows for number in _listed(name, row)):
+    return [_row(name, value, row) for row in _listed(name, rows)]
+
+
+def _row(name: str, value: Any, row: Any) -> Any:
+    """Returns a row of a map; `value` is the whole map."""
+    flags = _listed(name, row)
+    if not all(isinstance(flag, (numbers.Number, np.bool_)) and flag in (0, 1) for flag in flags):
         raise _refused(name, value, "rows of the numbers 0 and 1")
-    return [(tuple if isinstance(row, tuple) else list)(int(number) for number in row) for row in rows]
+    return (tuple if isinstance(row, tuple) else list)(int(flag) for flag in flags)

@@ -16,7 +16,7 @@ def read_rewards(rewards: Any) -> tuple[str, Optional[RewardFunction]]:
     """Returns the name of the engine's rewards, and the function that changes them if there is one."""
     if callable(rewards):
         return "own", rewards
-    if rewards not in _NAMES:
+    if not isinstance(rewards, str) or rewards not in _NAMES:
         raise ValueError(f"rewards is {rewards!r}, expected 'own', 'shared' or a function")
     return str(rewards), None
 

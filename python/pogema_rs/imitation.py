@@ -11,6 +11,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
+from pogema_rs._files import replaced
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.integrations.make_pogema import pogema_v0
 from pogema_rs.planners import plan
@@ -109,15 +110,14 @@ def _play(
 
 
 def _write(path: Path, episodes: list[dict[str, Any]]) -> None:
-    """Writes a file atomically."""
+    """Writes a file of episodes."""
     solved = [episode for episode in episodes if episode["actions"]]
 
     def joined(name: str) -> np.ndarray:
         return np.concatenate([np.asarray(episode[name]) for episode in solved]) if solved else np.empty(0)
 
     numbers = [episode["number"] for episode in solved for _ in episode["actions"]]
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
+    with replaced(path) as file:
         np.savez_compressed(
             file,
             observations=joined("observations"),
@@ -126,4 +126,3 @@ def _write(path: Path, episodes: list[dict[str, Any]]) -> None:
             episode=np.asarray(numbers, dtype=np.int64),
             seeds=np.asarray([episode["seed"] for episode in solved], dtype=np.int64),
         )
-    part.replace(path)

@@ -132,8 +132,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
         or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
-        N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is seen, as in POGEMA's 2.0 line.
-        `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
+        N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is
+        seen, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
         core and environment]. A step uses fewer while measured times show that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config

@@ -37,7 +37,7 @@ pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDic
 }
 
 guarded! {
-/// Returns the known name that is closest to `name`.
+/// Returns the known name that is closest to `name`, or an empty text if `known` is empty.
 #[pyfunction]
 pub fn nearest_name(name: &str, known: Vec<String>) -> PyResult<String> {
     Ok(nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned())
@@ -50,7 +50,7 @@ pub fn source(fields: &Fields, registered: Option<&str>) -> Result<InstanceSourc
     InstanceSource::new(config, map)
 }
 
-/// Returns a config and the map that its `map_name` names.
+/// Returns a config and the map that its `map_name` names. `registered` is the text of that map, if it is registered.
 pub fn read(fields: &Fields, registered: Option<&str>) -> Result<(GridConfig, Option<Map>), Error> {
     let mut config = GridConfig::from_value(&fields.0)?;
     // POGEMA ignores an unregistered name.

@@ -33,6 +33,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<evaluation::Evaluation>()?;
     module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::play_built_in, module)?)?;
+    module.add_function(wrap_pyfunction!(views::check_views, module)?)?;
     module.add_function(wrap_pyfunction!(views::show_views, module)?)?;
     module.add_function(wrap_pyfunction!(vec::num_cores, module)?)?;
     module.add_function(wrap_pyfunction!(guard::force_panic, module)?)?;

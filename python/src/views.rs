@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use pogema_core::{Error, Words};
-use pogema_toolbox::views::{Format, Gallery, ImageFormat, ShownView};
+use pogema_toolbox::views::{self, Format, Gallery, ImageFormat, ShownView};
 use pogema_toolbox::{Results, six::Definition};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::evaluation::to_py_error;
@@ -13,6 +14,14 @@ use crate::interrupt;
 
 /// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
+
+guarded! {
+/// Checks the views in a JSON text with a field `results_views`.
+#[pyfunction]
+pub fn check_views(text: &str) -> PyResult<()> {
+    views::parse_views(text).map(|_| ()).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+}
 
 guarded! {
 /// Shows views of the results in folders, and returns notes on incomplete results followed by the views.

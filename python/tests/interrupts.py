@@ -63,7 +63,7 @@ SHORT = {
         "Evaluation.environment", "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
         "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset", "Policy.encoder", "Policy.reset",
         "Policy.sampling", "_panic",
-        "machine", "nearest_name", "num_cores",
+        "check_views", "machine", "nearest_name", "num_cores",
     },
 }  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import threading
 import warnings
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import pytest
@@ -18,6 +18,13 @@ from pogema_rs.grid_config import GridConfig
 
 CONFIG: dict[str, Any] = {"size": 6, "num_agents": 3, "obs_radius": 2, "density": 0.1, "seed": 3}
 SYSTEMS = ("priority", "block_both", "soft")
+
+class Pair(NamedTuple):
+    """A cell."""
+
+    row: Any
+    col: Any
+
 
 #: A list that contains itself.
 ENDLESS: list = []
@@ -292,3 +299,30 @@ def test_reset_with_an_invalid_assigned_field_changes_nothing(field, value, erro
     with pytest.raises(error):
         env.reset()
     assert state(env) == before
+
+
+def test_values_of_numpy_and_iterators_are_read_as_pogema_reads_them():
+    config = GridConfig(empty_outside=np.False_, persistent=np.True_, agents_xy=[Pair(np.int64(0), np.int32(1))])
+    assert (config.empty_outside, config.persistent, config.agents_xy) == (False, True, [(0, 1)])
+    assert type(config.agents_xy[0][0]) is int
+    rows = [map(int, row) for row in ("010", "000")]
+    assert GridConfig(map=rows).map == GridConfig(map=[[np.int8(0), 1, 0], [0, 0, np.False_]]).map == [[0, 1, 0], [0, 0, 0]]
+    assert GridConfig(map=b".#.").map == GridConfig(map=".#.").map
+    assert GridConfig(persistent=b"yes").persistent is True
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"map": [np.zeros((2, 2), int)]},
+        {"map": [[0, "1"]]},
+        {"on_target": object()},
+        {"collision_system": {1}},
+        {"persistent": np.array([True, False])},
+        {"persistent": b"\xff"},
+    ],
+)
+def test_values_that_no_field_takes_name_the_field(fields):
+    with pytest.raises(ValueError) as raised:
+        GridConfig(**fields)
+    assert f"`{next(iter(fields))}` is `" in str(raised.value)

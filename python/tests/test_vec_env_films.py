@@ -1,6 +1,7 @@
 """Tests the films of a `VecEnv` against single engines that record the same episodes."""
 
 import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -325,6 +326,42 @@ def test_videos_are_written_by_ffmpeg(tmp_path, monkeypatch, fails):
     size = arguments.split("-video_size ")[1].split()[0]
     width, height = map(int, size.split("x"))
     assert max(width, height) == 720 and int(num_bytes) % (4 * width * height) == 0 < int(num_bytes)
+
+
+INTERRUPTED = """
+import os, signal, sys, time
+from pathlib import Path
+from pogema_rs import Film
+from pogema_rs.vec_env import VecEnv
+
+env = VecEnv({"num_agents": 2, "size": 5, "max_episode_steps": 4}, 1, film=Film("films", every=50, format="mp4"))
+env.reset(seed=0)
+for _ in range(4):
+    env.step(env.action_space.sample() * 0)
+try:
+    while not Path("started").exists():
+        time.sleep(0.02)
+    os.killpg(0, signal.SIGINT)
+    time.sleep(60)
+except KeyboardInterrupt:
+    env.close()
+print([path.name for path in Path("films").iterdir()])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for ffmpeg is a script")
+def test_ctrl_c_in_a_terminal_loses_no_video(tmp_path):
+    program = Path(stand_in(tmp_path, False)) / "ffmpeg"
+    wait = 'if "-version" not in sys.argv:\n    open("started", "w"); import time; time.sleep(0.5)\n'
+    program.write_text(program.read_text().replace('if "-version" not in sys.argv:\n', wait, 1))
+    path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED],
+        cwd=tmp_path, env={**os.environ, "PATH": path}, start_new_session=True, capture_output=True, text=True, timeout=60,
+        # A shell's background job would ignore SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "['pogema-episode-0.mp4']\n"), done.stderr
 
 
 def test_videos_without_ffmpeg_are_an_error(tmp_path, monkeypatch):

@@ -4,7 +4,7 @@
 
 use pogema_core::{
     Action, Cell, Collision, CollisionMeter, Config, DensityMeter, Environment, Episode, EpisodeMeter, Error,
-    GoalStream, Instance, Map, Metrics, OnGoal, Outside, Snapshot, StepOut, Trace,
+    GoalStream, Instance, Map, Metrics, OnGoal, Outside, Recording, Snapshot, StepOut, Trace,
 };
 use pogema_reference::Reference;
 
@@ -187,5 +187,14 @@ fn a_resumed_episode_continues_like_the_original() {
     }
     assert_eq!(second.step_back(), Ok(true));
     let foreign = vec![Snapshot { cells: vec![Cell::new(9, 9); 3], ..first.snapshot() }];
-    assert_eq!(second.resume(instance(), 0, foreign, None), Err(Error::ForeignState));
+    assert_eq!(second.resume(instance(), 0, foreign.clone(), None), Err(Error::ForeignState));
+    // As many states as the steps leave are needed, and recorded ones must fit, too.
+    let past = first.past().to_vec();
+    for num_steps in [0, first.num_steps() + 1, u64::MAX] {
+        let resumed = second.resume(instance(), num_steps, past.clone(), None);
+        assert_eq!(resumed, Err(Error::ForeignState), "{num_steps}");
+    }
+    let recording = Recording { start: foreign[0].clone(), steps: Vec::new() };
+    let resumed = second.resume(instance(), first.num_steps(), past, Some(recording));
+    assert_eq!(resumed, Err(Error::ForeignState));
 }

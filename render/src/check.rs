@@ -2,13 +2,15 @@
 
 use pogema_core::{Cell, Error, Snapshot, Trace, TraceStep, rows_and_columns};
 
-/// Checks that a trace can be drawn: every list has one entry per agent, all agents and goals are on the map, and no
-/// agent moves farther than to a neighbouring cell in one step.
+/// Checks that a trace can be drawn: noise has the size of the map with its border, every list has one entry per agent,
+/// all agents and goals are on the map, and no agent moves farther than to a neighbouring cell in one step.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::OutOfRange`] or [`Error::Trace`] for the first state that cannot be drawn.
 pub fn check(trace: &Trace) -> Result<(), Error> {
-    let num_agents = trace.header.config.num_agents;
+    let header = &trace.header;
+    header.outside.check_fits(&header.map, &header.config)?;
+    let num_agents = header.config.num_agents;
     for (frame, state) in trace.states().enumerate() {
         check_state(trace, frame, state, num_agents)?;
     }

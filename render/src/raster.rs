@@ -34,7 +34,7 @@ pub fn width_for(trace: &Trace, style: &Style, longer: u32) -> u32 {
     let (height, width) = (ground.rows(style.border).len() + 1, ground.cols(style.border).len() + 1);
     let cell = f64::from(longer) / height.max(width) as f64;
     let cell = if cell >= 1.0 { cell.floor() } else { cell };
-    (width as f64 * cell).ceil() as u32
+    ((width as f64 * cell).ceil() as u32).min(longer.max(1))
 }
 
 /// Draws the frames of a scene and intermediate frames; draws the parts that never change only once.

@@ -13,7 +13,7 @@ use crate::style::Style;
 
 /// Default length of the longer side of a video. Units: pixels.
 pub const LONGER_SIDE: u32 = 720;
-/// Frame rate; higher if a step is shorter than a frame. Units: frames per second.
+/// Target frame rate. The rate of a video fits a whole number of frames into a step. Units: frames per second.
 const RATE: f64 = 30.0;
 /// Maximum length of a quoted error message of ffmpeg. Units: characters.
 const LONGEST_REASON: usize = 200;
@@ -60,8 +60,8 @@ impl VideoFormat {
 /// Units: `width` in pixels, rounded up to an even number.
 ///
 /// # Errors
-/// Those of [`crate::gif::encode`] and [`VideoFormat::of`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`] if
-/// it fails or the file cannot be written.
+/// Those of [`crate::gif::encode`] and [`VideoFormat::of`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`]
+/// if ffmpeg fails or the file cannot be written.
 pub fn write(
     trace: &Trace,
     style: &Style,
@@ -92,12 +92,12 @@ pub fn write(
 /// Checks that ffmpeg is installed and starts.
 ///
 /// # Errors
-/// [`Error::Request`] if it is missing, [`Error::Io`] if it cannot be started.
+/// [`Error::Request`] if it is missing, [`Error::Io`] if it cannot be started or fails.
 pub fn check_ffmpeg() -> Result<(), Error> {
     let mut command = Command::new("ffmpeg");
-    let started =
-        command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    started.map(|_| ()).map_err(not_started)
+    command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let status = command.status().map_err(not_started)?;
+    if status.success() { Ok(()) } else { Err(Error::io("ffmpeg", format!("`-version` failed ({status})"))) }
 }
 
 fn not_started(error: std::io::Error) -> Error {
@@ -121,6 +121,9 @@ fn start(
     command.args(["-framerate", &format!("{:.4}", motion.rate(step_time)), "-i", "-", "-an"]);
     command.args(format.arguments().split(' ')).arg(file);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(log);
+    // Ctrl-C in a terminal must not end ffmpeg before its caller has decided what to do. It ends when its input does.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.spawn().map_err(not_started)
 }
 

@@ -17,11 +17,11 @@ use crate::results::Proof;
 pub struct Played {
     /// Its metrics.
     pub metrics: Metrics,
-    /// Total time of the policy over all steps.
+    /// Total time of the policy: its construction and its choice of actions in all steps.
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
-    /// The part of the runtime that a network took, summed over threads, if the policy has one.
+    /// Time that the policy's network took, summed over threads; `None` for a policy without a network.
     pub network_time: Option<Duration>,
     /// What a one-shot planner proved about the episode, if anything.
     pub proof: Proof,

@@ -21,7 +21,7 @@ pub const SOLVED: &str = "CSR";
 /// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
 
-/// The part of [`RUNTIME`] that a network took, read from the same file.
+/// The time that a network took, summed over threads, read from the same file.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
 /// The field of a config that names its map.

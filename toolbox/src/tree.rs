@@ -57,7 +57,7 @@ impl Node {
         }
     }
 
-    /// Returns the text, if it is one.
+    /// Returns the text, if the value is one.
     pub fn text(&self) -> Option<&str> {
         match &self.content {
             Content::Plain(Value::String(text)) => Some(text),
@@ -113,10 +113,11 @@ impl<'de> Visitor<'de> for Reader {
         Ok(Content::Plain(value.into()))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Content, E> {
-        // JSON has no NaN. It becomes a text, which the reader of the field rejects.
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Content, E> {
         let number = serde_json::Number::from_f64(value).map(Value::Number);
-        Ok(Content::Plain(number.unwrap_or_else(|| value.to_string().into())))
+        number
+            .map(Content::Plain)
+            .ok_or_else(|| E::custom(format!("the number {value}, expected a finite one")))
     }
 
     fn visit_str<E>(self, value: &str) -> Result<Content, E> {

@@ -153,6 +153,23 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
 }
 
 #[test]
+fn wrong_rows_of_means_are_rejected_with_their_line() {
+    let row = "MAPF,01-random,LaCAM,4,2,0.5,40,,none\n";
+    for (means, message) in [
+        (MEANS.replace("LaCAM,4,2", "LaCAM,4.0,2"), "line 3: `num_agents` is `4.0`, expected a whole number"),
+        (MEANS.replace("LaCAM,4,2", "LaCAM,,2"), "line 3: `num_agents` is ``, expected a whole number"),
+        (
+            format!("{MEANS}{row}"),
+            "line 7: the row repeats the setting, dataset, algorithm, num_agents of line 3",
+        ),
+    ] {
+        let folder = folder(&means, "01-random", &[]);
+        let error = show(folder.path(), VIEW, &results()).unwrap_err();
+        assert!(error.ends_with(message), "{error}");
+    }
+}
+
+#[test]
 fn folders_are_datasets_and_the_longest_time_is_shown() {
     let means = MEANS.replace("remark", "runtime").replace("none", "3");
     let folder = folder(&means, "01-random", &[]);

@@ -1,4 +1,4 @@
-//! The verdict as an SVG badge for a README.
+//! The verdict as a badge for a README: as SVG, or as JSON for shields.io.
 
 use pogema_conformance::port::PortReport;
 use pogema_core::Error;
@@ -17,6 +17,7 @@ fn message(report: &PortReport) -> (String, &'static str) {
         Verdict::Known => ("known deviations", "#6b6f00"),
         Verdict::Diverges => ("diverges", "#c01f2e"),
         Verdict::Misbehaves => ("misbehaves", "#b35900"),
+        Verdict::Unchecked if score.is_interrupted => ("interrupted", "#6a6a6a"),
         Verdict::Unchecked => ("nothing checked", "#6a6a6a"),
     };
     (format!("{word} {}/{} rules", score.passed, score.claimed), colour)

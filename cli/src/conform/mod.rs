@@ -101,7 +101,7 @@ impl Conform {
         bar.finish_and_clear();
         if self.oracle && !watch.is_stopped() {
             let python = find_oracle_python(&self.oracle_folder)?;
-            report.check_cases_with_oracle(&cases::folder(), &python)?;
+            report.check_cases_with_oracle(&cases::folder(), &python, watch)?;
             let bar = self.bar("POGEMA 1.4.0");
             let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
             report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, watch)?;

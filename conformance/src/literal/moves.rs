@@ -1,4 +1,6 @@
 //! POGEMA's own procedures for moves.
+//!
+//! Source: POGEMA 1.4.0, `envs.py`, `Pogema.move_agents` and `Pogema._revert_action`
 
 use std::collections::HashMap;
 

@@ -9,7 +9,7 @@ use super::guarded::{Guarded, Side};
 use super::sealed::Spread;
 use super::{Value, lead_of};
 
-/// Values between a slice and its guard page. A store of a whole cache line touches them, but no guard page.
+/// Numbers of values between a slice and its guard page. A stray store that ends before the page changes these values.
 const DISTANCES: [usize; 9] = [0, 1, 2, 5, 8, 15, 16, 33, 63];
 
 fn check<V: Value + Spread>(path: SimdPath, canary: V) {

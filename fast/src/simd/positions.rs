@@ -20,6 +20,7 @@ pub struct WindowPositions {
 }
 
 impl WindowPositions {
+    /// Computes the positions of at most [`GROUP`] agents, whose windows have side `SIDE`.
     #[allow(clippy::inline_always, reason = "so that each path compiles it with its own features")]
     #[inline(always)]
     pub fn of<const SIDE: usize>(source: &WindowSource<'_>, agents: Range<usize>) -> Self {

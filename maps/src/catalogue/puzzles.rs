@@ -24,11 +24,11 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["#####" "###.#" "ab..." "#####" "#####"] => ["#####" "###.#" "ba..." "#####" "#####"];
     "swap-in-dead-end", 10, "Two agents in a dead end change places at its mouth.":
         ["##a##" "##b##" "....." "#####" "#####"] => ["##b##" "##a##" "....." "#####" "#####"];
-    "two-bays", 19, "Three agents in a corridor change places at two bays.":
+    "two-bays", 19, "The outer two of three agents in a corridor change places at two bays.":
         ["#####" "#.#.#" "ab.c." "#####" "#####"] => ["#####" "#.#.#" "cb.a." "#####" "#####"];
-    "three-reversed", 27, "Three agents leave a corridor and come back in reverse.":
+    "three-reversed", 27, "Three agents leave a corridor and come back in reverse order.":
         ["a####" "b#.##" "c...." "##.##" "#####"] => ["c####" "b#.##" "a...." "##.##" "#####"];
-    "crossroads", 28, "Four agents cross one square, each to the opposite arm.":
+    "crossroads", 28, "Four agents cross one cell, each to the opposite arm.":
         ["##a##" "##.##" "b...d" "##.##" "##c##"] => ["##c##" "##.##" "d...b" "##.##" "##a##"];
     "full-ring", 8, "Eight agents fill a ring: it turns only if all of them move in the same step.":
         ["#####" "#abc#" "#h#d#" "#gfe#" "#####"] => ["#####" "#hab#" "#g#c#" "#fed#" "#####"];
@@ -38,7 +38,7 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["##.##" "##.##" "ab..c" "#####" "#####"] => ["##.##" "##.##" "cb..a" "#####" "#####"];
     "hostage", 7, "An agent that is already on its goal leaves it for another agent and comes back.":
         ["#####" "##.##" "a.b.." "#####" "#####"] => ["#####" "##.##" "..b.a" "#####" "#####"];
-    "deep-hostage", 7, "An agent whose goal is in a dead end lets the other agent in behind it.":
+    "deep-hostage", 7, "An agent on its goal in a crossing leaves it for another agent and comes back.":
         ["#####" "##.##" "a.b.." "##.##" "#####"] => ["#####" "##.##" "..b.a" "##.##" "#####"];
     "revolving-door", 36, "Two agents enter a room through one door while two come out.":
         ["ab..." "....." "##.##" "....." "cd..."] => ["cd..." "....." "##.##" "....." "ab..."];
@@ -56,15 +56,15 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["a..##" ".#.##" "....." "##.#." "##..b"] => ["b..##" ".#.##" "....." "##.#." "##..a"];
     "tight-eight", 55, "Two rings share one cell, with three agents on each.":
         ["ab.##" "c#.##" "....." "##.#d" "##.ef"] => ["fe.##" "d#.##" "....." "##.#c" "##.ba"];
-    "lobby", 24, "Three agents in single file leave a lobby while a fourth enters it.":
+    "lobby", 24, "Three agents in single file make way for a fourth, which enters their row.":
         ["#####" ".abc." "##.##" "##d##" "#####"] => ["#####" "d.abc" "##.##" "##.##" "#####"];
     "bottleneck", 26, "Two agents need the same passage, and a third comes through it.":
         ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];
-    "double-shunt", 28, "Two sidings hold two agents each; one agent of each pair changes sidings.":
+    "double-shunt", 28, "Two pairs of agents each change their order at one junction.":
         ["a#..c" "b#.#d" "....." "#####" "#####"] => ["b#..d" "a#.#c" "....." "#####" "#####"];
-    "guarded-gate", 7, "Two agents whose goals are in a gate open it for a third.":
+    "guarded-gate", 7, "One of two agents on their goals makes way for a third and comes back.":
         ["##.##" "a.b.." "##c##" "##.##" "#####"] => ["##.##" "..b.a" "##c##" "##.##" "#####"];
-    "parade", 36, "Three agents in a row turn around in one square.":
+    "parade", 36, "Three agents in a row reverse their order, with bays at both ends.":
         ["#####" ".###." "abc.." ".###." "#####"] => ["#####" ".###." "cba.." ".###." "#####"];
     "long-way-round", 16, "The short way is occupied, so one of two agents takes the long way.":
         ["a...b" ".###." ".###." ".###." "....."] => ["b...a" ".###." ".###." ".###." "....."];

@@ -1,4 +1,4 @@
-//! RePlan: each agent searches a path in every step, through cells in which it has seen no obstacle.
+//! RePlan: in every step, each agent searches for a path through cells in which it has seen no obstacle.
 //!
 //! Source: Skrynnik et al., "When to switch: planning and learning for partially observable multi-agent pathfinding",
 //! 2023; when-to-switch, `planning/replan_algo.py`, `planning/planner.cpp`

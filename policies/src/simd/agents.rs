@@ -1,6 +1,6 @@
 //! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
 //!
-//! Eight agents use vectors of half the width, which processors that split wide vectors run faster.
+//! With AVX-512, eight agents use vectors of half the width, which processors that split wide vectors run faster.
 //!
 //! The sums have the terms and the order of `kernels`. The zeros of the margins are left out. They can change only the
 //! sign of a zero sum, and the final `+ 0.0` removes that sign.
@@ -13,7 +13,8 @@ use super::{BLOCK, CHAINS, LANES, Shape};
 /// rows of pixels of channels of agents, without margins.
 ///
 /// # Safety
-/// `super::convolve_agents` checked the job, and the instruction set of `V` is enabled.
+/// `super::convolve_agents` checked the job for `N * V::COUNT` agents, `C` divides `LANES`, and the instruction set of
+/// `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
 pub unsafe fn convolve<V: Vector, const N: usize, const C: usize>(job: &mut Convolve<'_>) {
@@ -88,7 +89,7 @@ unsafe fn convolve_pixel<V: Vector, const N: usize, const C: usize>(
     }
 }
 
-/// A dense layer of 8 or 16 agents. Both lists hold values of agents.
+/// A dense layer of 8 or 16 agents. Input and output hold the first value of all agents, then the second, and so on.
 pub struct MultiplyAgents<'a> {
     pub input: &'a [f32],
     pub output: &'a mut [f32],
@@ -98,8 +99,11 @@ pub struct MultiplyAgents<'a> {
     pub relu: bool,
 }
 
+/// Computes `C` outputs together. `N` vectors `V` hold one value of every agent.
+///
 /// # Safety
-/// `super::multiply_agents` checked the job, and the instruction set of `V` is enabled.
+/// `super::multiply_agents` checked the job for `N * V::COUNT` agents, `C` divides `LANES`, and the instruction set of
+/// `V` is enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
 pub unsafe fn multiply<V: Vector, const N: usize, const C: usize>(job: &mut MultiplyAgents<'_>) {

@@ -13,7 +13,7 @@ from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 from pogema_rs.toolbox._optional import required
 
 #: The packages of the extra `train`, by the name of their module.
-_NEEDED = ("torch", "torchrl", "tensordict", "yaml", "matplotlib")
+_NEEDED = ("torch", "torchrl", "tensordict", "matplotlib")
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
@@ -25,7 +25,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         else:
             _train(given)
     except KeyboardInterrupt:
-        print("stopped; --resume continues from the last checkpoint", file=sys.stderr)
+        has_checkpoint = given.command == "train" and (given.out / "checkpoint.pt").exists()
+        print("stopped" + "; --resume continues from the last checkpoint" * has_checkpoint, file=sys.stderr)
         return 130
     except (ImportError, ValueError, TypeError, OSError) as error:
         print(f"{given.command} {given.method}: {_line(error)}", file=sys.stderr)
@@ -42,10 +43,10 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("method", metavar="METHOD", help=f"one of {', '.join(METHODS)}")
         command.add_argument("--config", metavar="FILE", help="YAML file of hyperparameters [default: the package's]")
         command.add_argument(
-            "--set", metavar="SECTION.KEY=VALUE", action="append", default=[], help="replaces one hyperparameter"
+            "--set", metavar="SECTION.KEY=VALUE", action="append", default=[], help="replace one hyperparameter; may be repeated"
         )
     train.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="folder of the run")
-    train.add_argument("--minutes", type=float, help="training time [default: 60, without --updates]")
+    train.add_argument("--minutes", type=float, help="training time in minutes [default: 60, without --updates]")
     train.add_argument("--updates", type=int, help="number of iterations, for a result that can be repeated")
     train.add_argument("--seed", type=int, default=0, help="seed of the training [default: 0]")
     train.add_argument("--threads", type=int, default=1, help="number of threads [default: 1]")
@@ -55,10 +56,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _train(given: argparse.Namespace) -> None:
-    for name, least in (("minutes", 0), ("updates", 0), ("threads", 0)):
+    for name in ("minutes", "updates", "threads"):
         value = getattr(given, name)
-        if value is not None and not value > least:
-            raise ValueError(f"--{name} is {value}, expected more than {least}")
+        if value is not None and not value > 0:
+            raise ValueError(f"--{name} is {value}, expected more than 0")
     if not 0 <= given.seed < 2**63:
         raise ValueError(f"--seed is {given.seed}, expected 0 to {2**63 - 1}")
     config = load_config(given.method, given.config, given.set)

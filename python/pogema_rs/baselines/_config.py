@@ -201,7 +201,11 @@ def load_config(
         name = f"{method}.yaml"
         text = (resources.files(__package__) / "configs" / name).read_text(encoding="utf-8")
     else:
-        name, text = os.fspath(path), Path(path).read_text(encoding="utf-8")
+        name = os.fspath(path)
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{name}: {error}") from None
     try:
         values = yaml.safe_load(text)
     except yaml.YAMLError as error:
@@ -358,7 +362,10 @@ def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:
     inner = values.setdefault(section, {})
     if not isinstance(inner, dict):
         raise ValueError(f"--set {change!r}: {section!r} is no section, expected SECTION.KEY=VALUE")
-    inner[last] = yaml.safe_load(text)
+    try:
+        inner[last] = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(f"--set {change!r}: {' '.join(str(error).split())}") from None
 
 
 def _plain(value: Any) -> Any:

@@ -7,9 +7,8 @@ import io
 from pathlib import Path
 from typing import Any
 
-from pogema_rs.baselines import _checkpoint
+from pogema_rs._files import replaced
 from pogema_rs.toolbox._optional import required
-
 
 
 def score_of(on_target: tuple[str, ...]) -> str:
@@ -42,9 +41,12 @@ class Curve:
         writer = csv.DictWriter(text, names, lineterminator="\n")
         writer.writeheader()
         writer.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in self.rows)
-        _checkpoint.write(folder / "curve.csv", text.getvalue().encode())
+        with replaced(folder / "curve.csv") as file:
+            file.write(text.getvalue().encode())
         if drawn:
-            _checkpoint.write(folder / "curve.svg", self._svg(title))
+            drawing = self._svg(title)
+            with replaced(folder / "curve.svg") as file:
+                file.write(drawing)
 
     def _svg(self, title: str) -> bytes:
         figures = required("matplotlib.figure", "drawing the learning curve")

@@ -19,6 +19,7 @@ from typing import Any, Optional, Union
 import torch
 
 from pogema_rs import __version__, policies
+from pogema_rs._files import replaced
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, differences
@@ -269,7 +270,8 @@ class _Run:
             "command": ["python", "-m", "pogema_rs.baselines", *sys.argv[1:]],
             "config": self.config.to_dict(),
         }
-        _checkpoint.write(self.folder / "run.json", (json.dumps(values, indent=2) + "\n").encode())
+        with replaced(self.folder / "run.json") as file:
+            file.write((json.dumps(values, indent=2) + "\n").encode())
 
 
 def _learner_of(config: TrainingConfig) -> type[Learner]:

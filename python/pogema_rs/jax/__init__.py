@@ -6,7 +6,7 @@ actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 | file | content |
 | --- | --- |
 | `_config`, `_pool`, `_pack` | static sizes and rules; the instances, made in Rust; their maps as rows of bits |
-| `_state` | the state and its beginning |
+| `_state` | the state, and the reset that begins an episode |
 | `_step`, `_checked` | the order of the phases in a step; the next episode; steps that check actions |
 | `_collide` | conflicting moves |
 | `_goals`, `_division` | the effects of reaching a goal: rewards, ends and next goals; exact quotients for rewards |

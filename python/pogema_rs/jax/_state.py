@@ -1,4 +1,4 @@
-"""The state of an environment, and its beginning."""
+"""The state of an environment, and the reset that begins an episode."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ __all__ = ["State", "reset"]
 class State(NamedTuple):
     """The state of one environment, without its instances.
 
-    Cells are (row, col), counted from the corner of the map. The rows after the agents of an instance are padding,
-    which is never active.
+    Cells are (row, col), counted from the upper left corner of the map. The rows after the agents of an instance are
+    padding, which is never active.
 
     Shape: `obstacles` `(rows, words)`, uint32, the map with its border as rows of bits; `cells`, `goals` and `starts`
     `(agents, 2)`, int32; `active`, `marked` (whether the cell has the agent's mark) and `on_goal` `(agents,)`, bool;
-    `goal_index` `(agents,)`, int32, the index of the goal in the agent's list; all others are scalars, int32
+    `goal_index` `(agents,)`, int32, the index of the goal in the agent's list; `counts` as in `EpisodeCounts`; all
+    others are scalars, int32
 
     `num_wraps` counts lists of goals that began again, and `num_clipped` actions out of range, both since the reset.
     """
@@ -44,14 +45,15 @@ class State(NamedTuple):
 
 
 def reset(params: Params, instance: jax.Array) -> State:
-    """Begins an episode of the instance with an index, which is clamped to the pool.
+    """Begins an episode of the instance at an index, which is clamped to the pool.
 
-    Shape: a scalar, int32; with `jax.vmap`, one for each environment
+    Shape: `instance` a scalar, int32; with `jax.vmap`, one for each environment
 
     Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
     """
     config, pool = params.config, params.pool
-    instance = jnp.clip(jnp.asarray(instance, jnp.int32), 0, pool.starts.shape[0] - 1)
+    # Clamped before the cast, which would make large numbers negative.
+    instance = jnp.clip(jnp.asarray(instance), 0, pool.starts.shape[0] - 1).astype(jnp.int32)
     num_agents = pool.num_agents[instance]
     present = jnp.arange(config.num_agents) < num_agents
     cells = cell_of(config, pool.starts[instance])
@@ -77,6 +79,6 @@ def reset(params: Params, instance: jax.Array) -> State:
 
 
 def cell_of(config: Config, numbers: jax.Array) -> jax.Array:
-    """Returns the cells with some numbers of a pool. Shape: `(...)` becomes `(..., 2)`, int32"""
+    """Returns the cells of the given numbers of a pool. Shape: `(...)` becomes `(..., 2)`, int32"""
     numbers = numbers.astype(jnp.int32)
     return jnp.stack([numbers // config.width, numbers % config.width], axis=-1)

@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
 
+from pogema_rs._files import replaced
 from pogema_rs.toolbox import _chunks
 from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox._work import plain
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views.view_multi_plot import MultiPlotView, process_multi_plot_view
-from pogema_rs.toolbox.views.view_plot import PlotView, draw, process_plot_view
+from pogema_rs.toolbox.views.view_plot import PlotView, check_views, draw, process_plot_view
 from pogema_rs.toolbox.views.view_tabular import TabularView, process_table_view
 
 _Path = Union[str, os.PathLike[str]]
@@ -26,38 +28,46 @@ _BACKENDS: dict[str, Callable[..., list[dict[str, Any]]]] = {
     "balanced_multiprocessing": _chunks.balanced_multiprocess_backend,
     "balanced_dask": _chunks.balanced_dask_backend,
 }
-# The views of pogema-toolbox. The engine draws all other types.
+# The options of the types of views that pogema-toolbox has.
 _VIEWS: dict[str, Callable[..., Any]] = {"tabular": TabularView, "plot": PlotView, "multi-plot": MultiPlotView}
 
 
 def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) -> _Rows:
-    """Plays all episodes in memory, and writes `<algorithm>.json` and plots into the folder, if one is given.
+    """Plays all episodes in memory, and writes `<algorithm>.json` and plots into the folder.
 
-    Errors: `FileExistsError` if the folder has results that were stored episode by episode, whose other files would no
-    longer fit.
+    Without a folder, writes only the plots, into the current folder.
+
+    Errors: `FileExistsError` if the folder holds a run that can be resumed, because its other files would not match the
+    new results.
     """
     if eval_dir is not None and Path(eval_dir, "about.json").exists():
         raise FileExistsError(
             f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, or `begin` `anew`"
         )
-    _check_views(evaluation_config)
+    views = evaluation_config.get("results_views") or {}
+    _check_views(views)
+    algorithms = evaluation_config["algorithms"]
+    backends = {str(key): _backend_of(settings) for key, settings in algorithms.items()}
     variants = list(generate_variants(evaluation_config["environment"]))
     changes, environments = [variant[0] for variant in variants], [variant[1] for variant in variants]
     results: _Rows = []
-    for key, settings in evaluation_config["algorithms"].items():
-        config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
-        if config.parallel_backend not in _BACKENDS:
-            raise ValueError(
-                f"`parallel_backend` is `{config.parallel_backend}`, expected one of {', '.join(_BACKENDS)}"
-            )
-        metrics = _BACKENDS[config.parallel_backend](settings, environments, key)
+    for key, settings in algorithms.items():
+        key = str(key)
+        metrics = backends[key](settings, environments, key)
         rows = join_metrics_and_configs(metrics, environments, changes, settings, key)
         if eval_dir is not None:
-            _write(Path(eval_dir, f"{key}.json"), json.dumps(rows))
+            _write(Path(eval_dir, f"{key}.json"), json.dumps(rows, default=plain))
         results += rows
         ToolboxRegistry.success(f"{key}: {len(rows)} episodes played")
     run_views(results, evaluation_config, eval_dir=eval_dir)
     return results
+
+
+def _backend_of(settings: Mapping[str, Any]) -> Callable[..., list[dict[str, Any]]]:
+    config = ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
+    if config.parallel_backend not in _BACKENDS:
+        raise ValueError(f"`parallel_backend` is `{config.parallel_backend}`, expected one of {', '.join(_BACKENDS)}")
+    return _BACKENDS[config.parallel_backend]
 
 
 def join_metrics_and_configs(
@@ -86,15 +96,15 @@ def run_views(
 ) -> None:
     """Logs the tables of `results_views`, and writes each plot to `<name of the view>.pdf` in the folder.
 
-    `tabular` views are tables as in pogema-toolbox. All other types are drawn by the engine, those that pogema-toolbox
-    lacks included.
+    The default folder is the current one. `tabular` views are tables as in pogema-toolbox. The engine draws all other
+    types, including those that pogema-toolbox lacks.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """
     folder = Path(eval_dir if eval_dir is not None else ".")
-    folder.mkdir(parents=True, exist_ok=True)
-    for key, fields in evaluation_config.get("results_views", {}).items():
+    for key, fields in (evaluation_config.get("results_views") or {}).items():
         target = folder / f"{key}.pdf"
+        target.parent.mkdir(parents=True, exist_ok=True)
         if fields["type"] == "tabular":
             process_table_view(results, TabularView(**fields))
         elif fields["type"] == "plot":
@@ -106,19 +116,21 @@ def run_views(
                 ToolboxRegistry.info("\n" + table)
 
 
-def _check_views(evaluation_config: Mapping[str, Any]) -> None:
+def _check_views(views: Mapping[Any, Mapping[str, Any]]) -> None:
     """Raises the error of a wrong view or a missing package before the first episode, not after the last one."""
-    for fields in evaluation_config.get("results_views", {}).values():
+    for name, fields in views.items():
+        if "type" not in fields:
+            raise ValueError(f"the view `{name}` of `results_views` has no `type`")
         if fields["type"] in _VIEWS:
             _VIEWS[fields["type"]](**fields)
         if fields["type"] == "tabular" and fields.get("print_results"):
             for package in ("pandas", "tabulate"):
                 required(package, "a view of type `tabular` with `print_results`")
+    check_views(views)
 
 
 def _write(path: Path, text: str) -> None:
     """Writes a whole file, or on failure leaves the existing one unchanged."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
+    with replaced(path) as file:
+        file.write(text.encode())

@@ -19,6 +19,7 @@ import numpy as np
 Described = tuple
 Outcome = dict[str, Any]
 
+# In seconds of processor time, so that other programs do not matter.
 TIME_LIMIT = 2.0
 GREEDY = 9
 
@@ -26,7 +27,7 @@ _MOVES = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 
 
 class Timeout(BaseException):
-    """A call exceeds its time limit; not an Exception, so that the called code cannot catch it."""
+    """Signals that a call exceeds its time limit; not an Exception, so that `except Exception` does not catch it."""
 
 
 def _expire(*_: Any) -> None:
@@ -49,7 +50,9 @@ def described(value: Any) -> Described:
         flags = (value.flags.c_contiguous, value.flags.writeable)
         return ("array", value.dtype.str, value.shape, flags, value.tobytes())
     if isinstance(value, np.generic):
-        return (type(value).__name__.rstrip("_"), repr(value.item()))
+        # NumPy 1 calls the type `bool_` and NumPy 2 `bool`, as Python's own.
+        kind = "numpy.bool" if isinstance(value, np.bool_) else type(value).__name__.rstrip("_")
+        return (kind, repr(value.item()))
     # A read-only list or dictionary counts as the list or dictionary that it is.
     if isinstance(value, dict):
         return ("dict", tuple((described(key), described(item)) for key, item in value.items()))
@@ -77,13 +80,15 @@ class Player:
     def play(self, script: list[tuple]) -> list[Outcome]:
         """Returns the outcome of each call; stops after a timeout or a failed `make`."""
         outcomes: list[Outcome] = []
-        signal.signal(signal.SIGALRM, _expire)
-        for call in script:
-            outcomes.append(self._outcome(call))
-            if "timeout" in outcomes[-1] or (call[0] == "make" and "error" in outcomes[-1]):
-                break
-        for name in self.registered:
-            del self.package.registry.GRID_STR_REGISTRY[name]
+        signal.signal(signal.SIGVTALRM, _expire)
+        try:
+            for call in script:
+                outcomes.append(self._outcome(call))
+                if "timeout" in outcomes[-1] or (call[0] == "make" and "error" in outcomes[-1]):
+                    break
+        finally:
+            for name in self.registered:
+                del self.package.registry.GRID_STR_REGISTRY[name]
         return outcomes
 
     def _outcome(self, call: tuple) -> Outcome:
@@ -91,14 +96,14 @@ class Player:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                signal.setitimer(signal.ITIMER_REAL, TIME_LIMIT)
+                signal.setitimer(signal.ITIMER_VIRTUAL, TIME_LIMIT)
                 outcome["value"] = getattr(self, f"_{call[0]}")(*call[1:])
             except Timeout:
                 outcome["timeout"] = True
             except Exception as error:  # noqa: BLE001 - the errors are what is compared
                 outcome["error"] = ([kind.__name__ for kind in type(error).__mro__], str(error))
             finally:
-                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         outcome["warnings"] = [([kind.__name__ for kind in one.category.__mro__], str(one.message)) for one in caught]
         return outcome
 
@@ -168,7 +173,9 @@ class Player:
     def _history(self) -> Described:
         kept = self.env.get_history()
         again = self.env.decompress_history(kept)
-        return described([kept, self.env.get_full_history(), again, kept[0][0] == kept[0][-1]])
+        # POGEMA returns a bool of NumPy if a cell is one of NumPy.
+        is_same = bool(kept[0][0] == kept[0][-1])
+        return described([kept, self.env.get_full_history(), again, is_same])
 
     def _seed(self, seed: int | None) -> Described:
         self.env.unwrapped.grid_config.seed = seed

@@ -222,7 +222,13 @@ def test_nearest_map_is_named():
 
 @pytest.mark.parametrize(
     "begin, wrong, message",
-    [("new", {"z": "SoC"}, "suite.yaml: line 1: unknown key `z` in view `Costs`"), ("replace", {"width": "wide"}, "width")],
+    [
+        ("new", {"z": "SoC"}, "suite.yaml: line 1: unknown key `z` in view `Costs`"),
+        ("replace", {"width": "wide"}, "width"),
+        ("replace", {"y": "SoC", "error_bar": ["xx", 3]}, "error_bar"),
+        ("replace", {"type": "plto"}, "did you mean `plot`?"),
+        ("replace", {"type": "radar", "z": 1}, "unknown key `z` in view `Costs`"),
+    ],
 )
 def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
     ToolboxRegistry.register_algorithm("Policy", Broken)
@@ -230,6 +236,37 @@ def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
     with pytest.raises(ValueError, match=message):
         evaluation({**SUITE, "results_views": views}, tmp_path / "out", begin=begin)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("second", [{"name": "Unknown"}, {"name": "Policy", "parallel_backend": "cloud"}])
+def test_a_wrong_second_algorithm_is_refused_before_the_first_one_plays(tmp_path, second):
+    ToolboxRegistry.register_algorithm("Policy", Broken)
+    algorithms = {"First": {"name": "Policy", "parallel_backend": "sequential"}, "Second": second}
+    with pytest.raises((KeyError, ValueError)) as raised:
+        evaluation({**SUITE, "algorithms": algorithms}, tmp_path / "out", begin="replace")
+    assert "Unknown" in str(raised.value) or "parallel_backend" in str(raised.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path):
+    ToolboxRegistry.register_algorithm("Stay", Still)
+    suite = {
+        "environment": {**SUITE["environment"], "num_agents": {"grid_search": np.arange(2, 4)}},
+        "algorithms": {1: {"name": "Stay", "parallel_backend": "sequential"}},
+        "results_views": {"costs/plot": {"type": "plot", "x": "num_agents", "y": "SoC"}},
+    }
+    rows = evaluation(suite, tmp_path / "out", begin="replace")
+    assert {row["algorithm"] for row in rows} == {"1"}
+    assert sorted(path.name for path in (tmp_path / "out").rglob("*.*")) == ["1.json", "plot.pdf"]
+
+
+def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch, caplog):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "means.csv").write_text("setting,dataset,algorithm,num_agents,ISR\nMAPF,out,A,2,0.5\n")
+    rows = [{"metrics": {"ISR": 1.0}, "env_grid_search": {"num_agents": 2}, "algorithm": "A"}]
+    views = {"Ratios": {"type": "ratios", "file": "means.csv", "setting": "MAPF"}}
+    run_views(rows, {"results_views": views}, eval_dir=tmp_path)
+    assert "No such file" not in caplog.text
 
 
 def test_returned_rows_tell_the_time_of_the_network(tmp_path):

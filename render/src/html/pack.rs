@@ -1,7 +1,8 @@
 //! An episode as JSON for a page: a readable header, and all long data as packed bytes.
 //!
-//! The bytes are the map, the noise outside its wall if any, and the byte fields of [`Parts`] in order, with integers in
-//! little endian, compressed by zlib and encoded in base64. `film.js` reads them.
+//! The bytes are the map and the noise outside its wall, if any, with one bit per cell, then the byte fields of
+//! [`Parts`] in order, with integers in little endian. They are compressed by zlib and encoded in base64. `film.js`
+//! reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -39,7 +40,7 @@ struct Reason {
     cause: &'static str,
 }
 
-/// The packed data. Each part is ordered by step, then by agent.
+/// The packed data. Each part is ordered by step, then by agent; marks by step, then by cell.
 #[derive(Default)]
 struct Parts {
     /// For each agent: start row and col, first goal's row and col (u16).
@@ -158,17 +159,16 @@ impl Parts {
 
     /// Rule: occupancy/as-released
     fn add_marks(&mut self, trace: &Trace, state: &Snapshot, at: u32) {
-        let mut differs = vec![false; trace.header.map.obstacles().len()];
+        let map = &trace.header.map;
+        let mut has_agent = vec![false; map.obstacles().len()];
         let active = state.cells.iter().zip(&state.active).filter(|&(_, &active)| active);
-        for (&cell, _) in active {
-            differs[trace.header.map.index(cell)] = true;
-        }
-        for &cell in state.occupied.iter().filter(|&&cell| trace.header.map.contains(cell)) {
-            differs[trace.header.map.index(cell)] ^= true;
-        }
-        for (index, _) in differs.iter().enumerate().filter(|&(_, &differs)| differs) {
+        active.for_each(|(&cell, _)| has_agent[map.index(cell)] = true);
+        let mut has_mark = vec![false; map.obstacles().len()];
+        let marked = state.occupied.iter().filter(|&&cell| map.contains(cell));
+        marked.for_each(|&cell| has_mark[map.index(cell)] = true);
+        for index in (0..has_mark.len()).filter(|&index| has_mark[index] != has_agent[index]) {
             self.marks.extend(at.to_le_bytes());
-            put_cell(&mut self.marks, trace.header.map.cell_at(index));
+            put_cell(&mut self.marks, map.cell_at(index));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Tests of the pages without a browser.
 
-use pogema_core::{Cell, Error, Trace};
+use pogema_core::{Cell, Error, Outside, Trace};
 
 use super::{editor, replay};
 use crate::blocked_moves::play::play;
@@ -71,4 +71,22 @@ fn jumps_are_rejected() {
         replay_error(&jump),
         "trace: line 3: agent 1 is on (5, 5), expected (0, 0) or a cell next to it"
     );
+}
+
+#[test]
+fn noise_of_another_size_is_rejected() {
+    let mut trace = trace();
+    trace.header.outside = Outside::Noise(trace.header.map.clone());
+    let got = trace.header.map.height();
+    let want = got + 2 * trace.header.config.radius;
+    assert_eq!(replay(&trace, "t"), Err(Error::Length { what: "rows of noise", want, got }));
+}
+
+#[test]
+fn a_mark_that_is_listed_twice_is_one_mark() {
+    let trace = trace();
+    let mut twice = trace.clone();
+    let cell = twice.start.state.occupied[0];
+    twice.start.state.occupied.push(cell);
+    assert_eq!(replay(&twice, "t"), replay(&trace, "t"));
 }

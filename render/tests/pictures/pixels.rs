@@ -45,7 +45,7 @@ fn pixels_show_the_content_of_each_cell() {
         let (picture, state) = (draw(&trace, &style), trace.state(frame).unwrap());
         assert_eq!((picture.width, picture.height), (240, 240));
         let colors = Colors::default();
-        let color_of = |agent: usize| colors.agents[agent % 24];
+        let color_of = |agent: usize| colors.agents[agent];
         for (row, col) in (-1..10).flat_map(|row| (-1..10).map(move |col| (row, col))) {
             // The margin is half a cell and the border one cell.
             let (y, x) = ((f64::from(row) + 2.0) * CELL, (f64::from(col) + 2.0) * CELL);
@@ -79,7 +79,7 @@ fn pixels_show_the_content_of_each_cell() {
     }
 }
 
-/// Renders an SVG on white with an independent library.
+/// Renders an SVG on white with resvg, which rasterizes with the same library as [`raster`].
 fn rendered(svg: &str, width: u32, height: u32) -> Vec<u8> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default()).unwrap();
     let mut canvas = Pixmap::new(width, height).unwrap();
@@ -107,7 +107,7 @@ fn png_and_svg_look_alike() {
                 );
                 let far =
                     picture.data.iter().zip(&other).filter(|(one, other)| one.abs_diff(**other) > 40).count();
-                // The two renderers smooth edges differently.
+                // Pixels on the edges of shapes may differ.
                 assert!(far * 500 < other.len(), "{far} of {} for {style:?}", other.len());
             }
         }

@@ -8,12 +8,13 @@ use pogema_maps::files::read_text;
 use pogema_maps::nearest;
 
 /// The columns that identify a row.
-const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", "num_agents"];
+const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", NUM_AGENTS];
+const NUM_AGENTS: &str = "num_agents";
 
 /// The content of a file of means, with a row for each setting, dataset, algorithm and number of agents.
 pub(super) struct Means {
     path: PathBuf,
-    /// The text of each column by its name, row by row.
+    /// For each row, the text of each cell by the name of its column.
     rows: Vec<HashMap<String, String>>,
 }
 
@@ -21,7 +22,8 @@ impl Means {
     /// Reads a file that has a column for each metric, with numbers or empty cells.
     ///
     /// # Errors
-    /// One line with the file, the line and the column of the error.
+    /// One line with the file and the missing column, or the line of the error and, for a wrong number, its column.
+    /// A row that repeats the keys of an earlier one is an error, too.
     pub fn read(path: &Path, metrics: &[String]) -> Result<Self, Error> {
         let text = read_text(path)?;
         let failed = |error: csv::Error| Error::io(path, error);
@@ -35,15 +37,25 @@ impl Means {
                 nearest(name, &head).map(|hint| format!("; did you mean `{hint}`?")).unwrap_or_default();
             return Err(Error::io(path, format!("no column `{name}`{hint}")));
         }
-        let mut rows = Vec::new();
+        let mut rows: Vec<HashMap<String, String>> = Vec::new();
+        let mut lines = HashMap::new();
         for record in reader.records() {
             let record = record.map_err(failed)?;
             let row: HashMap<String, String> = record.deserialize(Some(&head)).map_err(failed)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let wrong = |name: &str, expected: &str| {
+                let found = &row[name];
+                Error::io(path, format!("line {line}: `{name}` is `{found}`, expected {expected}"))
+            };
             if let Some(name) = metrics().find(|&name| !row[name].is_empty() && number(&row[name]).is_none())
             {
-                let (line, found) = (record.position().map_or(0, csv::Position::line), &row[name]);
-                let reason =
-                    format!("line {line}: `{name}` is `{found}`, expected a number or an empty cell");
+                return Err(wrong(name, "a number or an empty cell"));
+            }
+            if row[NUM_AGENTS].parse::<u64>().is_err() {
+                return Err(wrong(NUM_AGENTS, "a whole number"));
+            }
+            if let Some(first) = lines.insert(KEYS.map(|name| row[name].clone()), line) {
+                let reason = format!("line {line}: the row repeats the {} of line {first}", KEYS.join(", "));
                 return Err(Error::io(path, reason));
             }
             rows.push(row);

@@ -114,19 +114,24 @@ pub struct Shown {
 /// # Errors
 /// One line with the file, the line and the key of the error.
 pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
-    let text = read_text(path)?;
-    let in_file = |error: Error| in_file(path, error);
-    let root = Node::parse(&text).map_err(in_file)?;
-    let Some(node) = root.field(VIEWS) else {
-        return Err(Error::io(path, format!("expected a field `{VIEWS}`")));
-    };
-    let fields = node.fields().ok_or_else(|| in_file(wrong(node, VIEWS, "names and their fields")))?;
+    let views = parse_views(&read_text(path)?).map_err(|error| in_file(path, error))?;
     // In the suite saved with results, paths are relative to the folder of the original file.
     let copied = if path.file_name().is_some_and(|name| name == SUITE) { path.parent() } else { None };
     let original = copied.and_then(|folder| Manifest::read(folder).ok().flatten()).map(|known| known.suite);
     let origin = original.as_deref().unwrap_or(path);
-    let views = fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?.beside(origin))));
-    views.collect::<Result<_, _>>().map_err(in_file)
+    Ok(views.into_iter().map(|(name, view)| (name, view.beside(origin))).collect())
+}
+
+/// Reads the views of a text, whose paths stay as they are, and ignores its other fields.
+///
+/// # Errors
+/// One line with the line and the key of the error.
+pub fn parse_views(text: &str) -> Result<Vec<(String, View)>, Error> {
+    let root = Node::parse(text)?;
+    let missing = || Error::Syntax { reason: format!("expected a field `{VIEWS}`") };
+    let node = root.field(VIEWS).ok_or_else(missing)?;
+    let fields = node.fields().ok_or_else(|| wrong(node, VIEWS, "names and their fields"))?;
+    fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?))).collect()
 }
 
 /// Checks the views of a suite, so that a wrong one is not found only after hours of play.

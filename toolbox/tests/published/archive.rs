@@ -6,17 +6,20 @@ use std::sync::LazyLock;
 
 use pogema_toolbox::Results;
 
-/// The folder named by `POGEMA_PUBLISHED`, and a temporary folder with its unpacked archive.
+/// The folder named by `POGEMA_PUBLISHED`, and a folder with its unpacked archive.
 pub struct Published {
     pub folder: PathBuf,
-    unpacked: tempfile::TempDir,
+    unpacked: PathBuf,
 }
 
 static PUBLISHED: LazyLock<Option<Published>> = LazyLock::new(|| {
     let folder = PathBuf::from(std::env::var_os("POGEMA_PUBLISHED").filter(|folder| !folder.is_empty())?);
-    let unpacked = tempfile::tempdir().unwrap();
-    let archive = File::open(folder.join("results-mapf.tar.gz")).unwrap();
-    tar::Archive::new(flate2::read::GzDecoder::new(archive)).unpack(unpacked.path()).unwrap();
+    // Not a temporary folder: nothing drops a static, so it would never be deleted.
+    let unpacked = Path::new(env!("CARGO_TARGET_TMPDIR")).join("published");
+    let archive = folder.join("results-mapf.tar.gz");
+    assert!(archive.exists(), "{} is missing", archive.display());
+    let archive = flate2::read::GzDecoder::new(File::open(archive).unwrap());
+    tar::Archive::new(archive).unpack(&unpacked).unwrap();
     Some(Published { folder, unpacked })
 });
 
@@ -30,7 +33,7 @@ pub fn published(what: &str) -> Option<&'static Published> {
 
 impl Published {
     pub fn set(&self, name: &str) -> PathBuf {
-        self.unpacked.path().join("results-mapf").join(name)
+        self.unpacked.join("results-mapf").join(name)
     }
 
     pub fn read(&self, sets: &[&str]) -> Results {

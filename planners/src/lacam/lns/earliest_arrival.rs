@@ -42,14 +42,17 @@ pub(crate) struct EarliestArrival {
     /// Labels by f-value, counted from that of the start.
     buckets: Vec<Vec<u32>>,
     num_vertices: usize,
-    /// For each start of an interval and each vertex, the earliest time there, counted down from `epoch`.
+    /// The earliest known time in each safe interval, as a rank: `epoch + span - 1 - time`. Ranks below `epoch` belong
+    /// to earlier searches.
+    ///
+    /// Shape: `[span, vertices]`, by the start of the interval.
     best: Vec<u32>,
     epoch: u32,
     num_expanded: u64,
 }
 
 impl EarliestArrival {
-    /// Returns the memory of searches. Units: bytes.
+    /// Returns the memory of searches, without their labels. Units: bytes.
     pub fn num_bytes(num_vertices: usize, span: usize) -> usize {
         num_vertices * span * size_of::<u32>()
     }
@@ -99,7 +102,9 @@ impl EarliestArrival {
         if self.buckets.len() < num_buckets {
             self.buckets.resize_with(num_buckets, Vec::new);
         }
-        self.epoch = self.epoch.checked_add(span).unwrap_or_else(|| {
+        // The ranks of the new search go up to `epoch + span - 1`.
+        let next = self.epoch.checked_add(span).filter(|epoch| epoch.checked_add(span).is_some());
+        self.epoch = next.unwrap_or_else(|| {
             self.best.fill(0);
             span
         });

@@ -11,6 +11,7 @@ from math import isnan
 from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
+from pogema_rs import _engine
 from pogema_rs.toolbox._work import plain
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
@@ -98,6 +99,7 @@ def draw(
     extension = target.suffix.removeprefix(".")
     if extension not in ("pdf", "png", "svg"):
         raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
+    check_views({target.stem: fields})
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for algorithm in dict.fromkeys(row["algorithm"] for row in results):
@@ -106,11 +108,29 @@ def draw(
             (folder / f"{name}.json").write_text(json.dumps(rows, default=plain), encoding="utf-8")
         # JSON is YAML.
         views = folder / "views.yaml"
-        views.write_text(json.dumps({"results_views": {target.stem: dict(fields)}}), encoding="utf-8")
+        views.write_text(_as_json({target.stem: _with_whole_paths(fields)}), encoding="utf-8")
         shown = show(folder, config=views, plot_format=extension, out=folder / "plots")  # type: ignore[arg-type]
         for file in (file for view in shown for file in view.files):
             shutil.move(file, target)
     return [table for view in shown for table in view.tables]
+
+
+def check_views(views: Mapping[Any, Mapping[str, Any]]) -> None:
+    """Checks the options of views of any type that `pogema views` knows.
+
+    Errors: `ValueError` for an unknown type or a wrong option.
+    """
+    _engine.check_views(_as_json(views))
+
+
+def _as_json(views: Mapping[Any, Mapping[str, Any]]) -> str:
+    return json.dumps({"results_views": {str(name): dict(fields) for name, fields in views.items()}}, default=plain)
+
+
+def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the fields with absolute paths: relative ones begin in the current folder."""
+    whole = {key: os.path.abspath(fields[key]) for key in ("file", "episodes") if isinstance(fields.get(key), str)}
+    return {**fields, **whole}
 
 
 def _shown(row: Mapping[str, Any], algorithm: str) -> dict[str, Any]:
