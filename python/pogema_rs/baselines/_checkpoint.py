@@ -1,8 +1,9 @@
-"""Files that stay whole if a training run is killed, and checkpoints."""
+"""Checkpoints of training runs."""
 
 from __future__ import annotations
 
-import zipfile
+import hashlib
+import io
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ import torch
 from pogema_rs._files import replaced
 
 #: The version of the format of checkpoints.
-VERSION = 1
+VERSION = 2
+#: The size of the SHA-256 digest that ends a checkpoint. Units: bytes.
+_DIGEST = 32
 
 
 def save(path: Path, values: dict[str, Any]) -> None:
@@ -19,8 +22,11 @@ def save(path: Path, values: dict[str, Any]) -> None:
 
     Errors: those of `replaced`.
     """
+    buffer = io.BytesIO()
+    torch.save({"version": VERSION, **values}, buffer)
+    content = buffer.getvalue()
     with replaced(path) as file:
-        torch.save({"version": VERSION, **values}, file)
+        file.write(content + hashlib.sha256(content).digest())
 
 
 def load(path: Path, method: str) -> dict[str, Any]:
@@ -31,19 +37,12 @@ def load(path: Path, method: str) -> dict[str, Any]:
     """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no checkpoint to resume from; train without --resume")
-    try:
-        # PyTorch does not compare the checksums of the file.
-        with zipfile.ZipFile(path) as archive:
-            is_damaged = archive.testzip() is not None
-        values = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError:
-        raise
-    except Exception:  # a damaged file makes PyTorch raise almost any class
-        raise ValueError(f"{path}: the file is not a checkpoint of a training") from None
-    if is_damaged:
-        raise ValueError(f"{path}: the checkpoint is damaged")
-    if not isinstance(values, dict) or "version" not in values or "method" not in values:
-        raise ValueError(f"{path}: the file is not a checkpoint of a training")
+    content = path.read_bytes()
+    content, digest = content[:-_DIGEST], content[-_DIGEST:]
+    # PyTorch reads damaged files, too.
+    if hashlib.sha256(content).digest() != digest:
+        raise ValueError(f"{path}: the file is not a checkpoint of a training, or is damaged")
+    values = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     if values["version"] != VERSION:
         raise ValueError(f"{path}: the checkpoint has version {values['version']}, expected {VERSION}")
     if values["method"] != method:
