@@ -51,7 +51,7 @@ def pack(name: str, windows: list[Array], shape: tuple[int, ...], odd: list[str]
     if not same(bits.astype(FLOAT32), values):
         # As texts, because -0.0 equals 0.0.
         unexpected = [(i, set(map(repr, row.tolist())) - {"0.0", "1.0"}) for i, row in enumerate(values)]
-        odd.extend(f"{name}[{i}] has values {sorted(found)}" for i, found in unexpected if found)
+        odd.extend(f"{name}[{i}] has values [{', '.join(sorted(found))}]" for i, found in unexpected if found)
     packed = np.packbits(bits, axis=1)
     text, size = packed.tobytes().hex(), 2 * packed.shape[1]
     return [text[start : start + size] for start in range(0, len(text), size)]

@@ -9,6 +9,8 @@ import unittest
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+from episodes import pack
 from oracle_client import HERE, SMALL, STEPS, Config, OracleTest, unpack_window
 
 
@@ -28,6 +30,11 @@ class Odd(OracleTest):
         self.assertEqual(record["map"], [".?.."])
         expected = ["obstacles[0] has values [2.0]", "global_obstacles has values [2.0]"]
         self.assertEqual(record["observations"]["odd"], expected)
+
+    def test_negative_zeros(self) -> None:
+        odd: list[str] = []
+        pack("agents", [np.array([[0.0, 1.0], [-0.0, 1.0]], dtype=np.float32)], (2, 2), odd)
+        self.assertEqual(odd, ["agents[0] has values [-0.0]"])
 
     def test_goals_that_are_not_integers(self) -> None:
         config = {"map": "...", "obs_radius": 1, "seed": 1, "observation_type": "POMAPF"}
