@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -10,13 +12,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_pogema");
+use program::pogema as run;
 
-fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let output = Command::new(PROGRAM).args(arguments).current_dir(folder).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
-}
+const PROGRAM: &str = env!("CARGO_BIN_EXE_pogema");
 
 fn folder_with(suite: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();

@@ -2,16 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-fn pogema(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
-}
+use program::pogema;
 
 /// Returns a folder with the suite `descent.yaml` and its network.
 fn folder() -> tempfile::TempDir {

@@ -2,17 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::path::Path;
-use std::process::Command;
+mod program;
 
 use serde_json::Value;
 
-fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let program = env!("CARGO_BIN_EXE_pogema");
-    let output = Command::new(program).args(arguments).current_dir(folder).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
-}
+use program::pogema as run;
 
 const TASK: [&str; 6] = ["--map", "four-rooms", "--num-agents", "4", "--seed", "1"];
 

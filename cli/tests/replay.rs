@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::fs;
-use std::path::Path;
-use std::process::Command;
 
 use serde_json::Value;
+
+use program::pogema as run;
 
 const SUITE: &str = "
 maps: own.map
@@ -24,13 +26,6 @@ algorithms:
 ";
 
 const MAP: &str = "type octile\nheight 4\nwidth 6\nmap\n......\n.@@.@.\n.@..@.\n......\n";
-
-fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let output = Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output();
-    let output = output.unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
-}
 
 fn evaluated(more: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();

@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::path::Path;
-use std::process::Command;
+mod program;
 
-/// Runs the command in a folder; returns standard output, standard error and the exit status.
+use std::path::Path;
+
+use program::pogema;
+
 fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let program = env!("CARGO_BIN_EXE_pogema");
-    let output = Command::new(program).arg("validate").args(arguments).current_dir(folder).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
+    pogema(folder, &[&["validate"], arguments].concat())
 }
 
 /// Returns a folder with a map, a scenario of two agents and the given files.

@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::fs;
-use std::path::Path;
-use std::process::Command;
+
+use program::pogema as run;
 
 const SUITE: &str = "
 results_views:
@@ -17,13 +19,6 @@ results_views:
     y: SoC
     extension: svg
 ";
-
-fn run(folder: &Path, arguments: &[&str]) -> (String, String, i32) {
-    let program = env!("CARGO_BIN_EXE_pogema");
-    let output = Command::new(program).args(arguments).current_dir(folder).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap().trim_end().to_owned();
-    (text(output.stdout), text(output.stderr), output.status.code().unwrap())
-}
 
 fn row(algorithm: &str, num_agents: u64, seed: u64, cost: &str) -> String {
     format!(
