@@ -29,7 +29,7 @@ const COST: &str = "SoC";
 /// it, only if both solve all instances.
 ///
 /// `show_std` adds half of the 95 % interval to each of our means but that of the sums of costs. `decision_times` adds
-/// the columns of [`decisions`].
+/// the planner's and the network's time for one action of one agent.
 #[derive(Clone, Debug)]
 pub struct PublishedView {
     common: Common,

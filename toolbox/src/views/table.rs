@@ -30,7 +30,8 @@ const FORMATS: [(Format, &str); 4] = [
 /// Rows with equal values in all columns except metrics and `drop_keys` form a group. Metrics are in the order of their
 /// first appearance in any row; pogema-toolbox takes only those of the first row, and groups by the others.
 ///
-/// With `decision_times`, the columns of [`decisions`] replace the run times of episodes.
+/// With `decision_times`, the planner's and the network's time for one action of one agent replace the run times of
+/// episodes.
 ///
 /// Source: pogema-toolbox 0.1.1, `view_tabular.py`
 #[derive(Clone, Debug)]
