@@ -288,17 +288,11 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
 def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
     path = tmp_path / "checkpoint.pt"
     _checkpoint.save(path, {"method": "iql", "numbers": torch.arange(64)})
-    content, num_refused = path.read_bytes(), 0
+    content = path.read_bytes()
     for place in range(0, len(content), 3):
         path.write_bytes(content[:place] + bytes([content[place] ^ 0x3A]) + content[place + 1 :])
-        try:
-            numbers = _checkpoint.load(path, "iql")["numbers"]
-        except ValueError as error:
-            num_refused += 1
-            assert str(error).startswith(f"{path}: ")
-        else:
-            assert torch.equal(numbers, torch.arange(64)), place
-    assert num_refused == len(range(0, len(content), 3))
+        with pytest.raises(ValueError, match="checkpoint.pt: the file is not a checkpoint of a training, or is damaged"):
+            _checkpoint.load(path, "iql")
 
 
 @pytest.mark.parametrize(

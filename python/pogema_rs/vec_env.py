@@ -133,8 +133,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
         or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
         N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is
-        seen, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many as suit the work of a step, at most one per
-        core and environment]. A step uses fewer while measured times show that more do not make it faster.
+        seen, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many as suit the work
+        of a step, at most one per core and environment]. A step uses fewer while measured times show that more do not
+        make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.

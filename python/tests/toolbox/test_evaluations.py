@@ -266,7 +266,8 @@ def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch,
     rows = [{"metrics": {"ISR": 1.0}, "env_grid_search": {"num_agents": 2}, "algorithm": "A"}]
     views = {"Ratios": {"type": "ratios", "file": "means.csv", "setting": "MAPF"}}
     run_views(rows, {"results_views": views}, eval_dir=tmp_path)
-    assert "No such file" not in caplog.text
+    # The file was read: only its rows do not fit.
+    assert f"`{tmp_path / 'means.csv'}` has no MAPF means of A" in caplog.text
 
 
 def test_returned_rows_tell_the_time_of_the_network(tmp_path):
