@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use pogema_core::Error;
 use rayon::ThreadPoolBuilder;
@@ -89,6 +91,11 @@ impl Watch<'_> {
     /// Returns `None` after `stop`, because the key that stops the run also reaches the processes of the workers, which
     /// may then fail.
     fn unless_stopped<T>(&self, result: Result<T, Error>) -> Result<Option<T>, Error> {
+        // The end of a process may be noticed before the thread that handles the key has run.
+        let deadline = Instant::now() + Duration::from_secs(1);
+        while result.is_err() && !self.is_stopped() && Instant::now() < deadline {
+            thread::sleep(Duration::from_millis(10));
+        }
         if self.is_stopped() { Ok(None) } else { result.map(Some) }
     }
 }
