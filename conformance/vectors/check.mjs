@@ -27,7 +27,8 @@ function compared(claims, answer) {
   delete kept.error;
   for (const key of OPTIONAL) if (!claims.tells?.includes(key)) delete kept[key];
   for (const key of ["observations", "metrics"]) if (!claims.profiles.includes(key)) delete kept[key];
-  for (const name in kept.metrics ?? {}) if (!claims.metrics.includes(name)) delete kept.metrics[name];
+  for (const name in kept.metrics ?? {}) if (!claims.metrics?.includes(name)) delete kept.metrics[name];
+  if (Object.keys(kept.metrics ?? {}).length === 0) delete kept.metrics;
   return kept;
 }
 
@@ -71,6 +72,7 @@ function firstDifference(answer, claims, exchanges) {
   }
 }
 
+if (process.argv.length !== 3) throw new Error("usage: node check.mjs PORT.mjs");
 const { answer } = await import(pathToFileURL(process.argv[2]));
 const claims = answer({ type: "hello", protocol: "pogema-conform/1" });
 const read = (path) => readFileSync(new URL(path, import.meta.url));
