@@ -12,7 +12,7 @@ use pogema_core::files::write_whole;
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
-    Begin, EpisodeConfigs, Event, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
+    Begin, EpisodeConfigs, Event, HasResults, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
 };
 
 use crate::interrupt::exit_on_ctrl_c;
@@ -63,7 +63,10 @@ impl Evaluate {
             (_, true) => Begin::Anew,
             _ => Begin::New,
         };
-        let store = Arc::new(Store::open(&self.out, &suite, begin)?);
+        let store = Store::open(&self.out, &suite, begin).map_err(|error| {
+            HasResults::explained(error, "`--resume` continues them, `--force` deletes them")
+        })?;
+        let store = Arc::new(store);
         let bar = Arc::new(Bar::default());
         let (shown, folder) = (Arc::clone(&bar), self.out.clone());
         exit_on_ctrl_c(move || shown.interrupted(&folder))?;

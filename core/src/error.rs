@@ -19,13 +19,7 @@ pub enum Error {
     #[error("{}", one_line(wrong_field(name, value, expected)))]
     Argument { name: String, value: String, expected: String },
     /// A config field names a cell outside the map.
-    #[error(
-        "{}",
-        one_line(format_args!(
-            "config: `{field}` is `{cell}`, expected cells inside the map of {}",
-            rows_and_columns(*height, *width)
-        ))
-    )]
+    #[error("{}", one_line(format_args!("config: {}", cell_outside(field, cell, *height, *width))))]
     CellOutside { field: String, cell: String, height: usize, width: usize },
     /// A config cannot be parsed. The reason is the message of the parser, with line and column.
     #[error("{}", one_line(format_args!("config: {reason}")))]
@@ -177,6 +171,11 @@ fn wrong_field(field: &str, value: &str, expected: &str) -> String {
     format!("`{field}` is `{value}`, expected {expected}")
 }
 
+fn cell_outside(field: &str, cell: &str, height: usize, width: usize) -> String {
+    let size = rows_and_columns(height, width);
+    format!("`{field}` is `{cell}`, expected cells inside the map of {size}")
+}
+
 impl Error {
     /// Longest part of an input value that a message quotes. Units: characters.
     pub const LONGEST_QUOTE: usize = 60;
@@ -216,8 +215,11 @@ impl Error {
     pub fn reason(&self) -> String {
         match self {
             Self::Config { field, value, expected } => one_line(wrong_field(field, value, expected)),
+            Self::CellOutside { field, cell, height, width } => {
+                one_line(cell_outside(field, cell, *height, *width))
+            }
             Self::Syntax { reason } => one_line(reason),
-            other => other.to_string().trim_start_matches("config: ").to_owned(),
+            other => other.to_string(),
         }
     }
 

@@ -11,8 +11,8 @@ use pogema_maps::{Library, parse_map_text};
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
-    Algorithm, Begin, BuiltIn, Done, EpisodeConfigs, Event, Failed, Pairs, Progress, Results, Running, Store,
-    Suite, run_one,
+    Algorithm, Begin, BuiltIn, Done, EpisodeConfigs, Event, Failed, HasResults, Pairs, Progress, Results,
+    Running, Store, Suite, run_one,
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -64,7 +64,10 @@ impl Evaluation {
         };
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
-        let store = Store::open(&folder, &suite, begin).map_err(|error| to_py_error(&error))?;
+        let store = Store::open(&folder, &suite, begin).map_err(|error| {
+            let options = "`begin` `resume` (`--resume`) continues them, `anew` (`--force`) deletes them";
+            to_py_error(&HasResults::explained(error, options))
+        })?;
         let store = Arc::new(store.with(versions));
         Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
     }

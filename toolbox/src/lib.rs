@@ -37,7 +37,7 @@ pub use progress::{Done, Failed, Progress};
 pub use replay::differences;
 pub use results::{Episode, Pairs, Proof, Results, Row, short};
 pub use run::{Event, Running, Summary, built_in, run, run_one};
-pub use store::{Begin, REPORT, Store};
+pub use store::{Begin, HasResults, REPORT, Store};
 pub use suite::{Algorithm, Backend, Replacement, Suite};
 pub use tree::{Content, Node};
 pub use variants::{Variant, Variants};

@@ -27,6 +27,23 @@ words! {
     }
 }
 
+/// The cause of the error if a folder has results and the run was to begin with [`Begin::New`].
+#[derive(Debug, thiserror::Error)]
+#[error("has results already")]
+pub struct HasResults;
+
+impl HasResults {
+    /// Adds to an error with this cause which options accept the folder; returns other errors unchanged.
+    pub fn explained(error: Error, options: &str) -> Error {
+        match error {
+            Error::Io { path, cause } if cause.get().is::<Self>() => {
+                Error::io(path, format!("{Self}: {options}"))
+            }
+            other => other,
+        }
+    }
+}
+
 /// A folder of results, to which only one process at a time may write.
 #[derive(Debug)]
 pub struct Store {
@@ -152,10 +169,7 @@ fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option
             Ok((manifest, None))
         }
         (Begin::Anew, Some(known)) => Ok((manifest, Some(known))),
-        (Begin::New, Some(_)) => {
-            let reason = "has results already: `--resume` continues them, `--force` deletes them";
-            Err(Error::io(folder, reason))
-        }
+        (Begin::New, Some(_)) => Err(Error::io(folder, HasResults)),
         (_, None) => check_empty(folder).map(|()| (manifest, None)),
     }
 }

@@ -97,7 +97,7 @@ def run_views(
     """Logs the tables of `results_views`, and writes each plot to `<name of the view>.pdf` in the folder.
 
     The default folder is the current one. `tabular` views are tables as in pogema-toolbox. The engine draws all other
-    types, including those that pogema-toolbox lacks.
+    types, including those that pogema-toolbox lacks; the name of the folder is that of the dataset.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """
@@ -112,7 +112,7 @@ def run_views(
         elif fields["type"] == "multi-plot":
             process_multi_plot_view(results, MultiPlotView(**fields), target)
         else:
-            for table in draw(results, fields, target):
+            for table in draw(results, fields, target, folder.resolve().name or "results"):
                 ToolboxRegistry.info("\n" + table)
 
 

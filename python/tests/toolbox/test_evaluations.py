@@ -79,7 +79,7 @@ def metrics(rows):
 def test_own_import_keeps_earlier_results(tmp_path, backend):
     ToolboxRegistry.register_algorithm("Policy", Still)
     stored = evaluation(SUITE, tmp_path / "stored")
-    with pytest.raises(OSError, match="has results already"):
+    with pytest.raises(OSError, match="has results already: `begin` `resume` "):
         evaluation(SUITE, tmp_path / "stored")
     # A folder with the suite and other files is no obstacle.
     suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend, "num_process": 2}}}
@@ -262,12 +262,14 @@ def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path):
 
 def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch, caplog):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "means.csv").write_text("setting,dataset,algorithm,num_agents,ISR\nMAPF,out,A,2,0.5\n")
+    means = f"setting,dataset,algorithm,num_agents,ISR\nMAPF,{tmp_path.name},A,2,0.5\n"
+    (tmp_path / "means.csv").write_text(means)
     rows = [{"metrics": {"ISR": 1.0}, "env_grid_search": {"num_agents": 2}, "algorithm": "A"}]
-    views = {"Ratios": {"type": "ratios", "file": "means.csv", "setting": "MAPF"}}
-    run_views(rows, {"results_views": views}, eval_dir=tmp_path)
-    # The file was read: only its rows do not fit.
-    assert f"`{tmp_path / 'means.csv'}` has no MAPF means of A" in caplog.text
+    view = {"type": "published", "file": "means.csv", "setting": "MAPF", "algorithm": "A"}
+    for folder in (tmp_path, ".", None):
+        caplog.clear()
+        run_views(rows, {"results_views": {"Beside": view}}, eval_dir=folder)
+        assert "0.5" in caplog.text
 
 
 def test_returned_rows_tell_the_time_of_the_network(tmp_path):

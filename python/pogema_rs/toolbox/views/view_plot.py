@@ -87,11 +87,15 @@ def prepare_plot_fields(view: PlotView) -> tuple[Optional[str], Optional[str], s
 
 
 def draw(
-    results: Sequence[Mapping[str, Any]], fields: Mapping[str, Any], save_path: Union[str, os.PathLike[str]]
+    results: Sequence[Mapping[str, Any]],
+    fields: Mapping[str, Any],
+    save_path: Union[str, os.PathLike[str]],
+    dataset: str = "results",
 ) -> list[str]:
     """Draws a view of any type that `pogema views` knows, and returns its tables as text.
 
-    `save_path` is the file of its plot, whose ending is the format: `.pdf`, `.png` or `.svg`.
+    `save_path` is the file of its plot, whose ending is the format: `.pdf`, `.png` or `.svg`. `dataset` is the name of
+    the results for views that compare them with published ones.
 
     Errors: `ValueError` for another ending or a wrong option.
     """
@@ -101,15 +105,18 @@ def draw(
         raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
     check_views({target.stem: fields})
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
+        # Views read the name of a dataset from that of its folder.
+        folder = Path(temporary, "results", dataset)
+        folder.mkdir(parents=True)
         for algorithm in dict.fromkeys(row["algorithm"] for row in results):
             name = algorithm.replace("/", "_")  # also the name of a file
             rows = [_shown(row, name) for row in results if row["algorithm"] == algorithm]
             (folder / f"{name}.json").write_text(json.dumps(rows, default=plain), encoding="utf-8")
         # JSON is YAML.
-        views = folder / "views.yaml"
+        views = Path(temporary, "views.yaml")
         views.write_text(_as_json({target.stem: _with_whole_paths(fields)}), encoding="utf-8")
-        shown = show(folder, config=views, plot_format=extension, out=folder / "plots")  # type: ignore[arg-type]
+        plots = Path(temporary, "plots")
+        shown = show(folder, config=views, plot_format=extension, out=plots)  # type: ignore[arg-type]
         for file in (file for view in shown for file in view.files):
             shutil.move(file, target)
     return [table for view in shown for table in view.tables]
