@@ -105,7 +105,8 @@ fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
 
 /// Reads the arguments of the program; returns `None` if there are none.
 ///
-/// Errors: what clap reports, help and version included.
+/// # Errors
+/// Usage errors; also the help text and the version, which clap returns as errors.
 pub fn parse() -> Result<Option<Arguments>, clap::Error> {
     if std::env::args_os().len() == 1 {
         return Ok(None);

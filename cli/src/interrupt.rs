@@ -11,7 +11,7 @@ use crate::output::tell;
 /// The exit status of an interrupted command: 128 and the number of the signal, as a shell reports it.
 const INTERRUPTED: u8 = 130;
 
-/// Ends the program on Ctrl-C, after `keep` has kept the results; prints the line that it returns.
+/// On Ctrl-C, calls `keep` to keep the results, prints the line that `keep` returns, and ends the program.
 ///
 /// # Errors
 /// [`Error::External`] if the system refuses the handler.
@@ -27,7 +27,7 @@ pub fn exit_on_ctrl_c(mut keep: impl FnMut() -> String + Send + 'static) -> Resu
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Sets the flag from now on.
+    /// Returns a flag that Ctrl-C sets from now on.
     ///
     /// # Errors
     /// [`Error::External`] if the system refuses the handler.

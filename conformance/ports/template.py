@@ -78,7 +78,7 @@ class Environment:
     def observe(self) -> list[str]:
         """Returns the observation of each agent, also of finished ones, row by row as `0` and `1`.
 
-        An observation holds obstacles, agents (itself included) and goal.
+        An observation holds three windows: obstacles, active agents (the observing agent included) and goal.
         """
         radius, side = self.radius, 2 * self.radius + 1
         marks = [["0"] * len(row) for row in self.obstacles]

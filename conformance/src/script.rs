@@ -153,8 +153,8 @@ fn toward_goal(state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     }
 }
 
-/// Moves towards another agent that is adjacent (a swap, if that agent does the same) or two cells away (a contest
-/// for the cell between).
+/// Returns a move towards another agent that is adjacent (a swap, if that agent does the same) or two cells away (a
+/// contest for the cell between); a random move if there is no such agent.
 fn at_neighbour(map: &Map, state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     let mut moves = [Action::Up, Action::Down, Action::Left, Action::Right];
     dice.shuffle(&mut moves);

@@ -63,7 +63,7 @@ impl GoalStream {
         Self { first: goal, rest: Rest::Same }
     }
 
-    /// Creates a stream of a first goal, followed by `cells` from the second one on, repeated cyclically.
+    /// Creates a stream that begins with `first` and continues with `cells` from its second cell on, cyclically.
     ///
     /// If `cells` is empty, the first goal is the only one.
     ///
@@ -107,7 +107,7 @@ impl GoalStream {
     /// Returns the position in the stream, for [`GoalStream::restore`].
     ///
     /// # Errors
-    /// If the goals come from a source that cannot be saved.
+    /// [`Error::ForeignGoals`] if the goals come from a source that cannot be saved.
     pub fn save(&self) -> Result<StreamState, Error> {
         let state = match &self.rest {
             Rest::Same => StreamState::Same,
@@ -120,7 +120,7 @@ impl GoalStream {
     /// Continues at the saved position of a stream of the same goals.
     ///
     /// # Errors
-    /// If the state belongs to a stream of other goals.
+    /// [`Error::ForeignGoals`] if the state cannot belong to these goals.
     pub fn restore(&mut self, state: &StreamState) -> Result<(), Error> {
         let fits = match (&mut self.rest, state) {
             (Rest::Same, StreamState::Same) => true,
@@ -134,7 +134,7 @@ impl GoalStream {
         if fits { Ok(()) } else { Err(Error::ForeignGoals) }
     }
 
-    /// Moves on to the goal after the one reached at `at`, and returns it.
+    /// Advances to the goal after the one reached at `at`, and returns it.
     pub fn advance(&mut self, at: Cell) -> Cell {
         match &mut self.rest {
             Rest::Same => self.first,
@@ -146,7 +146,7 @@ impl GoalStream {
         }
     }
 
-    /// Returns the first `count` goals, as if each were reached in turn.
+    /// Returns the first `count` goals of a stream that has not advanced, as if each were reached in turn.
     pub fn list(&self, count: usize) -> Vec<Cell> {
         let mut stream = self.clone();
         let mut at = self.first;

@@ -19,6 +19,7 @@
 //! | `masks` | action masks |
 //! | `buffers` | the buffers for observations and global states |
 //! | `batch` | many environments |
+//! | `bits` | a writer for packed bits |
 //! | `simd` | conversion of windows to bits and of bits to values, without intrinsics or with AVX2 or AVX-512 |
 //!
 //! ```

@@ -10,7 +10,7 @@ use crate::grid::{Board, FREE, Strips, num_bytes};
 
 /// The fast engine: one environment with the rules of POGEMA 1.4.0, on bit sets.
 ///
-/// It allocates no memory after a reset.
+/// Without a thread pool, steps and observations allocate no memory.
 #[derive(Debug)]
 pub struct Engine {
     pub(crate) config: Config,
@@ -48,7 +48,7 @@ impl Engine {
         Self::with_path(config, SimdPath::from_environment()?)
     }
 
-    /// Creates an environment that computes observations with a given path.
+    /// Creates an environment that computes observations with a given SIMD path.
     ///
     /// # Errors
     /// If the config is out of range or this machine does not support the path.
@@ -181,6 +181,8 @@ impl Engine {
         Ok(())
     }
 
+    /// Writes the state after a reset, except the goal streams.
+    ///
     /// Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
     fn load(&mut self, instance: &Instance) {
         let num_agents = self.config.num_agents;

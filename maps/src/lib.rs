@@ -1,6 +1,6 @@
 //! Generates instances from a config and a seed, bit for bit as POGEMA 1.4.0 does.
 //!
-//! [`GridConfig`] is POGEMA's config file. [`InstanceSource`] turns it into one [`pogema_core::Instance`] per
+//! [`GridConfig`] is POGEMA's config. [`InstanceSource`] turns it into one [`pogema_core::Instance`] per
 //! reset. It draws the same random numbers as POGEMA, which uses NumPy ([`pogema_numpy`]).
 //!
 //! ```

@@ -97,12 +97,13 @@ pub(crate) fn check_side(line: usize, text: &str) -> Result<usize, Error> {
 
 /// Reads a map text.
 ///
-/// `.` is free, `#` an obstacle, `a` a start, `A` a goal, `@` a possible start, `$` a possible goal, and `!` free but
-/// neither. White space separates rows.
+/// `.` is free, `#` an obstacle, `a` to `z` are starts, `A` to `Z` goals, `@` is a possible start, `$` a possible goal,
+/// and `!` free but neither. White space separates rows.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for an unknown character or a row of another length, and an error for
-/// unequal numbers of starts and goals, letters next to `@`, `$` or `!`, or no cell at all.
+/// With line and column: [`Error::UnknownLetter`] for an unknown character, [`Error::Map`] for a row of another length,
+/// a side over [`Map::LONGEST_SIDE`], or no cell at all. [`Error::Instance`] for unequal numbers of starts and goals,
+/// or for letters next to `@`, `$` or `!`.
 ///
 /// Rule: grid/text, grid/letters, grid/pools
 ///

@@ -36,6 +36,9 @@ impl Bfs {
     }
 
     /// Returns the steps from each vertex to a goal, or [`UNREACHABLE`].
+    ///
+    /// # Panics
+    /// If the goal is not a vertex of the graph.
     pub fn costs_to_go(&mut self, goal: Vertex) -> impl Iterator<Item = u32> + '_ {
         self.costs.clone_from(&self.blank);
         let start = self.places[goal as usize];

@@ -38,7 +38,7 @@ impl<T: Copy + Precedes> HeapQ<T> {
         self.rise(self.0.len() - 1, item);
     }
 
-    /// Removes the first item.
+    /// Removes and returns the first item.
     pub fn pop(&mut self) -> Option<T> {
         let last = self.0.pop()?;
         let Some(&first) = self.0.first() else { return Some(last) };

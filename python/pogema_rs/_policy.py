@@ -81,9 +81,9 @@ class Policy:
 
         Shape: `(num_envs, agents)`, int64
 
-        Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, or with
-        `mats-lp`, which needs a `VecEnv`; `StateError` if a logit is not finite, or if `mats-lp` misses a state;
-        RuntimeError for a second environment without `reset_states`.
+        Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if a logit
+        is not finite, or with `mats-lp`, which needs a `VecEnv`. For a `VecEnv`, `StateError` if a logit is not finite,
+        or if `mats-lp` misses a state. RuntimeError for a second environment without `reset_states`.
         """
         batch = getattr(observations, "_batch", None)
         if isinstance(batch, _engine.Batch):

@@ -52,7 +52,9 @@ class Resettable:
             return
         for name, value in zip(self._LIVE, last):
             if _differ(fields[name], value):
-                raise StateError(f"`{name}` of the config changed from `{value}` to `{fields[name]}`; call `reset` first")
+                raise StateError(
+                    f"`{name}` of the config changed from `{value}` to `{fields[name]}`; call `reset` first"
+                )
 
     def _remember_config(self) -> None:
         fields = self.grid_config.__dict__

@@ -115,7 +115,7 @@ def of_env(arrays: Any, index: int) -> Any:
 
 
 def per_env(rows: Any, envs: list[int], num_envs: int) -> np.ndarray:
-    """Returns a list that holds the rows of some environments, as Gymnasium has it for `final_obs`."""
+    """Returns the rows of some environments, and None for the others, in an array like Gymnasium's `final_obs`."""
     every = np.full(num_envs, None, dtype=object)
     for index, env in enumerate(envs):
         every[env] = of_env(rows, index)

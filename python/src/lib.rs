@@ -55,7 +55,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
 
-/// Returns the words that each argument accepts, keyed by the argument's name in Python.
+/// Returns the words that config fields and arguments accept, keyed by field or by kind of argument.
 fn words(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let words = PyDict::new(py);
     words.set_item("on_target", OnGoal::NAMES)?;

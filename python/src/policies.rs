@@ -259,7 +259,7 @@ impl Player {
     }
 }
 
-/// Returns the instance of an environment's episode, as far as the episode has not changed it.
+/// Returns the instance of an environment's episode. After a step, it lacks goals that agents have already received.
 fn instance(engine: &Engine) -> Result<Instance, Error> {
     let (map, outside) = surroundings_of(engine)?;
     Instance::new(map, outside, engine.starts().to_vec(), engine.streams().to_vec())
@@ -335,8 +335,8 @@ fn other_environment() -> PyErr {
 guarded! {
 /// Writes a network with its encoder as a `.safetensors` file and the JSON beside it.
 ///
-/// `config` is the content of the JSON, and `name` that of the policy that shall play the network. An error leaves both
-/// files as they were.
+/// `config` is the content of the JSON file, and `name` the name of the policy that plays the network. An error leaves
+/// both files unchanged.
 #[pyfunction]
 pub fn write_network(
     path: PathBuf,
@@ -359,7 +359,7 @@ pub fn write_network(
 }
 }
 
-/// Converts an error from reading weights: those of the system to `OSError`, others to `ValueError`.
+/// Converts an error from reading or writing weights: one of the system to `OSError`, any other to `ValueError`.
 fn to_py_error(error: &Error) -> PyErr {
     let text = error.to_string();
     let Error::Io { cause, .. } = error else { return PyValueError::new_err(text) };

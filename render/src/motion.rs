@@ -20,6 +20,10 @@ pub(crate) struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
+    /// Cuts a scene into about `rate` frames per second. Rounds both sides of a frame up to multiples of `multiple`.
+    ///
+    /// Units: `width` and `multiple` in pixels.
+    ///
     /// # Errors
     /// If the animation would have too many frames, or a frame too many pixels.
     pub fn new(scene: &'a Scene<'a>, width: u32, rate: f64, multiple: u32) -> Result<Self, Error> {
@@ -37,7 +41,7 @@ impl<'a> Motion<'a> {
         self.num_frames
     }
 
-    /// Returns the frame rate. Units: `step_time` in seconds; frames per second.
+    /// Returns the frame rate. Units: frames per second; `step_time` in seconds.
     pub fn rate(&self, step_time: f64) -> f64 {
         self.per_step as f64 / step_time
     }

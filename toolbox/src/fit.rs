@@ -10,7 +10,7 @@ const READABLE: usize = 12;
 ///
 /// Wide cells are wrapped. If the columns would be too narrow for that, each row is a list of titles and cells.
 pub fn fitted(mut table: Table) -> String {
-    // A gap on both sides of each cell, and a line around each.
+    // Each column has a gap on both sides and a line after it; one more line is at the left edge.
     let columns = table.column_max_content_widths();
     let natural = columns.iter().map(|&width| usize::from(width) + 3).sum::<usize>() + 1;
     match table.width() {

@@ -79,7 +79,7 @@ impl Manifest {
     /// Takes over the runs and algorithms of an earlier manifest; algorithms that left the suite are kept.
     ///
     /// # Errors
-    /// The difference, if the earlier results are of other environments or parameters; nothing is changed then.
+    /// The difference, if the earlier results are of other environments, parameters or weights; nothing changes then.
     pub(crate) fn continue_from(&mut self, known: Self) -> Result<(), String> {
         if known.environment != self.environment {
             let reason = "has results of other environments than the suite's; choose another folder, or delete the \

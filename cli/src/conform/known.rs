@@ -27,7 +27,7 @@ struct Deviation {
     #[serde(default)]
     rule: Option<String>,
     what: String,
-    /// The circumstances; `None` for all, if they are the same for all occurrences.
+    /// The circumstances; `None` accepts any, but only if all occurrences have one cause.
     #[serde(default)]
     when: Option<String>,
     #[serde(deserialize_with = "text")]
@@ -38,7 +38,7 @@ struct Deviation {
     port: Option<String>,
 }
 
-/// Reads any value as text, so that a number is rejected as a date and not for its type.
+/// Reads any value as text, so that the error for a number names the expected date and not a type.
 fn text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let value = Value::deserialize(deserializer)?;
     Ok(value.as_str().map_or_else(|| value.to_string(), str::to_owned))

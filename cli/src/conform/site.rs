@@ -1,4 +1,4 @@
-//! The standing report: a folder of static pages that compares implementations rule by rule.
+//! The report as a site: a folder of static pages that compares ports rule by rule.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

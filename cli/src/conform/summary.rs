@@ -71,12 +71,13 @@ pub fn is_rule(row: &str) -> bool {
     row != PROTOCOL_ROW
 }
 
-/// Returns the rows of the table: the rules that were played with a port or that a port does not claim, and the protocol.
+/// Returns the rows of the table: the rules that were played or that a port does not claim, and the protocol if a port
+/// broke it.
 pub fn rows(reports: &[PortReport]) -> BTreeSet<&str> {
     reports.iter().flat_map(|report| report.rules.keys()).map(String::as_str).collect()
 }
 
-/// Returns everything that any of the ports does not claim.
+/// Returns the features that at least one port does not claim.
 pub fn unclaimed(reports: &[PortReport]) -> BTreeSet<&str> {
     reports.iter().flat_map(|report| report.not_claimed.keys()).map(String::as_str).collect()
 }

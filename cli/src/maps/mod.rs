@@ -70,7 +70,8 @@ impl Sources {
         &self.paths
     }
 
-    /// Returns the built-in maps, those of the files, and those of the paper that a name or pattern selects.
+    /// Returns the built-in maps and those of the files; if none of them matches the name or pattern, also the maps of
+    /// the paper that it selects.
     pub fn library(&self, name: Option<&str>) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {

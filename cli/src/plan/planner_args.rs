@@ -37,7 +37,7 @@ impl PlannerArgs {
         Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
     }
 
-    /// Returns the budget of one plan.
+    /// Returns the budget of one plan. Prints a note if the machine has fewer cores than threads.
     pub fn budget(&self) -> Result<Budget, Error> {
         note_threads(self.threads);
         let seconds = self.seconds.or(self.nodes.is_none().then_some(1.0));

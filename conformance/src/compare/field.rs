@@ -30,7 +30,7 @@ pub enum FieldPart {
 }
 
 impl Field {
-    /// Returns the field without its index. Differences of one kind have one cause.
+    /// Returns the field without its index. A report groups the differences of one rule and kind.
     pub fn kind(&self) -> String {
         match self.part {
             FieldPart::Length => format!("number of {} entries", self.name),

@@ -23,10 +23,10 @@ pub struct Cause {
     pub when: String,
     /// Number of occurrences; with `share`, of all causes with the same rule and field.
     pub times: u64,
-    /// How many of the shrunk occurrences have this cause, if they have several.
+    /// How many of the shrunk occurrences have this cause; present if they have several causes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
-    /// Number of hand-written cases that show it, by rule.
+    /// Number of occurrences in hand-written cases, by the rule of the case.
     pub cases: BTreeMap<String, u64>,
     /// The smallest occurrence.
     pub example: Example,
@@ -47,7 +47,7 @@ pub struct Cause {
     pub known: Option<String>,
 }
 
-/// The part of the shrunk occurrences that have one cause.
+/// The part of the shrunk occurrences that has one cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Share {
     /// Occurrences with this cause.

@@ -97,7 +97,7 @@ pub enum FaultKind {
         /// The key of the list.
         key: &'static str,
     },
-    /// Any other kind, for implementations of [`Link`] outside this crate.
+    /// Any other kind, for example one of an implementation of [`Link`] outside this crate.
     Other(String),
 }
 

@@ -90,7 +90,7 @@ fn resolve(expected: &[String], answer: &mut [String], num_values: usize) {
     }
 }
 
-/// Returns the hash of the values, one byte per value.
+/// Returns the hash of the values, one byte per value; none for an unknown algorithm.
 fn hash(algorithm: &str, values: impl Iterator<Item = bool>) -> Option<String> {
     let bytes: Vec<u8> = values.map(u8::from).collect();
     match algorithm {

@@ -23,7 +23,7 @@ const MAX_HANGS: u64 = 5;
 /// Checks ports in parallel. Calls `total` once with the number of checks.
 ///
 /// # Errors
-/// If a case or recording cannot be read.
+/// If a case or recording cannot be read, or the threads cannot be started.
 pub fn check_ports(
     subjects: &[Subject<'_>],
     plan: &Plan,
@@ -97,8 +97,9 @@ fn weight(fault: &Misbehaviour) -> u64 {
     }
 }
 
-/// Checks a port by an item, in each mode in which the item is played, until `is_over`. Returns the claims of the port,
-/// unless it did not start, and the results.
+/// Checks a port by an item, in each mode in which the item is played, until `is_over` returns true for a result.
+///
+/// Returns the claims of the port, if it started, and the results.
 pub fn judge_item(
     worker: &mut Worker<'_>,
     plan: &Plan,
@@ -138,7 +139,8 @@ pub fn judge_item(
     (Some(hello), results)
 }
 
-/// Returns whether an item is played in a mode. Items about drawing need a config; all others use every mode.
+/// Returns whether an item is played in a mode: an item about drawing only from a config, any other from an instance
+/// and, if the port claims seeding, also from a config. A plan for seeding alone plays nothing from an instance.
 fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
     let seeds = hello.profiles.contains(&Profile::Seeding);
     let only_seeding =

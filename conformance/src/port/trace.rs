@@ -17,10 +17,10 @@ use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, num
 
 /// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
-/// `limit` bounds each file.
+/// `limit` bounds the lines and the size of each file.
 ///
 /// # Errors
-/// [`Error::Trace`] or [`Error::Io`] for a file that is not a trace.
+/// [`Error::Io`] for a file that cannot be read or is not a trace.
 pub fn check_traces(paths: &[impl AsRef<Path>], limit: InputLimit) -> Result<PortReport, Error> {
     let mut report = PortReport { command: format!("{} traces", paths.len()), ..PortReport::default() };
     let plan = Plan::default();

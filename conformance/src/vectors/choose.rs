@@ -14,14 +14,14 @@ use crate::request::{Record, Response};
 const NUM_RECORDINGS: usize = 3;
 /// The minimum number of operations of a recording.
 const MIN_OPS: usize = 12;
-/// The minimum number of agents of a recording: fewer have few conflicts.
+/// The minimum number of agents of a recording: fewer agents rarely conflict.
 const MIN_AGENTS: usize = 3;
 
 /// A recording, played in a mode.
 struct Candidate {
     recording: usize,
     mode: Mode,
-    /// The rules that are compared, if the mode is the one in which they are tested.
+    /// The compared rules that are tested in this mode.
     rules: Vec<String>,
     /// The length of the conversation. Units: bytes.
     length: usize,

@@ -71,7 +71,7 @@ struct Listed {
     sha256: String,
 }
 
-/// What was written.
+/// The numbers of written files and vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
     /// The number of files of rules.
@@ -85,7 +85,8 @@ pub struct Written {
 /// Replaces the files of an earlier call.
 ///
 /// # Errors
-/// [`Error::Io`] if the folder contains anything but vectors, or cannot be written.
+/// [`Error::Io`] if the folder has files but no manifest of vectors, or cannot be written. [`Error::Port`] if the
+/// reference contradicts a recording. Those of [`crate::cases::read`].
 pub fn write(folder: &Path) -> Result<Written, Error> {
     let old = files_of(folder)?;
     let by_rule = all()?;

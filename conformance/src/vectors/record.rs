@@ -41,7 +41,7 @@ impl Link for Recorder {
     }
 }
 
-/// Returns an answer without the keys that the question already gave.
+/// Returns an answer without the keys that are not compared, because the question determines them.
 fn compared(mode: Mode, ask: &Ask, mut answer: Reply) -> Reply {
     if matches!(ask, Ask::Step { .. }) {
         answer.actions = None;
@@ -76,7 +76,7 @@ pub fn converse(
     let hello = recorder.hello().map_err(|fault| wrong(fault.what))?;
     let judged = judge(&mut recorder, &hello, mode, request, expected);
     if mode == Mode::Config && recorder.exchanges.is_empty() {
-        // The kit asks no port for an instance that the config cannot have; the reference rejects it as any other.
+        // If the config has no instance, the kit asks nothing. The reference rejects it like any invalid config.
         let (config, register) = (Some(request.config.clone()), request.register.clone());
         let beginning = Beginning { config, register, ..Beginning::default() };
         recorder.ask(&Ask::Reset(Box::new(beginning))).map_err(|fault| wrong(fault.what))?;
@@ -123,7 +123,7 @@ pub fn cases() -> Result<BTreeMap<String, Vec<Vector>>, Error> {
     Ok(by_rule)
 }
 
-/// Returns the mode in which a rule is tested: by a config if the config or the seed decides something.
+/// Returns the mode in which a rule is tested: a config for rules of seeding and policies, otherwise an instance.
 pub fn mode_of(rule: &str) -> Mode {
     match profile_of(rule) {
         Profile::Seeding | Profile::Policies => Mode::Config,

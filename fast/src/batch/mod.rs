@@ -116,8 +116,8 @@ impl Batch {
     ///
     /// # Errors
     /// If a lane has no next instance, or its next instance does not fit the config, for example because it has more
-    /// agents: every episode is then unchanged. If there is not enough memory for a lane's map: that lane is then
-    /// unchanged.
+    /// agents: every episode is then unchanged. If there is not enough memory for a lane's map: the episode of that
+    /// lane is then unchanged.
     pub fn reset(&mut self) -> Result<(), Error> {
         self.reset_lanes(&vec![true; self.lanes.len()])
     }
@@ -218,7 +218,7 @@ impl Batch {
     ///
     /// # Errors
     /// [`Error::Length`] if the instances belong to a batch of another size. If there is not enough memory for a lane's
-    /// map; that lane is then unchanged.
+    /// map; the episode of that lane is then unchanged.
     pub fn begin_with(&mut self, firsts: FirstInstances) -> Result<(), Error> {
         let FirstInstances { preparer, instances } = firsts;
         Error::check_length("first instances", self.lanes.len(), instances.len())?;

@@ -16,7 +16,8 @@ impl GridConfig {
     /// Reads a config from YAML.
     ///
     /// # Errors
-    /// One line that names the field, its value and the expected values.
+    /// [`Error::Syntax`] for invalid YAML or an unknown field; otherwise one line that names the field or the place in
+    /// the map, what was found, and what is expected.
     ///
     /// Rule: config/fields
     pub fn from_yaml(text: &str) -> Result<Self, Error> {
@@ -29,7 +30,7 @@ impl GridConfig {
     /// Reads a config from JSON.
     ///
     /// # Errors
-    /// One line that names the field, its value and the expected values.
+    /// As for [`GridConfig::from_yaml`], for invalid JSON instead of invalid YAML.
     ///
     /// Rule: config/fields
     pub fn from_json(text: &str) -> Result<Self, Error> {
@@ -39,7 +40,7 @@ impl GridConfig {
     /// Reads a config from an already parsed object.
     ///
     /// # Errors
-    /// One line that names the field, its value and the expected values.
+    /// As for [`GridConfig::from_yaml`]; [`Error::Syntax`] also for a value that is not an object.
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {

@@ -119,7 +119,7 @@ impl<'a> Search<'a> {
         self.explored.path_to(self.closest)
     }
 
-    /// Generates one successor of the node on top of the stack.
+    /// Generates one successor of the node on top of the stack, or pops the node if it is pruned or exhausted.
     pub fn expand(&mut self) -> Progress {
         let Some(&top) = self.open.last() else {
             return Progress::Exhausted;

@@ -6,7 +6,7 @@ use pogema_core::{Cell, Error, GoalStream, Instance, State};
 
 /// The future goals of all agents, read from their instance and advanced with the episode.
 ///
-/// Only a policy that its paper gives future goals should use it, because an environment does not reveal them.
+/// Only a policy whose paper provides future goals should use it, because an environment does not reveal them.
 #[derive(Debug)]
 pub struct GoalForecast {
     streams: Vec<GoalStream>,
@@ -17,8 +17,8 @@ pub struct GoalForecast {
 }
 
 impl GoalForecast {
-    /// Creates the forecast at the start of an episode, with this many goals of each agent (at least 1), including the
-    /// current one.
+    /// Creates the forecast at the start of an episode, with `num_goals` goals of each agent (at least 1), including
+    /// the current one.
     pub fn new(instance: &Instance, num_goals: usize) -> Self {
         let mut streams = instance.goals().to_vec();
         let ahead = streams.iter_mut().map(|stream| {

@@ -8,10 +8,10 @@ use super::steps::{FlatStep, Heads, LayerSteps, PlaneStep};
 use super::tensors::Tensors;
 use crate::simd::Plane;
 
-/// The largest number of values that a layer may return for an agent.
+/// The largest number of values of a window, margins and padding included.
 const MOST_VALUES: usize = 1 << 24;
 
-/// The largest number of layers, so that nested layers cannot exhaust the stack.
+/// The largest depth of nested layers, so that they cannot exhaust the stack.
 const MOST_DEPTH: usize = 16;
 
 /// Builds the steps of a network. Errors are messages that name the layer or the tensor.

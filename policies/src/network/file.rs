@@ -1,4 +1,4 @@
-//! Reads weights and the JSON beside them.
+//! Reads and writes weights and the JSON beside them.
 
 use std::fs::File;
 use std::io::Read;
@@ -12,7 +12,7 @@ use super::config::NetworkConfig;
 use super::tensors::Tensors;
 use crate::onnx::{self, Graph};
 
-/// What a file holds beside its config.
+/// The content of a file of weights.
 pub enum Content {
     /// The tensors of the layers that the config names.
     Layers(Tensors),

@@ -5,7 +5,9 @@ use pogema_core::SimdPath;
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
 
-/// A recurrent layer. Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
+/// A recurrent layer.
+///
+/// Source: <https://docs.pytorch.org/docs/stable/generated/torch.nn.GRU.html>
 #[derive(Debug)]
 pub struct Gru {
     pub size: usize,
@@ -23,7 +25,8 @@ impl Gru {
         let of_state = Dense::take(tensors, [&state_weight, &bias], &[Piece { pixels: 1, channels: size }])?;
         if size == 0 || of_input.num_outputs % 3 != 0 || of_state.num_outputs != 3 * size {
             return Err(format!(
-                "tensors `{weight}` and `{state_weight}` have {} and {} rows, expected three for each value of the state",
+                "tensors `{weight}` and `{state_weight}` have {} and {} rows, expected three for each value of the \
+                 state",
                 of_input.num_outputs, of_state.num_outputs
             ));
         }

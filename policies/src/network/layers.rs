@@ -112,7 +112,7 @@ impl Piece {
     }
 }
 
-/// The values of an agent that are a list.
+/// A list of values of an agent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flat {
     pub pieces: Vec<Piece>,
@@ -170,7 +170,7 @@ impl Dense {
         Self { num_inputs, num_outputs, weights: packed, bias: pad(bias, stride) }
     }
 
-    /// Takes the heads as one layer: the logits, then the value.
+    /// Takes the heads as one layer: the logits, then the value. Returns it with the number of logits.
     pub fn take_heads(
         tensors: &mut Tensors,
         actions: &str,

@@ -1,4 +1,4 @@
-//! What a network runs: layers of ours, or a graph of a runtime.
+//! The program of a network: its layers, or a graph that a runtime runs.
 
 use pogema_core::SimdPath;
 
@@ -50,7 +50,7 @@ impl Layers {
     }
 }
 
-/// What a network runs.
+/// The program of a network.
 #[derive(Debug)]
 pub enum Program {
     Layers(Box<Layers>),
@@ -144,6 +144,7 @@ pub struct Workspace {
     pub(super) values: Vec<f32>,
 }
 
+/// The buffers of layers: for agents one after the other, for 8 and for 16 side by side, and for the heads.
 #[derive(Clone, Debug)]
 struct LayerBuffers {
     apart: Buffers,

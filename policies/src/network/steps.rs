@@ -6,7 +6,7 @@ use super::gru::{Gru, Output, States};
 use super::layers::{Activation, Convolution, Dense, Flat, Rows};
 use crate::simd::{BLOCK, Plane};
 
-/// Room for agents that are computed one after the other.
+/// The largest number of agents that are computed one after the other.
 pub const CHUNK: usize = 12;
 
 /// A step on the windows of one agent. Numbers are slots of the workspace.
@@ -66,7 +66,7 @@ pub struct Heads {
     pub num_actions: usize,
 }
 
-/// The inputs of a chunk of agents.
+/// The inputs of a chunk of agents, laid out as in [`super::Inputs`].
 #[derive(Clone, Copy, Debug)]
 pub struct Chunk<'a> {
     pub num_agents: usize,
@@ -159,7 +159,7 @@ impl LayerSteps {
         }
     }
 
-    /// Returns the largest number of agents that are faster one after the other than 8 or 16 side by side. Their results
+    /// Returns the largest number of agents that are faster one after the other than 8 or 16 side by side. The results
     /// have the same bits either way.
     pub fn most_apart(&self) -> usize {
         let fills_blocks = |step: &PlaneStep| match step {
@@ -173,7 +173,7 @@ impl LayerSteps {
         if self.of_planes.iter().all(fills_blocks) { CHUNK } else { 5 }
     }
 
-    /// Returns the number of floats of scratch space that any step needs for an agent.
+    /// Returns the largest number of floats of scratch space that a step needs for an agent.
     pub fn scratch(&self) -> usize {
         let of_steps = self.of_flats.iter().map(|step| match step {
             FlatStep::Gru { gru, .. } => gru.scratch(),

@@ -66,7 +66,8 @@ impl<'a> Reader<'a> {
         Ok(self.append(input, layer, shape))
     }
 
-    /// Stores the tensors of a layer. Its name is that of its weights if they have one of their own.
+    /// Stores the tensors of a layer and returns its name: that of its weights if no other layer has it, else
+    /// `layer-NUMBER`.
     fn store(&mut self, weights: &TensorProto, tensors: Vec<(&str, Vec<usize>, Vec<f32>)>) -> String {
         let number = self.tensors.len();
         let own = weights.name.strip_suffix(".weight").filter(|name| !self.tensors.contains_key(*name));
@@ -168,7 +169,7 @@ impl<'a> Reader<'a> {
             }
             [Value::Step(one), Value::Step(other)] if self.steps[one].shape == self.steps[other].shape => {
                 let shape = self.steps[one].shape;
-                // A value follows the other if it was read later.
+                // Only the value that was read later can be computed from the other.
                 let (first, last) = (one.min(other), one.max(other));
                 let layers = self.layers_between(first, last);
                 let layers = layers
@@ -232,7 +233,8 @@ impl<'a> Reader<'a> {
         Ok(self.append(one, Layer::Scalars(layers), Shape::List(len)))
     }
 
-    /// Reads an axis of size 1 around a recurrent layer or after a head with one output.
+    /// Reads an operator that adds or removes an axis of size 1, around a recurrent layer or after a head with one
+    /// output.
     fn squeeze(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         let (step, shape) = self.step(node, 0)?;
         let is_recurrent = matches!(self.steps[step].layer, Some(Layer::Gru(_)));

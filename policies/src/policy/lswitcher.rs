@@ -1,4 +1,4 @@
-//! LSwitcher: planning or learning, whichever promises more.
+//! LSwitcher: planning or learning, whichever has the larger predicted value.
 
 use std::time::Duration;
 
@@ -29,7 +29,8 @@ impl Judge {
     /// Creates a judge of a network with its own encoder.
     ///
     /// # Errors
-    /// [`Error::Request`] if the network has another number of outputs, no encoder, or one of another shape.
+    /// [`Error::Request`] if the network does not have two outputs, has no encoder, or has one of another shape;
+    /// [`Error::Config`] for invalid settings of the encoder.
     pub fn new(network: Network) -> Result<Self, Error> {
         if network.num_actions() != NUM_VALUES {
             let found = network.num_actions();
@@ -67,12 +68,12 @@ pub(crate) struct LSwitcher {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Side {
     learns: bool,
-    /// Number of steps since the agent has changed sides, or since the second step of the episode.
+    /// Number of steps since the agent changed sides; before the first change, since the second step of the episode.
     steps: u32,
 }
 
 impl Side {
-    /// Returns the side in the next step, of an agent for which EPOM has the larger value or not.
+    /// Returns the side in the next step; `prefers_learning` says whether EPOM has the larger value there.
     fn next(self, prefers_learning: bool) -> Self {
         let changes = prefers_learning != self.learns && self.steps >= LEAST_STEPS;
         let steps = if changes { 0 } else { self.steps };

@@ -16,8 +16,8 @@ impl NetworkPolicy {
     /// Creates a policy of a network with its own encoder and sampling.
     ///
     /// # Errors
-    /// [`Error::Request`] if the network has no encoder, or one of another shape; [`Error::Config`] for invalid
-    /// settings.
+    /// [`Error::Request`] if the network has no encoder, one of another shape, or not one logit for each action;
+    /// [`Error::Config`] for invalid settings of the encoder.
     pub fn new(network: Network) -> Result<Self, Error> {
         let encoder = encoder_of(&network)?;
         Self::with_encoder(network, encoder)
@@ -37,7 +37,8 @@ impl NetworkPolicy {
         Ok(Self(NetworkSettings { network, encoder, sampling, masks_actions }))
     }
 
-    /// Creates the policy Follower, for a network whose window has Follower's two channels.
+    /// Creates the policy Follower. A network without an encoder gets Follower's, so its window must have the two
+    /// channels of Follower.
     ///
     /// # Errors
     /// Those of [`NetworkPolicy::new`].

@@ -1,4 +1,4 @@
-//! RePlan's planner: what the agents remember, and one search for each agent in every step.
+//! RePlan's planner: the memory of the agents, and one search for each agent in every step.
 
 use pogema_core::{Action, Cell, Instance, Occupancy, State};
 
@@ -9,9 +9,10 @@ use crate::replan::search::{Query, Search};
 /// The two versions of RePlan that its authors released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ReplanVersion {
-    /// The C++ version with which ASwitcher plans. It gives no move without a path, or to one of the last two cells.
+    /// The C++ version, with which ASwitcher plans. Without a path it has no move.
     Cpp,
-    /// The Python version, which plays alone. Without a path it moves towards the seen cell nearest to the goal.
+    /// The Python version, which plays alone and in LSwitcher. Without a path it moves towards the expanded cell
+    /// nearest to the goal.
     Python,
 }
 
@@ -50,10 +51,10 @@ struct Agent {
     trail: [Option<Place>; 2],
 }
 
-/// What the plan of an agent says.
+/// The plan of an agent for one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Plan {
-    /// The agent is on its goal or inactive, or there is no path.
+    /// The agent is on its goal or inactive, or the search finds no move.
     None,
     /// The first move of the path.
     Move(Action),

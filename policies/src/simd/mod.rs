@@ -27,7 +27,7 @@ use pogema_core::SimdPath;
 pub use agents::MultiplyAgents;
 pub use kernels::{Convolve, Multiply};
 
-/// Number of floats in a vector. The channels of activations are padded to a multiple of it.
+/// Number of floats in a vector of `kernels`. The channels of activations are padded to a multiple of it.
 pub const LANES: usize = 8;
 
 /// Number of output channels that are computed together.
@@ -36,7 +36,7 @@ pub const BLOCK: usize = 2 * LANES;
 /// Largest number of agents whose values lie side by side in the kernels for many agents.
 pub const AGENTS: usize = 16;
 
-/// The other number of agents for which there are such kernels.
+/// The other number of agents that have such kernels.
 pub const HALF: usize = AGENTS / 2;
 
 /// Number of partial sums of each output of a dense layer.
@@ -88,7 +88,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Returns the index of the first value that the first output of a row reads, if the first tap is in this row.
+    /// Returns the index of the first value that a row of outputs reads from a row of the input.
     fn input_index(&self, row: usize) -> usize {
         row * self.input.row_len() + (self.input.margin - self.padding) * self.input.stride
     }

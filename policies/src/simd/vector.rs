@@ -1,4 +1,4 @@
-//! Vectors of floats: one trait, implemented without intrinsics and with AVX2.
+//! Vectors of floats: one trait, implemented without intrinsics, with AVX2 and with AVX-512.
 //!
 //! Each operation is one that IEEE 754 defines exactly, so every implementation returns the same bits.
 

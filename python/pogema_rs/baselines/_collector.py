@@ -15,8 +15,8 @@ from pogema_rs.baselines._teacher import Teacher, cells_ahead
 from pogema_rs.policies import Policy
 from pogema_rs.vec_env import AutoresetMode, VecEnv
 
-#: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`; or a policy
-#: that plays in Rust.
+#: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`; or a
+#: policy that plays in Rust.
 Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 
 
@@ -137,7 +137,7 @@ class Collector:
                 rewards += weight * self._at_next_cell(record, step, before, channel)
         if weights.approach:
             rewards += weights.approach * self._approaches(record, step, before)
-        # A finished agent gets no reward.
+        # A finished agent earns no reward, but gets that of its team.
         rewards *= record.active[step] & record.played[step][:, None]
         if weights.team:
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
@@ -162,7 +162,7 @@ class Collector:
         return np.where(has_path, positions + offsets, goals)
 
     def _at_next_cell(self, record: Record, step: int, before: np.ndarray, channel: str) -> np.ndarray:
-        """Returns the value of a channel, as it was before the step, at the cell that each agent moved to; else 0.
+        """Returns the value that a channel had before the step at the cell that each agent moved to; 0 if it stayed.
 
         For `cost_to_go` the unit is one step towards the goal.
         """

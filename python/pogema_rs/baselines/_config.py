@@ -39,6 +39,7 @@ class EnvironmentConfig:
     max_episode_steps: int = 128
     collision_system: str = "soft"
     obs_radius: int = 5
+    #: The side and the density of obstacles of `plain` maps.
     size: int = 8
     density: float = 0.3
 
@@ -52,11 +53,17 @@ class EnvironmentConfig:
 class RewardConfig:
     """The weights of the parts of the reward."""
 
+    #: Whether each agent gets the mean of all agents' rewards.
     team: bool = False
+    #: For reaching a goal; if `on_target` is `nothing`, for each step that ends on the goal.
     goal: float = 1.0
+    #: For each step that leads nearer to the goal; its negative for a step that leads away.
     progress: float = 0.0
+    #: For each step that leads nearer to the goal than any step before.
     approach: float = 0.0
+    #: For each cell of Follower's path that the agent enters.
     path: float = 0.0
+    #: For each step.
     step: float = 0.0
 
 
@@ -91,7 +98,8 @@ class QLearningConfig(DescentConfig):
     epsilon_steps: int = 100_000
     #: The trained network draws from the softmax of the values divided by this; 0 for the largest value.
     temperature: float = 0.0
-    #: The trained network is a moving average, which keeps this share of itself in each iteration; 0 for the last network.
+    #: The trained network is a moving average, which keeps this share of itself in each iteration; 0 for the last
+    #: network.
     averaging: float = 0.0
     replay: int = 5000
     batch: int = 32

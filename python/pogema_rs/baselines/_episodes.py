@@ -13,7 +13,7 @@ from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, ge
 
 #: The smallest seed of a map or an episode. Published sets have small seeds, at most 2175.
 FIRST_SEED = 2**32
-#: The rows and columns of the largest map of each kind.
+#: The rows and columns that have room for all maps of a kind; those of warehouses are the published warehouse's.
 LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
 
 # The streams of seeds.
@@ -88,6 +88,6 @@ def _drawn(kind: str, seed: int) -> str:
         return generate_map(MapRangeSettings().sample(seed))
     if kind == "mazes":
         return MazeGenerator.generate_maze(**MazeRangeSettings(17, 21, 17, 21).sample(seed))
-    # The paper's warehouse has 5 rows of shelves.
+    # The warehouse of the default settings has 5 rows of shelves, and the published one has 8.
     rng = np.random.default_rng(seed)
     return generate_warehouse(WarehouseConfig(walls_in_row=int(rng.integers(3, 6)), walls_rows=int(rng.integers(3, 5))))

@@ -30,8 +30,8 @@ NUM_VALUES = 2
 class ValueLearner:
     """Learns the discounted returns of two policies, of which one plays each iteration.
 
-    The policies are EPOM with the weights of the package, and RePlan. Both play by LSwitcher with a network that always
-    prefers the same side.
+    The policies are EPOM with the weights of the package, and RePlan. LSwitcher plays each of them, with a network that
+    always prefers that policy.
     """
 
     #: LSwitcher draws EPOM's actions.
@@ -51,7 +51,7 @@ class ValueLearner:
 
     @property
     def side(self) -> int:
-        """The policy that plays the next iteration: each in turn in every kind of episodes."""
+        """The index of the policy that plays the next iteration; in each kind of episodes, the policies take turns."""
         return self._iteration // len(self.config.environment.kinds) % NUM_VALUES
 
     def open(self, folder: Path) -> None:

@@ -23,7 +23,7 @@ class Replay:
     ) -> None:
         """Opens the files, or creates them if `count`, the number of episodes so far, is 0.
 
-        Errors: FileNotFoundError or ValueError if a file is missing or has the wrong size.
+        Errors: FileNotFoundError if a file is missing or has the wrong size; OSError if it cannot be created.
         """
         self.capacity, spare = sizes
         self.count, self._slots = count, self.capacity + spare

@@ -88,7 +88,7 @@ def train(
 
 @contextmanager
 def _settings(seed: int, threads: int) -> Iterator[None]:
-    """Gives PyTorch the settings of a training, and the caller's afterwards."""
+    """Sets PyTorch up for a training, and restores the caller's settings afterwards."""
     before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled())
     warns, fills = torch.is_deterministic_algorithms_warn_only_enabled(), torch.utils.deterministic.fill_uninitialized_memory
     with torch.random.fork_rng(devices=[]):
@@ -168,7 +168,7 @@ class _Run:
             self.folder.rmdir()
 
     def close(self) -> None:
-        """Frees the environments."""
+        """Frees the environments, and closes the files for TensorBoard."""
         for collector in (*self.lanes.values(), *self.judges.values()):
             collector.close()
         if self.writer is not None:

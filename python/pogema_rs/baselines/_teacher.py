@@ -28,7 +28,7 @@ class Teacher:
         self.advice = np.zeros(shape, dtype=np.int8)
 
     def advise(self, step: int, obstacles: np.ndarray, positions: np.ndarray, goals: np.ndarray) -> None:
-        """Notes the planner's actions in a state, for any goals of the agents.
+        """Stores in `advice` the planner's actions in a state, for the given goals.
 
         Shape: `obstacles` `(lanes, rows, columns)`, `positions` and `goals` `(lanes, agents, 2)`
         """

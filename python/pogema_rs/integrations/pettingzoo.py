@@ -70,7 +70,9 @@ class PogemaParallel(ParallelEnv):
         """Returns the space of an agent's actions."""
         return self.action_spaces[agent]
 
-    def reset(self, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def reset(
+        self, seed: Optional[int] = None, options: Optional[dict] = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Begins an episode and returns observations and infos by name."""
         observations, infos = self.pogema.reset(seed=seed, options=options)
         self.agents = self.possible_agents[:]
@@ -96,7 +98,7 @@ class PogemaParallel(ParallelEnv):
         return self.pogema.get_state()
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map."""
+        """Prints the map, or returns its text if `mode` is "ansi"."""
         return self.pogema.render(mode=mode)
 
     def close(self) -> None:

@@ -72,12 +72,12 @@ class PyMarlPogema:
         return len(self.get_state())
 
     def get_avail_actions(self) -> list[list[int]]:
-        """Returns all actions for each agent."""
+        """Returns the numbers of all actions for each agent."""
         return [self.get_avail_agent_actions(agent) for agent in range(self.n_agents)]
 
     @staticmethod
     def get_avail_agent_actions(agent_id: int) -> list[int]:
-        """Returns all actions."""
+        """Returns the numbers of all actions, as in POGEMA; PyMARL expects a flag for each action."""
         return list(range(PyMarlPogema.get_total_actions()))
 
     @staticmethod
@@ -105,7 +105,7 @@ class PyMarlPogema:
         return self.env.sample_actions()
 
     def render(self, *args: Any, **kwargs: Any) -> Optional[str]:
-        """Prints the map."""
+        """Prints the map, or returns its text if `mode` is "ansi"."""
         return self.env.render(*args, **kwargs)
 
     def save_replay(self) -> None:

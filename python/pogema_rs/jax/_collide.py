@@ -30,10 +30,10 @@ class Moved(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """The cell and the target of each agent, as numbers of grid cells. Inactive agents have the number after the last cell.
+    """The cell and the target of each agent, as numbers of grid cells.
 
-    `board` holds the active agent on each cell, or the number of agents if there is none; `occupant` is its value at the
-    target. `is_blocked`: whether the target is an obstacle.
+    Inactive agents have the number after the last cell. `board` holds the active agent on each cell, or the number of
+    agents if it has none; `occupant` is its value at the target. `is_blocked`: whether the target is an obstacle.
 
     Shape: `(agents,)` each; `board` `(cells,)`
     """

@@ -61,8 +61,8 @@ class InstancePool:
     `num_agents` and `map_size`, rows and columns, make room for larger instances [default: those of the config].
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
 
-    Errors: TypeError or ValueError for wrong arguments, before anything is made; `InstanceError` if a seed has no
-    instance.
+    Errors: TypeError or ValueError for wrong arguments, before more than one instance is made; `InstanceError` if a
+    seed has no instance.
     """
 
     def __init__(
@@ -110,8 +110,8 @@ class InstancePool:
     def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
         """Replaces all instances, and returns the new `params`.
 
-        The arrays keep their shapes, so nothing is compiled again, unless the goals need more room than the first
-        ones and an eighth. Current episodes continue with the old `params`; with the new ones, lifelong agents
+        The arrays keep their shapes, so nothing is compiled again, unless the new instances have over an eighth more
+        goals than the first ones. Current episodes continue with the old `params`; with the new ones, lifelong agents
         continue with goals of the new instances. After an error the old instances stay.
         """
         self.params = self._make(seeds)

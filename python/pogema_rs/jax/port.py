@@ -1,7 +1,7 @@
 """Serves `pogema_rs.jax` to the conformance kit: `python -m pogema_rs.jax.port`.
 
-The port pads instances to a few sizes, so that few functions are compiled. `--cache FOLDER` keeps the compiled functions
-in a folder [default: none].
+The port pads instances to a few sizes, so that few functions are compiled. `--cache FOLDER` keeps the compiled
+functions in a folder [default: none].
 """
 
 from __future__ import annotations
@@ -295,7 +295,8 @@ class Port:
             if self.episode is None:
                 raise Refusal("this question arrived before an instance")
             if kind in ("step", "act"):
-                return self.episode.step(question["actions"]) if kind == "step" else self.episode.act(question["policy"])
+                is_step = kind == "step"
+                return self.episode.step(question["actions"]) if is_step else self.episode.act(question["policy"])
             if kind in ("back", "history"):
                 return self.episode.back() if kind == "back" else self.episode.history()
             raise Refusal(f"the question {kind!r} is not claimed")

@@ -130,7 +130,7 @@ def _initialize(state: dict[str, Any], reader: Connection, writer: Connection) -
     # Ctrl-C reaches all processes of a terminal; the parent ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(reader,), daemon=True).start()
-    # Otherwise NumPy uses all cores in every process.
+    # For libraries that a policy loads later, for example PyTorch. A library that is already loaded keeps its threads.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     ToolboxRegistry.recreate_from_state(state)
     forget()  # a forked process has the algorithm of its parent

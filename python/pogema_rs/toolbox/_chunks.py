@@ -1,7 +1,7 @@
-"""Backends that play all episodes of an algorithm in memory, each process one chunk of them.
+"""Backends that play all episodes of an algorithm and keep the results in memory, chunk by chunk.
 
-A process makes one algorithm for its chunk. The results of an algorithm that keeps a state between episodes, such as a
-generator, therefore depend on the chunks, which are those of pogema-toolbox.
+Each chunk has its own instance of the algorithm. The results of an algorithm that keeps a state between episodes, for
+example a generator, therefore depend on the chunks, which are those of pogema-toolbox.
 """
 
 from __future__ import annotations

@@ -117,5 +117,8 @@ def _draw(env: Any, task: Task) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Returns a NumPy number as a Python number, and any other value unchanged."""
+    """Returns a number of NumPy or PyTorch as a Python number, and a value without the method `item` unchanged.
+
+    Errors: ValueError for a NumPy array of several numbers.
+    """
     return value.item() if hasattr(value, "item") else value

@@ -100,7 +100,7 @@ def evaluation(
 
     `evaluation_config` is a YAML file or its content. `begin` says how to treat earlier results in the folder
     `eval_dir`: `new` rejects them, `resume` continues an interrupted run of the same suite, `anew` deletes them,
-    `replace` does what pogema-toolbox does [default: `new`; `replace` after `install_as_pogema(toolbox=True)` and
+    `replace` does what pogema-toolbox does [default: `new`; `replace` after `install_as_pogema(toolbox=True)` or
     without a folder]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
     of a scheduler for algorithms with a Dask `parallel_backend` [default: the one in the suite, otherwise a cluster of
     processes on this machine]. At the end the tables of `results_views` are printed, and plots are written to `views`

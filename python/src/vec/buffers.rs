@@ -46,6 +46,7 @@ impl<'py> Buffer<'py> {
         Ok(Self::Encoded(cast(&value(dict, "windows")?)?, Some(cast(&value(dict, "scalars")?)?)))
     }
 
+    /// Takes the buffers for the observations of the engine.
     pub fn new(arrays: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(dict) = arrays.cast::<PyDict>() {
             return Apart::new(dict).map(|apart| Self::Apart(Box::new(apart)));

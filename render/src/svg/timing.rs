@@ -17,7 +17,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Returns the clock for this number of frames; none for a single frame.
+    /// Returns the clock for this number of frames; none for a single frame. Units: `step_time` in seconds.
     pub fn new(num_frames: usize, step_time: f64) -> Option<Self> {
         // Viewers do not play an animation of duration 0.
         let duration = number_to((num_frames as f64 * step_time).max(1e-3), 4);

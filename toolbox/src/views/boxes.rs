@@ -20,8 +20,8 @@ use crate::tree::Node;
 
 /// `type: box`: a box of the metric `y` for each value of the column `x` [default: `algorithm`].
 ///
-/// A box spans the middle half of the values and shows their median. Its whiskers reach to the last value within 1.5
-/// box lengths. Values beyond the whiskers are dots.
+/// A box spans the middle half of the values and shows their median. Its whiskers end at the outermost values within
+/// 1.5 box lengths of the box. Values beyond the whiskers are dots.
 #[derive(Clone, Debug)]
 pub struct BoxView {
     common: Common,

@@ -24,7 +24,8 @@ const MORE_IS_BETTER: [&str; 3] = ["CSR", "ISR", "avg_throughput"];
 /// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and a table of wins.
 ///
 /// `y` is the metric [default: `SoC`]. `better` is `lower` or `higher` [default: `higher` for `CSR`, `ISR` and
-/// `avg_throughput`, else `lower`]. Results without `CSR`, for example lifelong ones, count as solved.
+/// `avg_throughput`, else `lower`]. Results without `CSR`, for example lifelong ones, count as solved. With `CSR`,
+/// `ISR` and `avg_throughput`, unsolved instances count, too.
 #[derive(Clone, Debug)]
 pub struct CompareView {
     common: Common,
@@ -38,12 +39,12 @@ pub struct CompareView {
 /// The outcomes of the instances that both algorithms played.
 #[derive(Clone, Debug, Default)]
 struct Score {
-    /// The values of both, for instances that both solved.
+    /// The values of both, for instances that count for both.
     both: Vec<(f64, f64)>,
     only_first: usize,
     only_second: usize,
     neither: usize,
-    /// Number of instances that one of them has not played or lacks a value for.
+    /// Number of instances that at least one of them has not played or lacks a value for.
     alone: usize,
 }
 
@@ -88,7 +89,7 @@ impl CompareView {
         Ok(Shown { tables: vec![self.table(&pair, &score)], pictures, notes })
     }
 
-    /// Returns the two algorithms; if none are named and the results have exactly two, those.
+    /// Returns the named algorithms, or the only two of the results if none are named.
     fn pair(&self, name: &str, results: &Results) -> Result<[String; 2], Error> {
         let all = results.algorithms();
         let (first, second) = match (&self.first, &self.second, all.as_slice()) {
@@ -125,7 +126,7 @@ impl CompareView {
         score
     }
 
-    /// Returns whether a row's value counts: the row is solved, or higher is better by default.
+    /// Returns whether a row's value counts: the row is solved, or the metric is one of [`MORE_IS_BETTER`].
     fn counts(&self, row: &Row) -> bool {
         MORE_IS_BETTER.contains(&self.metric.as_str()) || row.is_solved()
     }

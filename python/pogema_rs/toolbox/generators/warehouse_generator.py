@@ -62,6 +62,8 @@ def generate_wfi_positions(grid_str: str, bottom_gap: int, vertical_gap: int) ->
 def generate_wfi_warehouse(cfg: WarehouseConfig = WarehouseConfig()) -> str:
     """Returns the text of a warehouse with possible starts (`@`) and goals (`$`) only at some cells.
 
+    Errors: those of `generate_warehouse` and `generate_wfi_positions`.
+
     Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_wfi_warehouse`
     """
     text = generate_warehouse(cfg)

@@ -15,7 +15,7 @@ __all__ = ["Aggregator", "TabularView", "View", "preprocess_table", "process_tab
 
 
 class TabularView(View):
-    """The options of a table.
+    """The options of a table; `show_std` and `skip_zero_std` have no effect.
 
     Source: pogema-toolbox 0.1.1, `view_tabular.py`, `TabularView`
     """

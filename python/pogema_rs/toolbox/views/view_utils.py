@@ -39,7 +39,7 @@ class View(Model):
 
 
 def drop_na(df: Any) -> Any:
-    """Returns a frame without the columns that lack a number in some row, and logs a warning for each of them."""
+    """Returns a frame without the columns that lack a value in some row, and logs a warning for each of them."""
     complete = df.dropna(axis=1, how="any")
     for column in df.columns.difference(complete.columns):
         ToolboxRegistry.warning(f"column `{column}` is dropped: some rows have no value")
@@ -83,7 +83,7 @@ def load_from_folder(folder_path: Path) -> tuple[list[dict[str, Any]], dict[str,
 
 
 def check_seeds(results: _Rows) -> None:
-    """Logs an error for the instances that an algorithm lacks or has more than once, or that every row is there.
+    """Logs an error that lists the instances that an algorithm lacks or has more than once; otherwise logs a success.
 
     Source: pogema-toolbox 0.1.1, `view_utils.py`, `check_seeds`
     """

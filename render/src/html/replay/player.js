@@ -1,7 +1,8 @@
 // The playback: the current time, playing and pausing.
 
 class Player {
-  // `onFrame(time)` draws a frame and is called only after a change; `onStop()` is called when playback stops.
+  // `onFrame(time)` draws a frame and is called only after a change; `onStop()` is called when playback stops, and
+  // after a jump while it is paused.
   constructor(numSteps, onFrame, onStop) {
     Object.assign(this, { numSteps, onFrame, onStop, time: 0, speed: 4, isPlaying: false, isSmooth: true });
     this.drawTimes = new Float64Array(600);

@@ -1,6 +1,6 @@
 // Colours and the map.
 
-// POGEMA's seven colours; each later colour is the one most distant from all before it.
+// POGEMA's seven colours first; each later colour is the one most distant from all before it.
 const PALETTE = [
   "#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72d5c8", "#0ea08c", "#8f7b66",
   "#fca800", "#fc90f0", "#903090", "#007800", "#90b40c", "#fc7878",
@@ -59,7 +59,7 @@ function paintMap(context, view, isObstacle, bitmap) {
   context.strokeRect(-wall / 2, -wall / 2, width + wall, height + wall);
   if (scale < 2 * COARSE) {
     context.imageSmoothingEnabled = scale < 1;
-    // At small scales opaque obstacles would hide the agents among them.
+    // At small scales, agents among opaque obstacles would be hard to see.
     context.globalAlpha = scale < COARSE ? 0.6 : 1;
     context.drawImage(bitmap(), 0, 0);
     context.globalAlpha = 1;
