@@ -7,9 +7,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-LIMIT = float(os.environ.get("POGEMA_ORACLE_TIMEOUT", "20"))
-if not 0 < LIMIT < 1e6:
-    raise ValueError(f"POGEMA_ORACLE_TIMEOUT is {LIMIT}, expected a number of seconds above 0 and below 1e6")
+
+
+def read_limit(text: str) -> float:
+    """Reads a time limit. Units: seconds. Errors: ValueError for any other text."""
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = 0.0
+    if not 0 < limit < 1e6:
+        raise ValueError(f"POGEMA_ORACLE_TIMEOUT is {text}, expected a number of seconds above 0 and below 1e6")
+    return limit
+
+
+LIMIT = read_limit(os.environ.get("POGEMA_ORACLE_TIMEOUT", "20"))
 
 
 class Timeout(BaseException):

@@ -42,7 +42,10 @@ class Oracle:
         )
         assert self.process.stdin and self.process.stdout
         self.input, self.output = self.process.stdin, self.process.stdout
-        self.greeting = json.loads(self.output.readline())
+        line = self.output.readline()
+        if not line:
+            raise RuntimeError(f"the oracle did not start: {self.close()[2].decode()}")
+        self.greeting = json.loads(line)
 
     def send(self, line: bytes) -> dict[str, Any]:
         """Sends a raw line; returns the response."""
@@ -58,7 +61,11 @@ class Oracle:
 
     def close(self) -> tuple[int, bytes, bytes]:
         """Closes the input; returns the exit code and the remaining output."""
-        out, err = self.process.communicate(timeout=30)
+        try:
+            out, err = self.process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
         return self.process.returncode, out, err
 
 

@@ -78,7 +78,7 @@ class Environment {
     }
   }
 
-  // Returns the observation of an agent, also of a finished one: obstacles, agents (itself included) and goal.
+  // Returns the observation of an agent, also of a finished one: obstacles, active agents (itself included), goal.
   observe(agent) {
     const [[row, col], goal, radius] = [this.cells[agent], this.goals[agent], this.radius];
     // A goal outside the window is drawn on its edge: each axis is clamped separately.

@@ -138,11 +138,12 @@ class Port:
             return CLAIMS
         try:
             if "instance" in question:  # without an instance, `reset` resets the current environment
+                self.environment = None
                 self.environment = Environment(question["instance"])
             if self.environment and question["type"] in ("reset", "step") and "config" not in question:
                 return play(self.environment, question)
             raise ValueError("this question is not claimed, or arrived before an instance")
-        except (KeyError, TypeError, ValueError) as error:
+        except Exception as error:
             return {"error": f"{type(error).__name__}: {error}"}
 
 

@@ -142,14 +142,7 @@ impl Case {
 
     /// Describes the first deviation of an answer from the case.
     pub fn mismatch(&self, response: &Response) -> Option<String> {
-        if let Some(expected) = &self.error {
-            return match &response.error {
-                Some(error) if error.message.contains(expected.as_str()) => None,
-                Some(error) => Some(format!("expected the error `{expected}`, got `{}`", error.message)),
-                None => Some(format!("expected the error `{expected}`, got none")),
-            };
-        }
-        if let Some(error) = &response.error {
+        if let (None, Some(error)) = (&self.error, &response.error) {
             return Some(format!("unexpected error: {}", error.message));
         }
         let mut map: Option<Map> = None;
@@ -163,7 +156,12 @@ impl Case {
                 return Some(format!("after operation {op}: {mismatch}"));
             }
         }
-        None
+        let expected = self.error.as_ref()?;
+        match &response.error {
+            Some(error) if error.message.contains(expected.as_str()) => None,
+            Some(error) => Some(format!("expected the error `{expected}`, got `{}`", error.message)),
+            None => Some(format!("expected the error `{expected}`, got none")),
+        }
     }
 
     /// Returns whether the case has any expectation.

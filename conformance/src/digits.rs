@@ -22,8 +22,17 @@ pub(crate) fn unpack(window: &str) -> Vec<bool> {
         .collect()
 }
 
-/// Returns the area of a square window, given the number of flags of three windows padded to whole bytes.
-pub(crate) fn area_of(num_flags: usize) -> Option<usize> {
-    let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| 3 * area <= num_flags);
-    areas.last().filter(|area| num_flags < 3 * area + 8)
+/// Returns the `N` square windows of one size that [`pack`] packed together; `None` if the digits hold other windows.
+pub(crate) fn windows<const N: usize>(digits: &str) -> Option<[Vec<bool>; N]> {
+    let flags = unpack(digits);
+    let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| N * area <= flags.len());
+    let area = areas.last().filter(|area| flags.len() < N * area + 8)?;
+    Some(std::array::from_fn(|index| flags[index * area..(index + 1) * area].to_vec()))
+}
+
+/// Draws a square window, row by row, with `.` for 0 and `1` for 1.
+pub(crate) fn lines(window: &[bool]) -> String {
+    let side = window.len().isqrt().max(1);
+    let line = |row: &[bool]| row.iter().map(|&flag| if flag { '1' } else { '.' }).collect::<String>();
+    window.chunks(side).map(line).collect::<Vec<_>>().join("\n")
 }

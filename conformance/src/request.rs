@@ -235,10 +235,11 @@ impl Response {
 
     /// Returns the map of the episode that contains an operation.
     pub fn map_at(&self, op: usize) -> Option<Map> {
-        self.records.iter().take(op + 1).rev().find_map(|record| match record {
-            Record::Reset(reset) => Map::from_rows(&reset.map).ok(),
+        let mut resets = self.records.iter().take(op + 1).rev().filter_map(|record| match record {
+            Record::Reset(reset) => Some(&reset.map),
             _ => None,
-        })
+        });
+        resets.next().and_then(|rows| Map::from_rows(rows).ok())
     }
 
     /// Returns the last state before an operation.
@@ -299,7 +300,8 @@ impl TryFrom<Vec<Value>> for Op {
         let unknown = || format!("unknown operation {}", Value::Array(parts.clone()));
         let name = parts.first().and_then(Value::as_str).ok_or_else(unknown)?;
         match (name, &parts[1..]) {
-            ("reset", [seed]) => Ok(Self::Reset(seed.as_u64())),
+            ("reset", [Value::Null]) => Ok(Self::Reset(None)),
+            ("reset", [seed]) => seed.as_u64().map(|seed| Self::Reset(Some(seed))).ok_or_else(unknown),
             ("step", [actions]) => {
                 serde_json::from_value(actions.clone()).map(Self::Step).map_err(|error| error.to_string())
             }

@@ -32,15 +32,13 @@ const MAX_STEPS: usize = 26;
 /// Returns the complete request and the answer of the given engine.
 pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Request, Response) {
     let mut dice = Dice::new(seed ^ 0x5ca1_ab1e, request.id);
-    let mut response = Response { id: Some(request.id), ..Response::default() };
     let Ok(mut player) = Player::new(&engine.make, &request) else {
         request.ops.push(Op::Reset(None));
         return (request.clone(), crate::play_on(engine, &request));
     };
     let num_episodes = if dice.chance(0.2) { 2 } else { 1 };
     for _ in 0..num_episodes {
-        play_episode(&mut player, &mut dice, &mut request, &mut response);
-        if response.error.is_some() {
+        if play_episode(&mut player, &mut dice, &mut request).is_none() {
             break;
         }
     }
@@ -49,14 +47,13 @@ pub fn play_script(engine: NamedEngine, mut request: Request, seed: u64) -> (Req
     (request, response)
 }
 
-fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, response: &mut Response) {
+/// Plays an episode and adds its operations to the request. Returns `None` after an operation that failed.
+fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request) -> Option<()> {
     let script = draw_script(dice, player);
     // No step between the resets, because POGEMA adds the counters of an abandoned episode to the next one.
     for _ in 0..if dice.chance(0.15) { 3 } else { 1 } {
         let seed = dice.chance(0.2).then(|| dice.below(1000) as u64);
-        if !perform(player, Op::Reset(seed), request, response) {
-            return;
-        }
+        perform(player, Op::Reset(seed), request)?;
     }
     let max_steps = player.config.max_episode_steps.clamp(1, MAX_STEPS as i64) as usize;
     let num_extra = if dice.chance(0.2) { 2 } else { 0 };
@@ -68,15 +65,11 @@ fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, res
             Script::Sample => Op::Sample,
             _ => Op::Step(choose(script, player, dice)),
         };
-        if !perform(player, op, request, response) {
-            return;
-        }
+        let mut record = perform(player, op, request)?;
         while can_go_back && dice.chance(0.2) {
-            if !perform(player, Op::Back, request, response) {
-                return;
-            }
+            record = perform(player, Op::Back, request)?;
         }
-        let is_over = response.records.last().and_then(Record::step).is_some_and(|step| {
+        let is_over = record.step().is_some_and(|step| {
             let all = |flags: &[bool]| flags.iter().all(|&flag| flag);
             all(&step.step.terminated) || all(&step.step.truncated)
         });
@@ -86,8 +79,9 @@ fn play_episode(player: &mut Player, dice: &mut Dice, request: &mut Request, res
         }
     }
     if player.config.persistent {
-        perform(player, Op::History, request, response);
+        perform(player, Op::History, request)?;
     }
+    Some(())
 }
 
 /// Returns whether steps back can be compared. In POGEMA they fail if an agent has vanished or returns to an obstacle.
@@ -96,16 +90,11 @@ fn can_compare_back(player: &Player) -> bool {
         && player.config.possible_agents_xy.is_none()
 }
 
-fn perform(player: &mut Player, op: Op, request: &mut Request, response: &mut Response) -> bool {
+/// Adds an operation to the request and performs it; returns `None` if it fails.
+fn perform(player: &mut Player, op: Op, request: &mut Request) -> Option<Record> {
     let result = player.perform(&op);
     request.ops.push(op);
-    match result {
-        Ok(record) => {
-            response.records.push(record);
-            true
-        }
-        Err(_) => false,
-    }
+    result.ok()
 }
 
 fn draw_script(dice: &mut Dice, player: &Player) -> Script {

@@ -20,3 +20,67 @@ fn every_case_holds_on_every_engine() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// Returns the deviation that a case on two agents finds, given what it expects and does.
+fn mismatch(text: &str) -> Option<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("case.yaml");
+    let observation = if text.contains("xy") { "POMAPF" } else { "default" };
+    let config =
+        format!("{{map: \"a.b B.A\", obs_radius: 1, persistent: true, observation_type: {observation}}}");
+    std::fs::write(&path, format!("rule: move/free\nsays: An example.\nconfig: {config}\n{text}")).unwrap();
+    let case = cases::read(&path).unwrap();
+    case.mismatch(&play_on(NamedEngine::REFERENCE, &case.request().unwrap()))
+}
+
+#[test]
+fn expectations_hold_if_the_answer_meets_them() {
+    for text in [
+        "start: {cells: [[0, 0], [0, 2]]}\nsteps: [{do: [right, stay], cells: [[0, 1], [0, 2]]}]",
+        "start: {sees: {agent: 1, obstacles: '111 ..1 ..1'}}",
+        "start: {sees: {agent: 1, goal: '... ... 1..'}, derived: {num_agents: 2}}",
+        "start: {sees: {agent: 1, obstacles: '111 ..1 ..1'}, xy: [[0, 0], [0, 0]]}",
+        "steps: [{do: [right, stay]}, {op: back, moved: true}, {op: history}]",
+        "start: {cells: [[0, 0], [0, 2]]}\nsteps: [{do: [stay, 5]}]\nerror: is `5`",
+    ] {
+        assert_eq!(mismatch(text), None, "{text}");
+    }
+}
+
+#[test]
+fn an_expectation_that_cannot_be_met_or_missed_is_a_deviation() {
+    for (text, key) in [
+        ("start: {rewards: [0, 0]}", "rewards"),
+        ("start: {moved: true}", "moved"),
+        ("start: {foretold: [[[0, 0]], [[0, 0]]]}", "foretold"),
+        ("start: {reward: [0, 0]}", "reward"),
+        ("start: {global_xy: [[0, 0], [0, 0]]}", "global_xy"),
+        ("steps: [{do: [stay, stay], padded: '.'}]", "padded"),
+        ("steps: [{do: [stay, stay], derived: {size: 3}}]", "derived"),
+        ("steps: [{op: history, cells: [[0, 0], [0, 2]]}]", "cells"),
+        ("steps: [{op: back, sees: {agent: 0, agents: '.'}}]", "sees"),
+        ("steps: [{do: [stay, stay], changes: []}]", "changes"),
+    ] {
+        let found = mismatch(text).unwrap_or_default();
+        assert!(found.contains(&format!("`{key}`")), "{text}: {found}");
+    }
+}
+
+#[test]
+fn wrong_windows_and_wrong_states_before_an_error_are_deviations() {
+    for (text, found) in [
+        ("start: {sees: {agent: 5, agents: '.'}}", "the windows of agent 5 are missing"),
+        (
+            "start: {sees: {agent: 5, agents: '.'}, xy: [[0, 0], [0, 0]]}",
+            "the windows of agent 5 are missing",
+        ),
+        ("start: {sees: {agent: 0, obstacles: '11'}}", "obstacles window"),
+        ("start: {sees: {agent: 0, goal: '.'}, xy: [[0, 0], [0, 0]]}", "goal window"),
+        ("start: {derived: {depth: 3}}", "derived depth"),
+        ("start: {cells: [[0, 0], [0, 1]]}\nsteps: [{do: [stay, 5]}]\nerror: is `5`", "cells: expected"),
+        ("steps: [{do: [stay, stay]}]\nerror: is `5`", "expected the error `is `5``, got none"),
+    ] {
+        let got = mismatch(text).unwrap_or_default();
+        assert!(got.contains(found), "{text}: {got}");
+    }
+}

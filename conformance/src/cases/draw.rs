@@ -118,7 +118,7 @@ fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
     add("target_xy", list(expect.target_xy.as_ref()));
     add("global_xy", list(expect.global_xy.as_ref()));
     add("global_target_xy", list(expect.global_target_xy.as_ref()));
-    add("derived", expect.derived.as_ref().map(Value::to_string));
+    add("derived", expect.derived.as_ref().map(|fields| serde_json::json!(fields).to_string()));
     add("foretold goals", list(expect.foretold.as_ref()));
     add("padded dtype", expect.padded_dtype.clone());
     add("taken back", expect.moved.map(|moved| moved.to_string()));

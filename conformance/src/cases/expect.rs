@@ -6,8 +6,8 @@ use pogema_core::{Cell, Change, Map, Metrics, Observed, ObservedMapf, Snapshot, 
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::digits::{area_of, unpack};
-use crate::request::{Record, ResetRecord, StepRecord};
+use crate::digits::{lines, windows};
+use crate::request::{Derived, Record, ResetRecord, StepRecord};
 
 /// Expectations after one operation. Blank lines at the end of a picture are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -52,7 +52,7 @@ pub struct Expect {
     /// NumPy's name of the element type of the map with its border.
     pub padded_dtype: Option<String>,
     /// Derived config fields: any of `width`, `height`, `size`, `density`, `num_agents`.
-    pub derived: Option<Value>,
+    pub derived: Option<BTreeMap<String, Value>>,
     /// The foretold goals of each agent.
     pub foretold: Option<Vec<Vec<Cell>>>,
     /// Whether a step was taken back.
@@ -89,6 +89,9 @@ impl Expect {
         if let Some(key) = self.unknown.keys().next() {
             return Some(format!("unknown expectation `{key}`"));
         }
+        if let Some(key) = self.misplaced(record) {
+            return Some(format!("`{key}` is expected of an operation that does not report it"));
+        }
         let state = record.state().map(|state| self.of_state(state, map));
         let rest = match record {
             Record::Reset(reset) => self.of_reset(reset),
@@ -98,6 +101,43 @@ impl Expect {
             Record::Odd(record) => Some(format!("the record does not match its operation: {record}")),
         };
         state.flatten().or(rest)
+    }
+
+    /// Returns an expectation that no record of this kind can meet or miss.
+    fn misplaced(&self, record: &Record) -> Option<&'static str> {
+        let reset = if let Record::Reset(reset) = record { Some(reset) } else { None };
+        let (step, has_state) = (record.step(), record.state().is_some());
+        let observed = reset.and_then(|reset| reset.observations.as_ref());
+        let observed = observed.or_else(|| step.and_then(|step| step.step.observations.as_ref()));
+        let has_cells = matches!(observed, Some(Observed::Pomapf(_) | Observed::Mapf(_)));
+        let has_global_cells = matches!(observed, Some(Observed::Mapf(_)));
+        let (is_reset, is_step) = (reset.is_some(), step.is_some());
+        let expected = [
+            ("picture", self.picture.is_some(), has_state),
+            ("occupied", self.occupied.is_some(), has_state),
+            ("cells", self.cells.is_some(), has_state),
+            ("goals", self.goals.is_some(), has_state),
+            ("active", self.active.is_some(), has_state),
+            ("on_goal", self.on_goal.is_some(), has_state),
+            ("rewards", self.rewards.is_some(), is_step),
+            ("terminated", self.terminated.is_some(), is_step),
+            ("truncated", self.truncated.is_some(), is_step),
+            ("actions", self.actions.is_some(), is_step),
+            ("actions_after", self.actions_after.is_some(), is_step),
+            ("metrics", self.metrics.is_some(), is_step),
+            ("sees", self.sees.is_some(), observed.is_some()),
+            ("xy", self.xy.is_some(), has_cells),
+            ("target_xy", self.target_xy.is_some(), has_cells),
+            ("global_xy", self.global_xy.is_some(), has_global_cells),
+            ("global_target_xy", self.global_target_xy.is_some(), has_global_cells),
+            ("padded", self.padded.is_some(), is_reset),
+            ("padded_dtype", self.padded_dtype.is_some(), is_reset),
+            ("derived", self.derived.is_some(), is_reset),
+            ("foretold", self.foretold.is_some(), reset.is_some_and(|reset| reset.goal_lists.is_some())),
+            ("moved", self.moved.is_some(), matches!(record, Record::Back(_))),
+            ("changes", self.changes.is_some(), matches!(record, Record::History(_))),
+        ];
+        expected.into_iter().find(|(_, is_given, is_reported)| *is_given && !is_reported).map(|(key, ..)| key)
     }
 
     fn of_state(&self, state: &Snapshot, map: &Map) -> Option<String> {
@@ -114,17 +154,18 @@ impl Expect {
     fn of_reset(&self, reset: &ResetRecord) -> Option<String> {
         differ_in_lines("padded", self.padded.as_deref(), &reset.padded.rows.join("\n"))
             .or_else(|| differ("padded_dtype", self.padded_dtype.as_ref(), &reset.padded.dtype))
-            .or_else(|| self.of_derived(reset))
+            .or_else(|| self.of_derived(&reset.derived))
             .or_else(|| differ("foretold", self.foretold.as_ref(), reset.goal_lists.as_ref()?))
             .or_else(|| self.of_observations(reset.observations.as_ref()?))
     }
 
-    fn of_derived(&self, reset: &ResetRecord) -> Option<String> {
-        let derived = serde_json::to_value(&reset.derived).ok()?;
-        let expected = self.derived.as_ref()?.as_object()?;
-        let wrong = expected.iter().find(|(field, value)| derived[field.as_str()].as_f64() != value.as_f64());
-        wrong.map(|(field, value)| {
-            format!("derived {field}: expected {value}, got {}", derived[field.as_str()])
+    fn of_derived(&self, derived: &Derived) -> Option<String> {
+        let derived = serde_json::to_value(derived).unwrap_or_default();
+        let mut expected = self.derived.iter().flatten();
+        expected.find_map(|(field, value)| {
+            let got = &derived[field.as_str()];
+            (got.as_f64() != value.as_f64() || got.is_null())
+                .then(|| format!("derived {field}: expected {value}, got {got}"))
         })
     }
 
@@ -160,17 +201,17 @@ impl Expect {
 impl Sees {
     fn mismatch(&self, observed: &Observed) -> Option<String> {
         let agent = self.agent;
-        let windows: Vec<Vec<bool>> = match observed {
-            Observed::Default { windows, .. } => {
-                let flags = unpack(windows.get(agent)?);
-                flags.chunks(area_of(flags.len())?).map(<[bool]>::to_vec).collect()
-            }
+        let seen = match observed {
+            Observed::Default { windows: all, .. } => all.get(agent).and_then(|digits| windows::<3>(digits)),
             Observed::Pomapf(pomapf) | Observed::Mapf(ObservedMapf { pomapf, .. }) => {
-                [&pomapf.obstacles[agent], &pomapf.agents[agent]].map(|window| unpack(window)).into()
+                let of = |all: &[String]| all.get(agent).and_then(|digits| windows::<1>(digits));
+                let both = of(&pomapf.obstacles).zip(of(&pomapf.agents));
+                both.map(|([obstacles], [agents])| [obstacles, agents, Vec::new()])
             }
         };
+        let Some(seen) = seen else { return Some(format!("the windows of agent {agent} are missing")) };
         let expected = [("obstacles", &self.obstacles), ("agents", &self.agents), ("goal", &self.goal)];
-        let mut pairs = expected.into_iter().zip(&windows);
+        let mut pairs = expected.into_iter().zip(&seen);
         pairs.find_map(|((what, expected), window)| differ_in_window(what, expected.as_deref(), window))
     }
 }
@@ -186,14 +227,8 @@ fn differ_in_lines(what: &str, expected: Option<&str>, got: &str) -> Option<Stri
 }
 
 fn differ_in_window(what: &str, expected: Option<&str>, got: &[bool]) -> Option<String> {
-    let lines: Vec<&str> = expected?.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let flags: Vec<bool> = lines.concat().chars().map(|character| character != '.').collect();
-    let holds = got.len() >= flags.len() && got.len() < flags.len() + 8 && got[..flags.len()] == flags[..];
-    let side = lines.len().max(1);
-    let drawn: Vec<String> = got
-        .chunks(side)
-        .take(side)
-        .map(|row| row.iter().map(|&flag| if flag { '1' } else { '.' }).collect())
-        .collect();
-    (!holds).then(|| format!("{what} window: expected\n{}\n  got\n{}", lines.join("\n"), drawn.join("\n")))
+    let expected: Vec<&str> = expected?.split_whitespace().collect();
+    let flags: Vec<bool> = expected.concat().chars().map(|character| character != '.').collect();
+    let text = || format!("{what} window: expected\n{}\n  got\n{}", expected.join("\n"), lines(got));
+    (flags != got).then(text)
 }

@@ -11,6 +11,10 @@ use super::link::Misbehaviour;
 use crate::compare::Divergence;
 use crate::request::Request;
 
+/// The largest number of occurrences of a cause that are kept. A port that fails in every case would fill the memory
+/// otherwise.
+const MAX_OCCURRENCES: usize = 1000;
+
 /// A defect of a port, with all its occurrences.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
@@ -30,7 +34,7 @@ pub struct Cause {
     pub cases: BTreeMap<String, u64>,
     /// The smallest occurrence.
     pub example: Example,
-    /// All occurrences, from which those to shrink are chosen.
+    /// The smallest occurrence and up to [`MAX_OCCURRENCES`] others, from which those to shrink are chosen.
     #[serde(skip)]
     pub(super) occurrences: Vec<Example>,
     /// The file of the smallest counterexample.
@@ -148,8 +152,13 @@ pub fn add(causes: &mut Vec<Cause>, example: Example, case_rule: Option<&str>) {
     if let Some(rule) = case_rule {
         *cause.cases.entry(rule.to_owned()).or_default() += 1;
     }
-    if example.size() < cause.example.size() {
+    let is_smallest = example.size() < cause.example.size();
+    if is_smallest {
         cause.example = example.clone();
     }
-    cause.occurrences.push(example);
+    if cause.occurrences.len() < MAX_OCCURRENCES {
+        cause.occurrences.push(example);
+    } else if is_smallest {
+        cause.occurrences[0] = example;
+    }
 }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::group::Example;
 use crate::compare::{Divergence, Field, FieldPart};
-use crate::digits::{area_of, unpack};
+use crate::digits::{lines, windows};
 use crate::files;
 use crate::play::play;
 use crate::request::{Op, Record, Registered};
@@ -183,12 +183,9 @@ fn facts(
 fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: Option<Field>) {
     let Some((field, agent)) = field.and_then(|field| Some((field, field.index()?))) else { return };
     match observed {
-        Some(Observed::Default { windows, .. }) if field.name == "observation" => {
-            let Some(window) = windows.get(agent) else { return };
-            let bits = unpack(window);
-            let Some(area) = area_of(bits.len()) else { return };
-            let [obstacles, agents, goal] =
-                [0, 1, 2].map(|channel| lines(&bits[channel * area..(channel + 1) * area]));
+        Some(Observed::Default { windows: all, .. }) if field.name == "observation" => {
+            let Some(seen) = all.get(agent).and_then(|digits| windows(digits)) else { return };
+            let [obstacles, agents, goal] = seen.map(|window| lines(&window));
             facts.insert(
                 "sees",
                 json!({ "agent": agent, "obstacles": obstacles, "agents": agents, "goal": goal }),
@@ -200,10 +197,4 @@ fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observe
         }
         _ => {}
     }
-}
-
-fn lines(bits: &[bool]) -> String {
-    let side = bits.len().isqrt().max(1);
-    let line = |row: &[bool]| row.iter().map(|&bit| if bit { '1' } else { '.' }).collect::<String>();
-    bits.chunks(side).map(line).collect::<Vec<_>>().join("\n")
 }

@@ -91,7 +91,7 @@ impl Keeper<'_> {
 
     /// Shrinks some occurrences: the smallest, and others of all sizes.
     fn shrink_some(&mut self, mut occurrences: Vec<Example>) -> Vec<Example> {
-        occurrences.sort_by_key(Example::size);
+        occurrences.sort_by_cached_key(Example::size);
         let fault = occurrences.first().and_then(|example| example.fault.as_ref());
         // Each repetition of a hang costs the time limit. A shorter limit is enough to find the same hang again.
         let hangs = fault.is_some_and(Misbehaviour::is_hang);

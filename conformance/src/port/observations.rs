@@ -1,6 +1,7 @@
 //! Conversion of observations between the protocol and records.
 
 use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
+use serde::Deserialize as _;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
@@ -118,12 +119,13 @@ fn windows(
         return Err(format!("`{name}` has length {}, expected {num_agents}, one for each agent", list.len()));
     }
     let window = |(agent, window): (usize, &Value)| {
+        let odd = |what| odd.push(format!("`{name}` of agent {agent}: {what}"));
         read_window(window, num_values, odd).map_err(|what| format!("`{name}` of agent {agent} {what}"))
     };
     list.iter().enumerate().map(window).collect()
 }
 
-fn read_window(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+fn read_window(answer: &Value, num_values: usize, odd: impl FnMut(String)) -> Result<String, String> {
     let Some(text) = answer.as_str() else { return read_values(answer, num_values, odd) };
     let (digits, length) = match text.split_once(':') {
         Some(("sha256", digits)) => (digits, 64),
@@ -141,7 +143,7 @@ fn read_window(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Resu
 }
 
 /// Reads numbers nested to any depth. A number other than 0 and 1 is valid in form but a wrong answer.
-fn read_values(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Result<String, String> {
+fn read_values(answer: &Value, num_values: usize, mut odd: impl FnMut(String)) -> Result<String, String> {
     let mut bits = Vec::with_capacity(num_values);
     let mut rest = vec![answer];
     while let Some(value) = rest.pop() {
@@ -151,7 +153,7 @@ fn read_values(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Resu
             Value::Number(number) => {
                 let number = number.as_f64().unwrap_or(f64::NAN);
                 if number != 0.0 && number != 1.0 {
-                    odd.push(format!("value {} is {number}", bits.len()));
+                    odd(format!("value {} is {number}", bits.len()));
                 }
                 bits.push(number != 0.0);
             }
@@ -166,7 +168,7 @@ fn read_values(answer: &Value, num_values: usize, odd: &mut Vec<String>) -> Resu
 }
 
 fn pairs(name: &str, answer: &Value, num_agents: usize) -> Result<Vec<[i32; 2]>, String> {
-    let pairs: Vec<[i32; 2]> = serde_json::from_value(answer.clone())
+    let pairs = Vec::<[i32; 2]>::deserialize(answer)
         .map_err(|_| format!("`{name}` is not a list of pairs of whole numbers"))?;
     if pairs.len() == num_agents {
         Ok(pairs)

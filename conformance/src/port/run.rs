@@ -67,25 +67,26 @@ fn check_item(
     plan: &Plan,
     item: &Item,
 ) -> Result<ItemResult, Error> {
-    let (request, expected) = item.request(plan.seed)?;
-    let is_over = || faults.load(Ordering::Relaxed) >= MAX_FAULTS;
-    let is_cut_off = is_over();
-    let (mut hello, mut judged) = (None, Vec::new());
-    if !is_cut_off {
-        (hello, judged) = judge_item(worker, plan, item, (&request, &expected), |judged| {
-            faults.fetch_add(judged.fault.as_ref().map_or(0, weight), Ordering::Relaxed);
-            is_over()
-        });
-    }
-    Ok(ItemResult {
+    let mut result = ItemResult {
         subject,
         name: item.name(plan.seed),
         case_rule: item.case_rule().map(str::to_owned),
-        num_steps: expected.records.iter().filter(|record| record.step().is_some()).count() as u64,
-        judged,
-        is_cut_off,
-        hello,
-    })
+        num_steps: 0,
+        judged: Vec::new(),
+        is_cut_off: false,
+        hello: None,
+    };
+    let is_over = || faults.load(Ordering::Relaxed) >= MAX_FAULTS;
+    if is_over() {
+        return Ok(ItemResult { is_cut_off: true, ..result });
+    }
+    let (request, expected) = item.request(plan.seed)?;
+    result.num_steps = expected.records.iter().filter(|record| record.step().is_some()).count() as u64;
+    (result.hello, result.judged) = judge_item(worker, plan, item, (&request, &expected), |judged| {
+        faults.fetch_add(judged.fault.as_ref().map_or(0, weight), Ordering::Relaxed);
+        is_over()
+    });
+    Ok(result)
 }
 
 /// Returns how much a misbehaviour counts towards the maximum.

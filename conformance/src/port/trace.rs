@@ -22,7 +22,8 @@ use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, num
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read or is not a trace.
 pub fn check_traces(paths: &[impl AsRef<Path>], limit: InputLimit) -> Result<PortReport, Error> {
-    let mut report = PortReport { command: format!("{} traces", paths.len()), ..PortReport::default() };
+    let traces = if paths.len() == 1 { "trace" } else { "traces" };
+    let mut report = PortReport { command: format!("{} {traces}", paths.len()), ..PortReport::default() };
     let plan = Plan::default();
     for path in paths {
         let path = path.as_ref();

@@ -101,7 +101,12 @@ pub fn write(folder: &Path) -> Result<Written, Error> {
     write_file(folder, SCHEMA, &pretty(&schema())?)?;
     for gone in old.iter().filter(|path| listed.iter().all(|file| file.path != **path)) {
         let path = folder.join(gone);
-        std::fs::remove_file(&path).map_err(|error| Error::io(&path, error))?;
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::io(&path, error));
+            }
+            _ => {}
+        }
     }
     let num_vectors = listed.iter().map(|file| file.num_vectors).sum();
     let written = Written { num_rules: listed.len(), num_vectors };

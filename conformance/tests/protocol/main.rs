@@ -56,6 +56,10 @@ fn a_wrong_hash_and_a_value_of_one_half_are_differences() {
         assert!(report.causes.iter().all(|cause| cause.rule.as_ref().unwrap().starts_with("observe/")));
         assert!(report.rules["observe/default/goal"].failed > 0);
     }
+    let report = check(|_| (), in_halves);
+    let got: Vec<&str> =
+        report.causes.iter().map(|cause| &*cause.example.divergence.as_ref().unwrap().got).collect();
+    assert!(got.iter().any(|got| got.contains("of agent 0: value 4 is 0.5")), "{got:?}");
 }
 
 #[test]
