@@ -1,7 +1,7 @@
 //! Standard output and output files of the program.
 
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use comfy_table::{CellAlignment, Table, TableStyle, presets};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -70,6 +70,25 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     }
     // The test file has no name, so that nothing remains of it, even if the process is killed.
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
+}
+
+/// Checks that the files that flags name can be written, and that no two flags name the same file.
+///
+/// # Errors
+/// [`Error::Request`] for two flags with one file; those of [`check_writable`].
+pub fn check_files<'a>(files: impl IntoIterator<Item = (&'a str, &'a Path)>) -> Result<(), Error> {
+    let mut taken: Vec<(&str, PathBuf)> = Vec::new();
+    for (flag, path) in files {
+        check_writable(path)?;
+        // `x` and `./x` are the same file.
+        let place = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
+        if let Some((other, _)) = taken.iter().find(|(_, known)| *known == place) {
+            let reason = format!("`{other}` and `{flag}` name the same file, `{}`", path.display());
+            return Err(Error::request(reason));
+        }
+        taken.push((flag, place));
+    }
+    Ok(())
 }
 
 /// Writes a value as JSON.

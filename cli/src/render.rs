@@ -23,7 +23,7 @@ pub struct Render {
     /// Play the episode in the terminal [default if no picture is requested]
     #[arg(long)]
     text: bool,
-    /// Draw only the steps A to B, both included, such as `10..20`; `--frame` then counts from A [default: all]
+    /// Draw only the frames A to B, both included, such as `10..20`; `--frame` then counts from A [default: all]
     #[arg(long, value_name = "A..B")]
     steps: Option<FrameRange>,
     #[command(flatten)]
@@ -58,7 +58,7 @@ impl Render {
         let file = files::open_within(&self.trace, self.input.limit())?;
         let trace = Trace::read(file).map_err(|error| Error::io(&self.trace, error))?;
         check(&trace).map_err(|error| Error::io(&self.trace, error))?;
-        self.pictures.check(trace.header.config.num_agents)?;
+        self.pictures.check(trace.header.config.num_agents, &[])?;
         let (first, trace) = match self.steps {
             Some(FrameRange { first, last }) => {
                 (first, trace.part(first..=last).map_err(flagged("--steps"))?)
@@ -77,7 +77,8 @@ impl Render {
         let (mut screen, ground) = (self.pictures.screen(), Ground::of(trace));
         match self.pictures.frame() {
             Some(frame) => {
-                screen.draw(ground, first + frame, trace.state(frame).map_err(flagged("--frame"))?)
+                let state = trace.state(frame).map_err(flagged("--frame"))?;
+                screen.draw(ground, first + frame, state)
             }
             None => {
                 (first..).zip(trace.states()).try_for_each(|(step, state)| screen.draw(ground, step, state))

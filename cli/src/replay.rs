@@ -9,7 +9,7 @@ use pogema_toolbox::{Pairs, Results, Suite, differences};
 
 use crate::evaluate::environments;
 use crate::maps::Sources;
-use crate::output::{check_writable, in_one_line, print_line, tell, write_trace};
+use crate::output::{in_one_line, print_line, tell, write_trace};
 use crate::render::Pictures;
 
 #[derive(Args, Debug)]
@@ -33,8 +33,8 @@ impl Replay {
     pub fn run(&self) -> Result<(), Error> {
         let suite = Suite::of_results(&self.folder)?;
         let environments = environments(&suite, &self.sources)?;
-        self.trace.as_deref().map_or(Ok(()), check_writable)?;
-        self.pictures.check(environments.at(self.episode)?.config.num_agents)?;
+        let num_agents = environments.at(self.episode)?.config.num_agents;
+        self.pictures.check(num_agents, &[("--trace", &self.trace)])?;
         let (metrics, trace) =
             suite.play_again(&environments, &self.algorithm, self.episode, &Arc::default())?;
         if let Some(path) = &self.trace {

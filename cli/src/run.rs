@@ -14,7 +14,7 @@ use pogema_render::Ground;
 use serde_json::json;
 
 use crate::input::Input;
-use crate::output::{check_writable, in_one_line, print_json, print_line, tell, write_trace};
+use crate::output::{in_one_line, print_json, print_line, tell, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use learned_args::LearnedArgs;
@@ -56,8 +56,7 @@ pub struct Run {
 impl Run {
     pub fn run(&self) -> Result<(), Error> {
         let config = self.settings.config()?;
-        self.trace.as_deref().map_or(Ok(()), check_writable)?;
-        self.pictures.check(config.num_agents)?;
+        self.pictures.check(config.num_agents, &[("--trace", &self.trace)])?;
         let mut settings = self.planner_args.policy_settings(self.future_goals)?;
         settings.learned = self.learned_args.read(&self.policy)?;
         let generated = self.settings.generate(&config)?;

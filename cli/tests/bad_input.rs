@@ -38,7 +38,7 @@ const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 1000";
 const MORE: &str = "\n\nFor more information, try '--help'.";
 
 /// Arguments and the error message that they cause.
-const REJECTED: [(&str, &str); 61] = [
+const REJECTED: [(&str, &str); 65] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     (
         "run --sped 3",
@@ -171,6 +171,17 @@ const REJECTED: [(&str, &str); 61] = [
         "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",
     ),
     ("render trace.jsonl --svg a --png a", "`--svg` and `--png` name the same file, `a`"),
+    ("run --trace a --html ./a", "`--trace` and `--html` name the same file, `./a`"),
+    ("plan --out a --result ./a", "`--out` and `--result` name the same file, `./a`"),
+    (
+        "render trace.jsonl --steps 0..0 --frame 18446744073709551615",
+        "`--frame` is `18446744073709551615`, expected 0 to 0",
+    ),
+    (
+        "maps show five-rooms",
+        "five-rooms: no such file; config: `map_name` is `five-rooms`, expected a pattern that matches a known map; \
+         did you mean `four-rooms`?",
+    ),
     (
         "render trace.jsonl --video a.avi",
         "a.avi: unknown video format, expected a name ending in `.mp4` or `.webm`",

@@ -126,8 +126,9 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
     let at = folder.path();
     fs::write(at.join("port.py"), MUTE_PORT).unwrap();
     // Without the interrupt, the check would wait for a day.
-    let outputs = ["--json", "report.json", "--html", "report.html", "--badge", "badge.svg"];
-    let arguments = [&["conform", "--port", "python3 port.py", "--timeout", "86400"], &outputs[..]].concat();
+    let files =
+        ["--json", "report.json", "--html", "report.html", "--badge", "badge.svg", "--junit", "report.xml"];
+    let arguments = [&["conform", "--port", "python3 port.py", "--timeout", "86400"], &files[..]].concat();
     let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
     command.args(arguments).current_dir(at).process_group(0);
     let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -143,6 +144,9 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
         assert!(at.join(file).exists(), "{file}");
     }
     assert!(fs::read_to_string(at.join("badge.svg")).unwrap().contains("interrupted 0/"));
+    // A dashboard shows the run as failed.
+    let junit = fs::read_to_string(at.join("report.xml")).unwrap();
+    assert!(junit.contains("errors=\"1\"") && junit.contains("name=\"(interrupted)\""), "{junit}");
 }
 
 /// Ctrl-C in a terminal reaches POGEMA's process, too. Its end must not lose the report.

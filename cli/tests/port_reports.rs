@@ -24,6 +24,11 @@ const SOMETIMES_MUTE: [&str; 2] = [
     "    return {**state, **results",
     "    if len(environment.cells) > 20: del state[\"active\"]\n    return {**state, **results",
 ];
+/// Like [`MUTE`], but only with one agent.
+const MUTE_ALONE: [&str; 2] = [
+    "    return {**state, **results",
+    "    if len(environment.cells) == 1: del state[\"active\"]\n    return {**state, **results",
+];
 const NAMED: [&str; 2] = [r#""name": "template""#, r#""name": "<b>&\"'\x1b[2J""#];
 
 const KNOWN_LATE: &str =
@@ -54,9 +59,11 @@ fn conform_whole(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, Stri
 fn a_run_that_checks_nothing_fails() {
     let folder = folder(&[]);
     let nothing = ["--port", "python3.11 wrong.py", "--part", "cases", "--rules", "metrics*"];
-    let (status, text) = status_and_text(&run(folder.path(), &nothing));
+    let (status, text) =
+        status_and_text(&run(folder.path(), &[&nothing[..], &["--junit", "report.xml"]].concat()));
     assert!(text.contains("nothing was checked"), "{text}");
     assert_eq!(status, Some(1));
+    assert_eq!(failures(&suite(folder.path())), ["(nothing checked)"]);
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
@@ -288,10 +295,21 @@ fn deviations_that_stopped_occurring_fail_the_run() {
 #[test]
 fn known_faults_are_accepted_unless_they_cut_the_run_short() {
     for (wrong, expected_status, expected, failing) in [
-        (MUTE, 3, "misbehaves only in known ways, but too often to finish the run: ", vec!["(not run)"]),
-        (SOMETIMES_MUTE, 0, "except for 1 known: ", vec![]),
+        (
+            &[MUTE][..],
+            3,
+            "misbehaves only in known ways, but too often to finish the run: ",
+            vec!["(not run)"],
+        ),
+        (&[SOMETIMES_MUTE], 0, "except for 1 known: ", vec![]),
+        (
+            &[MUTE_ALONE, LATE],
+            3,
+            "diverges, and misbehaves in known ways too often to finish the run: 1 cause in ",
+            vec!["end/truncated", "(not run)"],
+        ),
     ] {
-        let folder = folder(&[wrong]);
+        let folder = folder(wrong);
         let known = "- {rule: protocol, what: left `active` out of an answer that needs it, since: 2026-11-22, reason: r}";
         std::fs::write(folder.path().join("known.yaml"), known).unwrap();
         let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);

@@ -30,6 +30,11 @@ fn invalid_lists_of_known_deviations_are_rejected_with_one_line() {
             "entry 2: unknown field `until`, expected one of `rule`, `what`, `when`, `since`, `reason`, `port`".into(),
         ),
         ("- {rule: end/after, what: cell, since: 2026-11-22}".into(), "entry 1: missing field `reason`".into()),
+        ("- {what: cell, since: 2026-11-22, reason: r}".into(), "entry 1: missing field `rule`".into()),
+        (
+            "- {rule: end/after, rule: end/after}".into(),
+            "line 1, column 21: duplicate key `rule`".into(),
+        ),
         (
             entry("rule: colide/soft"),
             "entry 1: unknown rule `colide/soft`; did you mean `collide/soft`?".into(),
@@ -45,7 +50,7 @@ fn invalid_lists_of_known_deviations_are_rejected_with_one_line() {
             "entry 1: invalid type: string \"end/after\", expected fields and values such as `rule: collide/soft`"
                 .into(),
         ),
-        ("- [\n".into(), "line 1 column 3: unclosed bracket '['".into()),
+        ("- [\n".into(), "line 1, column 3: unclosed bracket '['".into()),
     ];
     let folder = folder();
     for (text, expected) in rejected {
@@ -66,7 +71,7 @@ fn unwritable_reports_are_rejected_before_the_run() {
         ("--port a --badge ./", "./: is not a regular file".into()),
         (
             "--port a --html report.html --junit ./report.html",
-            "report.html: two reports would be written to this file".into(),
+            "`--junit` and `--html` name the same file, `report.html`".into(),
         ),
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
         (

@@ -162,9 +162,12 @@ fn of_agent(agent: Option<usize>) -> String {
 
 /// Returns the size of a map for a message, such as `1 row and 3 columns`.
 pub fn rows_and_columns(rows: usize, columns: usize) -> String {
-    let counted =
-        |number: usize, noun: &str| format!("{number} {noun}{}", if number == 1 { "" } else { "s" });
     format!("{} and {}", counted(rows, "row"), counted(columns, "column"))
+}
+
+/// Returns a number and its noun, in the plural unless the number is 1.
+pub fn counted(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
 fn wrong_field(field: &str, value: &str, expected: &str) -> String {

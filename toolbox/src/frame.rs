@@ -75,7 +75,7 @@ pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) 
             if lacking > 0 {
                 let algorithm = shown(&keys[0]);
                 notes.push(format!(
-                    "`{algorithm}` has no `{metric}` in {lacking} of {all} rows; means are over the others"
+                    "`{algorithm}` has no `{metric}` in {lacking} of {all} rows; these are left out"
                 ));
             }
         }
@@ -109,6 +109,6 @@ mod tests {
         let all: Vec<&Row> = rows.iter().collect();
         assert_eq!(values(&all, "SoC"), [4.0]);
         let notes = lacking(&rows, &["SoC".to_owned()]);
-        assert_eq!(notes, ["`A` has no `SoC` in 2 of 3 rows; means are over the others"]);
+        assert_eq!(notes, ["`A` has no `SoC` in 2 of 3 rows; these are left out"]);
     }
 }

@@ -63,9 +63,42 @@ fn a_comparison_counts_each_instance_once() {
     );
     assert!(svg(&shown).contains(">SoC, One<"));
     let shown = show("{type: compare, y: CSR, first: Other, second: One}").unwrap();
-    assert_eq!(csv(&shown)[1..4], ["Other is better,6", "both are equal,18", "One is better,6"]);
-    assert!(show("{type: compare, first: One, second: Oter}").unwrap_err().contains("did you mean `Other`?"));
+    // Unsolved instances count, too, so nothing is said of them.
+    assert_eq!(csv(&shown)[1..], ["Other is better,6", "both are equal,18", "One is better,6"]);
+    let error = show("{type: compare, first: One, second: Oter}").unwrap_err();
+    assert!(error.ends_with("expected an algorithm of the results; did you mean `Other`?"), "{error}");
+    let error = show("{type: compare, first: One, second: One}").unwrap_err();
+    assert!(error.ends_with("`first` and `second` are both `One`, expected two algorithms"), "{error}");
     assert!(show("{type: compare, first: One}").unwrap_err().contains("each one of One, Other"));
+}
+
+#[test]
+fn an_instance_without_a_value_is_noted_once() {
+    let mut broken = results();
+    broken.rows[0].metrics.retain(|name, _| name != "SoC");
+    broken.rows[1].metrics.retain(|name, _| name != "SoC");
+    let notes = show_of(&broken, "{type: compare}").unwrap().notes;
+    assert_eq!(
+        notes.last().unwrap(),
+        "view `View1`: 1 instance left out, because a row or its value is missing"
+    );
+}
+
+#[test]
+fn equal_numbers_share_a_box() {
+    let mut results = results();
+    for (number, row) in results.rows.iter_mut().enumerate() {
+        let width = if number % 2 == 0 { serde_json::json!(1) } else { serde_json::json!(1.0) };
+        row.settings.insert("width".into(), width);
+    }
+    let text = svg(&show_of(&results, "{type: box, x: width, y: SoC}").unwrap());
+    assert_eq!(text.matches(">1<").count() + text.matches(">1.0<").count(), 1, "{text}");
+}
+
+#[test]
+fn a_table_is_sorted_by_its_own_columns() {
+    let error = show("{type: tabular, drop_keys: [seed], sort_by: seed}").unwrap_err();
+    assert!(error.contains("`sort_by` is `seed`, expected a column of the table"), "{error}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::Row;
 pub struct Target {
     pub name: String,
     pub want: f64,
-    /// Absent if a figure was not measured.
+    /// The worst of the rows that were measured; absent if there is none, or if another figure is missing.
     pub got: Option<f64>,
     /// Whether `want` is an upper bound.
     pub is_limit: bool,

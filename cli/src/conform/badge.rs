@@ -20,7 +20,7 @@ fn message(report: &PortReport) -> (String, &'static str) {
         Verdict::Unchecked if score.is_interrupted => ("interrupted", "#6a6a6a"),
         Verdict::Unchecked => ("nothing checked", "#6a6a6a"),
     };
-    (format!("{word} {}/{} rules", score.passed, score.claimed), colour)
+    (format!("{word} {}/{} rules", score.passed, score.played), colour)
 }
 
 /// Returns the badge of a port in the form that shields.io reads from a URL.

@@ -54,7 +54,7 @@ fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
         "verdict": verdict(report),
         "class": score.verdict(),
         "passed": score.passed,
-        "claimed": score.claimed,
+        "played": score.played,
         "num_not_run": report.num_not_run,
         "num_interrupted": report.num_interrupted,
         "new": shown(false),
@@ -73,7 +73,12 @@ pub fn place_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Op
     if !["failed", "error", "known"].contains(&class) {
         return None;
     }
-    let first = causes_of(report, rule).next()?;
+    let is_shown = |cause: &&Cause| match class {
+        "failed" => cause.rule.is_some(),
+        "error" => cause.rule.is_none(),
+        _ => true,
+    };
+    let first = causes_of(report, rule).find(is_shown)?;
     let number = report.causes.iter().position(|cause| std::ptr::eq(cause, first))?;
     Some(format!("#{}", id(port, number)))
 }

@@ -5,7 +5,9 @@ use quick_junit::{NonSuccessKind, Property, Report, SerializeError, TestCase, Te
 
 use super::known::Leftover;
 use super::port_table::cause_text;
-use super::summary::{Standing, causes_of, names, score, standing, times, title, verdict, why_unclaimed};
+use super::summary::{
+    Standing, Verdict, causes_of, names, score, standing, times, title, verdict, why_unclaimed,
+};
 
 /// Returns the report as JUnit XML: a suite for each port, a test case for each rule.
 pub fn xml(reports: &[PortReport], leftover: &Leftover) -> Result<String, SerializeError> {
@@ -33,13 +35,23 @@ fn suite(report: &PortReport, name: &str) -> TestSuite {
         }
         suite.add_test_case(case);
     }
-    if score(report).is_cut_short {
-        // The run fails for this reason even if all faults are known.
+    let score = score(report);
+    let mut add_error = |title: &str, ty: &str, message: String| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-        status.set_type("misbehaviour").set_message(format!("{} cases were not run", report.num_not_run));
-        let mut case = TestCase::new("(not run)", status);
+        status.set_type(ty).set_message(message);
+        let mut case = TestCase::new(title, status);
         case.set_classname(name);
         suite.add_test_case(case);
+    };
+    // The run fails for these reasons even if no rule is broken, or all faults are known.
+    if score.is_cut_short {
+        add_error("(not run)", "misbehaviour", format!("{} cases were not run", report.num_not_run));
+    }
+    if score.is_interrupted {
+        let message = format!("interrupted: {} cases were not run", report.num_interrupted);
+        add_error("(interrupted)", "interruption", message);
+    } else if score.verdict() == Verdict::Unchecked {
+        add_error("(nothing checked)", "nothing checked", verdict(report));
     }
     suite
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 use jiff::civil::Date;
 use pogema_conformance::port::{Cause, Plan, PortReport};
 use pogema_core::Error;
+use pogema_maps::files::read_text;
+use pogema_maps::value_from_yaml;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
@@ -23,22 +25,24 @@ pub struct Known {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "fields and values such as `rule: collide/soft`")]
 struct Deviation {
-    /// The rule; `None` for the protocol.
-    #[serde(default)]
-    rule: Option<String>,
+    /// The rule; [`PROTOCOL`] for misbehaviour.
+    #[serde(deserialize_with = "text")]
+    rule: String,
+    #[serde(deserialize_with = "text")]
     what: String,
     /// The circumstances; `None` accepts any, but only if all occurrences have one cause.
     #[serde(default)]
     when: Option<String>,
     #[serde(deserialize_with = "text")]
     since: String,
+    #[serde(deserialize_with = "text")]
     reason: String,
     /// The name of the port; `None` for all ports.
     #[serde(default)]
     port: Option<String>,
 }
 
-/// Reads any value as text, so that the error for a number names the expected date and not a type.
+/// Reads any value as text, so that `what: 3` is valid and the error for a number in `since` names the expected date.
 fn text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let value = Value::deserialize(deserializer)?;
     Ok(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
@@ -59,12 +63,8 @@ impl Known {
     /// # Errors
     /// [`Error::Io`] with the number of the first invalid entry.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let failed = |reason: String| {
-            let line = reason.lines().next().unwrap_or("unreadable");
-            Error::io(path, line.strip_prefix("error: ").unwrap_or(line))
-        };
-        let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-        let entries = match serde_saphyr::from_str(&text).map_err(|error| failed(error.to_string()))? {
+        let failed = |reason: String| Error::io(path, reason);
+        let entries = match value_from_yaml(&read_text(path)?).map_err(|error| failed(error.reason()))? {
             Value::Array(entries) => entries,
             Value::Null => Vec::new(),
             _ => return Err(failed("expected a list of entries".into())),
@@ -111,8 +111,8 @@ impl Known {
 impl Deviation {
     fn new(entry: Value) -> Result<Self, String> {
         let mut deviation: Self = serde_json::from_value(entry).map_err(|error| error.to_string())?;
-        deviation.rule.take_if(|rule| rule == PROTOCOL);
-        if let Some(rule) = deviation.rule.as_ref().filter(|rule| rule_names().all(|known| known != *rule)) {
+        let rule = &deviation.rule;
+        if rule != PROTOCOL && rule_names().all(|known| known != rule) {
             return Err(format!("unknown rule `{rule}`; did you mean `{}`?", nearest_rule(rule)));
         }
         // Only one date format is accepted, so that lists can be sorted and searched by date.
@@ -132,7 +132,7 @@ impl Deviation {
         Ok(deviation)
     }
 
-    fn key(&self) -> (&Option<String>, &str, &Option<String>, &Option<String>) {
+    fn key(&self) -> (&str, &str, &Option<String>, &Option<String>) {
         (&self.rule, &self.what, &self.when, &self.port)
     }
 
@@ -142,7 +142,7 @@ impl Deviation {
 
     /// Returns whether a cause has the rule and the field of this deviation.
     fn explains(&self, cause: &Cause) -> bool {
-        (&self.rule, &self.what) == (&cause.rule, &cause.what)
+        (&*self.rule, &self.what) == (cause.rule.as_deref().unwrap_or(PROTOCOL), &cause.what)
     }
 
     /// Returns whether this deviation accepts a cause. Without `when`, it accepts no group that has several causes, so
@@ -158,20 +158,17 @@ impl Deviation {
             && plan.parts.is_empty()
             && report.num_not_run + report.num_interrupted == 0;
         is_whole
-            && match &self.rule {
-                Some(rule) => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),
+            && match &*self.rule {
                 // Any request may break the protocol, so no rule may be left out.
-                None => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
+                PROTOCOL => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
+                rule => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),
             }
     }
 
     fn title(&self) -> String {
-        let Self { what, since, reason, .. } = self;
+        let Self { rule, what, since, reason, .. } = self;
         let when = self.when.as_ref().map_or(String::new(), |when| format!(" ({when})"));
         let port = self.port.as_ref().map_or(String::new(), |port| format!(" of {port}"));
-        format!(
-            "{}: {what}{when}{port}, known since {since}: {reason}",
-            self.rule.as_deref().unwrap_or(PROTOCOL)
-        )
+        format!("{rule}: {what}{when}{port}, known since {since}: {reason}")
     }
 }

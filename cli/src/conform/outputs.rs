@@ -1,6 +1,5 @@
 //! The output files of a run on ports, and the list of known deviations.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,7 +9,7 @@ use pogema_core::Error;
 
 use super::known::{Known, Leftover};
 use super::{badge, html, junit, site};
-use crate::output::check_writable;
+use crate::output::check_files;
 
 #[derive(Args, Debug)]
 pub struct Outputs {
@@ -50,21 +49,11 @@ impl Outputs {
         if self.badge.is_some() && num_ports != 1 {
             return Err(Error::request("`--badge` needs exactly one port"));
         }
-        let mut taken = BTreeSet::new();
-        for path in self.paths().chain(json) {
-            check_writable(path)?;
-            // `x` and `./x` are the same file.
-            let place = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
-            if !taken.insert(place) {
-                return Err(Error::io(path, "two reports would be written to this file"));
-            }
-        }
+        let named = [("--junit", &self.junit), ("--html", &self.html), ("--badge", &self.badge)];
+        let named = named.into_iter().filter_map(|(flag, path)| Some((flag, path.as_deref()?)));
+        check_files(named.chain(json.map(|path| ("--json", path))))?;
         self.site.as_deref().map_or(Ok(()), site::create)?;
         self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)
-    }
-
-    fn paths(&self) -> impl Iterator<Item = &Path> {
-        [&self.junit, &self.html, &self.badge].into_iter().flatten().map(PathBuf::as_path)
     }
 
     /// Writes the requested reports.

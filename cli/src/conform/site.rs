@@ -7,7 +7,7 @@ use std::path::Path;
 use pogema_conformance::panel::{Limits, text_of_panels};
 use pogema_conformance::port::{Cause, Mode, PortReport, Verdicts};
 use pogema_conformance::{Request, files};
-use pogema_core::Error;
+use pogema_core::{Error, one_line};
 use serde_json::{Value, json};
 
 use super::badge::{badge, endpoint};
@@ -48,6 +48,9 @@ fn write_text(folder: &Path, name: &str, text: &str) -> Result<(), Error> {
     files::write(&folder.join(name), text.as_bytes())
 }
 
+/// The length to which names of ports are cut in names of files. Units: bytes.
+const LONGEST_NAME: usize = 100;
+
 /// Returns names of files without ending, one for each port: lower-case letters, digits, `.` and `-`.
 fn file_names(names: &[String]) -> Vec<String> {
     let mut taken = vec!["index".to_owned(), "reports".to_owned()];
@@ -55,7 +58,8 @@ fn file_names(names: &[String]) -> Vec<String> {
         let letters = name.to_lowercase();
         let kept = letters.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '.');
         let stem = kept.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
-        let stem = stem.trim_matches(['.', '-']);
+        // The letters are ASCII. File systems limit names to 255 bytes.
+        let stem = stem[..stem.len().min(LONGEST_NAME)].trim_matches(['.', '-']);
         let stem = if stem.is_empty() { "port" } else { stem };
         let mut numbered = (2..).map(|number| format!("{stem}-{number}"));
         let mut file = stem.to_owned();
@@ -115,12 +119,12 @@ fn mark(report: &PortReport, rule: &str) -> (String, &'static str) {
 
 /// Returns the report as Markdown: verdicts, the table of rules, and the smallest counterexample of each cause.
 fn survey(reports: &[PortReport]) -> String {
-    let names: Vec<String> = names(reports).iter().map(|name| name.replace('|', "\\|")).collect();
+    let names: Vec<String> = names(reports).iter().map(|name| one_line(name).replace('|', "\\|")).collect();
     let mut text = String::new();
     for (report, name) in reports.iter().zip(&names) {
         let score = score(report);
         let _ =
-            writeln!(text, "- {name}: {} of {} rules hold; {}", score.passed, score.claimed, verdict(report));
+            writeln!(text, "- {name}: {} of {} rules hold; {}", score.passed, score.played, verdict(report));
     }
     let _ = writeln!(
         text,
@@ -196,5 +200,6 @@ mod tests {
         let names = ["POGEMA", "pogema", "../../x y", "…", "index", "pogema-2"].map(str::to_owned);
         let files = file_names(&names);
         assert_eq!(files, ["pogema", "pogema-2", "x-y", "port", "index-2", "pogema-2-2"]);
+        assert_eq!(file_names(&["long".repeat(100)])[0].len(), LONGEST_NAME);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Share, Verdicts, needed_by};
 use pogema_conformance::rules;
-use pogema_core::{Error, shorten, words};
+use pogema_core::{Error, counted, is_unprintable, shorten, words};
 use pogema_maps::nearest;
 use serde_json::Value;
 
@@ -132,7 +132,7 @@ pub struct Score {
     /// Rules that hold.
     pub passed: usize,
     /// Rules that were played.
-    pub claimed: usize,
+    pub played: usize,
     /// Known causes.
     pub known: usize,
     /// Causes that break a rule and are not known.
@@ -153,7 +153,7 @@ pub fn score(report: &PortReport) -> Score {
     let count = |pick: fn(&Cause) -> bool| report.causes.iter().filter(|cause| pick(cause)).count();
     Score {
         passed: played.iter().filter(|standing| **standing == Standing::Passed).count(),
-        claimed: played.len(),
+        played: played.len(),
         known: count(|cause| cause.known.is_some()),
         diverging: count(|cause| cause.rule.is_some() && cause.known.is_none()),
         misbehaving: count(|cause| cause.rule.is_none() && cause.known.is_none()),
@@ -185,7 +185,7 @@ impl Score {
             // Known faults do not excuse the cases that were not run because of them.
             Self { misbehaving: 1.., .. } | Self { is_cut_short: true, .. } => Verdict::Misbehaves,
             Self { diverging: 1.., .. } => Verdict::Diverges,
-            Self { claimed: 0, .. } | Self { is_interrupted: true, .. } => Verdict::Unchecked,
+            Self { played: 0, .. } | Self { is_interrupted: true, .. } => Verdict::Unchecked,
             Self { known: 1.., .. } => Verdict::Known,
             _ => Verdict::Conforms,
         }
@@ -196,13 +196,17 @@ impl Score {
 pub fn verdict(report: &PortReport) -> String {
     let score = score(report);
     let Score { known, diverging, misbehaving, .. } = score;
-    let counted = |number: u64, noun: &str| format!("{number} {noun}{}", if number == 1 { "" } else { "s" });
+    let counted = |number: u64, noun| counted(number as usize, noun);
     let played = format!("{}, {}", counted(report.num_played, "case"), counted(report.num_steps, "step"));
     let causes = |number: usize| counted(number as u64, "cause");
     let exception = if known == 0 { String::new() } else { format!(", except for {known} known") };
     match (diverging, misbehaving) {
         (0, 0) if score.is_cut_short => {
             format!("misbehaves only in known ways, but too often to finish the run: {played}")
+        }
+        (1.., 0) if score.is_cut_short => {
+            let found = causes(diverging);
+            format!("diverges, and misbehaves in known ways too often to finish the run: {found} in {played}")
         }
         (0, 0) if score.is_interrupted => format!("interrupted, no new cause so far: {played}"),
         (0, 0) if score.verdict() == Verdict::Unchecked => format!("nothing was checked: {played}"),
@@ -253,9 +257,9 @@ pub fn shortened(text: &str) -> String {
     shorten(text, 200)
 }
 
-/// Removes control characters, since ports may send anything.
+/// Removes control characters and text direction marks, since ports may send anything.
 pub fn printable(text: &str) -> String {
-    text.chars().filter(|letter| !letter.is_control() || "\n\t".contains(*letter)).collect()
+    text.chars().filter(|letter| !is_unprintable(*letter) || "\n\t".contains(*letter)).collect()
 }
 
 /// Fills in an HTML or SVG template; all values are escaped.

@@ -92,10 +92,15 @@ impl Sources {
         if Path::new(word).exists() {
             return read_maps(Path::new(word), Reading::default());
         }
-        let names = library.matching(word)?;
+        let names = library.matching(word).map_err(|error| no_such_file(word, &error))?;
         let map = |name: &str| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() });
         names.into_iter().map(map).collect()
     }
+}
+
+/// Returns an error about a word that names neither a map nor a file.
+pub fn no_such_file(word: &str, error: &Error) -> Error {
+    Error::io(word, format!("no such file; {error}"))
 }
 
 /// Returns an error about a word that does not select exactly one map; `purpose` says what requires one.

@@ -13,7 +13,7 @@ use pogema_reference::Reference;
 use serde_json::{Value, json};
 
 use crate::interrupt::Interrupt;
-use crate::output::{check_writable, print_json, print_line, write_trace};
+use crate::output::{print_json, print_line, write_trace};
 use crate::render::Pictures;
 use crate::run::Settings;
 use crate::words::word;
@@ -51,10 +51,8 @@ impl MakePlan {
     /// On Ctrl-C, the planner returns the best plan so far.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
-        for path in [&self.out, &self.result, &self.trace].into_iter().flatten() {
-            check_writable(path)?;
-        }
-        self.pictures.check(config.num_agents)?;
+        let others = [("--out", &self.out), ("--result", &self.result), ("--trace", &self.trace)];
+        self.pictures.check(config.num_agents, &others)?;
         let interrupt = Interrupt::watch()?;
         let budget = Budget { cancelled: Some(interrupt.flag()), ..self.planner_args.budget()? };
         let instance = self.settings.generate(&config)?.instance;

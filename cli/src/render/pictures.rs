@@ -9,7 +9,7 @@ use pogema_core::{Error, Trace};
 use pogema_render::{Border, Color, Colors, Style, gif, html, raster, svg, text, video};
 
 use super::screen::Screen;
-use crate::output::{check_writable, flagged, progress_bar};
+use crate::output::{check_files, flagged, progress_bar};
 use crate::words::word;
 
 /// Default length of the longer side of pictures. Units: pixels.
@@ -81,7 +81,7 @@ impl Pictures {
     }
 
     /// Returns the requested files, each with its flag.
-    fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+    fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
         let files = [
             ("--svg", &self.svg),
             ("--png", &self.png),
@@ -94,16 +94,13 @@ impl Pictures {
 
     /// Checks that the requested pictures can be drawn and written, as far as this is known before the episode.
     ///
+    /// `others` are further files that the command writes, with their flags.
+    ///
     /// # Errors
-    /// For the first file that cannot be written, or the first value that is out of range.
-    pub fn check(&self, num_agents: usize) -> Result<(), Error> {
-        for (at, (flag, path)) in self.files().enumerate() {
-            if let Some((other, _)) = self.files().take(at).find(|(_, other)| *other == path) {
-                let reason = format!("`{other}` and `{flag}` name the same file, `{}`", path.display());
-                return Err(Error::request(reason));
-            }
-            check_writable(path)?;
-        }
+    /// For the first file that cannot be written or that two flags name, or the first value that is out of range.
+    pub fn check(&self, num_agents: usize, others: &[(&str, &Option<PathBuf>)]) -> Result<(), Error> {
+        let others = others.iter().filter_map(|(flag, path)| Some((*flag, path.as_deref()?)));
+        check_files(others.chain(self.files()))?;
         if let Some(path) = &self.video {
             video::VideoFormat::of(path)?;
             video::check_ffmpeg()?;

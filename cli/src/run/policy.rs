@@ -78,7 +78,7 @@ fn read_actions(path: &Path, limit: InputLimit, num_agents: usize) -> Result<Vec
     }
     let mut steps = Vec::new();
     for (line, text) in (1_usize..).zip(file.lines()) {
-        let text: String = text.map_err(failed)?;
+        let text: String = text.map_err(|error| Error::io(path, format!("line {line}: {error}")))?;
         if !text.trim().is_empty() {
             let step = read_step(&text, num_agents);
             steps.push(step.map_err(|reason| Error::io(path, format!("line {line}: {reason}")))?);

@@ -10,7 +10,7 @@ use pogema_maps::{FIELDS, Generated, GridConfig, InstanceSource, Library, MapTex
 use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
-use crate::maps::Sources;
+use crate::maps::{Sources, no_such_file};
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -199,7 +199,7 @@ impl Settings {
         } else {
             let seed = fields.get("seed").and_then(Value::as_u64);
             chosen(&library, &word, seed).map_err(|error| match &self.map {
-                Some(_) => Error::io(&word, format!("no such file; {error}")),
+                Some(_) => no_such_file(&word, &error),
                 None => error,
             })?
         };

@@ -77,7 +77,7 @@ impl Axis {
     }
 }
 
-/// Formats a number for a tick, with a comma between thousands.
+/// Formats a number for a tick, with commas between groups of three digits.
 fn number(value: f64) -> String {
     let is_small = value != 0.0 && value.abs() < 1e-3;
     if is_small || value.abs() >= 1e7 {
@@ -86,7 +86,11 @@ fn number(value: f64) -> String {
     let text = ((value * 1e9).round() / 1e9).to_string();
     let start = usize::from(value < 0.0);
     let end = text.find('.').unwrap_or(text.len());
-    if end - start < 4 { text } else { format!("{},{}", &text[..end - 3], &text[end - 3..]) }
+    let mut grouped = text.clone();
+    for place in (start + 1..end).rev().filter(|place| (end - place).is_multiple_of(3)) {
+        grouped.insert(place, ',');
+    }
+    grouped
 }
 
 /// Returns about five round numbers within a range, with their labels.
@@ -287,6 +291,11 @@ mod tests {
             texts(Axis::of_numbers("", &[6e-5, 0.003], true, None)),
             ["5e-5", "1e-4", "2e-4", "5e-4", "0.001", "0.002"]
         );
+        assert_eq!(
+            texts(Axis::of_numbers("", &[1e6, 6e6], false, None)),
+            ["2,000,000", "4,000,000", "6,000,000"]
+        );
+        assert_eq!(number(-1_234_567.25), "-1,234,567.25");
         assert_eq!(texts(Axis::of_numbers("", &[], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);
         assert_eq!(texts(Axis::of_numbers("", &[2.0, 8.0], true, Some(&[0.0, 4.0]))), ["4"]);
         assert_eq!(texts(Axis::of_numbers("", &[5.0], false, Some(&[5.0]))), ["5"]);

@@ -14,7 +14,7 @@ use super::series::{at, distinct, placeless};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column};
 use crate::bootstrap::percentile;
-use crate::frame::{lacking, values};
+use crate::frame::{compare, lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
@@ -50,8 +50,8 @@ impl BoxView {
         known_column(name, "y", &self.y, results)?;
         let keys = distinct(&results.rows, &self.x);
         let group = |key: &Value| {
-            let rows: Vec<&Row> =
-                results.rows.iter().filter(|row| at(row, &self.x).as_ref() == Some(key)).collect();
+            let is_in_group = |row: &&Row| at(row, &self.x).is_some_and(|value| compare(&value, key).is_eq());
+            let rows: Vec<&Row> = results.rows.iter().filter(is_in_group).collect();
             (self.common.shown(&self.x, key), values(&rows, &self.y))
         };
         // Groups are drawn from bottom to top, so the order is reversed.

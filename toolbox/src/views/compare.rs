@@ -3,7 +3,7 @@
 use kuva::plot::line::LinePlot;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 
 use super::axes::{Axis, Frame};
 use super::grid::{Cell, Table};
@@ -77,8 +77,8 @@ impl CompareView {
         let rows = results.rows.iter().filter(|row| pair.contains(&row.algorithm));
         let mut notes = lacking(rows, std::slice::from_ref(&self.metric));
         if score.alone > 0 {
-            notes
-                .push(format!("{} instances are left out because only one of the two has them", score.alone));
+            let left_out = counted(score.alone, "instance");
+            notes.push(format!("view `{name}`: {left_out} left out, because a row or its value is missing"));
         }
         let pictures = if score.both.is_empty() {
             notes.push(format!("view `{name}`: no instance was solved by both, so there is no plot"));
@@ -102,8 +102,14 @@ impl CompareView {
         };
         for (key, algorithm) in [("first", &first), ("second", &second)] {
             if !all.contains(algorithm) {
-                return Err(named(name, key, algorithm, all.iter().map(String::as_str)));
+                let known = all.iter().map(String::as_str);
+                return Err(named(name, key, algorithm, "an algorithm of the results", known));
             }
+        }
+        if first == second {
+            let reason =
+                format!("view `{name}`: `first` and `second` are both `{first}`, expected two algorithms");
+            return Err(Error::request(reason));
         }
         Ok([first, second])
     }
@@ -126,9 +132,14 @@ impl CompareView {
         score
     }
 
-    /// Returns whether a row's value counts: the row is solved, or the metric is one of [`MORE_IS_BETTER`].
+    /// Returns whether the values of unsolved rows count.
+    fn counts_unsolved(&self) -> bool {
+        MORE_IS_BETTER.contains(&self.metric.as_str())
+    }
+
+    /// Returns whether the value of a row counts.
     fn counts(&self, row: &Row) -> bool {
-        MORE_IS_BETTER.contains(&self.metric.as_str()) || row.is_solved()
+        self.counts_unsolved() || row.is_solved()
     }
 
     fn table(&self, pair: &[String; 2], score: &Score) -> Table {
@@ -140,18 +151,20 @@ impl CompareView {
         let (wins, losses) = if self.is_more_better { (more, less) } else { (less, more) };
         let row = |what: String, count: usize| vec![Cell::Text(what), Cell::Count(count)];
         let metric = self.common.title(&self.metric);
-        Table {
-            head: vec![format!("{first} and {second}: {metric}"), "Instances".to_owned()],
-            rows: vec![
-                row(format!("{first} is better"), wins),
-                row("both are equal".to_owned(), ties),
-                row(format!("{second} is better"), losses),
+        let mut rows = vec![
+            row(format!("{first} is better"), wins),
+            row("both are equal".to_owned(), ties),
+            row(format!("{second} is better"), losses),
+        ];
+        if !self.counts_unsolved() {
+            rows.extend([
                 row(format!("only {first} solved it"), score.only_first),
                 row(format!("only {second} solved it"), score.only_second),
                 row("neither solved it".to_owned(), score.neither),
-            ],
-            ..Table::default()
+            ]);
         }
+        let head = vec![format!("{first} and {second}: {metric}"), "Instances".to_owned()];
+        Table { head, rows, ..Table::default() }
     }
 
     fn draw(&self, pair: &[String; 2], both: &[(f64, f64)]) -> Picture {

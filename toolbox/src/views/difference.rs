@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 
 use super::grid::{Cell, Table};
 use super::options::{Common, NUM_AGENTS, Options};
@@ -61,9 +61,8 @@ impl DifferenceView {
         let mut notes = lacking(&results.rows, &self.metrics);
         let num_alone: usize = lines.iter().map(|line| line.pairing.alone).sum();
         if num_alone > 0 {
-            notes.push(format!(
-                "view `{name}`: {num_alone} instances are left out because they have no partner"
-            ));
+            let left_out = counted(num_alone, "instance");
+            notes.push(format!("view `{name}`: {left_out} left out, because there is no partner"));
         }
         Ok(Shown { tables: vec![self.table(&lines)], notes, ..Shown::default() })
     }
@@ -75,7 +74,8 @@ impl DifferenceView {
         known.dedup();
         for (key, value) in [("first", &self.first), ("second", &self.second)] {
             if !known.contains(value) {
-                return Err(named(name, key, value, known.iter().map(String::as_str)));
+                let expected = format!("a value of `{}`", self.field);
+                return Err(named(name, key, value, &expected, known.iter().map(String::as_str)));
             }
         }
         Ok(())
@@ -199,7 +199,7 @@ mod tests {
                 ",A,8,2,2,2.5,0.5,0.5,0.5,2,25",
             ]
         );
-        assert_eq!(shown.notes, ["view `Cost`: 1 instances are left out because they have no partner"]);
+        assert_eq!(shown.notes, ["view `Cost`: 1 instance left out, because there is no partner"]);
     }
 
     #[test]
@@ -208,7 +208,7 @@ mod tests {
         let unknown = error("{type: difference, field: occupency, first: as_released, second: exact}");
         assert!(unknown.contains("`field` is `occupency`") && unknown.contains("`occupancy`"), "{unknown}");
         let unknown = error("{type: difference, field: occupancy, first: released, second: exact}");
-        assert!(unknown.contains("`first` is `released`"), "{unknown}");
+        assert!(unknown.contains("`first` is `released`, expected a value of `occupancy`"), "{unknown}");
         let missing = error("{type: difference, field: occupancy, first: exact}");
         assert!(missing.contains("a field `second`"), "{missing}");
     }

@@ -111,7 +111,15 @@ impl Table {
         let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
         let cell = |cell: &Cell| match cell {
             Cell::Mean(Some(estimate)) => format!("${}$", self.parts(estimate).join(" \\pm ")),
-            other => latex_text(&self.shown(other)),
+            // Outside of math mode, a minus sign is a hyphen.
+            other => match self.shown(other) {
+                text if matches!(other, Cell::Number(Some(_)) | Cell::Ratio(Some(_)))
+                    && text.starts_with('-') =>
+                {
+                    format!("${text}$")
+                }
+                text => latex_text(&text),
+            },
         };
         let remark = self.remark.as_ref().map(|remark| format!("% {remark}\n")).unwrap_or_default();
         let head = line(self.head.iter().map(|title| latex_text(title)).collect());
@@ -135,7 +143,7 @@ impl Table {
             let _ = writer.write_record(&record);
         }
         let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
-        text.trim_end().to_owned()
+        text.trim_end_matches('\n').to_owned()
     }
 }
 
@@ -188,6 +196,14 @@ mod tests {
             skips_zero: true,
             remark: None,
         }
+    }
+
+    #[test]
+    fn negative_numbers_have_a_minus_sign_in_latex() {
+        let cells = vec![Cell::Number(Some(-1.5)), Cell::Ratio(Some(-0.25)), Cell::Number(Some(2.0))];
+        let head = ["a", "b", "c"].map(str::to_owned).to_vec();
+        let table = Table { head, rows: vec![cells], digits: 2, ..Table::default() };
+        assert!(table.text(Format::Latex).contains("$-1.50$ & $-0.2500$ & 2.00 \\\\"));
     }
 
     #[test]

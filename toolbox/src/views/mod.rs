@@ -227,12 +227,18 @@ fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Resul
     if columns.iter().any(|known| known == column) {
         return Ok(());
     }
-    Err(named(view, key, column, columns.iter().map(String::as_str)))
+    Err(named(view, key, column, "a column of the results", columns.iter().map(String::as_str)))
 }
 
-/// Returns an error about an option whose column the results lack.
-fn named<'a>(view: &str, key: &str, column: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
-    let hint = nearest(column, known).map(|hint| format!("; did you mean `{hint}`?"));
+/// Returns an error about an option that names nothing known.
+fn named<'a>(
+    view: &str,
+    key: &str,
+    found: &str,
+    expected: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Error {
+    let hint = nearest(found, known).map(|hint| format!("; did you mean `{hint}`?"));
     let hint = hint.unwrap_or_default();
-    Error::request(format!("view `{view}`: `{key}` is `{column}`, expected a column of the results{hint}"))
+    Error::request(format!("view `{view}`: `{key}` is `{found}`, expected {expected}{hint}"))
 }

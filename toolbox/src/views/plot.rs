@@ -287,7 +287,7 @@ mod tests {
         assert!(!svg.contains("B &"), "{svg}");
         assert!(picture.bytes(ImageFormat::Pdf).unwrap().starts_with(b"%PDF"));
         assert!(picture.bytes(ImageFormat::Png).unwrap().starts_with(b"\x89PNG"));
-        assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; means are over the others");
+        assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; these are left out");
     }
 
     #[test]

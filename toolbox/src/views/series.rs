@@ -55,7 +55,9 @@ impl Places {
     fn place(&self, value: &Value) -> Option<f64> {
         match self {
             Self::Numbers => figure(value),
-            Self::Names(names) => names.iter().position(|name| name == value).map(|place| place as f64),
+            Self::Names(names) => {
+                names.iter().position(|name| compare(name, value).is_eq()).map(|place| place as f64)
+            }
         }
     }
 }
@@ -64,7 +66,7 @@ impl Places {
 pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Vec<Value> {
     let mut found: Vec<Value> = rows.into_iter().filter_map(|row| at(row, column)).collect();
     found.sort_by(compare);
-    found.dedup();
+    found.dedup_by(|one, other| compare(one, other).is_eq());
     found
 }
 

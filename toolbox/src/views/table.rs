@@ -159,7 +159,7 @@ impl TableView {
                 }
                 _ => {
                     let known = keys.iter().chain(metrics).map(String::as_str);
-                    return Err(named(name, "sort_by", column, known));
+                    return Err(named(name, "sort_by", column, "a column of the table", known));
                 }
             }
         }
@@ -201,7 +201,7 @@ mod tests {
                 "16,B,0.5,,,2,9,,,1",
             ]
         );
-        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; means are over the others"]);
+        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; these are left out"]);
     }
 
     #[test]
