@@ -293,7 +293,7 @@ impl Grid<'_> {
         let (map, outside) = surroundings(self.padded, self.shape, self.border)?;
         let streams = goals.iter().map(|&goal| GoalStream::single(goal)).collect();
         let occupancy = if self.exact { Occupancy::Exact } else { Occupancy::default() };
-        let config = Config { occupancy, num_agents: cells.len(), ..Config::default() };
+        let config = Config { occupancy, num_agents: cells.len(), radius: self.border, ..Config::default() };
         Ok((Instance::new(map, outside, cells.to_vec(), streams)?, config))
     }
 }

@@ -149,12 +149,14 @@ def check_mats_lp(policy, env):
 
 
 @pytest.mark.parametrize("on_target", ["restart", "finish", "nothing"])
-def test_observations_of_one_environment_give_the_actions_of_a_batch(on_target, network):
-    path, _ = network
+@pytest.mark.parametrize("name", ["network", "lswitcher"])
+def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_target, network):
+    own = {} if name == "lswitcher" else {"path": network[0], "sampling": "softmax"}
+    settings = {"name": name, "seed": 3, **own}
     config = {**CONFIG, "on_target": on_target, "seed": 9, "max_episode_steps": 30}
     single = pogema_v0(GridConfig(**config, observation_type="MAPF"))
     env = VecEnv(config, 1)
-    of_batch, of_one = load(path, sampling="softmax", seed=3), load(path, sampling="softmax", seed=3)
+    of_batch, of_one = load(**settings), load(**settings)
     for _ in range(2):
         env.reset(seed=[9])
         observations, _ = single.reset()
@@ -164,7 +166,9 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(on_target, 
             chosen = of_one.act(observations, None, None, None, None)
             assert chosen == actions.tolist()
             env.step(actions[None])
-            observations, *_ = single.step(chosen)
+            observations, _, terminated, _, _ = single.step(chosen)
+            if all(terminated):  # the batch has begun the next episode
+                break
     assert of_one.act(observations, skip_agents=[True] * 6) == [0] * 6
 
 
