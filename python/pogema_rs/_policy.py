@@ -80,6 +80,9 @@ class Policy:
         for each agent that stays. `rewards`, `dones` and `info` are not used; pogema-toolbox passes them.
 
         Shape: `(num_envs, agents)`, int64
+        After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
+        new episode.
+
 
         Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if a logit
         is not finite, or with `mats-lp`, which needs a `VecEnv`. For a `VecEnv`, `StateError` if a logit is not finite,

@@ -62,9 +62,9 @@ pub fn internal(text: &str) -> PyErr {
     Python::attach(|py| of_class(py, "InternalError", text))
 }
 
-/// Returns the error of a call that was made during a call of another thread.
-pub fn busy(py: Python<'_>) -> PyErr {
-    of_class(py, "StateError", Error::Busy { what: "this environment" })
+/// Returns the error of a call that was made during a call of another thread; `what` names the object with its article.
+pub fn busy(py: Python<'_>, what: &'static str) -> PyErr {
+    of_class(py, "StateError", Error::Busy { what })
 }
 
 /// Converts an error of an A* agent that was not cleared before a new episode.

@@ -17,7 +17,7 @@ use pogema_toolbox::{
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::guard::guarded;
+use crate::guard::{self, guarded};
 use crate::interrupt;
 
 /// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
@@ -249,9 +249,7 @@ impl Evaluation {
     }
 
     fn progress(&self) -> PyResult<MutexGuard<'_, Option<Progress>>> {
-        self.progress.try_lock().map_err(|_| {
-            PyRuntimeError::new_err("another thread is using this evaluation, expected one at a time")
-        })
+        Python::attach(|py| guard::lock(py, &self.progress, "this evaluation"))
     }
 
     fn with(&self, work: impl FnOnce(&mut Progress) -> Result<(), Error>) -> PyResult<()> {

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use pyo3::prelude::*;
 
@@ -45,6 +46,18 @@ pub(crate) use guarded;
 /// Runs the body of an entry.
 pub fn run<T>(body: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| Err(errors::internal(&text(&*panic))))
+}
+
+/// Locks an object for one call, without waiting; `what` names the object with its article.
+///
+/// Errors: `StateError` while another thread is inside a call, `InternalError` after a call that panicked.
+pub fn lock<'a, T>(py: Python<'_>, mutex: &'a Mutex<T>, what: &'static str) -> PyResult<MutexGuard<'a, T>> {
+    mutex.try_lock().map_err(|error| match error {
+        TryLockError::WouldBlock => errors::busy(py, what),
+        TryLockError::Poisoned(_) => {
+            errors::internal(&format!("an earlier call of {what} failed: make a new one"))
+        }
+    })
 }
 
 /// Returns the message of a panic.

@@ -15,7 +15,7 @@ use pogema_planners::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::guard::guarded;
+use crate::guard::{self, guarded};
 use crate::memory::check_aligned;
 use crate::{errors, interrupt};
 
@@ -228,7 +228,7 @@ impl PlanFollower {
     ) -> PyResult<Vec<i64>> {
         let arguments = || Ok((map(&obstacles)?, cells("positions", &positions)?, cells("goals", &goals)?));
         let (map, cells, goals) = arguments().map_err(|error: Error| errors::plan(&error))?;
-        let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
+        let mut inner = guard::lock(py, &self.inner, "this planner")?;
         let active = vec![true; cells.len()];
         let follower = &mut *inner;
         let step = follower.step;
@@ -241,7 +241,7 @@ impl PlanFollower {
 
     /// Forgets the last episode.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        let mut inner = self.inner.try_lock().map_err(|_| errors::busy(py))?;
+        let mut inner = guard::lock(py, &self.inner, "this planner")?;
         inner.policy.reset();
         inner.step = 0;
         Ok(())

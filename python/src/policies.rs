@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyReadwriteArray2,
@@ -16,7 +16,7 @@ use pogema_policies::{
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::guard::guarded;
+use crate::guard::{self, guarded};
 use crate::vec::{Batch, surroundings, surroundings_of};
 use crate::{errors, interrupt};
 
@@ -102,7 +102,7 @@ impl Policy {
     ///
     /// Shape: `actions` is `(envs, agents)`
     fn act_batch(&self, py: Python<'_>, batch: &Batch, mut actions: PyReadwriteArray2<'_, i64>) -> PyResult<()> {
-        let mut players = self.players.try_lock().map_err(|_| errors::busy(py))?;
+        let mut players = self.lock(py)?;
         let mut guard = batch.lock()?;
         if players.batch != batch.number() {
             if !players.lanes.is_empty() {
@@ -131,7 +131,7 @@ impl Policy {
         active: Vec<bool>,
         exact: bool,
     ) -> PyResult<Vec<i64>> {
-        let mut players = self.players.try_lock().map_err(|_| errors::busy(py))?;
+        let mut players = self.lock(py)?;
         if players.batch != 0 {
             return Err(other_environment());
         }
@@ -142,14 +142,17 @@ impl Policy {
         }
         let shape = (obstacles.shape()[0], obstacles.shape()[1]);
         let grid = Grid { padded: obstacles.as_slice()?, shape, border, exact };
-        let players = &mut *players;
+        let playing = &mut *players;
         let act = || {
             let cells = grid.cells("global_xy", &cells)?;
             let goals = grid.cells("global_target_xy", &goals)?;
-            self.act_in_one(players, &grid, (&cells, &goals, &active))
+            self.act_in_one(playing, &grid, (&cells, &goals, &active))
         };
         let acted = interrupt::detach_scoped(py, &self.stop, act)?;
-        acted.map_err(|error| PyValueError::new_err(error.to_string()))
+        let actions = acted.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        // An interrupted call does not count as a step, so that the next call returns its actions.
+        players.step += 1;
+        Ok(actions)
     }
 
     /// Returns the outputs of the network for a batch of agents at the beginning of an episode.
@@ -176,13 +179,17 @@ impl Policy {
 
     /// Forgets all episodes and the environment.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        *self.players.try_lock().map_err(|_| errors::busy(py))? = Players::default();
+        *self.lock(py)? = Players::default();
         Ok(())
     }
 }
 }
 
 impl Policy {
+    fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Players>> {
+        guard::lock(py, &self.players, "this policy")
+    }
+
     fn begin(&self, instance: &Instance, config: &Config, begun: u64) -> Result<Player, Error> {
         let stop = Some(Arc::clone(&self.stop));
         let policy = self.learned.begin(instance, config, self.seed, self.threads, stop)?;
@@ -205,7 +212,6 @@ impl Policy {
         // INVARIANT: the list has one player now.
         let player = lanes[0].as_mut().ok_or(Error::NotReset)?;
         let actions = player.act(State { step: *step, cells, goals, active, on_goal: &on_goal })?;
-        *step += 1;
         Ok(actions.iter().map(|&action| i64::from(u8::from(action))).collect())
     }
 

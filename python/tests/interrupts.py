@@ -54,7 +54,6 @@ SHORT = {
         "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note", "Evaluation.picks",
     },
     "they read or write the files of one network once": {"Policy.__new__", "write_network"},
-    "they forward at most one step of one environment": {"Policy.act"},
     "they read or set a few values": {
         "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
         "Batch.take_film_failures",
@@ -200,7 +199,7 @@ def batch_encoders():
     check_equal(env, twin)
 
 
-@interrupts("Policy.act_batch")
+@interrupts("Policy.act_batch", "Policy.act")
 def policy_actions():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "large.safetensors"
@@ -215,6 +214,15 @@ def policy_actions():
         small.reset()
         policy.reset_states()
         np.testing.assert_array_equal(policy.act(small), twin.act(small))
+        env = pogema_v0(GridConfig(size=64, num_agents=1500, density=0.1, seed=5, observation_type="MAPF"))
+        seen, _ = env.reset()
+        for each in (policy, twin):
+            each.reset_states()
+        interrupt("Policy.act", lambda: policy.act(seen))
+        for _ in range(2):
+            actions = policy.act(seen)
+            assert actions == twin.act(seen)
+            seen, *_ = env.step(actions)
 
 
 @interrupts("Batch.set_configs")

@@ -3,6 +3,7 @@
 import json
 import pickle
 import shutil
+import threading
 from functools import partial
 from pathlib import Path
 
@@ -208,6 +209,24 @@ def test_a_policy_plays_one_environment_at_a_time():
 
 def test_pickles_hold_the_settings():
     policy = load(WEIGHTS, sampling="greedy", seed=4)
+def test_a_call_during_a_call_of_another_thread_names_the_policy():
+    policy, env = load(WEIGHTS), VecEnv({**CONFIG, "size": 32, "num_agents": 200}, 64)
+    env.reset(seed=0)
+    said = set()
+
+    def interfere():
+        while thread.is_alive():
+            try:
+                policy.reset_states()
+            except StateError as error:
+                said.add(str(error))
+
+    thread = threading.Thread(target=lambda: [policy.act(env) for _ in range(20)])
+    thread.start()
+    interfere()
+    assert said == {"another thread is using this policy, expected one thread at a time"}
+
+
     copy = pickle.loads(pickle.dumps(policy))
     assert isinstance(copy, Policy) and copy.sampling == "greedy" and copy.encoder == policy.encoder
     assert copy.encoder == Encoder(1, ["cost_to_go"]) and repr(copy) == repr(policy) and copy.name == "network"

@@ -9,14 +9,14 @@ mod observe;
 pub mod state;
 mod step;
 
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::{Mutex, MutexGuard};
 
 use pogema_core::{Action, Cell, Episode};
 use pogema_maps::InstanceSource;
 use pyo3::prelude::*;
 
 use self::drawn::Drawn;
-use crate::errors;
+use crate::guard;
 
 /// An environment with its config, as Python sees it.
 ///
@@ -52,13 +52,8 @@ impl Engine {
 
     /// Locks the environment.
     ///
-    /// Errors: `StateError` while another thread is inside a call, `InternalError` after a call that panicked.
+    /// Errors: those of [`guard::lock`].
     fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Inner>> {
-        self.inner.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => errors::busy(py),
-            TryLockError::Poisoned(_) => {
-                errors::internal("an earlier call of this environment failed: make a new environment")
-            }
-        })
+        guard::lock(py, &self.inner, "this environment")
     }
 }
