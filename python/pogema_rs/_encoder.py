@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Union
 
-import numpy as np
-
 from pogema_rs import _engine
+from pogema_rs._checks import check_whole
 
 _LARGEST_RADIUS = 128
 _MOST = 64
@@ -48,10 +47,10 @@ class Encoder:
         Errors: TypeError or ValueError for the first wrong value.
         """
         values = {
-            "radius": _whole("radius", radius),
+            "radius": check_whole("radius", radius, 1, _LARGEST_RADIUS),
             "channels": _words("channels", channels, "channel"),
             "scalars": _words("scalars", scalars, "scalars"),
-            "sight": _whole("sight", sight),
+            "sight": check_whole("sight", sight, 1, _LARGEST_RADIUS),
             "follower": _word("follower", follower, "follower"),
         }
         for name, value in values.items():
@@ -91,14 +90,6 @@ def read_encoder(encoder: Union[Encoder, Mapping[str, Any]]) -> Encoder:
     Errors: those of `Encoder.from_dict`.
     """
     return encoder if isinstance(encoder, Encoder) else Encoder.from_dict(encoder)
-
-
-def _whole(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name} is {value!r}, expected a whole number")
-    if not 1 <= value <= _LARGEST_RADIUS:
-        raise ValueError(f"{name} is {value}, expected 1 to {_LARGEST_RADIUS}")
-    return int(value)
 
 
 def _words(name: str, values: Any, kind: str) -> tuple[str, ...]:

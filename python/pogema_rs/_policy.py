@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Optional, Union, cast, overload
 import numpy as np
 
 from pogema_rs import _engine
+from pogema_rs._checks import check_semantics, check_whole
 from pogema_rs._encoder import Encoder
 from pogema_rs.semantics import Semantics
 
@@ -79,14 +80,15 @@ class Policy:
         episode. An agent on its goal that is missing in its own window counts as finished. `skip_agents` holds a flag
         for each agent that stays. `rewards`, `dones` and `info` are not used; pogema-toolbox passes them.
 
-        Shape: `(num_envs, agents)`, int64
         After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
         new episode.
 
+        Shape: `(num_envs, agents)`, int64
 
-        Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if a logit
-        is not finite, or with `mats-lp`, which needs a `VecEnv`. For a `VecEnv`, `StateError` if a logit is not finite,
-        or if `mats-lp` misses a state. RuntimeError for a second environment without `reset_states`.
+        Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if
+        `skip_agents` has another length, if a logit is not finite, or with `mats-lp`, which needs a `VecEnv`. For a
+        `VecEnv`, `StateError` if a logit is not finite, or if `mats-lp` misses a state. RuntimeError for a second
+        environment without `reset_states`.
         """
         batch = getattr(observations, "_batch", None)
         if isinstance(batch, _engine.Batch):
@@ -96,6 +98,9 @@ class Policy:
             return actions
         actions_of_one = self._act_in_one(_checked(observations))
         if skip_agents is not None:
+            if len(skip_agents) != len(actions_of_one):
+                expected = f"{len(actions_of_one)}, one for each agent"
+                raise ValueError(f"skip_agents holds {len(skip_agents)} flags, expected {expected}")
             return [0 if skips else action for action, skips in zip(actions_of_one, skip_agents)]
         return actions_of_one
 
@@ -170,19 +175,15 @@ def load(
     """
     if name not in LEARNED:
         raise ValueError(f"name is {name!r}, expected one of {', '.join(map(repr, LEARNED))}")
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
-        raise TypeError(f"seed is {seed!r}, expected a whole number")
-    if not 0 <= seed < 2**64:
-        raise ValueError(f"seed is {seed}, expected 0 to {2**64 - 1}")
     settings = {
         "name": name,
         "sampling": sampling,
         "mask_actions": None if mask_actions is None else bool(mask_actions),
-        "seed": int(seed),
-        "num_threads": num_threads,
-        "expansions": expansions,
+        "seed": check_whole("seed", seed, 0, 2**64 - 1),
+        "num_threads": check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS),
+        "expansions": None if expansions is None else min(check_whole("expansions", expansions), 2**32 - 1),
         "faithful": faithful,
-        "semantics": Semantics(semantics).value,
+        "semantics": check_semantics(semantics).value,
     }
     return Policy(None if path is None else os.path.abspath(os.fspath(path)), settings)
 

@@ -11,12 +11,15 @@ from typing import Any, Optional
 import numpy as np
 
 from pogema_rs import _engine, grid_registry
+from pogema_rs._checks import check_whole
 from pogema_rs.grid_config import GridConfig, engine_fields
 
 # The fields that the engine reads, and the text of a named map.
 Config = tuple[dict[str, Any], Optional[str]]
 # The numbers of agents, and of rows and columns.
 Room = tuple[Optional[int], Optional[tuple[int, int]]]
+
+_INDEX = ", an index of an environment"
 
 
 def engine_config(config: Any, reward: str) -> Config:
@@ -43,9 +46,8 @@ def read_configs(
 ) -> tuple[list[Config], Optional[list[int]], int]:
     """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
     if not isinstance(grid_config, (list, tuple)):
-        num_envs = 1 if num_envs is None else num_envs
-        check_whole("num_envs", num_envs)
-        return [engine_config(grid_config, reward)], None, min(int(num_envs), sys.maxsize)
+        num_envs = check_whole("num_envs", 1 if num_envs is None else num_envs)
+        return [engine_config(grid_config, reward)], None, min(num_envs, sys.maxsize)
     if num_envs not in (None, len(grid_config)):
         raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
     configs = [engine_config(config, reward) for config in grid_config]
@@ -68,7 +70,7 @@ def read_changes(
     if isinstance(envs, str) or not (envs is None or hasattr(envs, "__iter__")):
         raise TypeError(f"envs is {envs!r}, expected a list of indices")
     every = range(num_envs) if envs is None else envs
-    chosen = [_env_index(f"envs[{place}]", env, num_envs) for place, env in enumerate(every)]
+    chosen = [check_whole(f"envs[{place}]", env, 0, num_envs - 1, _INDEX) for place, env in enumerate(every)]
     if len(set(chosen)) != len(chosen):
         raise ValueError(f"envs is {chosen}, expected each environment once")
     if not isinstance(configs, (list, tuple)):
@@ -84,42 +86,21 @@ def read_changes(
 def read_room(num_agents: Any, map_size: Any) -> Room:
     """Returns the numbers of agents, and of rows and columns, for which the arrays must have room at least."""
     if num_agents is not None:
-        check_whole("num_agents", num_agents)
-        num_agents = min(int(num_agents), sys.maxsize)
+        num_agents = min(check_whole("num_agents", num_agents), sys.maxsize)
     if map_size is None:
         return num_agents, None
     sides = (map_size, map_size) if isinstance(map_size, (int, np.integer)) else map_size
     if not isinstance(sides, (list, tuple)) or len(sides) != 2:
         raise TypeError(f"map_size is {map_size!r}, expected a whole number or a pair (rows, columns)")
-    rows, columns = sides
-    check_whole("map_size", rows)
-    check_whole("map_size", columns)
-    return num_agents, (min(int(rows), sys.maxsize), min(int(columns), sys.maxsize))
-
-
-def _env_index(name: str, env: Any, num_envs: int) -> int:
-    if isinstance(env, bool) or not isinstance(env, (int, np.integer)):
-        raise TypeError(f"{name} is {env!r}, expected a whole number")
-    if not 0 <= env < num_envs:
-        raise ValueError(f"{name} is {env}, expected 0 to {num_envs - 1}, an index of an environment")
-    return int(env)
+    rows, columns = (min(check_whole("map_size", side), sys.maxsize) for side in sides)
+    return num_agents, (rows, columns)
 
 
 def read_threads(num_threads: Optional[int]) -> Optional[int]:
     if num_threads is None:
         return None
-    check_whole("num_threads", num_threads)
-    if num_threads > _engine.MAX_THREADS:
-        raise ValueError(f"num_threads is {num_threads}, expected 1 to {_engine.MAX_THREADS}")
+    num_threads = check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS)
     if num_threads > _engine.num_cores():
         text = f"num_threads is {num_threads}, the machine has {_engine.num_cores()} cores"
         warnings.warn(text, UserWarning, stacklevel=3)
-    return int(num_threads)
-
-
-def check_whole(name: str, value: Any) -> None:
-    """Checks that an argument is a whole number of at least 1."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name} is {value!r}, expected a whole number")
-    if value < 1:
-        raise ValueError(f"{name} is {value}, expected at least 1")
+    return num_threads

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-import numpy as np
-
-from pogema_rs._vec_configs import check_whole
+from pogema_rs._checks import check_whole
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Batch
@@ -81,10 +79,7 @@ def _check(film: Any, num_envs: int) -> None:
     if not isinstance(film, Film):
         raise TypeError(f"film is a {type(film).__name__}, expected a Film")
     check_whole("every", film.every)
-    if isinstance(film.env, bool) or not isinstance(film.env, (int, np.integer)):
-        raise TypeError(f"env is {film.env!r}, expected a whole number")
-    if not 0 <= film.env < num_envs:
-        raise ValueError(f"env is {film.env}, expected 0 to {num_envs - 1}, the index of the filmed environment")
+    check_whole("env", film.env, 0, num_envs - 1, ", the index of the filmed environment")
     if film.format not in _FORMATS:
         raise ValueError(f"format is {film.format!r}, expected one of {', '.join(map(repr, _FORMATS))}")
     prefix = film.name_prefix

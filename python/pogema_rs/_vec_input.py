@@ -7,6 +7,8 @@ from typing import Any, Optional
 
 import numpy as np
 
+from pogema_rs._checks import check_whole
+
 try:
     from gymnasium.vector import AutoresetMode
 except ImportError:  # Gymnasium before 1.1 does not define the modes.
@@ -95,8 +97,4 @@ def read_seed(seed: Any, num_envs: int) -> tuple[Optional[int], Optional[list[in
 def _one_seed(name: str, seed: Any) -> int:
     if isinstance(seed, np.ndarray) and seed.ndim == 0:
         seed = seed[()]
-    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)):
-        raise TypeError(f"{name} is {seed!r}, expected a whole number")
-    if not 0 <= seed < _SEEDS:
-        raise ValueError(f"{name} is {seed}, expected 0 to {_SEEDS - 1}")
-    return int(seed)
+    return check_whole(name, seed, 0, _SEEDS - 1)

@@ -16,6 +16,7 @@ import numpy as np
 
 from pogema_rs import _engine
 from pogema_rs._base import ActionsSampler, PogemaBase
+from pogema_rs._checks import check_semantics
 from pogema_rs._forward import forwarded
 from pogema_rs._goal_generators import GoalGenerators
 from pogema_rs._history import Kept
@@ -91,7 +92,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
     ) -> None:
         self._check_overrides()
         super().__init__(GridConfig(num_agents=2) if grid_config is None else grid_config)
-        self.__dict__["semantics"] = Semantics(semantics)
+        self.__dict__["semantics"] = check_semantics(semantics)
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
         # As in POGEMA, the time limit and the class follow from the config that the environment was made with.

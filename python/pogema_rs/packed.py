@@ -7,6 +7,8 @@ from typing import Any, Optional, Union, overload
 
 import numpy as np
 
+from pogema_rs._checks import check_whole
+
 __all__ = ["unpack", "words_per_agent"]
 
 _LARGEST_RADIUS = 128
@@ -88,8 +90,4 @@ def _check_out(out: Any, kind: Any, shape: tuple[int, ...], dtype: Union[None, A
 
 
 def _num_cells(radius: int) -> int:
-    if isinstance(radius, bool) or not isinstance(radius, (int, np.integer)):
-        raise TypeError(f"radius is {radius!r}, expected a whole number")
-    if not 1 <= radius <= _LARGEST_RADIUS:
-        raise ValueError(f"radius is {radius}, expected 1 to {_LARGEST_RADIUS}")
-    return 3 * (2 * int(radius) + 1) ** 2
+    return 3 * (2 * check_whole("radius", radius, 1, _LARGEST_RADIUS) + 1) ** 2

@@ -8,6 +8,7 @@ map's corner, without the border.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional
@@ -16,6 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pogema_rs import _engine
+from pogema_rs._checks import check_whole
+
+_LARGEST = 2**64 - 1
 
 __all__ = ["Plan", "PlannerAgents", "cost_to_go", "plan", "validate"]
 
@@ -72,9 +76,8 @@ def plan(
     Errors: ValueError for cells that are not free, wrong shapes, or an unknown planner. An impossible problem or an
     exhausted budget is an outcome, not an error.
     """
-    result = _engine.make_plan(
-        obstacles, starts, goals, planner, _budget(seconds, nodes), most_steps, num_threads, seed
-    )
+    limits = _limits(seconds, nodes, most_steps, num_threads, seed)
+    result = _engine.make_plan(obstacles, _cells("starts", starts), _cells("goals", goals), planner, *limits)
     return Plan(**result)
 
 
@@ -87,7 +90,8 @@ def validate(
 
     Errors: ValueError for wrong shapes.
     """
-    return _engine.check_plan(obstacles, starts, goals, cells)
+    goals = None if goals is None else _cells("goals", goals)
+    return _engine.check_plan(obstacles, _cells("starts", starts), goals, _cells("cells", cells))
 
 
 def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
@@ -99,7 +103,7 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
 
     Errors: ValueError for a goal that is not free.
     """
-    row, col = goal
+    row, col = _cells("goal", goal).tolist()
     return _engine.cost_to_go(obstacles, (int(row), int(col)))
 
 
@@ -127,8 +131,8 @@ class PlannerAgents:
 
         Errors: ValueError for a planner that is unknown or does not support such episodes.
         """
-        budget = _budget(seconds, nodes)
-        self._follower = _engine.PlanFollower(planner, budget, most_steps, num_threads, seed, lifelong)
+        limits = _limits(seconds, nodes, most_steps, num_threads, seed)
+        self._follower = _engine.PlanFollower(planner, *limits, lifelong)
 
     def act(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
         """Returns the actions of all agents.
@@ -147,5 +151,22 @@ class PlannerAgents:
         self._follower.reset()
 
 
-def _budget(seconds: Optional[float], nodes: Optional[int]) -> tuple[Optional[float], Optional[int]]:
-    return (1.0 if seconds is None and nodes is None else seconds, nodes)
+def _limits(
+    seconds: Optional[float], nodes: Optional[int], most_steps: Optional[int], num_threads: int, seed: int
+) -> tuple[tuple[Optional[float], Optional[int]], Optional[int], int, int]:
+    """Returns the budget, the number of steps, the number of threads and the seed, as the engine reads them."""
+    if nodes is not None:
+        nodes = min(check_whole("nodes", nodes, 0), _LARGEST)
+    if most_steps is not None:
+        most_steps = min(check_whole("most_steps", most_steps, 0), sys.maxsize)
+    budget = (1.0 if seconds is None and nodes is None else seconds, nodes)
+    num_threads = check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS)
+    return budget, most_steps, num_threads, check_whole("seed", seed, 0, _LARGEST)
+
+
+def _cells(name: str, cells: ArrayLike) -> NDArray[Any]:
+    """Returns cells as an array; the engine would drop the fractions of their numbers."""
+    array = np.asarray(cells)
+    if array.dtype.kind == "f" and not (np.isfinite(array) & (array == np.trunc(array))).all():
+        raise ValueError(f"{name} has a fraction or no number, expected whole numbers")
+    return array

@@ -14,6 +14,7 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from pogema_rs import _engine, _vec_spaces
+from pogema_rs._checks import check_semantics
 from pogema_rs._encoder import Encoder
 from pogema_rs._vec_configs import read_changes, read_configs, read_room, read_threads
 from pogema_rs._vec_curriculum import Curriculum, NextEpisodes
@@ -141,10 +142,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         without an instance raises `InstanceError` only at the first reset.
         """
         self.closed = True
-        if semantics not in [known.value for known in Semantics]:
-            expected = " or ".join(repr(known.value) for known in Semantics)
-            raise ValueError(f"semantics is {semantics!r}, expected {expected}")
-        self.semantics = Semantics(semantics)
+        self.semantics = check_semantics(semantics)
         dtype = _vec_spaces.read_dtype(dtype)
         self.encoder = None if encoder is None else _vec_spaces.read_encoder_for(encoder, dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)

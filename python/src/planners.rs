@@ -270,11 +270,8 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
     check_aligned(what, places)?;
     let [_, numbers] = [places.shape()[0], places.shape()[1]];
     if numbers != 2 {
-        return Err(Error::config(
-            what,
-            format!("an array of {numbers} columns"),
-            "an array of shape (agents, 2)",
-        ));
+        let found = format!("an array of {numbers} columns");
+        return Err(Error::argument(what, found, "an array of shape (agents, 2)"));
     }
     let rows = places.as_array();
     (0..).zip(rows.outer_iter()).map(|(agent, place)| cell(what, agent, [place[0], place[1]])).collect()

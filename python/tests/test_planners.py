@@ -70,12 +70,22 @@ def test_impossible_problems_and_timeouts_are_outcomes():
         ({"goals": [[0, -1], [0, 0]]}, "agent 0: .* is not on the map"),
         ({"seconds": float("nan")}, "seconds"),
         ({"obstacles": np.empty((0, 3))}, "the map has no cells"),
+        ({"goals": [[0, 2, 1], [0, 0, 1]]}, "^`goals` is `an array of 3 columns`"),
+        ({"goals": [[0.9, 2], [0, 0]]}, "goals has a fraction or no number, expected whole numbers"),
+        ({"starts": [[0, 0], [0, float("nan")]]}, "starts has a fraction or no number, expected whole numbers"),
+        ({"num_threads": -1}, "num_threads is -1, expected 1 to"),
+        ({"seed": -1}, "seed is -1, expected 0 to 18446744073709551615"),
+        ({"nodes": -1}, "nodes is -1, expected at least 0"),
+        ({"most_steps": -1}, "most_steps is -1, expected at least 0"),
     ],
 )
 def test_wrong_input_raises_a_one_line_error(arguments, text):
     with pytest.raises(ValueError, match=text) as raised:
         plan(**{"obstacles": OBSTACLES, "starts": STARTS, "goals": GOALS, **arguments})
     assert "\n" not in str(raised.value)
+    if "planner" not in arguments and isinstance(next(iter(arguments.values())), int):
+        with pytest.raises(ValueError, match=text):
+            PlannerAgents(**arguments)
 
 
 def test_conflicts_are_reported():

@@ -171,6 +171,8 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_ta
             if all(terminated):  # the batch has begun the next episode
                 break
     assert of_one.act(observations, skip_agents=[True] * 6) == [0] * 6
+    with pytest.raises(ValueError, match="skip_agents holds 1 flags, expected 6, one for each agent"):
+        of_one.act(observations, skip_agents=[True])
 
 
 def test_threads_and_neighbours_do_not_change_the_actions():
@@ -207,8 +209,6 @@ def test_a_policy_plays_one_environment_at_a_time():
         policy.act(env)
 
 
-def test_pickles_hold_the_settings():
-    policy = load(WEIGHTS, sampling="greedy", seed=4)
 def test_a_call_during_a_call_of_another_thread_names_the_policy():
     policy, env = load(WEIGHTS), VecEnv({**CONFIG, "size": 32, "num_agents": 200}, 64)
     env.reset(seed=0)
@@ -227,6 +227,8 @@ def test_a_call_during_a_call_of_another_thread_names_the_policy():
     assert said == {"another thread is using this policy, expected one thread at a time"}
 
 
+def test_pickles_hold_the_settings():
+    policy = load(WEIGHTS, sampling="greedy", seed=4)
     copy = pickle.loads(pickle.dumps(policy))
     assert isinstance(copy, Policy) and copy.sampling == "greedy" and copy.encoder == policy.encoder
     assert copy.encoder == Encoder(1, ["cost_to_go"]) and repr(copy) == repr(policy) and copy.name == "network"
@@ -297,6 +299,8 @@ def test_wrong_arguments_are_refused():
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"seed": 1.5}, TypeError, "seed is 1.5"),
         ({"faithful": True}, ValueError, "`faithful` is given"),
+        ({"num_threads": -1}, ValueError, "num_threads is -1, expected 1 to"),
+        ({"expansions": -1}, ValueError, "expansions is -1, expected at least 1"),
         ({"semantics": "3.0"}, ValueError, "3.0"),
     ]:
         with pytest.raises(error, match=message):

@@ -152,7 +152,7 @@ BAD_VECTORS = [
     ({"num_envs": 0}, ValueError, "num_envs is 0, expected at least 1"),
     ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
     ({"num_threads": 1025}, ValueError, "num_threads is 1025, expected 1 to 1024"),
-    ({"num_threads": 0}, ValueError, "num_threads is 0, expected at least 1"),
+    ({"num_threads": 0}, ValueError, "num_threads is 0, expected 1 to"),
     ({"dtype": "float64"}, ValueError, "dtype is 'float64', expected 'float32', 'uint8' or 'bits'"),
     ({"autoreset_mode": "often"}, ValueError, "expected one of 'next_step', 'same_step', 'disabled'"),
     ({"semantics": "3"}, ValueError, "semantics is '3', expected '1.4.0' or '2.0'"),

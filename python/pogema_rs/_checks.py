@@ -1,0 +1,41 @@
+"""Checks of arguments that several modules share."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from pogema_rs.semantics import Semantics
+
+
+def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = None, meaning: str = "") -> int:
+    """Returns an argument that is a whole number, NumPy's included, as an `int`.
+
+    `meaning` is added to the error for a number that is out of range.
+
+    Errors: TypeError for any other type; ValueError for a number below `least` or above `most`.
+    """
+    try:
+        # NumPy's arrays of one number would pass, too.
+        number = None if isinstance(value, (bool, np.bool_, np.ndarray)) else operator.index(value)
+    except TypeError:
+        number = None
+    if number is None:
+        raise TypeError(f"{name} is {value!r}, expected a whole number")
+    if number < least or (most is not None and number > most):
+        expected = f"at least {least}" if most is None else f"{least} to {most}"
+        raise ValueError(f"{name} is {number}, expected {expected}{meaning}")
+    return number
+
+
+def check_semantics(semantics: Union[str, Semantics]) -> Semantics:
+    """Returns a release line of POGEMA that is given by its number.
+
+    Errors: ValueError for an unknown one.
+    """
+    known = [line.value for line in Semantics]
+    if semantics not in known:
+        raise ValueError(f"semantics is {semantics!r}, expected {' or '.join(map(repr, known))}")
+    return Semantics(semantics)
