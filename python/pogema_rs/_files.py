@@ -6,8 +6,24 @@ import contextlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
-from typing import IO
+from typing import IO, Union
+
+
+def write_text(name: Union[str, PathLike[str]], text: str) -> None:
+    """Writes a text to a file in UTF-8, and makes the folders above it.
+
+    Errors: OSError if the file cannot be written. After any error, an existing file keeps its content.
+    """
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.exists() and not path.is_file():
+        path.write_text(text, encoding="utf-8")  # a pipe, for example /dev/stdout, cannot be replaced
+        return
+    # A link stays a link.
+    with replaced(path.resolve()) as file:
+        file.write(text.encode())
 
 
 @contextmanager

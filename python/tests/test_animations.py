@@ -39,8 +39,38 @@ def test_saving_makes_folders(tmp_path: Path) -> None:
         for folder in (tmp_path / name / "new" / "folder", tmp_path):
             save(folder / f"saved-{name}")
             assert (folder / f"saved-{name}").read_text(encoding="utf-8").strip().endswith(">")
+    assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == [f"saved-{name}" for name in ways]
     with pytest.raises(OSError, match="a.svg"):
         env.save_animation(tmp_path / "saved-a.svg" / "below a file")
+
+
+def test_a_failed_write_of_a_drawing_leaves_the_earlier_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    animation, path = recorded().render_animation(), tmp_path / "a.svg"
+    (tmp_path / "link.svg").symlink_to(path)
+    animation.save(tmp_path / "link.svg")
+    before = path.read_text(encoding="utf-8")
+    assert before == animation.render()
+
+    def fail(_file: int) -> None:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr("os.fsync", fail)
+    with pytest.raises(OSError, match="the disk is full"):
+        recorded(seed=3).save_animation(path)
+    assert path.read_text(encoding="utf-8") == before
+    recorded().save_animation("/dev/null")
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"egocentric_idx": -1}, "egocentric_idx is -1, expected at least 0"),
+        ({"static_frame_idx": -1}, "static_frame_idx is -1, expected at least 0"),
+    ],
+)
+def test_negative_numbers_of_agents_and_frames_are_named(options: dict[str, int], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        recorded().render_animation(AnimationConfig(**options))
 
 
 def test_environment_tells_whether_it_records() -> None:

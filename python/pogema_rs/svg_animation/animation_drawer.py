@@ -6,9 +6,10 @@ import base64
 import math
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional, Union
 
+from pogema_rs._checks import check_whole
+from pogema_rs._files import write_text
 from pogema_rs._forward import forwarded
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ class SvgAnimation:
 
         Errors: `OSError` if the file cannot be written.
         """
-        write(name, self._text)
+        write_text(name, self._text)
 
     def _repr_html_(self) -> str:
         # An <img> isolates the ids of the drawing from those of other drawings on the page.
@@ -169,21 +170,12 @@ class SvgAnimation:
         return f'<img src="data:image/svg+xml;base64,{data}" alt="animation of an episode">'
 
 
-def write(name: Union[str, PathLike], text: str) -> None:
-    """Writes a text to a file, and makes the folders above it.
-
-    Errors: `OSError` if the file cannot be written.
-    """
-    path = Path(name)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-
-
 def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:
     """Draws the episode that an engine has recorded."""
+    agent, frame = config.egocentric_idx, config._frame()
     text = engine.draw_svg(
-        egocentric=config.egocentric_idx,
-        static_frame=config._frame(),
+        egocentric=None if agent is None else check_whole("egocentric_idx", agent, 0),
+        static_frame=None if frame is None else check_whole("static_frame_idx", frame, 0),
         show_agents=config.show_agents,
         show_lines=config.show_grid_lines,
     )

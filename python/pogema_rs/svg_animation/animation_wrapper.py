@@ -8,11 +8,12 @@ from itertools import cycle
 from os import PathLike
 from typing import Any, Optional, Union
 
+from pogema_rs._files import write_text
 from pogema_rs._forward import forwarded
 from pogema_rs._history import History, decompressed, kept
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.svg_animation._drawer import AnimationDrawer
-from pogema_rs.svg_animation.animation_drawer import AnimationConfig, GridHolder, SvgSettings, write
+from pogema_rs.svg_animation.animation_drawer import AnimationConfig, GridHolder, SvgSettings
 from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = ["AnimationConfig", "AnimationDrawer", "AnimationMonitor", "GridHolder", "SvgSettings"]
@@ -87,7 +88,7 @@ class AnimationMonitor(Wrapper):
             self.unwrapped.save_animation(name, animation_config)
         else:
             holder = self._holder(animation_config or AnimationConfig())
-            write(name, AnimationDrawer().create_animation(holder).render())
+            write_text(name, AnimationDrawer().create_animation(holder).render())
 
     @property
     def history(self) -> Optional[History]:

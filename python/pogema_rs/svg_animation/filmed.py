@@ -5,7 +5,8 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Optional, Union
 
-from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw, write
+from pogema_rs._files import write_text
+from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Engine
@@ -30,7 +31,8 @@ class Filmed:
     def render_animation(self, animation_config: Optional[AnimationConfig] = None) -> SvgAnimation:
         """Returns the episode so far as an animation that notebooks display.
 
-        Errors: `StateError` if the episode is not recorded, or has no such agent or frame.
+        Errors: `StateError` if the episode is not recorded, or has no such agent or frame; TypeError or ValueError if
+        their number is no whole number or negative.
         """
         return draw(self._engine, animation_config or AnimationConfig())
 
@@ -48,4 +50,4 @@ class Filmed:
 
         Errors: `StateError` if the episode is not recorded; `OSError` if the file cannot be written.
         """
-        write(name, self._engine.draw_html(title))
+        write_text(name, self._engine.draw_html(title))

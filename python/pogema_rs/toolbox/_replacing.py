@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
 
-from pogema_rs._files import replaced
+from pogema_rs._files import write_text
 from pogema_rs.toolbox import _chunks
 from pogema_rs.toolbox._optional import required
 from pogema_rs.toolbox._work import plain
@@ -56,7 +56,7 @@ def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) ->
         metrics = backends[key](settings, environments, key)
         rows = join_metrics_and_configs(metrics, environments, changes, settings, key)
         if eval_dir is not None:
-            _write(Path(eval_dir, f"{key}.json"), json.dumps(rows, default=plain))
+            write_text(Path(eval_dir, f"{key}.json"), json.dumps(rows, default=to_json))
         results += rows
         ToolboxRegistry.success(f"{key}: {len(rows)} episodes played")
     run_views(results, evaluation_config, eval_dir=eval_dir)
@@ -127,10 +127,3 @@ def _check_views(views: Mapping[Any, Mapping[str, Any]]) -> None:
             for package in ("pandas", "tabulate"):
                 required(package, "a view of type `tabular` with `print_results`")
     check_views(views)
-
-
-def _write(path: Path, text: str) -> None:
-    """Writes a whole file, or on failure leaves the existing one unchanged."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replaced(path) as file:
-        file.write(text.encode())
