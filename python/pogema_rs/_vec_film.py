@@ -61,18 +61,20 @@ class Films:
 
     def warn(self) -> None:
         """Warns about films that are missing; training continues without them."""
-        _warn(self._batch.take_film_failures())
+        # The caller of `VecEnv.step` or `VecEnv.reset`.
+        _warn(self._batch.take_film_failures(), 4)
 
     def finish(self) -> None:
         """Ends the current film, and waits until all are complete."""
         paths, failures = self._batch.finish_films()
         self._finished = [str(path) for path in paths]
-        _warn(failures)
+        # The caller of `VecEnv.close`, which calls this through `weakref.finalize`.
+        _warn(failures, 5)
 
 
-def _warn(failures: list[str]) -> None:
+def _warn(failures: list[str], stacklevel: int) -> None:
     for reason in failures:
-        warnings.warn(reason, RuntimeWarning, stacklevel=4)
+        warnings.warn(reason, RuntimeWarning, stacklevel=stacklevel)
 
 
 def _check(film: Any, num_envs: int) -> None:

@@ -210,6 +210,13 @@ def test_a_folder_that_disappears_is_a_warning_and_training_continues(tmp_path):
         assert f"the film of episode {episode} is missing: " in message
         assert f"pogema-episode-{episode}.svg" in message and "No such file" in message
     assert env.films == [] and env.closed
+    env = VecEnv(CONFIG, 1, film=Film(folder))
+    env.reset(seed=0)
+    env.step(env.sample_actions())
+    folder.rmdir()
+    with pytest.warns(RuntimeWarning, match="episode 0 is missing") as caught:
+        env.close()
+    assert caught[0].filename == __file__
 
 
 def test_a_warning_that_is_an_error_changes_nothing(tmp_path):
