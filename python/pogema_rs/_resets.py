@@ -5,6 +5,8 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, ClassVar, Optional
 
+import numpy as np
+
 from pogema_rs import grid_registry
 from pogema_rs.errors import StateError
 from pogema_rs.grid_config import GridConfig, engine_fields
@@ -13,8 +15,6 @@ if TYPE_CHECKING:
     from pogema_rs._engine import Engine
     from pogema_rs.grid import Grid
 
-_PLACES = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
-
 
 def _differ(one: Any, other: Any) -> bool:
     """Returns whether two values of a field differ; arrays, which NumPy compares by element, count as different."""
@@ -22,6 +22,20 @@ def _differ(one: Any, other: Any) -> bool:
         return bool(one != other)
     except ValueError:
         return True
+
+
+def _copied(value: Any) -> Any:
+    """Returns a copy of the lists and tuples that a field consists of, and any other value unchanged."""
+    if not isinstance(value, (list, tuple)) or not value:
+        return value
+    # All items of a field are lists, or none is.
+    if isinstance(value[0], (list, tuple)):
+        return (list if isinstance(value, list) else tuple)(_copied(item) for item in value)
+    return value[:]
+
+
+def _is_same_map(one: Optional[np.ndarray], other: Optional[np.ndarray]) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 
 class Resettable:
@@ -42,6 +56,8 @@ class Resettable:
     )
     _live = itemgetter(*_LIVE)
     _live_values: Optional[tuple[Any, ...]] = None
+    # The obstacles of the registered map that the config names.
+    _last_obstacles: Optional[np.ndarray] = None
 
     def _check_unchanged(self) -> None:
         """Raises `StateError` if a field that POGEMA reads in every step changed since the last reset."""
@@ -59,9 +75,11 @@ class Resettable:
     def _remember_config(self) -> None:
         fields = self.grid_config.__dict__
         self._last_config = self.grid_config
-        self._last_fields = {name: fields[name] for name in GridConfig.model_fields}
+        # Users change lists in place, for example a row of `map`.
+        self._last_fields = {name: _copied(fields[name]) for name in GridConfig.model_fields}
         self._live_values = self._live(fields)
-        self._last_places = {name: [*fields[name]] for name in _PLACES if fields[name] is not None}
+        obstacles = grid_registry.obstacles(self.grid_config.map_name)
+        self._last_obstacles = None if obstacles is None else obstacles.copy()
 
     def _registered(self) -> Optional[str]:
         return grid_registry.map_text(self.grid_config.map_name)
@@ -71,11 +89,10 @@ class Resettable:
         fields, last = self.grid_config.__dict__, self._last_fields
         is_same = self.grid_config is self._last_config
         changed = [name for name in last if fields[name] is not last[name] and _differ(fields[name], last[name])]
-        changed += [name for name, places in self._last_places.items() if _differ(fields[name], places)]
+        if not _is_same_map(grid_registry.obstacles(self.grid_config.map_name), self._last_obstacles):
+            changed.append("map_name")
         if is_same and all(name == "seed" for name in changed):
-            if changed:
-                self._engine.reseed({"seed": self.grid_config.seed})
-            messages = self._engine.reset()
+            messages = self._reset_with_seed(last["seed"]) if changed else self._engine.reset()
         else:
             fixed: dict[str, Any] = dict(self._fixed)
             pools = self._engine.pools()
@@ -85,3 +102,12 @@ class Resettable:
         if changed or not is_same or self._live_values is None:
             self._remember_config()
         return messages
+
+    def _reset_with_seed(self, last: Optional[int]) -> list[str]:
+        """Resets the engine with the seed of the config, or after an error gives it back its last one."""
+        try:
+            self._engine.reseed({"seed": self.grid_config.seed})
+            return self._engine.reset()
+        except BaseException:
+            self._engine.reseed({"seed": last})
+            raise

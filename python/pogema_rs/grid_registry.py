@@ -9,7 +9,7 @@ import numpy as np
 from pogema_rs import _engine, _map_text
 from pogema_rs._map_text import Cell
 from pogema_rs.errors import MapTextError, StateError
-from pogema_rs.utils import check_grid, render_grid
+from pogema_rs.utils import check_grid, grid_to_str, render_grid
 
 __all__ = ["GRID_STR_REGISTRY", "RegisteredGrid", "get_grid", "in_registry", "register_grid"]
 
@@ -106,7 +106,10 @@ def register_grid(rg: RegisteredGrid) -> None:
 
 def map_text(name: Optional[str]) -> Optional[str]:
     """Returns the obstacles of a registered map as text, or `None` if the name is not registered."""
-    if name is None or not in_registry(name):
-        return None
-    rows = GRID_STR_REGISTRY[name].get_obstacles()
-    return "\n".join("".join("#" if cell else "." for cell in row) for row in rows)
+    grid = obstacles(name)
+    return None if grid is None else grid_to_str(grid)
+
+
+def obstacles(name: Optional[str]) -> Optional[np.ndarray]:
+    """Returns the obstacles of a registered map, or `None` if the name is not registered."""
+    return GRID_STR_REGISTRY[name].get_obstacles() if name is not None and in_registry(name) else None

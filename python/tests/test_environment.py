@@ -10,6 +10,7 @@ import pogema_rs
 import pytest
 from pogema_rs import AnimationConfig, AnimationMonitor, BatchAStarAgent, GridConfig, pogema_v0
 from pogema_rs.grid import Grid
+from pogema_rs.grid_registry import RegisteredGrid
 from pydantic import ValidationError
 
 
@@ -94,6 +95,79 @@ def test_config_may_change_between_resets():
     env.unwrapped.grid_config = GridConfig(seed=1, num_agents=3, size=16)
     assert len(env.reset()[0]) == 3
     assert env.get_agents_xy() == _starts(GridConfig(seed=1, num_agents=3, size=16))
+
+
+def test_failed_reset_keeps_the_seed():
+    config = GridConfig(seed=1, num_agents=8)
+    env = pogema_v0(config)
+    env.reset()
+    expected = env.get_agents_xy()
+    for seed in (2, 10**30):
+        config.seed = seed
+        engine = env.unwrapped._engine
+        env.unwrapped._engine = _FailingEngine(engine)
+        with pytest.raises((MemoryError, ValueError)):
+            env.reset()
+        env.unwrapped._engine = engine
+        config.seed = 1
+        env.reset()
+        assert env.get_agents_xy() == expected
+
+
+class _FailingEngine:
+    """An engine whose resets fail, as without memory."""
+
+    def __init__(self, engine):
+        self._engine = engine
+
+    def __getattr__(self, name):
+        return getattr(self._engine, name)
+
+    def reset(self, *_):
+        raise MemoryError
+
+
+@pytest.mark.parametrize(
+    ("fields", "change"),
+    [
+        ({"map": [[0, 0, 0], [0, 0, 0]]}, lambda config: config.map[0].__setitem__(slice(1, 3), [1, 1])),
+        ({"agents_xy": [[0, 0]], "targets_xy": [[2, 2]]}, lambda config: config.agents_xy[0].__setitem__(0, 4)),
+        (
+            {"agents_xy": [[0, 0]], "targets_xy": [[[1, 1], [2, 2]]], "on_target": "restart"},
+            lambda config: config.targets_xy[0].__setitem__(0, [5, 5]),
+        ),
+        (
+            {"possible_agents_xy": [[0, 0]], "possible_targets_xy": [[1, 1]]},
+            lambda config: config.possible_agents_xy[0].__setitem__(1, 3),
+        ),
+    ],
+)
+def test_a_change_inside_a_field_takes_effect_at_the_next_reset(fields, change):
+    config = GridConfig(size=8, density=0, seed=1, **fields)
+    env = pogema_v0(config)
+
+    def seen():
+        env.reset()
+        return env.get_obstacles().tolist(), env.get_agents_xy(), env.get_targets_xy()
+
+    before = seen()
+    assert seen() == before
+    change(config)
+    after = seen()
+    assert after != before
+    assert seen() == after
+
+
+def test_a_map_that_is_registered_anew_is_played(monkeypatch):
+    monkeypatch.setattr(pogema_rs.grid_registry, "GRID_STR_REGISTRY", {})
+    RegisteredGrid("anew", "...\n...")
+    env = pogema_v0(GridConfig(map_name="anew", seed=1))
+    env.reset()
+    assert not env.get_obstacles(ignore_borders=True).any()
+    del pogema_rs.grid_registry.GRID_STR_REGISTRY["anew"]
+    RegisteredGrid("anew", ".#.\n...")
+    env.reset()
+    assert env.get_obstacles(ignore_borders=True).tolist() == [[0, 1, 0], [0, 0, 0]]
 
 
 def _starts(config):
