@@ -40,12 +40,14 @@ class _Alias(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         module = importlib.import_module(self._ours(spec.name))
-        self._spec = module.__spec__
+        # Two threads may import different modules at the same time, so that this finder cannot hold the spec.
+        spec.loader_state = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
         # The module has already run, and keeps its name.
-        module.__spec__ = self._spec
+        spec = module.__spec__
+        module.__spec__ = None if spec is None else spec.loader_state
 
 
 def install_as_pogema(toolbox: bool = False) -> None:

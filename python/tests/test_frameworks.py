@@ -87,6 +87,9 @@ def test_pymarl():
     assert done
     assert set(metrics) == {"ISR", "CSR", "ep_length"}
     assert isinstance(reward, float)
+    env = pogema_v0(GridConfig(seed=1, max_episode_steps=1, integration="PyMARL", persistent=True))
+    env.reset()
+    assert env.step([0])[1:] == (True, {})
 
 
 def test_state_of_pymarl_is_the_global_state():
@@ -130,6 +133,23 @@ def test_names_of_the_package_import_no_framework():
         "if name in sys.modules])"
     )
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
+
+
+def test_threads_import_different_modules_of_pogema_at_the_same_time():
+    code = """
+import importlib, sys, threading
+import pogema_rs
+from pogema_rs.install import _Alias
+pogema_rs.install_as_pogema()
+alias = next(finder for finder in sys.meta_path if isinstance(finder, _Alias))
+specs = [alias.find_spec(f"pogema.{name}") for name in ("grid", "envs")]
+modules = [alias.create_module(spec) for spec in specs]
+for spec, module in zip(specs, modules):
+    module.__spec__ = spec
+    alias.exec_module(module)
+assert [module.__spec__.name for module in modules] == ["pogema_rs.grid", "pogema_rs.envs"]
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_install_as_pogema():

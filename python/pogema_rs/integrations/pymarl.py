@@ -46,10 +46,13 @@ class PyMarlPogema:
         return np.array(self._observations).flatten()
 
     def step(self, actions: Sequence[int]) -> tuple[float, bool, dict]:
-        """Plays one step and returns the sum of rewards, whether the episode ended, and if so its metrics."""
+        """Plays one step and returns the sum of rewards, whether the episode ended, and if so its metrics.
+
+        With `persistent` in the config there are no metrics.
+        """
         self._observations, rewards, terminated, truncated, infos = self.env.step(actions)
         done = all(terminated) or all(truncated)
-        return sum(rewards), done, dict(infos[0]["metrics"]) if done else {}
+        return sum(rewards), done, dict(infos[0].get("metrics", {})) if done else {}
 
     def get_obs(self) -> np.ndarray:
         """Returns the observations of all agents, `(agents, 3 * side * side)`."""
