@@ -8,6 +8,7 @@ from typing import Any
 import jax
 
 from pogema_rs import _engine
+from pogema_rs._checks import check_whole
 
 __all__ = ["Config"]
 
@@ -42,13 +43,13 @@ class Config:
 
     def __post_init__(self) -> None:
         for name in ("num_agents", "height", "width", "radius"):
-            check_whole(name, getattr(self, name), 1)
-        if self.radius > LARGEST_RADIUS:
-            raise ValueError(f"radius is {self.radius}, expected 1 to {LARGEST_RADIUS}")
+            most = {"num_agents": LARGEST_GRID // 4, "radius": LARGEST_RADIUS}.get(name)
+            # NumPy's integers have a fixed size, which products exceed.
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, most))
         rows, columns = self.grid
-        if rows * columns > LARGEST_GRID or self.num_agents > LARGEST_GRID // 4:
-            large = "num_agents" if rows * columns <= LARGEST_GRID else "height x width"
-            raise ValueError(f"{large} is too large: a grid has at most {LARGEST_GRID} cells, with its border")
+        if rows * columns > LARGEST_GRID:
+            reason = f"a grid has at most {LARGEST_GRID} cells, with its border of {self.radius} cells"
+            raise ValueError(f"height is {self.height} and width is {self.width}: {reason}")
         check_word("collision", self.collision, COLLISIONS)
         check_word("on_goal", self.on_goal, ON_GOAL)
         check_word("occupancy", self.occupancy, OCCUPANCIES)
@@ -73,15 +74,6 @@ class Config:
     def window_words(self) -> int:
         """The number of 32-bit words of a row of a window."""
         return -(-self.side // 32)
-
-
-def check_whole(name: str, value: Any, least: int) -> int:
-    """Returns an argument that is a whole number of at least `least`."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise TypeError(f"{name} is {value!r}, expected a whole number")
-    if int(value) < least:
-        raise ValueError(f"{name} is {value}, expected at least {least}")
-    return int(value)
 
 
 def check_word(name: str, value: Any, known: tuple[str, ...]) -> None:

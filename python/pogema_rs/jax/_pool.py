@@ -10,16 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from pogema_rs import _engine
+from pogema_rs._checks import check_semantics, check_whole
 from pogema_rs._vec_configs import engine_config
 from pogema_rs.grid_config import GridConfig
-from pogema_rs.jax._config import Config, check_whole
+from pogema_rs.jax._config import Config
 from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.semantics import Semantics
 
 __all__ = ["InstancePool", "Params", "Pool", "check_fits", "draw_instance", "make_params", "make_pool"]
 
 LARGEST_STEP = 2**31 - 1
-LARGEST_SEED = 2**63 - 1
+LARGEST_SEED = 2**63 - 2
 
 
 class Pool(NamedTuple):
@@ -54,7 +55,7 @@ class InstancePool:
     `config` is a GridConfig or a dict. `seeds` is one seed, S, or one for each instance; with one, the seed of instance
     i is `int(SeedSequence(S, spawn_key=(i,)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
     `SeedSequence`. `num_steps` is the number of steps for which lifelong agents have goals [default: the config's
-    `max_episode_steps`]. An agent that reaches the last of its goals continues with its first one, and
+    `max_episode_steps`, at least 1]. An agent that reaches the last of its goals continues with its first one, and
     `State.num_wraps` counts it. This never happens within `num_steps` steps of an episode, except to sequences of the
     config, which repeat by the rules (Rule: goal/restart/sequence).
 
@@ -79,15 +80,13 @@ class InstancePool:
     ) -> None:
         self.num = check_whole("num", num, 1)
         check_pair("map_size", map_size)
-        known = [each.value for each in Semantics]
-        if semantics not in known:
-            raise ValueError(f"semantics is {semantics!r}, expected {' or '.join(map(repr, known))}")
+        line = check_semantics(semantics)
         if not isinstance(config, GridConfig):
             config = GridConfig(**config)
         self._fields, self._registered = engine_config(config, "own")
-        limit = config.max_episode_steps if num_steps is None else num_steps
+        limit = max(config.max_episode_steps, 1) if num_steps is None else num_steps
         self.num_steps = check_whole("num_steps", limit, 0)
-        occupancy = "exact" if Semantics(semantics).occupancy_is_exact else "as_released"
+        occupancy = "exact" if line.occupancy_is_exact else "as_released"
         probe = self._arrays(self._seeds(seeds)[:1])
         rows, columns = (int(size) for size in probe["sizes"])
         agents = len(probe["num_goals"])
@@ -146,10 +145,7 @@ class InstancePool:
             first = check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
             sequences = (np.random.SeedSequence(first, spawn_key=(index,)) for index in range(self.num))
             return [int(each.generate_state(1, np.uint64)[0]) % (2**63 - 1) for each in sequences]
-        listed = [check_whole(f"seeds[{index}]", seed, 0) for index, seed in enumerate(seeds)]
-        for index, seed in enumerate(listed):
-            if seed > LARGEST_SEED:
-                raise ValueError(f"seeds[{index}] is {seed}, expected at most {LARGEST_SEED}")
+        listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
         if len(listed) != self.num:
             raise ValueError(f"seeds holds {len(listed)} seeds, expected {self.num}, one for each instance")
         return listed

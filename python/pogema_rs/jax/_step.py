@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pogema_rs.jax._collide import MOVES, move_agents
 from pogema_rs.jax._goals import advance_goals, pay, terminate, truncate
@@ -34,7 +35,8 @@ class StepOut(NamedTuple):
 def step(params: Params, state: State, actions: jax.Array) -> tuple[State, StepOut]:
     """Plays one step of one environment. Steps after the end of an episode follow the same rules.
 
-    An action outside 0 to 4 is clipped, and `State.num_clipped` counts it; `checked_step` raises instead.
+    An action outside 0 to 4 is clipped, and `State.num_clipped` counts it; `checked_step` raises instead. Without
+    `jax_enable_x64`, `jax.jit` keeps only the lower 32 bits of an int64 action before this function sees it.
 
     Shape: `actions` `(agents,)`, integers from 0 to 4
 
@@ -88,6 +90,10 @@ def auto_reset(
 
 def check_actions(params: Params, actions: jax.Array) -> jax.Array:
     """Returns actions as an array of integers of the right shape."""
+    if isinstance(actions, np.ndarray) and np.issubdtype(actions.dtype, np.integer):
+        # Without x64, JAX would keep the lower 32 bits of a wrong action, which may be those of a right one.
+        kind, room = np.iinfo(actions.dtype), np.iinfo(np.int32)
+        actions = np.clip(actions, max(kind.min, room.min), min(kind.max, room.max))
     actions = jnp.asarray(actions)
     expected = (params.config.num_agents,)
     if actions.shape != expected:
