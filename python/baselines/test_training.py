@@ -1,10 +1,12 @@
 """Tests of whole trainings: repeated, killed and resumed ones, their files, and the networks that they export."""
 
 import csv
+import errno
 import json
 import os
 import signal
 import subprocess
+import sys
 import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -136,6 +138,64 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
     train(small_config(method), folder, Budget(updates=1))
     assert (folder / "weights.safetensors").exists()
+    # The checkpoint of a run may be deleted, and its description and curve kept.
+    (folder / "checkpoint.pt").unlink()
+    kept = {name: (folder / name).read_bytes() for name in ("run.json", "curve.csv", "curve.svg")}
+    with pytest.raises(ValueError):
+        train(too_many, folder, Budget(updates=1))
+    assert {name: (folder / name).read_bytes() for name in kept} == kept
+
+
+def test_a_failed_start_without_tensorboard_leaves_no_files(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "tensorboard", None)
+    with pytest.raises(ImportError, match="--tensorboard needs"):
+        train(small_config("iql"), tmp_path / "run", Budget(updates=1), tensorboard=True)
+    assert not (tmp_path / "run").exists()
+    train(small_config("iql"), tmp_path / "run", Budget(updates=1))
+    files = sorted(path.name for path in (tmp_path / "run").iterdir())
+    with pytest.raises(ImportError, match="--tensorboard needs"):
+        train(small_config("iql"), tmp_path / "run", Budget(updates=2), tensorboard=True, resume=True)
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == files
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ({}, "minutes and updates are None, expected at least one limit"),
+        ({"minutes": 0}, "minutes is 0, expected more than 0"),
+        ({"updates": 0}, "updates is 0, expected more than 0"),
+        ({"minutes": float("inf")}, "minutes is inf, expected more than 0"),
+    ],
+)
+def test_a_budget_ends_a_training(limits, text):
+    with pytest.raises(ValueError, match=text):
+        Budget(**limits)
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="needs a reservation of disk space")
+def test_a_replay_that_does_not_fit_the_disk_is_an_error(tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", fail)
+    with pytest.raises(OSError, match="No space left on device"):
+        train(small_config("iql"), tmp_path / "run", Budget(updates=1))
+    assert not (tmp_path / "run").exists()
+
+
+def test_one_sample_teaches_ppo_finite_weights(tmp_path):
+    single = ("environment.num_agents=1", "environment.max_episode_steps=1", "schedule.lanes=1")
+    config = small_config("ippo", *single)
+    last = train(config, tmp_path, Budget(updates=2))
+    assert all(np.isfinite(values).all() for values in weights(tmp_path).values())
+    assert np.isfinite(last["critic"])
+
+
+def test_losses_of_ppo_are_means_of_the_updates(tmp_path):
+    config = small_config("ippo", "schedule.lanes=1", "learner.minibatches=8", "learner.epochs=1")
+    whole = small_config("ippo", "schedule.lanes=1", "learner.minibatches=1", "learner.epochs=1")
+    few, one = (train(each, tmp_path / name, Budget(updates=1)) for name, each in (("few", config), ("one", whole)))
+    assert few["critic"] == one["critic"] > 0
 
 
 def test_windows_pass_convolutions_in_parts(monkeypatch):

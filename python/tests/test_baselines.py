@@ -104,6 +104,11 @@ WRONG = {
     "schedule: {lanes: 0}": "schedule.lanes is 0, expected at least 1",
     "encoder: {radius: 5, channels: [cost_tracer]}": "encoder.channels is ('cost_tracer',), expected names of",
     "encoder: {radius: 0, channels: [goal]}": "encoder: radius is 0, expected 1 to 128",
+    "encoder: {radius: 64, channels: [goal]}": "encoder.radius is 64, expected at most 63",
+    "learner: {max_gradient: 0}": "learner.max_gradient is 0.0, expected more than 0",
+    "learner: {discount: .nan}": "learner.discount is nan, expected a finite number",
+    "environment: {maps: [random, mazes, plain]}\nschedule: {lanes: 2}": "schedule.lanes is 2, expected at least the 3",
+    "environment: {maps: [random, mazes]}\nschedule: {validation_episodes: 1}": "schedule.validation_episodes is 1",
     "method: vdn": "method is 'vdn', expected 'qmix'",
     "a: [": "while parsing",
     "[]": "the file holds a list, expected a mapping",
@@ -126,6 +131,9 @@ def test_wrong_arguments_are_one_clear_line(tmp_path, capsys):
     out = ["--out", str(tmp_path / "run")]
     for arguments, expected in (
         (["train", "qmx", *out], "method is 'qmx', expected one of iql"),
+        (["train", "qmix", *out, "--set", "learner.batch=1.5"], "with --set learner.batch=1.5: learner.batch is 1.5"),
+        (["train", "ippo", *out, "--set", "learner.value=-1"], "learner.value is -1.0, expected at least 0"),
+        (["train", "ippo", *out, "--set", "learner.entropy=-1"], "learner.entropy is -1.0, expected at least 0"),
         (["train", "qmix", *out, "--minutes", "0"], "--minutes is 0.0, expected more than 0"),
         (["train", "qmix", *out, "--updates", "-1"], "--updates is -1, expected more than 0"),
         (["train", "qmix", *out, "--seed", "-1"], "--seed is -1, expected 0 to"),
@@ -136,6 +144,15 @@ def test_wrong_arguments_are_one_clear_line(tmp_path, capsys):
         message = capsys.readouterr().err
         assert expected in message and message.count("\n") == 1
     assert not (tmp_path / "run").exists()
+
+
+def test_an_unknown_method_lists_all_methods_once(capsys):
+    assert __main__.main(["config", "zzz"]) == 1
+    assert capsys.readouterr().err.count("follower") == 1
+
+
+def test_numbers_may_have_an_exponent():
+    assert load_config("iql", None, ["learner.learning_rate=1e-4"]).learner.learning_rate == 1e-4
 
 
 def test_missing_torch_is_one_line_that_names_the_extra(tmp_path):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,6 +26,9 @@ GOAL_RULES = ("nothing", "restart", "finish")
 CHANNELS = (
     "obstacles", "agents", "all_agents", "goal", "cost_to_go", "path", "follower_path", "seen_agents", "seen_obstacles",
 )  # fmt: skip
+
+#: With it, a signed byte holds `2 * radius`.
+LARGEST_RADIUS = 63
 
 Section = TypeVar("Section")
 
@@ -203,7 +208,7 @@ def load_config(
     value, with the file and the nearest key.
     """
     if method not in METHODS:
-        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}{_hint(method, METHODS)}")
+        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}{_nearest(method, METHODS)}")
     yaml = required("yaml", "reading the hyperparameters of a training")
     if path is None:
         name = f"{method}.yaml"
@@ -222,6 +227,7 @@ def load_config(
         raise TypeError(f"{name}: the file holds a {type(values).__name__}, expected a mapping")
     for change in changes:
         _apply(values, change, yaml)
+        name += f" with --set {change}"
     return read_config(values, method, name)
 
 
@@ -271,8 +277,12 @@ def _value(place: str, value: Any, kind: Any) -> Any:
         if not is_right:
             raise TypeError(f"{place} is {value!r}, expected a list of {'whole numbers' if word is int else 'names'}")
         return tuple(value)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+    if kind is float:
+        # PyYAML reads `1e-4` as a text.
+        with contextlib.suppress(ValueError, OverflowError):
+            value = float(value) if isinstance(value, (int, str)) and not isinstance(value, bool) else value
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{place} is {value!r}, expected a finite number")
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         expected = {int: "a whole number", float: "a number", bool: "true or false", str: "a name"}[kind]
         raise TypeError(f"{place} is {value!r}, expected {expected}")
@@ -286,8 +296,12 @@ def _check_keys(name: str, prefix: str, values: Mapping[str, Any], known: Sequen
 
 
 def _hint(word: str, known: Sequence[str], prefix: str = "") -> str:
+    return _nearest(word, known, prefix) or f"; expected one of {', '.join(known)}"
+
+
+def _nearest(word: str, known: Sequence[str], prefix: str = "") -> str:
     near = difflib.get_close_matches(word, known, 1, 0.5)
-    return f"; did you mean {prefix + near[0]!r}?" if near else f"; expected one of {', '.join(known)}"
+    return f"; did you mean {prefix + near[0]!r}?" if near else ""
 
 
 def _check_values(name: str, config: TrainingConfig) -> None:
@@ -309,15 +323,22 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(environment.size <= 255, "environment.size", "at most 255")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
+    # A byte holds `2 * radius` times each value.
+    check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
     for key in ("filters", "blocks", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
     check(config.network.hidden >= 1, "network.hidden", "at least 1")
     check(config.network.blocks == 0 or config.network.filters > 0, "network.blocks", "0 without filters")
     for one in dataclasses.fields(schedule):
         check(getattr(schedule, one.name) >= 1, f"schedule.{one.name}", "at least 1")
+    # The lanes play the kinds of maps in turn, and begin with the first one in each iteration.
+    for key in ("lanes", "validation_episodes"):
+        num_maps = len(environment.maps)
+        check(getattr(schedule, key) >= num_maps, f"schedule.{key}", f"at least the {num_maps} environment.maps")
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
     check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
     check(learner.half_life >= 0, "learner.half_life", "at least 0")
+    check(learner.max_gradient > 0, "learner.max_gradient", "more than 0")
     _check_learner(check, learner, schedule)
     _check_imitation(check, name, config)
 
@@ -357,6 +378,8 @@ def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig)
     if isinstance(learner, PPOConfig):
         check(0 <= learner.gae_lambda <= 1, "learner.gae_lambda", "0 to 1")
         check(learner.clip > 0, "learner.clip", "more than 0")
+        for key in ("entropy", "value"):
+            check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
         check(learner.critic_hidden >= 1, "learner.critic_hidden", "at least 1")
     for key in ("epochs", "minibatches"):
         check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")

@@ -73,8 +73,9 @@ class PPOLearner:
         """Updates the networks on the episodes; returns means of the updates."""
         gains, returns, odds = self._judged(record)
         played = _acted(record)
-        spread, mean = torch.std_mean(gains[played])
-        gains = (gains - mean) / (spread + 1e-8)
+        if played.sum() > 1:  # a single sample has no spread
+            spread, mean = torch.std_mean(gains[played])
+            gains = (gains - mean) / (spread + 1e-8)
         return self._pass(record, self._update, (gains, returns, odds, played))
 
     def imitate(self, record: Record, advice: np.ndarray) -> dict[str, float]:
@@ -92,7 +93,7 @@ class PPOLearner:
     ) -> dict[str, float]:
         """Calls an update with all minibatches of some lanes; returns the means of its results."""
         sums: dict[str, float] = {}
-        count = self.learner.epochs * self.learner.minibatches
+        count = self.learner.epochs * min(self.learner.minibatches, record.shape[1])
         for _ in range(self.learner.epochs):
             order = torch.randperm(record.shape[1], generator=self._generator)
             for lanes in torch.tensor_split(order, self.learner.minibatches):

@@ -71,10 +71,13 @@ def empty(config: TrainingConfig, map_size: tuple[int, int], lanes: int) -> Reco
     return Record(**arrays)
 
 
+def _arrays(record: Record) -> dict[str, np.ndarray]:
+    return {one.name: getattr(record, one.name) for one in fields(record)}
+
+
 def by_lane(record: Record) -> dict[str, np.ndarray]:
     """Returns the arrays of a record with the axis of the lanes first."""
-    arrays = {one.name: getattr(record, one.name) for one in fields(record)}
-    return {name: array if name == "maps" else array.swapaxes(0, 1) for name, array in arrays.items()}
+    return {name: array if name == "maps" else array.swapaxes(0, 1) for name, array in _arrays(record).items()}
 
 
 def by_step(arrays: dict[str, np.ndarray]) -> Record:
@@ -84,11 +87,11 @@ def by_step(arrays: dict[str, np.ndarray]) -> Record:
 
 def first_agents(record: Record, count: int) -> Record:
     """Returns the arrays of the first agents, which share the memory of the record."""
-    arrays = {one.name: getattr(record, one.name) for one in fields(record)}
-    return Record(**{name: one if name in ("maps", "played") else one[:, :, :count] for name, one in arrays.items()})
+    arrays = _arrays(record).items()
+    return Record(**{name: one if name in ("maps", "played") else one[:, :, :count] for name, one in arrays})
 
 
 def lanes_of(record: Record, lanes: np.ndarray) -> Record:
     """Returns the episodes of some lanes."""
-    arrays = {one.name: getattr(record, one.name) for one in fields(record)}
+    arrays = _arrays(record)
     return Record(**{name: array[lanes] if name == "maps" else array[:, lanes] for name, array in arrays.items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,9 @@ class Replay:
             size = int(np.prod(full)) * np.dtype(dtype).itemsize
             if count and (not path.is_file() or path.stat().st_size != size):
                 raise FileNotFoundError(f"{path}: the replay is missing or has another size, so the run cannot resume")
-            self._arrays[name] = np.memmap(path, dtype, "r+" if count else "w+", shape=full)
+            if not count:
+                _create(path, size)
+            self._arrays[name] = np.memmap(path, dtype, "r+", shape=full)
 
     def __len__(self) -> int:
         return min(self.count, self.capacity)
@@ -61,3 +64,15 @@ class Replay:
         for array in self._arrays.values():
             if isinstance(array, np.memmap):
                 array.flush()
+
+
+def _create(path: Path, size: int) -> None:
+    """Creates a file of zeros.
+
+    Errors: OSError if the disk has no room.
+    """
+    with open(path, "wb") as file:
+        file.truncate(size)
+        # A sparse file on a full disk would kill the process in a later write.
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)

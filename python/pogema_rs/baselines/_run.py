@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import math
 import platform
 import shutil
 import subprocess
@@ -42,6 +43,17 @@ class Budget:
     minutes: Optional[float] = None
     updates: Optional[int] = None
 
+    def __post_init__(self) -> None:
+        """Checks the limits.
+
+        Errors: ValueError without a limit, or for one that is not positive and finite.
+        """
+        if self.minutes is None and self.updates is None:
+            raise ValueError("minutes and updates are None, expected at least one limit")
+        for name, value in (("minutes", self.minutes), ("updates", self.updates)):
+            if value is not None and not 0 < value < math.inf:
+                raise ValueError(f"{name} is {value}, expected more than 0")
+
     def share(self, seconds: float, iteration: int) -> float:
         """Returns the used share of the budget; values of at least 1 end the training run."""
         shares = [0.0]
@@ -74,12 +86,12 @@ def train(
     """
     with _settings(seed, threads):
         run = _Run(config, folder, seed, threads, resume)
-        run.writer = open_tensorboard(folder) if tensorboard else None
         run.draw = draw
         try:
+            run.open(tensorboard)
             return run.play(budget)
         except BaseException:
-            if run.iteration == 0:
+            if run.is_new and run.iteration == 0:
                 run.remove()
             raise
         finally:
@@ -119,6 +131,9 @@ class _Run:
         if not resume and self.path.exists():
             raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
         saved = _checkpoint.load(self.path, config.method) if resume else None
+        self.is_new = saved is None
+        description = folder / "run.json"
+        self._earlier = description.read_bytes() if description.exists() else None
         self.generator = torch.Generator().manual_seed(seed)
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
         self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator)
@@ -127,8 +142,16 @@ class _Run:
         self.best_weights = self._weights()
         if saved is not None:
             self._restore(saved)
+        self.lanes: dict[tuple[str, int], Collector] = {}
+        self.judges: dict[tuple[str, int], Collector] = {}
         folder.mkdir(parents=True, exist_ok=True)
-        self.learner.open(folder)
+
+    def open(self, tensorboard: bool) -> None:
+        """Opens the files, and makes the environments."""
+        config, threads = self.config, self.threads
+        if tensorboard:
+            self.writer = open_tensorboard(self.folder)
+        self.learner.open(self.folder)
         size, schedule = self.episodes.map_size, config.schedule
         # Each kind needs its own collector: an environment cannot change `on_target` or its number of agents.
         kinds = config.environment.kinds
@@ -160,9 +183,16 @@ class _Run:
         return self.curve.rows[-1] if self.curve.rows else {}
 
     def remove(self) -> None:
-        """Deletes the files of the run, so that its folder can be used again."""
-        for name in ("checkpoint.pt", "run.json", "curve.csv", "curve.svg"):
-            (self.folder / name).unlink(missing_ok=True)
+        """Deletes the files of the run before its first validation, so that its folder can be used again.
+
+        The description and the curve of an earlier run, whose checkpoint was deleted, stay.
+        """
+        self.path.unlink(missing_ok=True)
+        description = self.folder / "run.json"
+        if self._earlier is None:
+            description.unlink(missing_ok=True)
+        elif description.read_bytes() != self._earlier:
+            description.write_bytes(self._earlier)
         shutil.rmtree(self.folder / "replay", ignore_errors=True)
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
