@@ -265,10 +265,11 @@ def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch,
     means = f"setting,dataset,algorithm,num_agents,ISR\nMAPF,{tmp_path.name},A,2,0.5\n"
     (tmp_path / "means.csv").write_text(means)
     rows = [{"metrics": {"ISR": 1.0}, "env_grid_search": {"num_agents": 2}, "algorithm": "A"}]
-    view = {"type": "published", "file": "means.csv", "setting": "MAPF", "algorithm": "A"}
+    view = {"type": "published", "file": "means.csv", "setting": "MAPF", "algorithm": "A", "metrics": ["ISR"]}
     for folder in (tmp_path, ".", None):
         caplog.clear()
-        run_views(rows, {"results_views": {"Beside": view}}, eval_dir=folder)
+        with caplog.at_level("INFO", "pogema_rs.toolbox"):
+            run_views(rows, {"results_views": {"Beside": view}}, eval_dir=folder)
         assert "0.5" in caplog.text
 
 
