@@ -45,7 +45,8 @@ def save_evaluation_results(eval_dir: Union[str, os.PathLike[str]]) -> None:
 
     Source: pogema-toolbox 0.1.1, `eval_utils.py`, `save_evaluation_results`
     """
-    archive = shutil.make_archive(str(eval_dir), "zip", eval_dir)
+    folder = Path(eval_dir)  # without a slash at the end
+    archive = shutil.make_archive(str(folder), "zip", folder)
     if not _is_offline:
         required("wandb", "`save_evaluation_results`").save(archive)
 

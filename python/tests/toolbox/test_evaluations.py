@@ -24,6 +24,7 @@ from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, ge
 from pogema_rs.toolbox.moving_ai_ingestion import map_to_grid
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views.view_plot import PlotView, process_plot_view
+from pogema_rs.toolbox.views.view_tabular import Aggregator, TabularView, preprocess_table
 from pogema_rs.toolbox.views.view_utils import load_from_folder
 
 SUITE = {
@@ -203,6 +204,7 @@ WRONG = [
     (lambda: evaluation(SUITE, html="a.html"), "`html` is given and `begin` is `replace`, expected `new`"),
     (lambda: evaluation({**SUITE, "algorithms": {"A": {"name": "None"}}}), "no algorithm is registered as `None`"),
     (lambda: create_env_base(Environment(map_name="b")), "no map matches `b`, and no map is registered"),
+    (lambda: preprocess_table([], TabularView()), "there are no results, expected at least one row"),
 ]
 
 
@@ -212,6 +214,29 @@ def test_wrong_input_is_reported_in_one_line(number):
     with pytest.raises((ValueError, TypeError, KeyError, AssertionError)) as raised:
         call()
     assert message in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_estimators_of_pandas_have_intervals():
+    class Series(list):
+        """The part of a series of pandas that a table reads."""
+
+        def agg(self, name):
+            return {"mean": np.mean}[name](self)
+
+    values = Series([1.0, 2.0, 3.0, 6.0])
+    texts = []
+    for estimator in ("mean", np.mean):
+        np.random.seed(0)
+        texts.append(Aggregator(estimator=estimator, error_level=95)(values))
+    assert texts[0] == texts[1] and texts[0].startswith("3.00 ± 1.")
+
+
+def test_a_folder_with_a_slash_is_archived_beside_it(tmp_path):
+    folder = tmp_path / "results"
+    folder.mkdir()
+    eval_utils.initialize_wandb({}, folder, disable_wandb=True, project_name="p")
+    eval_utils.save_evaluation_results(f"{folder}/")
+    assert (tmp_path / "results.zip").exists() and not list(folder.iterdir())
 
 
 def test_nearest_map_is_named():

@@ -8,10 +8,10 @@ from typing import Any, Literal, Optional, Union
 
 from pogema_rs.toolbox.views.view_plot import (
     PlotView,
-    draw,
     drop_na,
     eval_logs_to_pandas,
     prepare_plot_fields,
+    process_plot_view,
 )
 
 __all__ = [
@@ -50,5 +50,4 @@ def process_multi_plot_view(
 
     Source: pogema-toolbox 0.1.1, `view_multi_plot.py`, `process_multi_plot_view`
     """
-    if save_path is not None:
-        draw(results, view.dict(), save_path)
+    process_plot_view(results, view, save_path)

@@ -54,18 +54,22 @@ class Aggregator:
 
         Errors: `KeyError` for an unknown `error_method`.
         """
-        estimate = self.estimator(vals) if callable(self.estimator) else vals.agg(self.estimator)
-        text = f"{estimate:.{self.round_digits}f}"
+        text = f"{self._estimate(vals):.{self.round_digits}f}"
         if self.error_method is None or len(vals) <= 1:
             return text
         return f"{text} ± {self._half_interval(vals):.{self.round_digits}f}"
+
+    def _estimate(self, vals: Any) -> Any:
+        return self.estimator(vals) if callable(self.estimator) else vals.agg(self.estimator)
 
     def _half_interval(self, vals: Any) -> float:
         if self.error_method == "sd":
             return vals.std() * self.error_level
         if self.error_method == "ci":
             tails = (100 - self.error_level) / 2
-            low, high = np.percentile(self.bootstrap(vals, func=self.estimator), [tails, 100 - tails])
+            # Samples of `bootstrap` are arrays, which do not know pandas's names of functions.
+            func = self.estimator if callable(self.estimator) else lambda sample: self._estimate(type(vals)(sample))
+            low, high = np.percentile(self.bootstrap(vals, func=func), [tails, 100 - tails])
             return (high - low) / 2
         raise KeyError(f"`error_method` is `{self.error_method}`, expected `ci`, `sd` or None")
 
@@ -82,10 +86,12 @@ class Aggregator:
 def preprocess_table(eval_configs: Sequence[Mapping[str, Any]], view: View) -> Any:
     """Returns the frame of a table: a row for each combination of the varied fields that are not dropped.
 
-    Errors: `ImportError` without pandas.
+    Errors: `ImportError` without pandas; ValueError without results.
 
     Source: pogema-toolbox 0.1.1, `view_tabular.py`, `preprocess_table`
     """
+    if not eval_configs:
+        raise ValueError("there are no results, expected at least one row")
     df = eval_logs_to_pandas(eval_configs)
     drop_na(df)  # for its warnings: a table keeps these columns
     metrics = [name for name in eval_configs[0].get("metrics", ()) if name in df.columns]
@@ -105,7 +111,7 @@ def preprocess_table(eval_configs: Sequence[Mapping[str, Any]], view: View) -> A
 def process_table_view(results: Sequence[Mapping[str, Any]], view: TabularView) -> None:
     """Logs a table if `view.print_results` is set.
 
-    Errors: `ImportError` without pandas or tabulate.
+    Errors: `ImportError` without pandas or tabulate; ValueError without results.
 
     Source: pogema-toolbox 0.1.1, `view_tabular.py`, `process_table_view`
     """
