@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing.connection import Connection
 from typing import Any, Optional
@@ -39,32 +39,35 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
             with process_pool(num_processes) as pool:
                 while waiting or under_way:
                     while waiting and len(under_way) < _AHEAD * num_processes:
-                        task = waiting.pop()
-                        under_way[pool.submit(play, task)] = task
+                        # If the pool is broken, the task stays in its list.
+                        under_way[pool.submit(play, waiting[-1])] = waiting[-1]
+                        waiting.pop()
                     for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                         outcome = future.result()
                         del under_way[future]
                         yield outcome
         except BrokenProcessPool:
             deaths += 1
-            lost = list(under_way.values())
-            ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
+            # All futures are done now; some ended before the process died.
+            finished = [future.result() for future in under_way if future.exception() is None]
+            lost = [task for future, task in under_way.items() if future.exception() is not None]
             if deaths >= _MAX_DEATHS:
+                ToolboxRegistry.warning(f"processes died {deaths} times; failed episodes: {len(lost)}")
                 reason = f"its process, or another process of the pool, died {deaths} times"
-                yield from (Outcome(task.index, error=reason) for task in lost)
+                finished += [Outcome(task.index, error=reason) for task in lost]
                 deaths = 0
             else:
+                ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
                 waiting += reversed(lost)
+            yield from finished
 
 
 def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> Iterator[Outcome]:
     """Plays episodes on the workers of a scheduler [default: a local cluster]; Dask replays those of a dead worker."""
-    from distributed import as_completed
-
+    as_completed = required("distributed", "a Dask backend").as_completed
     with dask_client(num_processes, address) as client:
         state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
         rest = iter(tasks)
-        num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
         submit = {"pure": False, "retries": _MAX_DEATHS}
         names: dict[Any, int] = {}
 
@@ -73,15 +76,19 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
             names[future.key] = task.index
             return future
 
-        under_way = as_completed([send(task) for task in islice(rest, num_ahead)])
+        def send_more() -> list[Any]:
+            # Workers may join and leave at any time.
+            num_ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+            return [send(task) for task in islice(rest, max(0, num_ahead - len(names)))]
+
+        under_way = as_completed(send_more())
         for future in under_way:
             index = names.pop(future.key)
             if future.status == "finished":
                 yield future.result()
             else:
                 yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
-            for task in islice(rest, 1):
-                under_way.add(send(task))
+            under_way.update(send_more())
 
 
 @contextmanager
@@ -103,7 +110,8 @@ def dask_client(num_processes: int, address: Optional[str]) -> Iterator[Any]:
         for worker in cluster.workers.values() if cluster is not None else ():
             worker.auto_restart = False
             if worker.pid:
-                os.kill(worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+                with suppress(ProcessLookupError):  # it has just ended
+                    os.kill(worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
         raise
     finally:
         client.close()

@@ -16,6 +16,7 @@ from typing import Any, Literal, Optional, Union
 
 from pogema_rs._engine import Evaluation, num_cores
 from pogema_rs._forward import forwarded
+from pogema_rs.errors import InternalError
 from pogema_rs.install import is_installed
 from pogema_rs.toolbox import _backends, _replacing
 from pogema_rs.toolbox._chunks import (
@@ -222,7 +223,8 @@ def _run(
                 episode = {"index": outcome.index, "metrics": outcome.metrics, "runtime": outcome.runtime}
                 suite.keep(json.dumps({**episode, **outcome.of_planner}), outcome.machine)
             progress.step(outcome.index, outcome.error)
-    suite.finish()
+    if not suite.finish() and not num_failed:
+        raise InternalError(f"internal error, please report it: `{key}` ended without all episodes")
     return num_failed
 
 

@@ -7,14 +7,20 @@ import logging
 import os
 import subprocess
 import sys
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pogema_rs import BatchAStarAgent
-from pogema_rs.toolbox import eval_utils
+from pogema_rs.errors import InternalError
+from pogema_rs.toolbox import _backends, eval_utils
 from pogema_rs.toolbox._optional import required
+from pogema_rs.toolbox._work import Outcome, Task, play
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.create_env import Environment, create_env_base
 from pogema_rs.toolbox.evaluator import evaluation, run_views
@@ -237,6 +243,120 @@ def test_a_folder_with_a_slash_is_archived_beside_it(tmp_path):
     eval_utils.initialize_wandb({}, folder, disable_wandb=True, project_name="p")
     eval_utils.save_evaluation_results(f"{folder}/")
     assert (tmp_path / "results.zip").exists() and not list(folder.iterdir())
+
+
+def test_a_run_without_all_outcomes_is_an_error(tmp_path, monkeypatch):
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    monkeypatch.setattr("pogema_rs.toolbox._backends.sequential", lambda tasks: map(play, list(tasks)[1:]))
+    with pytest.raises(InternalError, match="`Policy` ended without all episodes"):
+        evaluation(SUITE, tmp_path / "out")
+
+
+class BreakingPool:
+    """A process pool that breaks in some of its calls of `submit`; `done` says which tasks it had played."""
+
+    def __init__(self, breaks_at, done=()):
+        self.breaks_at, self.done = list(breaks_at), done
+        self.submitted, self.num_deaths = 0, 0
+
+    @contextmanager
+    def open(self, _num_processes):
+        """Stands in for `process_pool`."""
+        self.futures = []
+        yield self
+
+    def submit(self, _function, task):
+        """Returns a future that is done, or breaks."""
+        self.submitted += 1
+        if self.submitted in self.breaks_at:
+            for future, index in self.futures:
+                if not future.done():
+                    is_played = index in self.done
+                    future.set_result(Outcome(index, {})) if is_played else future.set_exception(BrokenProcessPool())
+            raise BrokenProcessPool
+        future = Future()
+        self.futures.append((future, task.index))
+        if not self.breaks_at or self.submitted > self.breaks_at[-1]:
+            future.set_result(Outcome(task.index, {}))
+        elif len(self.futures) == 1:
+            future.set_result(Outcome(task.index, {}))
+        return future
+
+
+TASKS = [Task(index, "A", {}, {}) for index in range(8)]
+
+
+def test_no_episode_is_lost_if_a_process_dies_between_two_outcomes(monkeypatch):
+    # The pool breaks when the parent submits the next episode after the first outcome.
+    monkeypatch.setattr("pogema_rs.toolbox._backends.process_pool", BreakingPool([3]).open)
+    outcomes = list(_backends.processes(TASKS, 1))
+    assert sorted(outcome.index for outcome in outcomes) == list(range(8))
+    assert not any(outcome.error for outcome in outcomes)
+
+
+def test_an_episode_that_ended_before_the_third_death_is_kept(monkeypatch, caplog):
+    pool = BreakingPool([1, 2, 6], done=(1,))
+    monkeypatch.setattr("pogema_rs.toolbox._backends.process_pool", pool.open)
+    with caplog.at_level("WARNING", "pogema_rs.toolbox"):
+        outcomes = {outcome.index: outcome for outcome in _backends.processes(TASKS, 2)}
+    assert sorted(outcomes) == list(range(8))
+    assert [index for index, outcome in outcomes.items() if outcome.error] == [2]
+    assert caplog.messages == [
+        "a process died; playing 0 episodes again",
+        "a process died; playing 0 episodes again",
+        "processes died 3 times; failed episodes: 1",
+    ]
+
+
+def test_workers_that_join_later_are_used(monkeypatch):
+    in_flight = []
+
+    class Client:
+        """A client with a growing number of threads."""
+
+        num_threads = 1
+
+        def scatter(self, state, **_):
+            return state
+
+        def nthreads(self):
+            return {"worker": self.num_threads}
+
+        def submit(self, _function, _state, task, **_):
+            in_flight.append(task.index)
+            return SimpleNamespace(key=task.index, status="finished", result=lambda: Outcome(task.index, {}))
+
+    client = Client()
+
+    class Completed(list):
+        def __iter__(self):
+            while self:
+                yield self.pop(0)
+
+        update = list.extend
+
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(as_completed=Completed))
+    monkeypatch.setattr("pogema_rs.toolbox._backends.dask_client", lambda *_: nullcontext(client))
+    outcomes = _backends.dask(TASKS, 1, None)
+    next(outcomes)
+    assert len(in_flight) == 2
+    client.num_threads = 3
+    next(outcomes)
+    assert len(in_flight) == 7
+    assert len(list(outcomes)) == 6
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ImportError, match="a Dask backend needs `pip install distributed`"):
+        next(_backends.dask(TASKS, 1, None))
+
+
+def test_a_worker_that_has_just_ended_does_not_hide_the_error(monkeypatch):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    cluster = SimpleNamespace(workers={0: SimpleNamespace(pid=ended.pid)}, close=lambda: None)
+    made = {"LocalCluster": lambda **_: cluster, "Client": lambda *_, **__: SimpleNamespace(close=lambda: None)}
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(**made))
+    with pytest.raises(ArithmeticError), _backends.dask_client(1, None):
+        raise ArithmeticError
 
 
 def test_nearest_map_is_named():
