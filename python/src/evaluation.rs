@@ -197,30 +197,30 @@ impl Evaluation {
 
     /// Plays the missing episodes of a built-in algorithm; returns `None` for any other algorithm.
     ///
-    /// Calls `watch` after each episode, with its number and error if it failed, otherwise with `None`. Returns how
-    /// many episodes were played, how many failed, and whether the results are complete.
+    /// Calls `progress.begin` with the number of missing episodes, and after each episode `progress.step` with its
+    /// number and error if it failed, otherwise with 0 and an empty text. Returns how many episodes were played, how
+    /// many failed, and whether the results are complete.
     fn run_built_in(
         &self,
         py: Python<'_>,
         key: &str,
         threads: usize,
-        watch: Py<PyAny>,
+        progress: Py<PyAny>,
     ) -> PyResult<Option<(usize, usize, bool)>> {
         let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
         let stop = Arc::<AtomicBool>::default();
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
         let report = |event: Event<'_>| {
-            let error = match event {
-                Event::Played => None,
-                Event::Failed(failed) => Some((failed.index, failed.error.clone())),
-                Event::Begin { .. } | Event::End => return,
-            };
-            Python::attach(|py| {
-                if let (Err(error), Ok(mut raised)) = (watch.call1(py, (error,)), raised.lock()) {
-                    stop.store(true, Relaxed);
-                    raised.get_or_insert(error);
-                }
+            let watched = Python::attach(|py| match event {
+                Event::Begin { total, done, .. } => progress.call_method1(py, "begin", (total - done,)),
+                Event::Played => progress.call_method1(py, "step", (0, "")),
+                Event::Failed(failed) => progress.call_method1(py, "step", (failed.index, &failed.error)),
+                Event::End => Ok(py.None()),
             });
+            if let (Err(error), Ok(mut raised)) = (watched, raised.lock()) {
+                stop.store(true, Relaxed);
+                raised.get_or_insert(error);
+            }
         };
         let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
         let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);

@@ -14,7 +14,7 @@ import numpy as np
 
 from pogema_rs._engine import num_cores
 from pogema_rs.toolbox._backends import dask_client, process_pool
-from pogema_rs.toolbox._work import plain
+from pogema_rs.toolbox._work import make_env, plain
 from pogema_rs.toolbox.create_env import Environment
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
@@ -52,9 +52,7 @@ def sequential_backend(
     results = []
     for number, fields in enumerate(env_configs, start=1):
         ToolboxRegistry.info(f"{full_algo_name}: episode {number} of {len(env_configs)}")
-        env = ToolboxRegistry.create_env(fields.get("name", "Environment"), **fields)
-        if settings.preprocessing:
-            env = ToolboxRegistry.create_algorithm_preprocessing(env, name, **algo_config)
+        env = make_env(fields, algo_config, settings)
         metrics = ToolboxRegistry.run_episode(env, algorithm, settings.run_episode_func)
         results.append({metric: plain(value) for metric, value in metrics.items()})
         if fields.get("with_animation"):

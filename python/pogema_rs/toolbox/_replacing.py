@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 from pogema_rs._files import write_text
 from pogema_rs.toolbox import _chunks
 from pogema_rs.toolbox._optional import required
-from pogema_rs.toolbox._work import plain
+from pogema_rs.toolbox._work import to_json
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views.view_multi_plot import MultiPlotView, process_multi_plot_view

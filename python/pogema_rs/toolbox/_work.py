@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 import traceback
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Optional
@@ -45,8 +47,9 @@ class Outcome:
     film: str = ""
 
 
-#: Cache of the algorithm that this process played last, because loading one may take minutes.
-_ready: dict[str, tuple[dict[str, Any], Any, Any]] = {}
+#: Cache of the algorithm that each thread played last, because loading one may take minutes. An algorithm has a state,
+#: so that threads, for example those of a Dask worker, must not share it.
+_ready: dict[int, tuple[str, dict[str, Any], Any, Any]] = {}
 
 
 def play(task: Task, is_filmed: bool = False) -> Outcome:
@@ -59,20 +62,22 @@ def play(task: Task, is_filmed: bool = False) -> Outcome:
 
 
 def forget() -> None:
-    """Drops the algorithm that this process played last, because another one may be registered under its name."""
+    """Drops the algorithms that this process played last, because another one may be registered under its name."""
     _ready.clear()
 
 
 #: The state from which this process made its registry.
 _state: list[dict[str, Any]] = []
+_state_lock = threading.Lock()
 
 
 def play_with(state: dict[str, Any], task: Task) -> Outcome:
     """Plays an episode with the registry of another process, which all tasks of a run share."""
-    if not (_state and _state[0] is state):
-        ToolboxRegistry.recreate_from_state(state)
-        _state[:] = [state]
-        forget()
+    with _state_lock:
+        if not (_state and _state[0] is state):
+            ToolboxRegistry.recreate_from_state(state)
+            _state[:] = [state]
+            forget()
     return play(task)
 
 
@@ -84,30 +89,38 @@ def _play(task: Task, is_filmed: bool) -> Outcome:
         return Outcome(task.index, played["metrics"], played["runtime"], machine(), of_planner=of_planner)
     ToolboxRegistry.register_maps(task.maps)
     algorithm, settings = _algorithm(task)
-    env = ToolboxRegistry.create_env(task.environment.get("name", "Environment"), **task.environment)
-    if settings.preprocessing:
-        env = ToolboxRegistry.create_algorithm_preprocessing(env, task.settings["name"], **task.settings)
+    env = make_env(task.environment, task.settings, settings)
     if is_filmed:
         env.unwrapped.enable_animation()
     began = time.perf_counter()
-    metrics = dict(ToolboxRegistry.run_episode(env, algorithm, settings.run_episode_func))
-    runtime = metrics.pop("runtime", time.perf_counter() - began)
+    metrics = ToolboxRegistry.run_episode(env, algorithm, settings.run_episode_func)
+    seconds = time.perf_counter() - began
+    metrics = _in_json(metrics)
+    runtime = metrics.pop("runtime", seconds)
     if task.environment.get("with_animation"):
         _draw(env, task)
     film = env.unwrapped._engine.pack_film() if is_filmed else ""
-    shown = {name: plain(value) for name, value in metrics.items()}
-    return Outcome(task.index, shown, float(runtime), machine(), film=film)
+    return Outcome(task.index, metrics, float(runtime), machine(), film=film)
+
+
+def make_env(environment: Mapping[str, Any], settings: Mapping[str, Any], config: Any) -> Any:
+    """Makes an environment with the preprocessing of an algorithm; `config` is made from its `settings`."""
+    env = ToolboxRegistry.create_env(environment.get("name", "Environment"), **environment)
+    if config.preprocessing:
+        env = ToolboxRegistry.create_algorithm_preprocessing(env, settings["name"], **settings)
+    return env
 
 
 def _algorithm(task: Task) -> tuple[Any, Any]:
-    known = _ready.get(task.algorithm)
-    if known is None or known[0] != task.settings:
+    thread = threading.get_ident()
+    known = _ready.get(thread)
+    if known is None or known[:2] != (task.algorithm, task.settings):
+        _ready.pop(thread, None)  # before the next one is loaded, which may need its memory
         name = task.settings["name"]
         settings = ToolboxRegistry.create_algorithm_config(name, **task.settings)
-        known = task.settings, ToolboxRegistry.create_algorithm(name, **task.settings), settings
-        _ready.clear()
-        _ready[task.algorithm] = known
-    return known[1], known[2]
+        algorithm = ToolboxRegistry.create_algorithm(name, **task.settings)
+        known = _ready[thread] = task.algorithm, task.settings, algorithm, settings
+    return known[2:]
 
 
 def _draw(env: Any, task: Task) -> None:
@@ -122,3 +135,28 @@ def plain(value: Any) -> Any:
     Errors: ValueError for a NumPy array of several numbers.
     """
     return value.item() if hasattr(value, "item") else value
+
+
+def to_json(value: Any) -> Any:
+    """Returns a number of NumPy or PyTorch as a Python number, for the argument `default` of `json.dumps`.
+
+    Errors: TypeError for any other value, ValueError for a NumPy array of several numbers.
+    """
+    if not hasattr(value, "item"):
+        raise TypeError(f"a {type(value).__name__} is not JSON")
+    return value.item()
+
+
+def _in_json(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns metrics as JSON holds them.
+
+    Errors: ValueError that names the first metric that JSON cannot hold, for example NaN.
+    """
+    found: dict[str, Any] = {}
+    for name, value in metrics.items():
+        try:
+            found.update(json.loads(json.dumps({name: value}, default=to_json, allow_nan=False)))
+        except (TypeError, ValueError) as error:
+            kind = type(value).__name__
+            raise ValueError(f"the metric {name!r} is a {kind}, expected a value that JSON holds: {error}") from None
+    return found

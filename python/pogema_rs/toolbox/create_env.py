@@ -51,7 +51,7 @@ class ProvideGlobalObstacles(Wrapper):
 class MultiMapWrapper(Wrapper):
     """Chooses at each reset, by the seed, one of the maps whose names match the pattern `map_name` of the config.
 
-    Errors: KeyError if no name matches.
+    Errors: `MapTextError`, a KeyError, if no name matches.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper`
     """
@@ -62,13 +62,13 @@ class MultiMapWrapper(Wrapper):
         self._names: list[str] = []
         if pattern:
             maps = ToolboxRegistry.get_maps()
-            is_meant = re.compile(f"^{pattern}$").match
-            self._names = sorted(name for name in maps if is_meant(name))
             # In pogema-toolbox, the name of a map is a pattern too: `a.b` also matches `a-b`.
-            if pattern in maps and not (self._names and is_installed("pogema_toolbox")):
+            if pattern not in maps or is_installed("pogema_toolbox"):
+                self._names = _matching(pattern, list(maps))
+            if pattern in maps and not self._names:
                 self._names = [pattern]
             if not self._names:
-                raise MapTextError(_unmatched(pattern, is_meant(LOGO) is not None, list(maps)))
+                raise MapTextError(_unmatched(pattern, bool(_matching(pattern, [LOGO])), list(maps)))
 
     def reset(self, seed: Optional[int] = None, **kwargs: Any) -> tuple[Any, Any]:
         """Begins an episode; the default seed is that of the config."""
@@ -80,6 +80,15 @@ class MultiMapWrapper(Wrapper):
             fields.update(map=ToolboxRegistry.get_maps()[name], map_name=name, seed=seed)
             self.env.unwrapped.grid_config = type(config)(**fields)
         return self.env.reset(seed=seed, **kwargs)
+
+
+def _matching(pattern: str, names: list[str]) -> list[str]:
+    """Returns the sorted names that match a pattern; none match a pattern that is no regular expression."""
+    try:
+        is_meant = re.compile(f"^{pattern}$").match
+    except re.error:
+        return []
+    return sorted(filter(is_meant, names))
 
 
 def _unmatched(pattern: str, is_logo: bool, names: list[str]) -> str:

@@ -36,6 +36,7 @@ from pogema_rs.toolbox._work import Outcome, Task, forget, play
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
+from pogema_rs.utils import grid_to_str
 
 __all__ = [
     "EvaluationError",
@@ -133,7 +134,8 @@ def evaluation(
         path, text = Path("suite.yaml"), json.dumps(evaluation_config)
     else:
         path, text = Path(evaluation_config), None
-    grids = [(name, _map_text(grid)) for name, grid in ToolboxRegistry.get_maps().items()]
+    registered = ToolboxRegistry.get_maps().items()
+    grids = [(name, grid if isinstance(grid, str) else grid_to_str(grid)) for name, grid in registered]
     files = [str(file) for file in maps]
     suite = Evaluation(str(path), text, str(eval_dir), begin, grids, files, _versions())
     _open.add(suite)
@@ -157,7 +159,8 @@ def evaluation(
 def _content(evaluation_config: Union[_Path, Mapping[str, Any]]) -> Mapping[str, Any]:
     if isinstance(evaluation_config, Mapping):
         return evaluation_config
-    return required("yaml", "a suite in a file with `begin` `replace`").safe_load(Path(evaluation_config).read_text())
+    text = Path(evaluation_config).read_text(encoding="utf-8")
+    return required("yaml", "a suite in a file with `begin` `replace`").safe_load(text)
 
 
 def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:
@@ -198,7 +201,7 @@ def _run(
     is_remote = settings["parallel_backend"].endswith("dask") and address is not None
     if not _is_registered(settings) and not is_remote:
         threads = min(settings.get("num_process", num_cores()), num_cores())
-        summary = suite.run_built_in(key, threads, progress.built_in)
+        summary = suite.run_built_in(key, threads, progress)
         if summary is not None:
             return summary[1]
     is_built_in = not _is_registered(settings) and suite.is_built_in(key)
@@ -207,10 +210,10 @@ def _run(
         settings = {**settings, "weights": os.path.abspath(folder / settings["weights"])}
     make = AlgoBase if is_built_in else partial(ToolboxRegistry.create_algorithm_config, settings["name"])
     config = make(**settings)
+    forget()
     to_do = suite.begin(key)
     if to_do is None:
         return 0
-    forget()
     progress.begin(len(to_do))
     num_failed = 0
     tasks = (_task(suite, index, key, settings, is_built_in) for index in to_do)
@@ -245,22 +248,19 @@ def _task(
     name = environment.get("map_name")
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
-        environment["map_name"], maps = name, {name: text}
+        environment["map_name"] = name
+        # A registered map is the one that the suite chose, and every process has it.
+        maps = {} if name in ToolboxRegistry.get_maps() and not is_built_in else {name: text}
     return Task(index, key, settings, environment, maps, is_built_in)
-
-
-def _map_text(grid: Any) -> str:
-    """Returns a registered map as text; in rows given as lists, 0 is free."""
-    if isinstance(grid, str):
-        return grid
-    return "\n".join(row if isinstance(row, str) else "".join("#" if cell else "." for cell in row) for row in grid)
 
 
 def _results(folder: Path, key: str) -> list[dict[str, Any]]:
     path = folder / f"{key}.json"
     if not path.exists():
         return []
-    rows, episodes = json.loads(path.read_text()), json.loads((folder / f"{key}.episodes.json").read_text())
+    rows, episodes = (
+        json.loads(file.read_text(encoding="utf-8")) for file in (path, folder / f"{key}.episodes.json")
+    )
     for row, episode in zip(rows, episodes):
         row["metrics"].setdefault("runtime", episode["seconds"])
         if "network_seconds" in episode:
@@ -289,9 +289,6 @@ class _Progress:
     def begin(self, num_left: int) -> None:
         self._before = self._done = self._total - num_left
         ToolboxRegistry.info(f"{self._key}: {num_left} of {self._total} episodes to play")
-
-    def built_in(self, failed: Optional[tuple[int, str]]) -> None:
-        self.step(*(failed or (0, "")))
 
     def step(self, index: int, error: str) -> None:
         self._done += 1

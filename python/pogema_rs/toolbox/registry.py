@@ -171,9 +171,11 @@ class ToolboxRegistry:
 
     @classmethod
     def register_maps(cls, maps: Mapping[str, Any]) -> None:
-        """Registers maps, each as text or as a list of rows."""
+        """Registers maps, each as text, as a list of rows of text, or as a list of rows of 0 and 1."""
         known = cls.get_maps()
         for name, grid in maps.items():
+            if not isinstance(grid, str) and all(isinstance(row, str) for row in grid):
+                grid = "\n".join(grid)
             if known.get(name, grid) != grid:
                 cls.warning(f"a second map named {name} replaces the first one")
             known[name] = grid

@@ -7,7 +7,8 @@ import logging
 import os
 import subprocess
 import sys
-from concurrent.futures import Future
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -20,10 +21,10 @@ from pogema_rs import BatchAStarAgent
 from pogema_rs.errors import InternalError
 from pogema_rs.toolbox import _backends, eval_utils
 from pogema_rs.toolbox._optional import required
-from pogema_rs.toolbox._work import Outcome, Task, play
+from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.create_env import Environment, create_env_base
-from pogema_rs.toolbox.evaluator import evaluation, run_views
+from pogema_rs.toolbox.evaluator import EvaluationError, evaluation, run_views
 from pogema_rs.toolbox.generators.maze_generator import generate_and_save_mazes
 from pogema_rs.toolbox.generators.random_generator import generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
@@ -210,6 +211,7 @@ WRONG = [
     (lambda: evaluation(SUITE, html="a.html"), "`html` is given and `begin` is `replace`, expected `new`"),
     (lambda: evaluation({**SUITE, "algorithms": {"A": {"name": "None"}}}), "no algorithm is registered as `None`"),
     (lambda: create_env_base(Environment(map_name="b")), "no map matches `b`, and no map is registered"),
+    (lambda: create_env_base(Environment(map_name="b(")), "no map matches `b(`, and no map is registered"),
     (lambda: preprocess_table([], TabularView()), "there are no results, expected at least one row"),
 ]
 
@@ -243,6 +245,69 @@ def test_a_folder_with_a_slash_is_archived_beside_it(tmp_path):
     eval_utils.initialize_wandb({}, folder, disable_wandb=True, project_name="p")
     eval_utils.save_evaluation_results(f"{folder}/")
     assert (tmp_path / "results.zip").exists() and not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("grid", ["..\n\n..", [[0, 0], [0, 0]], ["..", ".."]])
+def test_registered_maps_stay_as_they_are(tmp_path, grid, caplog):
+    name = "maze(1"
+    ToolboxRegistry.register_maps({name: grid})
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    before = dict(ToolboxRegistry.get_maps())
+    environment = {**SUITE["environment"], "map_name": name, "num_agents": 2}
+    with caplog.at_level("WARNING", "pogema_rs.toolbox"):
+        assert len(evaluation({**SUITE, "environment": environment}, tmp_path / "out")) == 2
+    assert ToolboxRegistry.get_maps() == before and not caplog.messages
+
+
+class Numbers(Still):
+    """A policy whose runner returns a metric that JSON cannot hold, if there are three agents."""
+
+    wrong = float("nan")
+
+    @classmethod
+    def run(cls, env, policy):
+        """Returns the metrics of an episode."""
+        observations, _ = env.reset()
+        return {"steps": np.float32(1), "list": [np.float32(2)], "number": cls.wrong if len(observations) == 3 else 1}
+
+
+@pytest.mark.parametrize("backend", ["sequential", "multiprocessing"])
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), {1, 2}, Path("a"), lambda: 0])
+def test_a_metric_that_json_cannot_hold_fails_one_episode(tmp_path, backend, wrong, monkeypatch):
+    if backend != "sequential" and callable(wrong):
+        pytest.skip("slow, and as for the others")
+    monkeypatch.setattr(Numbers, "wrong", wrong)
+    ToolboxRegistry.register_run_func("numbers", Numbers.run)
+    ToolboxRegistry.register_algorithm("Policy", Numbers)
+    settings = {"name": "Policy", "parallel_backend": backend, "num_process": 2, "run_episode_func": "numbers"}
+    with pytest.raises(EvaluationError, match="2 episodes could not be played"):
+        evaluation({**SUITE, "algorithms": {"Policy": settings}}, tmp_path / "out")
+    failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
+    assert [row["config"]["num_agents"] for row in failed] == [3, 3]
+    assert all("the metric 'number' is" in row["error"] for row in failed)
+    kept = [json.loads(line) for line in (tmp_path / "out" / "Policy.jsonl").read_text().splitlines()]
+    assert [row["metrics"] for row in kept] == [{"steps": 1.0, "list": [2.0], "number": 1}] * 2
+
+
+def test_page_of_complete_results_replays_the_policy_of_now(tmp_path):
+    acted = []
+
+    class Noting(Still):
+        def act(self, observations):
+            acted.append(len(observations))
+            return super().act(observations)
+
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    evaluation(SUITE, tmp_path / "out")
+    ToolboxRegistry.register_algorithm("Policy", Noting)
+    evaluation(SUITE, tmp_path / "out", begin="resume", html=tmp_path / "page.html")
+    assert acted
+
+
+def test_built_in_algorithms_say_how_many_episodes_are_left(tmp_path, caplog):
+    with caplog.at_level("INFO", "pogema_rs.toolbox"):
+        evaluation({**SUITE, "algorithms": {"A": {"name": "stay"}}}, tmp_path / "out")
+    assert "A: 4 of 4 episodes to play" in caplog.messages
 
 
 def test_a_run_without_all_outcomes_is_an_error(tmp_path, monkeypatch):
@@ -306,6 +371,31 @@ def test_an_episode_that_ended_before_the_third_death_is_kept(monkeypatch, caplo
         "a process died; playing 0 episodes again",
         "processes died 3 times; failed episodes: 1",
     ]
+
+
+def test_threads_of_a_process_share_no_algorithm():
+    class Alone(Still):
+        """A policy that notes how many episodes use it at the same time."""
+
+        most = 0
+
+        def __init__(self):
+            self.num_users = 0
+
+        def act(self, observations):
+            self.num_users += 1
+            Alone.most = max(Alone.most, self.num_users)
+            time.sleep(0.002)
+            self.num_users -= 1
+            return super().act(observations)
+
+    ToolboxRegistry.register_algorithm("Policy", Alone)
+    state = ToolboxRegistry.get_state()
+    environment = {**SUITE["environment"], "num_agents": 2, "seed": 0}
+    tasks = [Task(index, "Policy", {"name": "Policy"}, environment) for index in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        outcomes = list(pool.map(lambda task: play_with(state, task), tasks))
+    assert not any(outcome.error for outcome in outcomes) and Alone.most == 1
 
 
 def test_workers_that_join_later_are_used(monkeypatch):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
 from pogema_rs import _engine
-from pogema_rs.toolbox._work import plain
+from pogema_rs.toolbox._work import to_json
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
@@ -111,7 +111,7 @@ def draw(
         for algorithm in dict.fromkeys(row["algorithm"] for row in results):
             name = algorithm.replace("/", "_")  # also the name of a file
             rows = [_shown(row, name) for row in results if row["algorithm"] == algorithm]
-            (folder / f"{name}.json").write_text(json.dumps(rows, default=plain), encoding="utf-8")
+            (folder / f"{name}.json").write_text(json.dumps(rows, default=to_json), encoding="utf-8")
         # JSON is YAML.
         views = Path(temporary, "views.yaml")
         views.write_text(_as_json({target.stem: _with_whole_paths(fields)}), encoding="utf-8")
@@ -131,7 +131,7 @@ def check_views(views: Mapping[Any, Mapping[str, Any]]) -> None:
 
 
 def _as_json(views: Mapping[Any, Mapping[str, Any]]) -> str:
-    return json.dumps({"results_views": {str(name): dict(fields) for name, fields in views.items()}}, default=plain)
+    return json.dumps({"results_views": {str(name): dict(fields) for name, fields in views.items()}}, default=to_json)
 
 
 def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
