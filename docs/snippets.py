@@ -19,7 +19,11 @@ OUTPUT = re.compile(r"(^<!-- output: (.*?) -->\n```text\n)(.*?)(^```$)", re.MULT
 
 def in_profile(script: str) -> str:
     """Returns the script with release builds replaced with those of `./check`; this saves minutes of compilation."""
-    script = script.replace("cargo run --release -- ", "pogema ").replace(" --release", " --profile checked").replace("target/release/", "target/checked/")
+    script = (
+        script.replace("cargo run --release -- ", "pogema ")
+        .replace(" --release", " --profile checked")
+        .replace("target/release/", "target/checked/")
+    )
     # A single package enables fewer features of its dependencies, so building it alone would compile them again.
     script = re.sub(r"^(cargo .*?) -p [\w-]+( --all-features)?", r"\1", script, flags=re.MULTILINE)
     return re.sub(r"^cargo build (?!.*--profile)", "cargo build --profile checked ", script, flags=re.MULTILINE)

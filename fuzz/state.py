@@ -17,7 +17,26 @@ from typing import Any
 from pogema_rs import GridConfig, pogema_v0
 from pogema_rs._engine import Engine, restore_engine
 
-VALUES = [None, True, -1, 0, 1, 2**15, 2**16, 2**31, 2**32, 2**63 - 1, 2**64 - 1, -(2**63), 1e308, 0.5, "", "soft", [], {}]
+VALUES = [
+    None,
+    True,
+    -1,
+    0,
+    1,
+    2**15,
+    2**16,
+    2**31,
+    2**32,
+    2**63 - 1,
+    2**64 - 1,
+    -(2**63),
+    1e308,
+    0.5,
+    "",
+    "soft",
+    [],
+    {},
+]
 LIMIT_OF_BYTES = 4 << 30
 LIMIT_OF_SECONDS = 10
 

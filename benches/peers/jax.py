@@ -38,7 +38,11 @@ def measure(pogema, rust, compiled, num_envs):
         ("u8 windows, against VecEnv", batch["uint8"], ours["u8"]),
         ("packed rows, against VecEnv with bits", batch["bits"], ours["rows"]),
         ("step alone, against VecEnv with f32", batch["float32"], ours[None]),
-        (f"compilations, against {COMPILE_BAR:.0f} s each", 1 / COMPILE_BAR, compiled.time("compile", num_envs, NUM_AGENTS)),
+        (
+            f"compilations, against {COMPILE_BAR:.0f} s each",
+            1 / COMPILE_BAR,
+            compiled.time("compile", num_envs, NUM_AGENTS),
+        ),
     ]
 
 

@@ -14,7 +14,12 @@ RUNS = 3
 # Steps of one compiled loop.
 STEPS = 16
 CONFIG = {
-    "size": 32, "density": 0.3, "obs_radius": 5, "collision_system": "soft", "on_target": "nothing", "max_episode_steps": 10**9,
+    "size": 32,
+    "density": 0.3,
+    "obs_radius": 5,
+    "collision_system": "soft",
+    "on_target": "nothing",
+    "max_episode_steps": 10**9,
 }
 VIEWS = {
     "f32": observe,

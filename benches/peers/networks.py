@@ -4,7 +4,8 @@ python3.11 benches/peers/networks.py WEIGHTS [--rounds N]
 
 WEIGHTS is the folder with `follower-lite.onnx` and `cost-tracer.onnx`. Install numpy, onnx and onnxruntime, and build
 ours with `cargo build --release -p pogema-policies --example forwards`. The peers take turns. Only the time
-on the processor counts, the shortest of many, since the machine may do other work. The ratio is the median over the rounds.
+on the processor counts, the shortest of many, since the machine may do other work. The ratio is the median of the
+rounds.
 """
 
 import argparse

@@ -59,7 +59,11 @@ def main():
                     rounds.append([row - without for row, without in zip(rows, bare)])
             theirs, ours, equal = (1000 * statistics.median(column) for column in zip(*rounds))
             ratios = (statistics.median(row[at] / row[0] for row in rounds) for at in (1, 2))
-            print("{:38}{:11.0f}{:9.0f}{:7.2f}{:19.0f}{:7.2f}".format(name, theirs, ours, next(ratios), equal, next(ratios)))
+            print(
+                "{:38}{:11.0f}{:9.0f}{:7.2f}{:19.0f}{:7.2f}".format(
+                    name, theirs, ours, next(ratios), equal, next(ratios)
+                )
+            )
 
 
 main()

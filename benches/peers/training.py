@@ -1,5 +1,5 @@
-"""Compares a whole training loop on `VecEnv` with others: on POGEMA 1.4.0, on an environment that costs nothing, and with
-Sample Factory and TorchRL on POGEMA 1.4.0.
+"""Compares a whole training loop on `VecEnv` with others: on POGEMA 1.4.0, on an environment that costs nothing, and
+with Sample Factory and TorchRL on POGEMA 1.4.0.
 
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
 
@@ -48,7 +48,9 @@ def main():
     for name, title in NAMES.items():
         theirs, own = (statistics.median(one[key] for one in rounds) for key in (name, "ours"))
         times = statistics.median(one["ours"] / one[name] for one in rounds)
-        table.append({"work": f"agent steps, {title}", "peer": theirs, "ours": own, "times": times, "bar": BARS.get(name)})
+        table.append(
+            {"work": f"agent steps, {title}", "peer": theirs, "ours": own, "times": times, "bar": BARS.get(name)}
+        )
     if arguments.json:
         arguments.json.write_text(json.dumps(table, indent=2) + "\n")
     print_table(table)

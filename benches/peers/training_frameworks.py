@@ -149,7 +149,11 @@ def torchrl(seconds):
     policy = train_ppo.Policy(int(np.prod(SHAPE)), PARAMS.hidden)
     logits = TensorDictModule(Outputs(policy, False), in_keys=["observation"], out_keys=["logits"])
     actor = ProbabilisticActor(
-        logits, in_keys=["logits"], distribution_class=Categorical, return_log_prob=True, default_interaction_type="random"
+        logits,
+        in_keys=["logits"],
+        distribution_class=Categorical,
+        return_log_prob=True,
+        default_interaction_type="random",
     )
     critic = TensorDictModule(Outputs(policy, True), in_keys=["observation"], out_keys=["state_value"])
     objective = ClipPPOLoss(

@@ -5,7 +5,6 @@ import time
 
 import gymnasium
 import numpy as np
-import torch
 from gymnasium.vector import AsyncVectorEnv
 
 sys.path.insert(0, __file__.rpartition("/")[0])

@@ -11,7 +11,10 @@ class Worker:
     def __init__(self, python, script, *arguments):
         self.child = subprocess.Popen(
             # -P, because the benchmark jax.py must not hide the package of this name.
-            [python, "-BP", script, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [python, "-BP", script, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
 
     def time(self, *work):

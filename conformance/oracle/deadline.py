@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from typing import Any
 
 
-
 def read_limit(text: str) -> float:
     """Reads a time limit. Units: seconds. Errors: ValueError for any other text."""
     try:

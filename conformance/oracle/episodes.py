@@ -199,5 +199,5 @@ class Episodes:
             with deadline(LIMIT / 10):
                 lists = self.base.get_lifelong_targets_xy(ignore_borders=True)
                 return {"goal_lists": [unpad(goals, 0) for goals in lists]}
-        except (Exception, Timeout) as error:
+        except (Exception, Timeout) as error:  # noqa: BLE001 - POGEMA may raise anything
             return {"goal_lists": None, "goal_lists_error": f"{type(error).__name__}: {error}"}

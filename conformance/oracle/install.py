@@ -71,7 +71,10 @@ def build(directory: Path) -> None:
     clear(directory)
     run([sys.executable, "-m", "venv", str(directory)], "cannot create a virtual environment; is `venv` installed?")
     pip = [str(directory / "bin" / "python"), "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
-    run([*pip, "--retries", "2", "--no-deps", "-r", str(REQUIREMENTS)], "pip cannot install requirements.txt; is the network up?")
+    run(
+        [*pip, "--retries", "2", "--no-deps", "-r", str(REQUIREMENTS)],
+        "pip cannot install requirements.txt; is the network up?",
+    )
     write_stamp(directory, expected_stamp())
 
 

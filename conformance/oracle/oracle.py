@@ -83,9 +83,10 @@ def run(request: Record) -> Record:
             config = GridConfig(**request["config"])
             when = "make"
             episodes = Episodes(config, request["density"])
-            for when, op in enumerate(request["ops"]):
+            for index, op in enumerate(request["ops"]):
+                when = index
                 response["records"].append(episodes.perform(op))
-    except (Exception, Timeout) as error:
+    except (Exception, Timeout) as error:  # noqa: BLE001 - POGEMA may raise anything
         response["error"] = describe(when, error)
     finally:
         disarm()

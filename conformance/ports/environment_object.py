@@ -162,7 +162,7 @@ def serve(
             reply = encode(server.answer(question))
         except Refusal as refusal:
             reply = encode({"error": str(refusal)})
-        except Exception as error:  # the environment may raise anything
+        except Exception as error:  # noqa: BLE001 - the environment may raise anything
             if trace:
                 traceback.print_exc()
             reply = encode({"error": f"{type(error).__name__}: {error}"})

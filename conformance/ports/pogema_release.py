@@ -74,7 +74,7 @@ def claims(raw: bool) -> dict[str, Any]:
 
 
 def make(config: GridConfig, raw: bool, with_density: bool) -> Any:
-    """Returns an environment with POGEMA's wrappers, and with the density wrapper if requested; if `raw`, without any."""
+    """Returns an environment with POGEMA's wrappers and, if requested, the density wrapper; if `raw`, without any."""
     if config.integration not in (None, "SampleFactory"):
         raise Refusal(f"`integration` is `{config.integration}`, expected none or `SampleFactory`")
     env = pogema_v0(grid_config=config)
@@ -176,7 +176,7 @@ def patch_grids(base: Any, instance: dict[str, Any]) -> None:
 
 
 def place_obstacles(grid: Any, instance: dict[str, Any]) -> None:
-    """Restores the obstacles under starts and goals, which POGEMA clears, and those outside the wall, which are random."""
+    """Restores the obstacles under starts and goals, which POGEMA clears, and those outside the wall, which vary."""
     radius, outside = instance["config"]["radius"], instance.get("outside", "free")
     if outside != "free":
         wall = grid[radius - 1 : 1 - radius or None, radius - 1 : 1 - radius or None].copy()

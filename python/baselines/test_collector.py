@@ -85,7 +85,11 @@ def costs_to(goal, obstacles):
 @pytest.mark.parametrize("on_target", ["nothing", "restart"])
 @pytest.mark.parametrize("channels", ["[obstacles, agents]", "[cost_to_go, agents]"])
 def test_approach_counts_each_nearest_cell_once(on_target, channels):
-    changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=40", f"encoder.channels={channels}"]
+    changes = [
+        f"environment.on_target=[{on_target}]",
+        "environment.max_episode_steps=40",
+        f"encoder.channels={channels}",
+    ]
     rewards = ["rewards.goal=0", "rewards.progress=0", "rewards.approach=1"]
     config = small_config("iql", *changes, *rewards)
     record, seen, _, _ = played(config)

@@ -18,7 +18,7 @@ CROWD = ("environment.maps=[mazes, random]", "environment.num_agents=6", "enviro
 
 
 def play(config, planner, nodes, act, rule):
-    """Plays the episodes of the first iteration with a teacher; returns them, the teacher, the configs and the seeds."""
+    """Plays the episodes of the first iteration with a teacher; returns them, the teacher, the configs and seeds."""
     episodes = Episodes(config.environment, 0, 48)
     configs, seeds = episodes.of_iteration(0, 4)
     collector = Collector(config, episodes.map_size, 4, 1)
@@ -72,7 +72,10 @@ def test_advice_is_given_for_the_states_that_the_agents_reach():
         agents = PlannerAgents("pibt", nodes=200, lifelong=True)
         for step in range(48):
             places = record.places[step, lane].astype(int)
-            assert agents.act(mapf(obstacles, places[:, :2], places[:, 2:])) == teacher.advice[step, lane].tolist(), (lane, step)
+            assert agents.act(mapf(obstacles, places[:, :2], places[:, 2:])) == teacher.advice[step, lane].tolist(), (
+                lane,
+                step,
+            )
     assert (teacher.advice != record.actions).mean() > 0.2
 
 
@@ -128,11 +131,23 @@ def test_a_run_resumes_before_and_after_the_change_to_ppo(method, tmp_path):
 @pytest.mark.parametrize(
     ("method", "changes", "expected"),
     [
-        ("follower", ["imitation.planner=lacam"], "follower.yaml: imitation: `planner` is `lacam`, expected one of `rhcr`"),
-        ("ippo", ["imitation.ahead=1"], "ippo.yaml: imitation.ahead is 1, expected 0 without the channel 'follower_path'"),
+        (
+            "follower",
+            ["imitation.planner=lacam"],
+            "follower.yaml: imitation: `planner` is `lacam`, expected one of `rhcr`",
+        ),
+        (
+            "ippo",
+            ["imitation.ahead=1"],
+            "ippo.yaml: imitation.ahead is 1, expected 0 without the channel 'follower_path'",
+        ),
         ("follower", ["imitation.nodes=0"], "follower.yaml: imitation.nodes is 0, expected at least 1"),
         ("follower", ["imitation.iterations=-1"], "follower.yaml: imitation.iterations is -1, expected at least 0"),
-        ("follower", ["environment.on_target=[finish]"], "follower.yaml: environment.on_target is ('finish',), expected"),
+        (
+            "follower",
+            ["environment.on_target=[finish]"],
+            "follower.yaml: environment.on_target is ('finish',), expected",
+        ),
         ("qmix", [], "qmix.yaml: imitation.iterations is 9, expected 0, because qmix learns no policy by PPO"),
     ],
 )

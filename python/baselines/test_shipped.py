@@ -23,7 +23,9 @@ def test_shipped_weights_choose_the_same_actions_in_rust(method):
     config = read_config(run["config"], method, "run.json")
     network = read_network(method, config, WEIGHTS / method / "weights.safetensors")
     policy = policies.load(name=method, sampling="greedy")
-    masks = json.loads((WEIGHTS / method / "weights.json").read_text(encoding="utf-8"))["sampling"].get("mask_actions", False)
+    masks = json.loads((WEIGHTS / method / "weights.json").read_text(encoding="utf-8"))["sampling"].get(
+        "mask_actions", False
+    )
     assert policy.encoder == config.encoder
     if method in VALUE_METHODS:
         # Which side an agent takes depends on nothing but these values.

@@ -19,7 +19,17 @@ from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, train
 from pogema_rs.baselines.__main__ import main
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
-from small import PPO_METHODS, Q_METHODS, VALUE_METHODS, command, compare_play, outputs_of, read_network, run, small_config
+from small import (
+    PPO_METHODS,
+    Q_METHODS,
+    VALUE_METHODS,
+    command,
+    compare_play,
+    outputs_of,
+    read_network,
+    run,
+    small_config,
+)
 
 
 def weights(folder):
@@ -351,7 +361,9 @@ def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
     content = path.read_bytes()
     for place in range(0, len(content), 3):
         path.write_bytes(content[:place] + bytes([content[place] ^ 0x3A]) + content[place + 1 :])
-        with pytest.raises(ValueError, match="checkpoint.pt: the file is not a checkpoint of a training, or is damaged"):
+        with pytest.raises(
+            ValueError, match="checkpoint.pt: the file is not a checkpoint of a training, or is damaged"
+        ):
             _checkpoint.load(path, "iql")
 
 

@@ -159,7 +159,8 @@ def main() -> None:
             for name, value in charts.items():
                 writer.add_scalar(name, value, global_step)
         if update % 20 == 0 or update == num_updates - 1:
-            print(f"step {global_step:>9,}  ISR {charts.get('charts/ISR', float('nan')):.3f}  {charts['charts/SPS']:,.0f}/s")
+            isr, speed = charts.get("charts/ISR", float("nan")), charts["charts/SPS"]
+            print(f"step {global_step:>9,}  ISR {isr:.3f}  {speed:,.0f}/s")
 
     envs.close()
     if args.tensorboard:

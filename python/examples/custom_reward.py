@@ -1,6 +1,6 @@
 """Adds a reward for each step that brings an agent closer to its goal.
 
-    python custom_reward.py
+python custom_reward.py
 """
 
 from collections.abc import Sequence

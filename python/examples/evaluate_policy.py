@@ -1,6 +1,6 @@
 """Evaluates policies: prints mean and standard deviation of their metrics over seeds.
 
-    python evaluate_policy.py --seeds 100
+python evaluate_policy.py --seeds 100
 """
 
 import argparse

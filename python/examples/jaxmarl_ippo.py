@@ -166,7 +166,9 @@ def update(train: Train, rollout: Transition, last_obs: jax.Array, key: jax.Arra
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--updates", type=int, default=200, help="number of rollouts, each with an update [default: 200]")
+    parser.add_argument(
+        "--updates", type=int, default=200, help="number of rollouts, each with an update [default: 200]"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of episodes, network and actions [default: 0]")
     arguments = parser.parse_args()
     env = ByAgent(CONFIG, NUM_ENVS)

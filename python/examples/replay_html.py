@@ -1,6 +1,6 @@
 """Plays an episode and writes a page that replays it in any browser.
 
-    python replay_html.py --out replay.html
+python replay_html.py --out replay.html
 """
 
 import argparse

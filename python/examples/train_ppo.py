@@ -264,7 +264,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.pt")
-    parser.add_argument("--replay", metavar="FILE", help="write a page that replays an unseen episode, e.g. episode.html")
+    parser.add_argument(
+        "--replay", metavar="FILE", help="write a page that replays an unseen episode, e.g. episode.html"
+    )
     parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
     arguments = parser.parse_args()
 

@@ -22,7 +22,11 @@ def main(version: str, folder: Path) -> None:
         with tarfile.open(archive.name) as files:
             for file in files:
                 path = PurePosixPath(*PurePosixPath(file.name).parts[1:])
-                if path.match("pufferlib/*.py") and len(path.parts) == 2 or path.match("pufferlib/environments/__init__.py"):
+                if (
+                    path.match("pufferlib/*.py")
+                    and len(path.parts) == 2
+                    or path.match("pufferlib/environments/__init__.py")
+                ):
                     file.name = str(path)
                     files.extract(file, folder, filter="data")
 

@@ -13,7 +13,10 @@ SHORT = {
     "train_mappo.py": (["--minutes", "0.05"], "agent steps  ISR"),
     "train_ppo.py": (["--minutes", "0.05", "--save", "policy.pt", "--plot", "learning.svg"], "unseen seeds: PPO"),
 }
-FILES = {"cleanrl_ppo.py": ["runs/events*", "wandb/offline-run-*/*.wandb"], "train_ppo.py": ["policy.pt", "learning.svg"]}
+FILES = {
+    "cleanrl_ppo.py": ["runs/events*", "wandb/offline-run-*/*.wandb"],
+    "train_ppo.py": ["policy.pt", "learning.svg"],
+}
 
 
 @pytest.mark.parametrize("name", SHORT)

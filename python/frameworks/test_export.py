@@ -46,7 +46,8 @@ class Network(nn.Module):
 def sequential(in_place):
     block = Residual(nn.ReLU(inplace=in_place), nn.Conv2d(4, 4, 3, padding=1), nn.ReLU(), nn.Conv2d(4, 4, 3, padding=1))
     return nn.Sequential(
-        nn.Conv2d(2, 4, 3, padding=1), block, nn.ReLU(), nn.Dropout(0.5), nn.Flatten(), nn.Sequential(nn.Linear(196, 8), nn.ELU()),
+        nn.Conv2d(2, 4, 3, padding=1), block, nn.ReLU(), nn.Dropout(0.5), nn.Flatten(),
+        nn.Sequential(nn.Linear(196, 8), nn.ELU()),
         nn.Linear(8, 5),
     )  # fmt: skip
 
@@ -119,19 +120,35 @@ def with_layer(layer):
     ("module", "error", "text"),
     [
         (with_layer(nn.MaxPool2d(2)), TypeError, "layer `0` cannot be exported: MaxPool2d"),
-        (with_layer(nn.Sequential(nn.ReLU(), nn.BatchNorm2d(2))), TypeError, "layer `0.1` cannot be exported: BatchNorm2d"),
+        (
+            with_layer(nn.Sequential(nn.ReLU(), nn.BatchNorm2d(2))),
+            TypeError,
+            "layer `0.1` cannot be exported: BatchNorm2d",
+        ),
         (with_layer(nn.Conv2d(2, 2, 3, stride=2)), TypeError, "layer `0` cannot be exported: Conv2d"),
         (with_layer(nn.Conv2d(2, 2, (3, 1), padding=(1, 0))), TypeError, "layer `0` cannot be exported: Conv2d"),
         (with_layer(nn.ELU(alpha=2)), TypeError, "layer `0` cannot be exported: ELU"),
-        (nn.Sequential(nn.Flatten(), nn.GRU(98, 4, num_layers=2), nn.Linear(4, 5)), TypeError, "layer `1` cannot be exported: GRU"),
+        (
+            nn.Sequential(nn.Flatten(), nn.GRU(98, 4, num_layers=2), nn.Linear(4, 5)),
+            TypeError,
+            "layer `1` cannot be exported: GRU",
+        ),
         (nn.Sequential(nn.Linear(2, 5), nn.ReLU()), TypeError, "`1` is a ReLU, expected an nn.Linear"),
         (nn.Sequential(), TypeError, "empty nn.Sequential"),
-        (nn.Linear(2, 5), TypeError, "module is a Linear, expected an nn.Sequential, or a module with `body` and `policy`"),
+        (
+            nn.Linear(2, 5),
+            TypeError,
+            "module is a Linear, expected an nn.Sequential, or a module with `body` and `policy`",
+        ),
         (3, TypeError, "module is a int"),
         (nn.Sequential(nn.Flatten(), nn.Linear(98, 4)), ValueError, "the network has 4 logits, expected 5"),
         (nn.Sequential(nn.Flatten(), nn.Linear(50, 5)), ValueError, "tensor `1.weight` has shape"),
         (nn.Sequential(nn.Linear(7, 5)), ValueError, "expected `flatten`"),
-        (nn.Sequential(Scaled(nn.ReLU()), nn.Flatten(), nn.Linear(98, 5)), ValueError, "differs from the module: a logit by"),
+        (
+            nn.Sequential(Scaled(nn.ReLU()), nn.Flatten(), nn.Linear(98, 5)),
+            ValueError,
+            "differs from the module: a logit by",
+        ),
     ],
 )
 def test_other_modules_are_refused(module, error, text, tmp_path):

@@ -64,5 +64,7 @@ compare(jax.tree.map(lambda leaf: jnp.concatenate(list(leaf), 1), mapped[1]), ex
 def test_sharded_and_mapped_environments_play_the_same_episodes():
     flags = f"--xla_force_host_platform_device_count={NUM_DEVICES}"
     environ = {**os.environ, "JAX_PLATFORMS": "cpu", "XLA_FLAGS": flags}
-    run = subprocess.run([sys.executable, "-B", "-c", PROGRAM], env=environ, capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [sys.executable, "-B", "-c", PROGRAM], env=environ, capture_output=True, text=True, check=False
+    )
     assert run.returncode == 0, run.stderr

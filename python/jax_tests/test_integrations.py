@@ -17,7 +17,15 @@ GOALS = ("finish", "nothing", "restart")
 
 
 def one_instance(on_target, **changes):
-    fields = {"size": 6, "num_agents": 5, "density": 0.2, "obs_radius": 2, "seed": 3, "max_episode_steps": 30, **changes}
+    fields = {
+        "size": 6,
+        "num_agents": 5,
+        "density": 0.2,
+        "obs_radius": 2,
+        "seed": 3,
+        "max_episode_steps": 30,
+        **changes,
+    }
     config = GridConfig(on_target=on_target, collision_system="soft", **fields)
     return config, pj.InstancePool(config, 1, [config.seed])
 
@@ -112,7 +120,9 @@ def test_gymnax_plays_the_episodes_of_pogema(on_target):
         np.testing.assert_array_equal(info["final_observation"], expected[0])
         if terminated or truncated:
             num_ends = [num_ends[0] + bool(terminated), num_ends[1] + bool(truncated)]
-            assert {name: float(info[name]) for name in told[0]["metrics"]} == pytest.approx(told[0]["metrics"], rel=1e-6)
+            assert {name: float(info[name]) for name in told[0]["metrics"]} == pytest.approx(
+                told[0]["metrics"], rel=1e-6
+            )
             expected = plain.reset()[0]
         np.testing.assert_array_equal(observation, expected[0])
     assert num_ends[1] > 0 and (num_ends[0] > 0 or on_target == "restart")

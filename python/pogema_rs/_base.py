@@ -51,9 +51,7 @@ class PogemaBase(Overridable, gymnasium.Env):
         """Plays one step; a subclass defines it."""
         raise NotImplementedError
 
-    def reset(
-        self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None
-    ) -> Any:
+    def reset(self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None) -> Any:
         """Begins an episode; a subclass defines it."""
         raise NotImplementedError
 

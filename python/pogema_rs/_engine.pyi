@@ -67,7 +67,10 @@ class Engine:
     # Write-only.
     elapsed: int
     def __new__(
-        cls, config: dict[str, Any], registered: Optional[str] = None, exact: bool = False,
+        cls,
+        config: dict[str, Any],
+        registered: Optional[str] = None,
+        exact: bool = False,
         num_retries: Optional[int] = None,
     ) -> Engine: ...
     def reset(self, /, config: Optional[dict[str, Any]] = None, registered: Optional[str] = None) -> list[str]: ...
@@ -150,9 +153,7 @@ class Batch:
 @final
 class AStarAgent:
     def __new__(cls, seed: int) -> AStarAgent: ...
-    def act(
-        self, /, xy: tuple[int, int], target_xy: tuple[int, int], obstacles: Any
-    ) -> tuple[int, bool]: ...
+    def act(self, /, xy: tuple[int, int], target_xy: tuple[int, int], obstacles: Any) -> tuple[int, bool]: ...
     def clear_state(self, /) -> None: ...
 
 @final

@@ -35,8 +35,8 @@ def save(
 
     `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by the names that the layers
     use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
-    chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle. `name` is
-    the policy in `LEARNED` that shall play the network. The network of `lswitcher` returns two values instead of logits,
+    chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle. `name`
+    is the policy in `LEARNED` that plays the network. The network of `lswitcher` returns two values instead of logits,
     and uses no `sampling` and `mask_actions`.
 
     Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not

@@ -48,7 +48,9 @@ class GoalGenerators:
 
     def _states(self) -> list[dict[str, Any]]:
         if not isinstance(self.generators, list):
-            raise TypeError(f"`random_generators` is of type `{_kind(self.generators)}`, expected a list of NumPy generators")
+            raise TypeError(
+                f"`random_generators` is of type `{_kind(self.generators)}`, expected a list of NumPy generators"
+            )
         got, num_agents = len(self.generators), len(self._engine.active)
         if got != num_agents:
             raise ValueError(f"`random_generators` has {got} entries, expected one for each of {num_agents} agents")

@@ -49,7 +49,7 @@ class NextEpisodes:
                 if config is not None:
                     changed[env] = config
             self._set_configs(list(changed.values()), list(changed))
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - raised later
             failure = error
         finally:
             # Even if Ctrl-C interrupts the function, the environments continue.
@@ -72,7 +72,7 @@ class NextEpisodes:
         chosen[ended] = True
         try:
             self._batch.reset(state, chosen.tolist())
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - the next call raises it
             self._stuck, self._reason = ended, error
             return error
         return None

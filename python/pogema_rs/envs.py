@@ -23,7 +23,7 @@ from pogema_rs._history import Kept
 from pogema_rs._read_only import FixedAttributes, ReadOnlyList
 from pogema_rs._resets import Resettable
 from pogema_rs._types import Cell, Infos, Observation, Step
-from pogema_rs.errors import NotResetError, StateError
+from pogema_rs.errors import StateError
 from pogema_rs.grid import Grid, GridLifeLong, foretold_goals, given_goals
 from pogema_rs.grid_config import GridConfig, engine_fields
 from pogema_rs.install import is_installed
@@ -308,9 +308,7 @@ class PogemaCoopFinish(Pogema[Observation]):
 _CLASSES = {"restart": PogemaLifeLong, "nothing": PogemaCoopFinish, "finish": Pogema}
 
 
-def _make_pogema(
-    grid_config: GridConfig, semantics: Union[str, Semantics] = Semantics.RELEASED
-) -> Pogema[Observation]:
+def _make_pogema(grid_config: GridConfig, semantics: Union[str, Semantics] = Semantics.RELEASED) -> Pogema[Observation]:
     try:
         made = _CLASSES[grid_config.on_target]
     except (KeyError, TypeError):

@@ -38,8 +38,8 @@ def collect(
     File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
     and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. With a
     budget of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1
-    if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out. Ctrl-C ends
-    the call at once; plans that have begun go on in the background, but no further file is begun.
+    if `nodes` is not given] plans depend on the machine. Episodes that the planner does not solve are left out. Ctrl-C
+    ends the call at once; plans that have begun go on in the background, but no further file is begun.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
     side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;
@@ -94,9 +94,7 @@ def _play(
     observations, infos = env.reset()
     obstacles = env.get_obstacles(ignore_borders=True)
     positions, goals = env.get_agents_xy(ignore_borders=True), env.get_targets_xy(ignore_borders=True)
-    found = plan(
-        obstacles, positions, goals, most_steps=config.max_episode_steps, seed=number % 2**63, **planning
-    )
+    found = plan(obstacles, positions, goals, most_steps=config.max_episode_steps, seed=number % 2**63, **planning)
     steps: dict[str, Any] = {"observations": [], "actions": [], "is_active": []}
     if found.is_solved and found.actions is not None:
         for actions in found.actions:

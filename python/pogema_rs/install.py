@@ -72,7 +72,7 @@ def install_as_pogema(toolbox: bool = False) -> None:
         if not is_installed(name):
             sys.meta_path.insert(0, _Alias(name))
     if not hasattr(gymnasium.Wrapper, "__getattr__"):
-        setattr(gymnasium.Wrapper, "__getattr__", _forward)
+        gymnasium.Wrapper.__getattr__ = _forward  # type: ignore[attr-defined]
 
 
 def is_installed(package: str = "pogema") -> bool:

@@ -20,9 +20,7 @@ def words_per_agent(radius: int) -> int:
 
 
 @overload
-def unpack(
-    packed: np.ndarray, radius: int, dtype: Any = None, out: Optional[np.ndarray] = None
-) -> np.ndarray: ...
+def unpack(packed: np.ndarray, radius: int, dtype: Any = None, out: Optional[np.ndarray] = None) -> np.ndarray: ...
 
 
 @overload
@@ -66,9 +64,7 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     return out
 
 
-def _unpack_tensor(
-    torch: Any, packed: Any, count: int, shape: tuple[int, ...], dtype: Any, out: Optional[Any]
-) -> Any:
+def _unpack_tensor(torch: Any, packed: Any, count: int, shape: tuple[int, ...], dtype: Any, out: Optional[Any]) -> Any:
     numbers = packed.contiguous().view(torch.uint8)
     shifts = torch.arange(8, dtype=torch.uint8, device=packed.device)
     bits = numbers.unsqueeze(-1).bitwise_right_shift(shifts).bitwise_and_(1)

@@ -81,9 +81,7 @@ def plan(
     return Plan(**result)
 
 
-def validate(
-    obstacles: ArrayLike, starts: ArrayLike, goals: Optional[ArrayLike], cells: ArrayLike
-) -> Optional[str]:
+def validate(obstacles: ArrayLike, starts: ArrayLike, goals: Optional[ArrayLike], cells: ArrayLike) -> Optional[str]:
     """Returns the first conflict of a plan as text, or None if it is valid; without goals agents may end anywhere.
 
     Shape: `cells` `(steps + 1, agents, 2)`

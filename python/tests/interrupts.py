@@ -40,29 +40,30 @@ CASES = {}
 #: The other entries by the reason why they end soon. A signal arrives when they return.
 SHORT = {
     "their work is linear in the agents, cells or goals that they read or return": {
-        "Engine.__new__", "Engine.__reduce__", "Engine.active", "Engine.cells", "Engine.executed", "Engine.goal_generators",
-        "Engine.goals", "Engine.history", "Engine.infos", "Engine.is_drawn", "Engine.obstacles", "Engine.observe",
-        "Engine.occupied", "Engine.on_goal", "Engine.pools", "Engine.reseed", "Engine.set_goal_generators", "Engine.starts",
-        "Engine.step_back", "derive_config",
+        "Engine.__new__", "Engine.__reduce__", "Engine.active", "Engine.cells", "Engine.executed",
+        "Engine.goal_generators", "Engine.goals", "Engine.history", "Engine.infos", "Engine.is_drawn",
+        "Engine.obstacles", "Engine.observe", "Engine.occupied", "Engine.on_goal", "Engine.pools", "Engine.reseed",
+        "Engine.set_goal_generators", "Engine.starts", "Engine.step_back", "derive_config",
     },
     "they play or observe at most one step": {
-        "AStarAgent.act", "Batch.ended", "Policy.logits", "Batch.global_state", "Batch.mask_actions", "Batch.mask_agents",
-        "Engine.step",
+        "AStarAgent.act", "Batch.ended", "Policy.logits", "Batch.global_state", "Batch.mask_actions",
+        "Batch.mask_agents", "Engine.step",
     },
     "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.films", "Batch.metrics"},
     "they read or write the files of one algorithm once": {
-        "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note", "Evaluation.picks",
+        "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note",
+        "Evaluation.picks",
     },
     "they read or write the files of one network once": {"Policy.__new__", "write_network"},
     "they read or set a few values": {
-        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
-        "Batch.take_film_failures",
-        "Engine.clear_metrics", "Engine.elapsed", "Engine.film", "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure",
-        "Engine.num_steps", "Engine.size", "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask",
-        "Evaluation.environment", "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
-        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset", "Policy.encoder", "Policy.reset",
-        "Policy.sampling", "_panic",
-        "check_views", "machine", "nearest_name", "num_cores",
+        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type",
+        "Batch.sizes", "Batch.take_film_failures", "Engine.clear_metrics", "Engine.elapsed", "Engine.film",
+        "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure", "Engine.num_steps", "Engine.size",
+        "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask", "Evaluation.environment",
+        "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
+        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset",
+        "Policy.encoder", "Policy.reset", "Policy.sampling", "_panic", "check_views", "machine", "nearest_name",
+        "num_cores",
     },
 }  # fmt: skip
 
@@ -204,9 +205,18 @@ def policy_actions():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "large.safetensors"
         rng = np.random.default_rng(0)
-        tensors = {"a.weight": rng.normal(size=(2000, 121)), "b.weight": rng.normal(size=(2000, 2000)), "policy.weight": rng.normal(size=(5, 2000))}
+        tensors = {
+            "a.weight": rng.normal(size=(2000, 121)),
+            "b.weight": rng.normal(size=(2000, 2000)),
+            "policy.weight": rng.normal(size=(5, 2000)),
+        }
         biases = {name.replace("weight", "bias"): np.zeros(len(weight)) for name, weight in tensors.items()}
-        save(path, Encoder(5, ["obstacles"]), ["flatten", {"dense": "a"}, "elu", {"dense": "b"}, "elu"], {**tensors, **biases})
+        save(
+            path,
+            Encoder(5, ["obstacles"]),
+            ["flatten", {"dense": "a"}, "elu", {"dense": "b"}, "elu"],
+            {**tensors, **biases},
+        )
         env, policy, twin = batch(400), load(path), load(path)
         env.reset()
         interrupt("Policy.act_batch", lambda: policy.act(env))
@@ -242,7 +252,14 @@ def batch_configs():
 @interrupts("Batch.finish_films")
 def films():
     with tempfile.TemporaryDirectory() as folder:
-        config = {"size": 128, "num_agents": 2000, "density": 0.1, "seed": 5, "max_episode_steps": 300, "on_target": "restart"}
+        config = {
+            "size": 128,
+            "num_agents": 2000,
+            "density": 0.1,
+            "seed": 5,
+            "max_episode_steps": 300,
+            "on_target": "restart",
+        }
         env = VecEnv(config, 1, film=Film(folder))
         env.reset()
         for _ in range(4 * 300):
@@ -263,7 +280,9 @@ def reset():
 
 
 def _filmed():
-    env = AnimationMonitor(pogema_v0(GridConfig(size=64, num_agents=400, seed=1, max_episode_steps=1500, on_target="restart")))
+    env = AnimationMonitor(
+        pogema_v0(GridConfig(size=64, num_agents=400, seed=1, max_episode_steps=1500, on_target="restart"))
+    )
     env.reset()
     ended = False
     while not ended:
@@ -418,7 +437,9 @@ def instances():
 
 @interrupts("cost_to_go", "check_plan")
 def distances_and_validation():
-    interrupt("cost_to_go", lambda: _engine.cost_to_go(np.zeros((4096, 4096), np.float32), (0, 0)), 0.05, is_abandoned=True)
+    interrupt(
+        "cost_to_go", lambda: _engine.cost_to_go(np.zeros((4096, 4096), np.float32), (0, 0)), 0.05, is_abandoned=True
+    )
     places = np.array([(row, 0) for row in range(4000)])
     steps = np.tile(places, (4000, 1, 1))
     obstacles = np.zeros((4000, 1), np.float32)

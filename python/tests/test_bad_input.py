@@ -19,6 +19,7 @@ from pogema_rs.grid_config import GridConfig
 CONFIG: dict[str, Any] = {"size": 6, "num_agents": 3, "obs_radius": 2, "density": 0.1, "seed": 3}
 SYSTEMS = ("priority", "block_both", "soft")
 
+
 class Pair(NamedTuple):
     """A cell."""
 
@@ -306,7 +307,11 @@ def test_values_of_numpy_and_iterators_are_read_as_pogema_reads_them():
     assert (config.empty_outside, config.persistent, config.agents_xy) == (False, True, [(0, 1)])
     assert type(config.agents_xy[0][0]) is int
     rows = [map(int, row) for row in ("010", "000")]
-    assert GridConfig(map=rows).map == GridConfig(map=[[np.int8(0), 1, 0], [0, 0, np.False_]]).map == [[0, 1, 0], [0, 0, 0]]
+    assert (
+        GridConfig(map=rows).map
+        == GridConfig(map=[[np.int8(0), 1, 0], [0, 0, np.False_]]).map
+        == [[0, 1, 0], [0, 0, 0]]
+    )
     assert GridConfig(map=b".#.").map == GridConfig(map=".#.").map
     assert GridConfig(persistent=b"yes").persistent is True
 

@@ -156,11 +156,7 @@ def test_numbers_may_have_an_exponent():
 
 
 def test_missing_torch_is_one_line_that_names_the_extra(tmp_path):
-    blocked = (
-        "import sys; sys.modules['torch'] = None\n"
-        "from pogema_rs.baselines.__main__ import main\n"
-        "sys.exit(main())"
-    )
+    blocked = "import sys; sys.modules['torch'] = None\nfrom pogema_rs.baselines.__main__ import main\nsys.exit(main())"
     command = [sys.executable, "-c", blocked, "train", "qmix", "--out", str(tmp_path / "run")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")

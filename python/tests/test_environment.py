@@ -24,7 +24,9 @@ def play(env, act, most=1000):
 
 
 def test_quickstart():
-    env = pogema_v0(grid_config=GridConfig(num_agents=2, size=8, density=0.4, seed=1, max_episode_steps=128, obs_radius=3))
+    env = pogema_v0(
+        grid_config=GridConfig(num_agents=2, size=8, density=0.4, seed=1, max_episode_steps=128, obs_radius=3)
+    )
     metrics = play(env, lambda _: env.sample_actions())
     assert list(metrics) == ["ISR", "CSR", "ep_length"]
     assert env.observation_space.shape == (3, 7, 7)
@@ -298,8 +300,17 @@ def test_too_many_agents_raise_the_exceptions_of_both_release_lines():
 def test_lists_of_the_caller_are_unchanged():
     actions, pool = [4, 3, 1], [[0, 0], [0, 1], [2, 2], [1, 1]]
     kept = copy.deepcopy(pool)
-    env = pogema_v0(GridConfig(size=3, density=0, num_agents=3, possible_agents_xy=pool, possible_targets_xy=pool,
-                               collision_system="soft", seed=1))
+    env = pogema_v0(
+        GridConfig(
+            size=3,
+            density=0,
+            num_agents=3,
+            possible_agents_xy=pool,
+            possible_targets_xy=pool,
+            collision_system="soft",
+            seed=1,
+        )
+    )
     env.reset()
     env.step(actions)
     env.reset()

@@ -1,6 +1,7 @@
 """Tests that Ctrl-C ends long calls, which leave all state as it was.
 
-Each case runs in its own process, which sends SIGINT to itself during a call that would take minutes, or at least seconds.
+Each case runs in its own process, which sends SIGINT to itself during a call that would take minutes, or at least
+seconds.
 """
 
 import ast
@@ -42,4 +43,6 @@ def test_interrupt_ends_the_call_and_leaves_the_state(case, tmp_path):
     command = [sys.executable, "-B", str(SCRIPT), case]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert {line.split(": ")[0] for line in done.stdout.splitlines() if "KeyboardInterrupt" in line} == set(CASES[case][1])
+    assert {line.split(": ")[0] for line in done.stdout.splitlines() if "KeyboardInterrupt" in line} == set(
+        CASES[case][1]
+    )

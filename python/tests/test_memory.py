@@ -1,4 +1,4 @@
-"""Tests that sizes beyond the memory raise MemoryError, that no panic leaves the engine, and that odd arrays are errors."""
+"""Tests that sizes beyond the memory raise MemoryError, that no panic leaves the engine, and that odd arrays fail."""
 
 import pickle
 import re

@@ -126,7 +126,13 @@ def test_python_threads_run_during_planning():
 @pytest.mark.parametrize("on_target", ["nothing", "finish"])
 def test_agents_follow_a_plan_to_their_goals(on_target):
     config = GridConfig(
-        num_agents=8, size=12, seed=2, density=0.2, on_target=on_target, observation_type="MAPF", collision_system="soft"
+        num_agents=8,
+        size=12,
+        seed=2,
+        density=0.2,
+        on_target=on_target,
+        observation_type="MAPF",
+        collision_system="soft",
     )
     env, agents = pogema_v0(config), PlannerAgents(nodes=2000, most_steps=config.max_episode_steps)
     for _ in range(2):

@@ -53,7 +53,7 @@ def test_actions_in_a_batch_follow_the_windows_and_the_recurrent_state(network, 
     states = np.zeros((3, 6, 4))
     num_compared = num_ends = 0
     is_over = np.zeros(3, bool)
-    for step in range(50):
+    for _ in range(50):
         actions = policy.act(env)
         assert actions.shape == (3, 6) and actions.dtype == np.int64
         np.testing.assert_array_equal(policy.act(env), actions)
@@ -255,7 +255,9 @@ def test_weights_are_relative_to_the_suite(tmp_path, monkeypatch):
         shutil.copy(WEIGHTS.with_suffix(suffix), tmp_path)
     suite = tmp_path / "suite.yaml"
     environment = {**CONFIG, "name": "Environment", "seed": 1}
-    suite.write_text(json.dumps({"environment": environment, "algorithms": {"A": {"name": "network", "weights": WEIGHTS.name}}}))
+    suite.write_text(
+        json.dumps({"environment": environment, "algorithms": {"A": {"name": "network", "weights": WEIGHTS.name}}})
+    )
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert len(evaluation(suite, tmp_path / "out")) == 1
@@ -294,7 +296,12 @@ def test_wrong_files_are_named(tmp_path):
 
 def test_wrong_arguments_are_refused():
     for arguments, error, message in [
-        ({"name": "lacam"}, ValueError, "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'lswitcher', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'"),
+        (
+            {"name": "lacam"},
+            ValueError,
+            "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'lswitcher', 'mats-lp', "
+            "'network', 'qmix', 'qplex', 'vdn'",
+        ),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"seed": 1.5}, TypeError, "seed is 1.5"),

@@ -34,7 +34,15 @@ def test_the_value_is_saved_beside_the_logits(tmp_path):
     drawn.dense("actor", 5, 50)
     drawn.dense("critic", 1, 50)
     path = tmp_path / "network.safetensors"
-    save(path, Encoder(2, ["obstacles", "agents"]), ["flatten"], drawn.tensors, actions="actor", value="critic", sampling="greedy")
+    save(
+        path,
+        Encoder(2, ["obstacles", "agents"]),
+        ["flatten"],
+        drawn.tensors,
+        actions="actor",
+        value="critic",
+        sampling="greedy",
+    )
     architecture = json.loads(path.with_suffix(".json").read_text())["architecture"]
     assert (architecture["actions"], architecture["value"]) == ("actor", "critic")
     assert load(path).sampling == "greedy" and load(path, sampling="softmax").sampling == "softmax"

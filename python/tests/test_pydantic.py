@@ -15,7 +15,7 @@ from pogema_rs._models import IS_PYDANTIC_1
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 
 # Classes as training code for POGEMA 1.4.0 defines them.
-SOURCE = '''
+SOURCE = """
 from typing import Any, Dict, List, Optional, Union
 
 from pydantic import Extra
@@ -66,7 +66,7 @@ class Inference(AlgoBase, extra=Extra.forbid):
     model_name: str = None
     preprocessing: Optional[Dict[str, Any]]
     seeds: List[int] = [1, 2]
-'''
+"""
 FUTURE = "from __future__ import annotations\n"
 
 

@@ -133,9 +133,9 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
     run = check("mypy", *STRICT, str(program))
     assert run.returncode == 1, run.stdout + run.stderr
     first = RIGHT.count("\n") + 1
-    assert lines_with_errors(run.stdout) == {
-        first + place: {code} for place, code in enumerate(WRONG.values())
-    }, run.stdout
+    assert lines_with_errors(run.stdout) == {first + place: {code} for place, code in enumerate(WRONG.values())}, (
+        run.stdout
+    )
 
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"

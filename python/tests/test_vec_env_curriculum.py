@@ -122,7 +122,7 @@ def test_set_configs_takes_effect_at_the_next_episodes(mode, num_threads):
             chosen = [(level + index) % NUM_ENVS for index in range(1 + level % NUM_ENVS)]
             configs = [GridConfig(**STAGES[(level + env) % 3], seed=99) for env in chosen]
             env.set_configs(configs, envs=chosen)
-            for index, config in zip(chosen, configs):
+            for index in chosen:
                 plain[index].config = STAGES[(level + index) % 3]
         if mode == AutoresetMode.DISABLED and step % 5 == 0:
             over = np.array([one.last is not None for one in plain])

@@ -48,11 +48,17 @@ def check(got, expected, text):
         return
     assert got.dtype == np.float32 and got.shape == expected.shape
     where = np.argwhere(got != expected)
-    assert not len(where), f"{text}: {len(where)} differ, the first at {where[0]}: {got[tuple(where[0])]}, {expected[tuple(where[0])]}"
+    assert not len(where), (
+        f"{text}: {len(where)} differ, the first at {where[0]}: {got[tuple(where[0])]}, {expected[tuple(where[0])]}"
+    )
 
 
 def of_env(observations, env):
-    return {name: part[env] for name, part in observations.items()} if isinstance(observations, dict) else observations[env]
+    return (
+        {name: part[env] for name, part in observations.items()}
+        if isinstance(observations, dict)
+        else observations[env]
+    )
 
 
 def play(envs, models, mode, num_steps):
@@ -155,7 +161,9 @@ def test_bytes_do_not_depend_on_threads():
 
 
 def test_films_and_statistics_work_beside_an_encoder(tmp_path):
-    envs = VecEnv(CONFIG, 2, encoder={"radius": 1, "channels": ["goal"]}, film=Film(tmp_path), statistics=True, masks=True)
+    envs = VecEnv(
+        CONFIG, 2, encoder={"radius": 1, "channels": ["goal"]}, film=Film(tmp_path), statistics=True, masks=True
+    )
     envs.reset(seed=0)
     infos = {}
     while "episode" not in infos:
@@ -187,17 +195,36 @@ def test_spaces_fit():
         ({"encoder": {"radius": 0, "channels": ["goal"]}}, ValueError, "radius is 0, expected 1 to 128"),
         ({"encoder": {"radius": 1.5, "channels": ["goal"]}}, TypeError, "radius is 1.5, expected a whole number"),
         ({"encoder": {"radius": 1, "channels": "goal"}}, TypeError, "channels is 'goal', expected a list of names"),
-        ({"encoder": {"radius": 1, "channels": ["goals"]}}, ValueError, r"channels\[0\] is 'goals', expected one of 'obst"),
-        ({"encoder": {"radius": 1, "channels": ["goal"] * 65}}, ValueError, "channels is a list of 65, expected at most 64"),
+        (
+            {"encoder": {"radius": 1, "channels": ["goals"]}},
+            ValueError,
+            r"channels\[0\] is 'goals', expected one of 'obst",
+        ),
+        (
+            {"encoder": {"radius": 1, "channels": ["goal"] * 65}},
+            ValueError,
+            "channels is a list of 65, expected at most 64",
+        ),
         ({"encoder": {"radius": 1, "channels": ["goal"], "scalars": ["x"]}}, ValueError, r"scalars\[0\] is 'x'"),
         ({"encoder": {"radius": 1, "channels": ["goal"], "sight": 200}}, ValueError, "sight is 200, expected 1 to 128"),
-        ({"encoder": {"radius": 1, "channels": ["goal"], "follower": "c"}}, ValueError, "follower is 'c', expected one of"),
-        ({"encoder": {"radius": 1, "channels": ["goal"], "size": 1}}, ValueError, "encoder has the unknown field 'size'"),
+        (
+            {"encoder": {"radius": 1, "channels": ["goal"], "follower": "c"}},
+            ValueError,
+            "follower is 'c', expected one of",
+        ),
+        (
+            {"encoder": {"radius": 1, "channels": ["goal"], "size": 1}},
+            ValueError,
+            "encoder has the unknown field 'size'",
+        ),
     ],
 )
 def test_wrong_encoders_are_refused(settings, error, text):
     settings = {"encoder": Encoder(1, ["goal"]), **settings}
-    config = {**CONFIG, **({"observation_type": settings.pop("observation_type")} if "observation_type" in settings else {})}
+    config = {
+        **CONFIG,
+        **({"observation_type": settings.pop("observation_type")} if "observation_type" in settings else {}),
+    }
     with pytest.raises(error, match=text):
         VecEnv(config, 2, **settings)
 
@@ -207,7 +234,11 @@ def test_wrong_buffers_are_refused_before_the_step():
     observations, _ = envs.reset(seed=1)
     for out, error, text in [
         (np.zeros(3), TypeError, "expected a dict of arrays with the keys"),
-        ({**observations, "windows": observations["windows"].astype(np.float64)}, TypeError, "has type float64, expected float32"),
+        (
+            {**observations, "windows": observations["windows"].astype(np.float64)},
+            TypeError,
+            "has type float64, expected float32",
+        ),
         ({**observations, "scalars": np.zeros((2, 5, 3), np.float32)}, ValueError, r"out\['scalars'\] has shape"),
     ]:
         with pytest.raises(error, match=text):

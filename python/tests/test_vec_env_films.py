@@ -228,7 +228,7 @@ def test_a_warning_that_is_an_error_changes_nothing(tmp_path):
     num_errors, actions = 0, np.zeros((1, 5), int)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for step in range(9):
+        for _ in range(9):
             env.step(actions)
             other.step(actions)
         # The thread takes some time to fail.
@@ -364,7 +364,8 @@ def test_ctrl_c_in_a_terminal_loses_no_video(tmp_path):
     path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
     done = subprocess.run(
         [sys.executable, "-c", INTERRUPTED],
-        cwd=tmp_path, env={**os.environ, "PATH": path}, start_new_session=True, capture_output=True, text=True, timeout=60,
+        cwd=tmp_path, env={**os.environ, "PATH": path}, start_new_session=True, capture_output=True, text=True,
+        timeout=60,
         # A shell's background job would ignore SIGINT.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip

@@ -164,7 +164,7 @@ BAD_VECTORS = [
     (
         {"grid_config": [CONFIG, {**CONFIG, "observation_type": "MAPF"}]},
         ValueError,
-        "`observation_type` is `\"MAPF\"`, expected \"default\", because environment 1 must share it",
+        '`observation_type` is `"MAPF"`, expected "default", because environment 1 must share it',
     ),
     (
         {"grid_config": {**CONFIG, "observation_type": "MAPF"}, "dtype": "bits"},

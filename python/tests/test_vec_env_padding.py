@@ -123,7 +123,10 @@ def check_end(infos, own_infos, index, number):
             assert infos["metrics"][name][index] == values[0]
     if "final_obs" in infos:
         final, own = infos["final_obs"][index], own_infos["final_obs"][0]
-        spread = lambda arrays: {name: part[None] for name, part in parts_of(arrays).items()}
+
+        def spread(arrays):
+            return {name: part[None] for name, part in parts_of(arrays).items()}
+
         check_arrays(spread(final), spread(own), 0, number)
         check_arrays(spread(infos["final_state"][index]), spread(own_infos["final_state"][0]), 0, number)
         assert infos["final_info"]["agent_mask"][index].tolist() == [True] * number + [False] * (9 - number)

@@ -107,7 +107,7 @@ def test_statistics_equal_those_of_gymnasium(mode, rewards):
     rng, num_ended, returns = np.random.default_rng(5), 0, 0.0
     env.reset(seed=4)
     other.reset(seed=4)
-    for step in range(60):
+    for _ in range(60):
         actions = rng.integers(5, size=(NUM_ENVS, 5))
         *_, truncated, infos = env.step(actions)
         *_, expected = other.step(actions)

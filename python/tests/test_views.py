@@ -25,7 +25,9 @@ def played(tmp_path_factory):
         "LaCAM": {"name": "LaCAM", "nodes": 100},
     }
     write(folder, {**suite(num_seeds=2, **more), "results_views": VIEWS})
-    done = subprocess.run([*command(folder), "", str(folder / "page.html")], capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [*command(folder), "", str(folder / "page.html")], capture_output=True, text=True, timeout=300
+    )
     assert "EvaluationError: 4 episodes could not be played" in done.stderr, done.stderr
     return folder, done
 

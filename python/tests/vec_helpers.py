@@ -1,6 +1,5 @@
 """A model of `VecEnv`: one engine for each environment, reset by hand."""
 
-
 import numpy as np
 from pogema_rs import _engine
 from pogema_rs.vec_env import AutoresetMode

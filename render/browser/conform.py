@@ -14,7 +14,9 @@ def test_the_conformance_page_fits_a_phone(world):
     page = context.new_page()
     page.goto(path.as_uri())
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
-    wide = page.evaluate("[...document.querySelectorAll('.wide')].filter((box) => box.scrollWidth > box.clientWidth).length")
+    wide = page.evaluate(
+        "[...document.querySelectorAll('.wide')].filter((box) => box.scrollWidth > box.clientWidth).length"
+    )
     equal(wide, 0, "the table of one port needs no scrolling")
     broken = page.evaluate("""[...document.querySelectorAll('th[scope=row]')].filter((cell) => {
       const text = document.createRange();
@@ -28,6 +30,8 @@ def test_the_conformance_page_fits_a_phone(world):
       return false;
     }).map((cell) => cell.textContent)""")
     equal(broken, [], "no name of a rule breaks inside a word")
-    sizes = page.evaluate("[...document.querySelectorAll('th, td, caption')].map((cell) => parseFloat(getComputedStyle(cell).fontSize))")
+    sizes = page.evaluate(
+        "[...document.querySelectorAll('th, td, caption')].map((cell) => parseFloat(getComputedStyle(cell).fontSize))"
+    )
     assert min(sizes) >= 12, min(sizes)
     context.close()

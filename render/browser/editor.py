@@ -93,7 +93,9 @@ def test_unreachable_goals_are_flagged(world):
         equal(text(page, "components"), "2")
         page.check("#tint")
         settle(page)
-        one, other = (pixel(page, "ground", *page.evaluate("(col) => editor.center(1, col)", col))[:3] for col in (1, 3))
+        one, other = (
+            pixel(page, "ground", *page.evaluate("(col) => editor.center(1, col)", col))[:3] for col in (1, 3)
+        )
         assert one != other and [255, 255, 255] not in (one, other), (one, other)
         page.click("#issues button")
         page.keyboard.press(".")
@@ -120,7 +122,10 @@ def test_keyboard_only(world):
         page.keyboard.press("?")
         assert page.locator("#help").is_visible()
         page.keyboard.press("Escape")
-        unnamed = page.evaluate("[...document.querySelectorAll('button')].filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length")
+        unnamed = page.evaluate(
+            "[...document.querySelectorAll('button')]"
+            ".filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length"
+        )
         equal(unnamed, 0, "buttons without a name")
 
 
@@ -148,7 +153,10 @@ def test_phone(world):
         (x, y), before = at(page, 8, 8), page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]")
 
         def touch(kind, *columns):
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": column, "y": y, "id": id} for id, column in columns]})
+            session.send(
+                "Input.dispatchTouchEvent",
+                {"type": kind, "touchPoints": [{"x": column, "y": y, "id": id} for id, column in columns]},
+            )
 
         touch("touchStart", (0, x - 30))
         touch("touchStart", (0, x - 30), (1, x + 30))

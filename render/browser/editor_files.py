@@ -57,7 +57,10 @@ def test_yaml_keeps_fields_that_are_not_edited(world):
         [read] = world.check(changed)
         equal(read["rows"], ["..#.", ".#..", ".#.."])
         equal([read["agents"], read["goals"]], [[[0, 0], [2, 3], [1, 3]], [[2, 0], [0, 3], [1, 2]]])
-        equal([read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")], [9007199254740993, 3, "soft", 3])
+        equal(
+            [read["fields"][name] for name in ("seed", "obs_radius", "collision_system", "num_agents")],
+            [9007199254740993, 3, "soft", 3],
+        )
         pick(page, changed)
         equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
 
@@ -96,7 +99,11 @@ def test_goal_sequences_are_kept(world):
 
 def test_maps_that_text_cannot_represent(world):
     shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
-    many = "map: |\n" + "  ....\n" * 14 + f"agents_xy: {[[row, 0] for row in range(14)] + [[row, 1] for row in range(13)]}\n"
+    many = (
+        "map: |\n"
+        + "  ....\n" * 14
+        + f"agents_xy: {[[row, 0] for row in range(14)] + [[row, 1] for row in range(13)]}\n"
+    )
     many += f"targets_xy: {[[row, 2] for row in range(14)] + [[row, 3] for row in range(13)]}\n"
     with world.open("editor") as page:
         for content, reason in [
@@ -112,28 +119,70 @@ def test_maps_that_text_cannot_represent(world):
 
 def test_errors_are_reported_with_line_and_column(world):
     cases = [
-        ("bad.txt", "..\n.x.\n.%", 'bad.txt: line 2, column 3'),
+        ("bad.txt", "..\n.x.\n.%", "bad.txt: line 2, column 3"),
         ("bad.txt", "...\n.?.", 'bad.txt: line 2, column 2: unknown character "?", expected one of .#@$!, a-z or A-Z'),
         ("bad.txt", "...\n..", "bad.txt: line 2, column 3: the row has 2 cells, expected 3 as in the first row"),
-        ("bad.txt", "a..\n.A.\n..b", "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
-        ("bad.txt", "a.A\n.@.", "bad.txt: line 2, column 2: the map has letters and one of @$!, expected either exact or possible starts and goals"),
+        (
+            "bad.txt",
+            "a..\n.A.\n..b",
+            "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers",
+        ),
+        (
+            "bad.txt",
+            "a.A\n.@.",
+            "bad.txt: line 2, column 2: the map has letters and one of @$!, expected either exact or possible starts "
+            "and goals",
+        ),
         ("bad.txt", " \n\n", "bad.txt: line 1, column 1: the map has no cell, expected some of .#@$!, a-z and A-Z"),
         ("bad.yaml", "seed: 1\n", "bad.yaml: line 1, column 1: the config has no map, expected the field map"),
-        ("bad.yaml", "seed: 1\nmap: |\n  ..\n  .*\n", 'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z'),
+        (
+            "bad.yaml",
+            "seed: 1\nmap: |\n  ..\n  .*\n",
+            'bad.yaml: line 4, column 4: unknown character "*", expected one of .#@$!, a-z or A-Z',
+        ),
         ("bad.yaml", "map: |\n  ..\nseed: 1\nmap: |\n  ..\n", 'bad.yaml: line 4, column 1: duplicate key "map"'),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\n", "bad.yaml: line 3, column 1: found agents_xy without targets_xy, expected both"),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n", "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 row and 2 columns"),
-        ("bad.yaml", "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n", "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]"),
-        ("bad.yaml", "map: |\n  ..\nno field\n", "bad.yaml: line 3, column 1: expected a field such as map: or a comment"),
-        ("bad.json", '{"map": "..", "seed": 9007199254740993}', "bad.json: line 1, column 1: seed has too many digits to be read exactly from JSON, expected a config in YAML"),
-        ("bad.json", '{"map": "..",\n "seed" 1}', "bad.json: line 2, column 9: invalid JSON, expected a config in braces to be JSON"),
+        (
+            "bad.yaml",
+            "map: |\n  ..\nagents_xy: [[0, 0]]\n",
+            "bad.yaml: line 3, column 1: found agents_xy without targets_xy, expected both",
+        ),
+        (
+            "bad.yaml",
+            "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n",
+            "bad.yaml: line 4, column 13: targets_xy has (0, 2), which is outside the map of 1 row and 2 columns",
+        ),
+        (
+            "bad.yaml",
+            "map: |\n  ..\nagents_xy: [[0, 0]]\ntargets_xy: [[0, x]]\n",
+            "bad.yaml: line 4, column 13: targets_xy cannot be read, expected a list of [row, col]",
+        ),
+        (
+            "bad.yaml",
+            "map: |\n  ..\nno field\n",
+            "bad.yaml: line 3, column 1: expected a field such as map: or a comment",
+        ),
+        (
+            "bad.json",
+            '{"map": "..", "seed": 9007199254740993}',
+            "bad.json: line 1, column 1: seed has too many digits to be read exactly from JSON, expected a config in "
+            "YAML",
+        ),
+        (
+            "bad.json",
+            '{"map": "..",\n "seed" 1}',
+            "bad.json: line 2, column 9: invalid JSON, expected a config in braces to be JSON",
+        ),
     ]
     with world.open("editor") as page:
         load(world, page, "good.txt", "a.A\n")
         for name, content, expected in cases:
             load(world, page, name, content)
             got = text(page, "message")
-            assert got == expected or (expected.endswith("column 3") and got.startswith(expected)), (content, got, expected)
+            assert got == expected or (expected.endswith("column 3") and got.startswith(expected)), (
+                content,
+                got,
+                expected,
+            )
             equal(page.get_attribute("#message", "class"), "bad")
             equal(rows(page), ["..."], "the map stays unchanged")
         page.click("#edit-source")

@@ -30,7 +30,11 @@ def main(folder, *names):
         world = World(browser, folder, os.environ["PAGES_PROGRAM"], scratch)
         chosen = [
             (name, test)
-            for module in ((speed,) if names == ("speed",) else (replay_film, replay, editor, editor_files, pictures, report, conform))
+            for module in (
+                (speed,)
+                if names == ("speed",)
+                else (replay_film, replay, editor, editor_files, pictures, report, conform)
+            )
             for name, test in tests_of(module)
             if not names or any(part in f"{module.__name__}.{name}" for part in names)
         ]

@@ -34,7 +34,15 @@ def test_steps_by_button_and_key(world):
             page.click(how)
             settle(page)
             equal(step(page), expected, how)
-        keys = [("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10), ("End", 64), ("ArrowRight", 64), ("Home", 0), ("ArrowLeft", 0)]
+        keys = [
+            ("ArrowRight", 1),
+            ("Shift+ArrowRight", 11),
+            ("ArrowLeft", 10),
+            ("End", 64),
+            ("ArrowRight", 64),
+            ("Home", 0),
+            ("ArrowLeft", 0),
+        ]
         for key, expected in keys:
             page.keyboard.press(key)
             settle(page)
@@ -92,6 +100,7 @@ def test_agents_glide_between_steps(world):
 
 def test_goals_show_numbers(world):
     with world.open("restart") as page:
+
         def has_number(cell):
             # Reads only the inside of the goal's ring, where its number is.
             x, y = page.evaluate("([row, col]) => replay.center(row, col)", cell)
@@ -120,7 +129,9 @@ def test_goals_show_numbers(world):
 def test_the_list_of_agents_uses_the_free_space(world):
     for height in (500, 800):
         with world.open("restart", viewport={"width": 1200, "height": height}) as page:
-            is_whole = page.evaluate("(({ scrollHeight, clientHeight }) => scrollHeight <= clientHeight)(document.getElementById('agents'))")
+            is_whole = page.evaluate(
+                "(({ scrollHeight, clientHeight }) => scrollHeight <= clientHeight)(document.getElementById('agents'))"
+            )
             spare = page.evaluate(
                 "document.querySelector('aside').getBoundingClientRect().bottom"
                 " - document.getElementById('no-agent').parentElement.getBoundingClientRect().bottom"
@@ -164,7 +175,10 @@ def test_touch(world):
         session = page.context.new_cdp_session(page)
 
         def touch(kind, *points):
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": at, "y": y, "id": id} for id, at in points]})
+            session.send(
+                "Input.dispatchTouchEvent",
+                {"type": kind, "touchPoints": [{"x": at, "y": y, "id": id} for id, at in points]},
+            )
 
         touch("touchStart", (0, x - 30), (1, x + 30))
         for spread in (40, 50, 60):
@@ -205,22 +219,34 @@ def test_help_and_labels(world):
         equal(step(page), 0, "keys do not step while the help is open")
         page.keyboard.press("Escape")
         assert page.locator("#help").is_hidden()
-        unnamed = page.evaluate("[...document.querySelectorAll('button')].filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length")
+        unnamed = page.evaluate(
+            "[...document.querySelectorAll('button')]"
+            ".filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length"
+        )
         equal(unnamed, 0, "buttons without a name")
         page.focus("#first")
         page.keyboard.press("Tab")
-        equal(page.evaluate("[document.activeElement.id, getComputedStyle(document.activeElement).outlineStyle]"), ["back", "solid"])
+        equal(
+            page.evaluate("[document.activeElement.id, getComputedStyle(document.activeElement).outlineStyle]"),
+            ["back", "solid"],
+        )
 
 
 def test_no_network_and_no_foreign_scripts(world):
     with world.open("finish") as page:
         refused = page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'sent', (error) => error.name)")
         equal(refused, "TypeError")
-        page.evaluate("document.body.append(Object.assign(document.createElement('script'), {textContent: 'window.foreign = 1'}))")
+        page.evaluate(
+            "document.body.append(Object.assign(document.createElement('script'), {textContent: 'window.foreign = 1'}))"
+        )
         equal(page.evaluate("window.foreign"), None, "a script that is not the page's own")
         assert len(page.errors) >= 2 and all("Content Security Policy" in one for one in page.errors), page.errors
         page.errors.clear()
-        equal(page.evaluate("(() => { try { 'use strict'; replay.step = 3 } catch {} return replay.step })()"), 0, "read only")
+        equal(
+            page.evaluate("(() => { try { 'use strict'; replay.step = 3 } catch {} return replay.step })()"),
+            0,
+            "read only",
+        )
 
 
 def test_damaged_data_is_reported(world):

@@ -33,10 +33,16 @@ def expected_state(film, at, agent):
     rewards = [one["rewards"][agent] for one in states[1 : at + 1]]
     why = reason(film, at, agent) if is_reverted(film, at, agent) else None
     return {
-        "cell": state["cells"][agent], "goal": state["goals"][agent], "isActive": state["active"][agent],
-        "isOnGoal": state["on_goal"][agent], "isMarked": state["cells"][agent] in state["occupied"],
-        "action": NAMES[state["actions"][agent]] if at else None, "reward": rewards[-1] if rewards else 0, "total": sum(rewards),
-        "isTerminated": bool(at) and state["terminated"][agent], "isTruncated": bool(at) and state["truncated"][agent],
+        "cell": state["cells"][agent],
+        "goal": state["goals"][agent],
+        "isActive": state["active"][agent],
+        "isOnGoal": state["on_goal"][agent],
+        "isMarked": state["cells"][agent] in state["occupied"],
+        "action": NAMES[state["actions"][agent]] if at else None,
+        "reward": rewards[-1] if rewards else 0,
+        "total": sum(rewards),
+        "isTerminated": bool(at) and state["terminated"][agent],
+        "isTruncated": bool(at) and state["truncated"][agent],
         "reverted": why,
     }
 
@@ -47,7 +53,14 @@ def reason(film, at, agent):
     state = film["states"][at]
     action = state["actions"][agent]
     cell = [here + there for here, there in zip(state["cells"][agent], MOVES[action])]
-    return {"step": at, "action": NAMES[action], "rule": recorded["rule"], "cause": recorded["cause"], "cell": cell, "other": recorded["other"]}
+    return {
+        "step": at,
+        "action": NAMES[action],
+        "rule": recorded["rule"],
+        "cause": recorded["cause"],
+        "cell": cell,
+        "other": recorded["other"],
+    }
 
 
 def test_names_come_from_the_episode_and_are_escaped(world):
@@ -57,7 +70,10 @@ def test_names_come_from_the_episode_and_are_escaped(world):
         equal(text(page, "title"), title)
         equal(page.title(), title)
         assert text(page, "metrics").startswith("· ISR "), "the metrics are apart from the facts"
-        equal(text(page, "facts"), f"8 × 8 · 4 agents · {len(world.film('finish')['states']) - 1} steps · priority · finish · radius 5")
+        equal(
+            text(page, "facts"),
+            f"8 × 8 · 4 agents · {len(world.film('finish')['states']) - 1} steps · priority · finish · radius 5",
+        )
 
 
 def test_states_are_those_of_the_episode(world):
@@ -82,7 +98,9 @@ def test_marks_are_the_occupancy_grid(world):
             expected = [sorted(row * width + col for row, col in state["occupied"]) for state in film["states"]]
             equal(shown, expected, name)
     soft = world.film("soft")["states"]
-    assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), "no agent vanished, so this tested nothing"
+    assert any(len(state["occupied"]) < sum(state["active"]) for state in soft), (
+        "no agent vanished, so this tested nothing"
+    )
 
 
 def test_windows_are_observations(world):
@@ -154,12 +172,17 @@ def test_reverted_moves_are_listed_and_lead_to_their_steps(world):
                 row = page.locator(f"#moves-{index}")
                 expected = reason(film, steps[index], agent)
                 shown = row.inner_text()
-                assert expected["rule"] in shown and str(steps[index]) in shown and expected["action"] in shown, (shown, expected)
+                assert expected["rule"] in shown and str(steps[index]) in shown and expected["action"] in shown, (
+                    shown,
+                    expected,
+                )
                 row.click()
                 settle(page)
                 equal(step(page), steps[index])
                 equal(text(page, "why-rule"), expected["rule"])
-                named = {"agent": f"agent {expected['other']}", "wall": "the wall", "obstacle": "obstacle"}[expected["cause"]]
+                named = {"agent": f"agent {expected['other']}", "wall": "the wall", "obstacle": "obstacle"}[
+                    expected["cause"]
+                ]
                 assert named in text(page, "why-text"), text(page, "why-text")
             page.keyboard.press("Home")
             settle(page)
@@ -184,7 +207,11 @@ def test_canvas_shows_agents_goals_and_obstacles(world):
                 equal(pixel(page, "actors", *at)[3], 0, f"no agent on {row} {col}")
         page.check("#goals")
         settle(page)
-        free = next(agent for agent in range(4) if state["goals"][agent] not in state["cells"] and state["goals"].count(state["goals"][agent]) == 1)
+        free = next(
+            agent
+            for agent in range(4)
+            if state["goals"][agent] not in state["cells"] and state["goals"].count(state["goals"][agent]) == 1
+        )
         x, y = page.evaluate("([row, col]) => replay.center(row, col)", state["goals"][free])
         scale = page.evaluate("replay.scale")
         equal(pixel(page, "actors", x + 0.35 * scale, y)[:3], rgb(POGEMA[free]), "the ring of a goal")

@@ -78,7 +78,9 @@ def test_replays_match_their_episodes(world):
         buttons = page.locator("[data-replay]")
         equal(buttons.count(), 2 * 6)
         for number in (0, 5, 6, 11):
-            name, episode = buttons.nth(number).get_attribute("aria-label").removeprefix("replay episode ").split(" of ")[::-1]
+            name, episode = (
+                buttons.nth(number).get_attribute("aria-label").removeprefix("replay episode ").split(" of ")[::-1]
+            )
             buttons.nth(number).click()
             frame = page.frame_locator("#player iframe").locator("body.ready")
             frame.wait_for()
@@ -111,7 +113,11 @@ def test_the_report_fits_a_phone(world):
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
         wide = page.locator(".wide").first
         assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "a wide table scrolls on its own"
-        equal(wide.evaluate("(box) => getComputedStyle(box).backgroundAttachment"), "local, scroll", "its end has a shadow")
+        equal(
+            wide.evaluate("(box) => getComputedStyle(box).backgroundAttachment"),
+            "local, scroll",
+            "its end has a shadow",
+        )
         page.locator("[data-replay]").first.tap()
         page.frame_locator("#player iframe").locator("body.ready").wait_for()
         settle(page)

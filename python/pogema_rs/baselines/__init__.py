@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 
 if TYPE_CHECKING:
-    from pogema_rs.baselines._run import Budget, train
+    from pogema_rs.baselines._run import Budget, train  # noqa: F401 - for type checkers
 
 # `Budget` and `train` need PyTorch, which an import of all names must not.
 __all__ = ["METHODS", "TrainingConfig", "load_config"]

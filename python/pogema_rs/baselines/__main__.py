@@ -43,7 +43,11 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("method", metavar="METHOD", help=f"one of {', '.join(METHODS)}")
         command.add_argument("--config", metavar="FILE", help="YAML file of hyperparameters [default: the package's]")
         command.add_argument(
-            "--set", metavar="SECTION.KEY=VALUE", action="append", default=[], help="replace one hyperparameter; may be repeated"
+            "--set",
+            metavar="SECTION.KEY=VALUE",
+            action="append",
+            default=[],
+            help="replace one hyperparameter; may be repeated",
         )
     train.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="folder of the run")
     train.add_argument("--minutes", type=float, help="training time in minutes [default: 60, without --updates]")

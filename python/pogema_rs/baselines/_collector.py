@@ -125,7 +125,7 @@ class Collector:
 
     def _reward(self, record: Record, step: int, before: np.ndarray, own: np.ndarray, on_target: str) -> None:
         """Writes the rewards of a step into the record; `before` are the windows before the step."""
-        config, weights = self._config, self._config.rewards
+        weights = self._config.rewards
         rewards = np.full(own.shape, weights.step, dtype=np.float32)
         if on_target == "nothing":
             places = record.places[step + 1]

@@ -355,7 +355,9 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
         check(learns_a_policy, "imitation.iterations", f"0, because {config.method} learns no policy by PPO")
         for rule in config.environment.on_target:
             # A planner keeps clear of agents that have finished and left.
-            check(rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise such episodes")
+            check(
+                rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise such episodes"
+            )
             try:
                 make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
             except ValueError as error:

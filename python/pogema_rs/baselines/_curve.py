@@ -12,7 +12,7 @@ from pogema_rs.toolbox._optional import required
 
 
 def score_of(on_target: tuple[str, ...]) -> str:
-    """Returns the metric that chooses the best weights: the mean reward of a step if no other metric has all episodes."""
+    """Returns the metric that chooses the best weights: the mean reward of a step if not all episodes have another."""
     scores = {"avg_throughput" if rule == "restart" else "ISR" for rule in on_target}
     return scores.pop() if len(scores) == 1 else "reward"
 

@@ -38,7 +38,9 @@ class AgentNetwork(nn.Module):
     and residual blocks, a dense layer, a GRU, and the outputs.
     """
 
-    def __init__(self, encoder: Encoder, config: NetworkConfig, has_value: bool, num_outputs: int = NUM_ACTIONS) -> None:
+    def __init__(
+        self, encoder: Encoder, config: NetworkConfig, has_value: bool, num_outputs: int = NUM_ACTIONS
+    ) -> None:
         super().__init__()
         channels, side, _ = encoder.shape
         self.window = encoder.shape

@@ -102,7 +102,10 @@ def train(
 def _settings(seed: int, threads: int) -> Iterator[None]:
     """Sets PyTorch up for a training, and restores the caller's settings afterwards."""
     before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled())
-    warns, fills = torch.is_deterministic_algorithms_warn_only_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    warns, fills = (
+        torch.is_deterministic_algorithms_warn_only_enabled(),
+        torch.utils.deterministic.fill_uninitialized_memory,
+    )
     with torch.random.fork_rng(devices=[]):
         torch.set_num_threads(threads)
         torch.use_deterministic_algorithms(True)
@@ -279,7 +282,11 @@ class _Run:
         network = copy.deepcopy(learner.trained())
         network.load_state_dict(self.best_weights)
         path = self.folder / "weights.safetensors"
-        rules: dict[str, Any] = {"sampling": learner.sampling, "mask_actions": learner.masks, "name": learner.policy_name}
+        rules: dict[str, Any] = {
+            "sampling": learner.sampling,
+            "mask_actions": learner.masks,
+            "name": learner.policy_name,
+        }
         policies.export(network, self.config.encoder, path, **rules)
 
     def _describe(self, budget: Budget) -> None:

@@ -29,7 +29,9 @@ class PogemaGymnax(Environment):
 
     def __init__(self, pool: InstancePool) -> None:
         if pool.config.num_agents != 1:
-            raise ValueError(f"num_agents is {pool.config.num_agents}, expected 1; JaxMARL's interface plays several agents")
+            raise ValueError(
+                f"num_agents is {pool.config.num_agents}, expected 1; JaxMARL's interface plays several agents"
+            )
         self._params = pool.params
 
     @property

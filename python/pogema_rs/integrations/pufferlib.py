@@ -74,9 +74,7 @@ class PogemaPuffer(PufferEnv):
         self.masks[:] = self._is_active
         return self.observations, []
 
-    def step(
-        self, actions: Any
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
         """Plays one step and returns the buffers of observations, rewards, terminals and truncations, and infos.
 
         Errors: those of `VecEnv.step`; the state does not change.

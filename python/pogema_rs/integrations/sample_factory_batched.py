@@ -59,7 +59,9 @@ class PogemaSampleFactory(gymnasium.Env):
         space = self.envs.single_observation_space
         if not isinstance(space, spaces.Box):
             raise ValueError("observation_type gives dictionaries, expected 'default'")
-        self.observation_space = spaces.Dict({"obs": spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)})
+        self.observation_space = spaces.Dict(
+            {"obs": spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)}
+        )
         self.action_space: spaces.Discrete = spaces.Discrete(NUM_ACTIONS)
         self.num_agents = self.envs.num_envs * self.envs.num_agents
         self.render_mode = render_mode
@@ -68,7 +70,7 @@ class PogemaSampleFactory(gymnasium.Env):
     def reset(
         self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Begins the first episodes of a seed, or the next ones, and returns the observations and an empty dictionary."""
+        """Begins the first episodes of a seed, or the next ones; returns the observations and an empty dictionary."""
         observations, _ = self.envs.reset(seed=seed, options=options)
         return self._rows(observations), {}
 

@@ -21,7 +21,9 @@ from __future__ import annotations
 try:
     import jax as _jax  # noqa: F401
 except ImportError as _error:
-    raise ImportError('pogema_rs.jax needs JAX, which the extra `jax` installs: pip install "pogema-rs[jax]"') from _error
+    raise ImportError(
+        'pogema_rs.jax needs JAX, which the extra `jax` installs: pip install "pogema-rs[jax]"'
+    ) from _error
 
 from pogema_rs.jax._checked import checked_step
 from pogema_rs.jax._config import Config

@@ -18,8 +18,8 @@ FAR = 2**31 - 1
 def cost_to_go(params: Params, state: State) -> jax.Array:
     """Returns the number of steps to each agent's goal from every cell of the map with its border, -1 without a path.
 
-    Compute it when goals change, and keep it: it takes as many rounds as the longest path has steps. As in the encoders,
-    the goal itself has cost 0 even if it is an obstacle.
+    Compute it when goals change, and keep it: it takes as many rounds as the longest path has steps. As in the
+    encoders, the goal itself has cost 0 even if it is an obstacle.
 
     Shape: `(agents, rows, columns)`, int32, with `Config.grid` rows and columns
     """

@@ -22,7 +22,8 @@ BITS = 32
 class GlobalState(NamedTuple):
     """The state that a centralised critic sees, as `VecEnv.state()` returns it, except beyond smaller maps.
 
-    Shape: `obstacles` `(height, width)`, uint8; `positions` and `goals` `(agents, 2)`, int32; `active` `(agents,)`, bool
+    Shape: `obstacles` `(height, width)`, uint8; `positions` and `goals` `(agents, 2)`, int32; `active` `(agents,)`,
+    bool
     """
 
     obstacles: jax.Array

@@ -171,9 +171,7 @@ def check_fits(config: Config, num_agents: int, size: tuple[int, int]) -> None:
         raise ValueError(f"map_size is {size[0]} x {size[1]}, expected at most {room}, as in the config")
 
 
-def make_pool(
-    config: Config, grids: Array, starts: Array, goals: Array, num_goals: Array, capacity: int = 0
-) -> Pool:
+def make_pool(config: Config, grids: Array, starts: Array, goals: Array, num_goals: Array, capacity: int = 0) -> Pool:
     """Returns instances as arrays on the default device.
 
     Shape: `grids` as `pack_grids` returns them; `starts` `(num, agents, 2)`; `goals` `(total, 2)`; `num_goals`

@@ -75,9 +75,7 @@ def change_goals(params: Params, state: State) -> State:
     return state
 
 
-def auto_reset(
-    params: Params, key: jax.Array, state: State, actions: jax.Array
-) -> tuple[State, StepOut, State]:
+def auto_reset(params: Params, key: jax.Array, state: State, actions: jax.Array) -> tuple[State, StepOut, State]:
     """Plays one step, and begins an episode of an instance that the key draws if the step ended one.
 
     Returns the state to continue with, the results of the step, and the state before the reset, for its observation

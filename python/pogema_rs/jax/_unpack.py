@@ -41,7 +41,9 @@ def unpack_rows(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax
     side = 2 * radius + 1
     packed = _check("packed", packed, (side, -(-side // 32)), radius)
     if side <= LARGEST_TABLE:
-        return jax.lax.platform_dependent(packed, cpu=partial(_look_up, side, dtype), default=partial(_shift, side, dtype))
+        return jax.lax.platform_dependent(
+            packed, cpu=partial(_look_up, side, dtype), default=partial(_shift, side, dtype)
+        )
     if side <= 32:
         return _shift(side, dtype, packed)
     bits = (packed[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1

@@ -238,9 +238,7 @@ def _owners(holder: GridHolder) -> list[int]:
 
 def _obstacles(holder: GridHolder) -> list[tuple[int, int]]:
     """Returns the cells of the obstacles, column by column from the bottom."""
-    cells = (
-        AnimationDrawer.fix_point(x, y, holder.width) for x in range(holder.height) for y in range(holder.width)
-    )
+    cells = (AnimationDrawer.fix_point(x, y, holder.width) for x in range(holder.height) for y in range(holder.width))
     return [(row, col) for row, col in cells if holder.obstacles[row][col]]
 
 

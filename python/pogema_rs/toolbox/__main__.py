@@ -20,7 +20,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m pogema_rs.toolbox", description="Play all episodes of a suite.")
     parser.add_argument("suite", help="YAML file with environments, algorithms and views")
     parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the results")
-    parser.add_argument("--register", action="append", default=[], metavar="FILE", help="script that registers policies")
+    parser.add_argument(
+        "--register", action="append", default=[], metavar="FILE", help="script that registers policies"
+    )
     parser.add_argument("--maps", action="append", default=[], metavar="PATH", help="file or folder with maps")
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler for Dask backends, e.g. tcp://host:8786")
     parser.add_argument("--html", metavar="FILE", help="write a page with tables, plots and replays")

@@ -162,9 +162,7 @@ def _in_processes(
         return _in_order(chunks, [future.result() for future in futures])
 
 
-def _on_dask(
-    algo_config: _Config, env_configs: Sequence[_Config], key: str, chunks: Sequence[list[int]]
-) -> _Metrics:
+def _on_dask(algo_config: _Config, env_configs: Sequence[_Config], key: str, chunks: Sequence[list[int]]) -> _Metrics:
     with dask_client(_num_processes(algo_config), None) as client:
         state = ToolboxRegistry.get_state()
         futures = [

@@ -18,9 +18,9 @@ class AlgoBase(Model):
     name: Optional[str] = None
     num_process: int = 3
     device: str = "cuda"
-    parallel_backend: Literal[
-        "dask", "sequential", "balanced_dask", "balanced_multiprocessing", "multiprocessing"
-    ] = "balanced_multiprocessing"
+    parallel_backend: Literal["dask", "sequential", "balanced_dask", "balanced_multiprocessing", "multiprocessing"] = (
+        "balanced_multiprocessing"
+    )
     run_episode_func: str = "default"
     seed: Optional[int] = 0
     preprocessing: Optional[str] = None

@@ -190,9 +190,7 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
     suite.write_report(os.fspath(path), again)
 
 
-def _run(
-    suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str], folder: Path
-) -> int:
+def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str], folder: Path) -> int:
     """Plays the missing episodes of an algorithm and returns the number of failed ones.
 
     `folder` is that of the suite.
@@ -241,9 +239,7 @@ def _outcomes(tasks: Iterable[Task], config: Any, address: Optional[str]) -> Gen
         yield from _backends.processes(tasks, num_processes)
 
 
-def _task(
-    suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_built_in: bool = False
-) -> Task:
+def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_built_in: bool = False) -> Task:
     environment, maps = json.loads(suite.environment(index)), {}
     name = environment.get("map_name")
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
@@ -258,9 +254,7 @@ def _results(folder: Path, key: str) -> list[dict[str, Any]]:
     path = folder / f"{key}.json"
     if not path.exists():
         return []
-    rows, episodes = (
-        json.loads(file.read_text(encoding="utf-8")) for file in (path, folder / f"{key}.episodes.json")
-    )
+    rows, episodes = (json.loads(file.read_text(encoding="utf-8")) for file in (path, folder / f"{key}.episodes.json"))
     for row, episode in zip(rows, episodes):
         row["metrics"].setdefault("runtime", episode["seconds"])
         if "network_seconds" in episode:

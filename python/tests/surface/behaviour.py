@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "oracle"))
-from player import described  # noqa: E402 - found through the line above
+from player import described
 
 SCENARIOS: dict[str, Callable[[], Any]] = {}
 MODES = ("finish", "nothing", "restart")
@@ -67,8 +67,11 @@ def greedy(env: Any) -> list[int]:
     base, moves = env.unwrapped, ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
     obstacles, actions = base.get_obstacles(), []
     for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
-        ways = [(abs(row + d - goal[0]) + abs(col + r - goal[1]), a) for a, (d, r) in enumerate(moves)
-                if not obstacles[row + d, col + r]]
+        ways = [
+            (abs(row + d - goal[0]) + abs(col + r - goal[1]), a)
+            for a, (d, r) in enumerate(moves)
+            if not obstacles[row + d, col + r]
+        ]
         actions.append(int(min(ways)[1]))
     return actions
 
@@ -343,9 +346,7 @@ def generators_of_goals() -> Any:
 @scenario
 def generators_beside_sequences() -> Any:
     """They exist, and nothing draws from them."""
-    env = bare(
-        map="....", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 0]]], on_target="restart", num_agents=1, seed=6
-    )
+    env = bare(map="....", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 0]]], on_target="restart", num_agents=1, seed=6)
     env.reset()
     seen = [generator_states(env), described(env.random_generators[0].random(3))]
     for _ in range(5):
@@ -384,9 +385,7 @@ def elapsed_steps() -> Any:
 def sequences_of_goals() -> Any:
     """Which goal of its sequence an agent is at."""
     sequences = [[[0, 1], [0, 0]], [[1, 2], [1, 3], [1, 2]]]
-    env = bare(
-        map="....\n....", agents_xy=[[0, 0], [1, 3]], targets_xy=sequences, on_target="restart", num_agents=2
-    )
+    env = bare(map="....\n....", agents_xy=[[0, 0], [1, 3]], targets_xy=sequences, on_target="restart", num_agents=2)
     other = bare(on_target="restart")
     seen: list[Any] = [env.has_custom_sequences, other.has_custom_sequences, env.current_goal_indices]
     for current in (env, other):

@@ -1,7 +1,7 @@
 """Runs a script on pogema-toolbox or pogema_rs: run_as.py PACKAGE FOLDERS SCRIPT [ARGUMENT...]
 
-PACKAGE is `pogema`, `pogema_rs` (pogema-toolbox on our POGEMA), `pogema_rs.toolbox` (both ours), or `changed` for a script
-that imports `pogema_rs` itself. FOLDERS, separated by colons, hold pogema-toolbox and what it imports.
+PACKAGE is `pogema`, `pogema_rs` (pogema-toolbox on our POGEMA), `pogema_rs.toolbox` (both ours), or `changed` for a
+script that imports `pogema_rs` itself. FOLDERS, separated by colons, hold pogema-toolbox and what it imports.
 """
 
 import importlib

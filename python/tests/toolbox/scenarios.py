@@ -189,7 +189,12 @@ def plots():
     fields = [{name: value for name, value in view.dict().items() if name != "palette"} for view in (plot, multi)]
     names = ("plot.pdf", "plot.svg", "plot.png", "multi.pdf", "none.pdf")
     written = [name for name in names if Path(name).exists()]
-    return [fields, view_plot.prepare_plot_fields(plot), written, raises(ValueError, view_plot.PlotView, legend_loc="nowhere")]
+    return [
+        fields,
+        view_plot.prepare_plot_fields(plot),
+        written,
+        raises(ValueError, view_plot.PlotView, legend_loc="nowhere"),
+    ]
 
 
 @scenario

@@ -196,16 +196,28 @@ def settings(**changes):
 
 
 WRONG = [
-    (lambda: generate_map(settings(obstacle_density=1.5)), "`obstacle_density` is `1.5`, expected a number from 0 to 1"),
+    (
+        lambda: generate_map(settings(obstacle_density=1.5)),
+        "`obstacle_density` is `1.5`, expected a number from 0 to 1",
+    ),
     (lambda: generate_map(settings(obstacle_density=float("nan"))), "`obstacle_density` is `NaN`"),
     (lambda: generate_map(settings(width=0)), "`width` is `0`, expected a whole number from 1 to"),
-    (lambda: generate_warehouse(WarehouseConfig(walls_rows=-5)), "`walls_rows` is `-5`, expected a whole number from 0"),
+    (
+        lambda: generate_warehouse(WarehouseConfig(walls_rows=-5)),
+        "`walls_rows` is `-5`, expected a whole number from 0",
+    ),
     (lambda: generate_and_save_mazes("none", range(0)), "`seed_range` is empty, expected at least one seed"),
     (lambda: list(generate_variants({"a": {"b": {"grid_search": 3}}})), "`a.b.grid_search` is `3`, expected a list"),
     (lambda: list(generate_variants({"a": {"grid_search": "xy"}})), "`a.grid_search` is `'xy'`, expected a list"),
     (lambda: map_to_grid(io.BytesIO(b"")), "line 1, column 1: found ``, expected `type octile`"),
-    (lambda: map_to_grid(io.BytesIO(b"type octile\nheight x\n")), "line 2, column 1: found `x`, expected a whole number"),
-    (lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")), "line 6, column 1: row 2 is missing, expected 2 rows"),
+    (
+        lambda: map_to_grid(io.BytesIO(b"type octile\nheight x\n")),
+        "line 2, column 1: found `x`, expected a whole number",
+    ),
+    (
+        lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")),
+        "line 6, column 1: row 2 is missing, expected 2 rows",
+    ),
     (lambda: process_plot_view([], PlotView(x="a", y="b"), "plot.gif"), "expected a name that ends in `.pdf`"),
     (lambda: evaluation(SUITE, begin="resume"), "`eval_dir` is `None` and `begin` is `resume`, expected a folder"),
     (lambda: evaluation(SUITE, html="a.html"), "`html` is given and `begin` is `replace`, expected `new`"),

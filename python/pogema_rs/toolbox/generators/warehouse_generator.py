@@ -59,7 +59,7 @@ def generate_wfi_positions(grid_str: str, bottom_gap: int, vertical_gap: int) ->
     return _engine.warehouse_cells(grid_str, bottom_gap, vertical_gap)
 
 
-def generate_wfi_warehouse(cfg: WarehouseConfig = WarehouseConfig()) -> str:
+def generate_wfi_warehouse(cfg: WarehouseConfig = WarehouseConfig()) -> str:  # noqa: B008 - as in pogema-toolbox
     """Returns the text of a warehouse with possible starts (`@`) and goals (`$`) only at some cells.
 
     Errors: those of `generate_warehouse` and `generate_wfi_positions`.
