@@ -80,8 +80,7 @@ fn broken_in_step(
 ) -> Option<(&'static str, String)> {
     for agent in 0..before.cells.len() {
         let (from, to) = (before.cells[agent], after.cells[agent]);
-        let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
-        if distance > u16::from(before.active[agent]) {
+        if from.distance(to) > u32::from(before.active[agent]) {
             return Some(("move/actions", format!("agent {agent} moved from {from} to {to} in one step")));
         }
         let row = obstacles.get(usize::from(to.row));

@@ -145,13 +145,13 @@ fn toward_goal(state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
 /// Returns a move towards another agent that is adjacent (a swap, if that agent does the same) or two cells away (a
 /// contest for the cell between); a random move if there is no such agent.
 fn at_neighbour(map: &Map, state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
-    let mut moves = [Action::Up, Action::Down, Action::Left, Action::Right];
+    let mut moves = Action::MOVES;
     dice.shuffle(&mut moves);
     let at = |action: Action, reach: i32| {
         let (down, right) = action.delta();
         let row = i32::from(state.cells[agent].row) + reach * down;
         let col = i32::from(state.cells[agent].col) + reach * right;
-        u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col))
+        Cell::checked((row, col))
     };
     let holds_agent = |cell: Option<Cell>| {
         cell.is_some_and(|cell| {

@@ -300,9 +300,8 @@ fn masks_forbid_only_moves_into_obstacles() {
             let (lane, agent) = (index / NUM_AGENTS, index % NUM_AGENTS);
             let LaneOutputs { state, episode, .. } = &shown[lane];
             let instance = instance(0, lane, episode.unwrap()).unwrap();
-            let is_free = |(row, col): (i32, i32)| {
-                let cell = u16::try_from(row).ok().zip(u16::try_from(col).ok());
-                cell.is_some_and(|(row, col)| !instance.map().is_obstacle(Cell::new(row, col)))
+            let is_free = |place: (i32, i32)| {
+                Cell::checked(place).is_some_and(|cell| !instance.map().is_obstacle(cell))
             };
             let is_active = state.active[agent];
             let expected = Action::ALL.map(|action| {

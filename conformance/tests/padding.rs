@@ -164,10 +164,8 @@ impl Alone {
         };
         let mask = |index: usize| {
             Action::ALL.map(|action| {
-                let (row, col) = state.cells[index].toward(action);
-                let cell = u16::try_from(row).ok().zip(u16::try_from(col).ok());
-                let is_free =
-                    cell.is_some_and(|(row, col)| !map.is_obstacle(pogema_core::Cell::new(row, col)));
+                let cell = pogema_core::Cell::checked(state.cells[index].toward(action));
+                let is_free = cell.is_some_and(|cell| !map.is_obstacle(cell));
                 i8::from(action == Action::Stay || state.active[index] && is_free)
             })
         };

@@ -24,12 +24,25 @@ impl Cell {
         Self { row, col }
     }
 
+    /// Returns the Manhattan distance to another cell, which exceeds 16 bits across the longest map. Units: cells.
+    pub fn distance(self, other: Self) -> u32 {
+        u32::from(self.row.abs_diff(other.row)) + u32::from(self.col.abs_diff(other.col))
+    }
+
     /// Returns the neighbour that `action` leads to, as signed (row, col), since it may lie outside the map.
     ///
     /// Rule: move/actions
     pub fn toward(self, action: Action) -> (i32, i32) {
         let (down, right) = action.delta();
         (i32::from(self.row) + down, i32::from(self.col) + right)
+    }
+
+    /// Returns the cell at signed (row, col), such as those of [`Cell::toward`], if both are in range.
+    pub fn checked<N>((row, col): (N, N)) -> Option<Self>
+    where
+        u16: TryFrom<N>,
+    {
+        Some(Self::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
     }
 
     /// Returns the action that leads from this cell to another one, if any.
@@ -80,6 +93,9 @@ pub enum Action {
 impl Action {
     /// All actions in the order of their numbers.
     pub const ALL: [Self; 5] = [Self::Stay, Self::Up, Self::Down, Self::Left, Self::Right];
+
+    /// The actions that request a move, in the order of their numbers.
+    pub const MOVES: [Self; 4] = [Self::Up, Self::Down, Self::Left, Self::Right];
 
     /// Returns the change of (row, col) that this action requests.
     pub const fn delta(self) -> (i32, i32) {

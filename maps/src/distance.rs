@@ -27,10 +27,6 @@ pub fn distances_to(map: &Map, goal: Cell) -> Vec<u32> {
 
 /// Returns the free cells above, below, left and right of a cell.
 pub fn free_neighbours(map: &Map, cell: Cell) -> impl Iterator<Item = Cell> + '_ {
-    let moves = Action::ALL.into_iter().filter(|&action| action != Action::Stay);
-    let targets = moves.filter_map(move |action| {
-        let (row, col) = cell.toward(action);
-        Some(Cell::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
-    });
+    let targets = Action::MOVES.into_iter().filter_map(move |action| Cell::checked(cell.toward(action)));
     targets.filter(|&target| !map.is_obstacle(target))
 }

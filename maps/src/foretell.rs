@@ -53,7 +53,7 @@ fn goals_of_agent(
     const MOST_REPEATS: usize = 10_000;
     let mut at = goal;
     let mut goals = vec![at];
-    let mut length = distance(start, at);
+    let mut length = i64::from(start.distance(at));
     let mut num_repeats = 0;
     while length < max_steps {
         let next = stream.advance(at);
@@ -61,13 +61,9 @@ fn goals_of_agent(
         if num_repeats > MOST_REPEATS || stop.load(Relaxed) {
             return None;
         }
-        length += distance(at, next);
+        length += i64::from(at.distance(next));
         goals.push(next);
         at = next;
     }
     Some(goals)
-}
-
-fn distance(one: Cell, other: Cell) -> i64 {
-    i64::from(one.row.abs_diff(other.row)) + i64::from(one.col.abs_diff(other.col))
 }

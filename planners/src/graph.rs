@@ -38,7 +38,7 @@ impl Graph {
             Self { width: map.width(), cells, vertices, neighbours: Vec::new(), degrees: Vec::new() };
         for &cell in &graph.cells {
             let (mut around, mut degree) = ([NO_VERTEX; 4], 0);
-            for action in [Action::Up, Action::Down, Action::Left, Action::Right] {
+            for action in Action::MOVES {
                 if let Some(neighbour) = step_from(map, cell, action).and_then(|cell| graph.vertex(cell)) {
                     around[degree] = neighbour;
                     degree += 1;
@@ -92,7 +92,5 @@ impl Graph {
 
 /// Returns the cell that an action leads to, unless it is off the map.
 pub(crate) fn step_from(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
-    let (row, col) = cell.toward(action);
-    let cell = Cell { row: u16::try_from(row).ok()?, col: u16::try_from(col).ok()? };
-    map.contains(cell).then_some(cell)
+    Cell::checked(cell.toward(action)).filter(|&cell| map.contains(cell))
 }

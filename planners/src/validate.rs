@@ -96,8 +96,7 @@ fn check_step(map: &Map, step: usize, before: &[Cell], now: &[Cell]) -> Result<(
         if map.is_obstacle(to) {
             return Err(alone(agent, ConflictKind::Obstacle));
         }
-        let distance = from.row.abs_diff(to.row) + from.col.abs_diff(to.col);
-        if distance > 1 {
+        if from.distance(to) > 1 {
             return Err(alone(agent, ConflictKind::Jump));
         }
         if let Some(other) = standing.insert(to, agent) {

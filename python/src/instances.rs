@@ -106,7 +106,7 @@ impl Parts {
             push_cell(&mut self.goals, goal);
             count += 1;
             // An agent reaches at most one goal per step, and moves by at most one cell.
-            steps += distance(at, goal).max(1);
+            steps += u64::from(at.distance(goal).max(1));
             at = goal;
             goal = stream.advance(at);
             let has_wrapped = matches!(stream.turn(), Some((_, 0)));
@@ -119,9 +119,4 @@ impl Parts {
 
 fn push_cell(cells: &mut Vec<u16>, cell: Cell) {
     cells.extend([cell.row, cell.col]);
-}
-
-/// Returns the Manhattan distance of two cells.
-fn distance(from: Cell, to: Cell) -> u64 {
-    u64::from(from.row.abs_diff(to.row)) + u64::from(from.col.abs_diff(to.col))
 }

@@ -44,7 +44,7 @@ impl<'a> Ground<'a> {
 
     /// Returns whether a cell of the map or its border is an obstacle.
     pub fn is_obstacle(&self, row: i32, col: i32) -> bool {
-        if let Some(cell) = cell(row, col).filter(|&cell| self.map.contains(cell)) {
+        if let Some(cell) = Cell::checked((row, col)).filter(|&cell| self.map.contains(cell)) {
             return self.map.is_obstacle(cell);
         }
         if self.rows(Border::Thin).contains(&row) && self.cols(Border::Thin).contains(&col) {
@@ -54,7 +54,7 @@ impl<'a> Ground<'a> {
         match self.outside {
             Outside::Free => false,
             Outside::Noise(noise) => {
-                cell(row + radius, col + radius).is_some_and(|cell| noise.is_obstacle(cell))
+                Cell::checked((row + radius, col + radius)).is_some_and(|cell| noise.is_obstacle(cell))
             }
         }
     }
@@ -84,8 +84,4 @@ impl<'a> Ground<'a> {
             Border::Full => self.radius as i32,
         }
     }
-}
-
-fn cell(row: i32, col: i32) -> Option<Cell> {
-    Some(Cell::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
 }

@@ -47,8 +47,7 @@ fn is_obstacle(map: &Map, cell: Cell) -> bool {
 fn aim(map: &Map, state: &Snapshot, agent: usize, action: i64) -> Option<&'static str> {
     let action = Action::from_number(agent, action).ok()?;
     let cell = *state.cells.get(agent)?;
-    let (row, col) = cell.toward(action);
-    let there = u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col));
+    let there = Cell::checked(cell.toward(action));
     let stands = |is_active: bool| {
         let mut agents = state.cells.iter().zip(&state.active);
         agents.any(|(&other, &active)| Some(other) == there && active == is_active)

@@ -260,7 +260,7 @@ impl<'l> Port<'l> {
 
 /// Returns the cell, unless a number is out of range for every map.
 fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
-    u16::try_from(row).ok().zip(u16::try_from(col).ok()).map(|(row, col)| Cell::new(row, col))
+    Cell::checked((row, col))
 }
 
 fn as_cells(pairs: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {

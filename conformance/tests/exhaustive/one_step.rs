@@ -107,8 +107,7 @@ impl Both {
 /// Returns a goal that the agent cannot reach in one step. If the map has none, returns any cell other than the start;
 /// if there is no other cell, returns the start.
 fn far_from(map: &Map, start: Cell) -> Cell {
-    let distance = |cell: &Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col);
-    let is_far = |cell: &Cell| *cell != start && (map.is_obstacle(*cell) || distance(cell) > 1);
+    let is_far = |cell: &Cell| *cell != start && (map.is_obstacle(*cell) || cell.distance(start) > 1);
     let cells = cells_of(map);
     let far = cells.iter().copied().find(is_far);
     far.or_else(|| cells.into_iter().find(|&cell| cell != start)).unwrap_or(start)

@@ -31,7 +31,7 @@ fn crowd(numbers: &mut Numbers) -> Instance {
         free.swap(index, numbers.below(index + 1));
     }
     let mut stream = |&start: &Cell| {
-        let is_near = |cell: &&Cell| cell.row.abs_diff(start.row) + cell.col.abs_diff(start.col) < 6;
+        let is_near = |cell: &&Cell| cell.distance(start) < 6;
         let near: Vec<Cell> = free.iter().filter(is_near).copied().collect();
         let goals: Vec<Cell> = (0..5).map(|_| near[numbers.below(near.len())]).collect();
         GoalStream::sequence(goals[0], Arc::from(goals))

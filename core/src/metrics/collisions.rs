@@ -25,9 +25,8 @@ impl CollisionMeter {
             if !active[agent] || action == Action::Stay || before[agent] != after[agent] {
                 continue;
             }
-            let (row, col) = before[agent].toward(action);
-            let target = u16::try_from(row).and_then(|row| Ok(Cell::new(row, u16::try_from(col)?)));
-            if target.is_ok_and(|cell| !map.is_obstacle(cell)) {
+            let target = Cell::checked(before[agent].toward(action));
+            if target.is_some_and(|cell| !map.is_obstacle(cell)) {
                 self.with_agents += 1;
             } else {
                 self.with_obstacles += 1;

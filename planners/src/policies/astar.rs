@@ -171,7 +171,7 @@ fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Plac
     open.push(Node { place: start, cost: 0, estimate: distance(start, goal) });
     for _ in 0..MAX_EXPANSIONS {
         let Some(node) = open.pop() else { break };
-        for action in [Action::Up, Action::Down, Action::Left, Action::Right] {
+        for action in Action::MOVES {
             let (down, right) = action.delta();
             let place = (node.place.0 + down, node.place.1 + right);
             if obstacles.contains(&place) || came_from.contains_key(&place) {

@@ -78,6 +78,15 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
 }
 
 #[test]
+fn a_jump_across_the_longest_map_is_reported() {
+    // The distance is 65,536, which is 0 in 16 bits.
+    let map = Map::new(Map::LONGEST_SIDE, 259, vec![false; Map::LONGEST_SIDE * 259]).unwrap();
+    let (start, end) = ((0, 0), (Map::LONGEST_SIDE as u16 - 1, 258));
+    let conflict = validate(&map, &cells(&[start]), None, &plan(&[&[start], &[end]])).unwrap_err();
+    assert_eq!(conflict.kind, ConflictKind::Jump);
+}
+
+#[test]
 fn costs_count_the_steps_until_an_agent_stays() {
     let plan = plan(&[&[(0, 0), (2, 0)], &[(0, 1), (2, 0)], &[(0, 0), (2, 1)], &[(0, 0), (2, 1)]]);
     assert_eq!(plan.arrivals(), [2, 2]);

@@ -193,12 +193,9 @@ fn mean_distance(free: &[Place], from: Place) -> f32 {
 fn advance(generator: &mut Generator, map: &Map, cells: &mut [Cell], goals: &mut [Cell], free: &[Place]) {
     let mut draw = |high: usize| generator.integers(0, high as i64).unwrap() as usize;
     for agent in 0..cells.len() {
-        let (row, col) = cells[agent].toward(Action::ALL[draw(5)]);
-        if let (Ok(row), Ok(col)) = (u16::try_from(row), u16::try_from(col)) {
-            let next = Cell::new(row, col);
-            if !map.is_obstacle(next) && !cells.contains(&next) {
-                cells[agent] = next;
-            }
+        let next = Cell::checked(cells[agent].toward(Action::ALL[draw(5)]));
+        if let Some(next) = next.filter(|next| !map.is_obstacle(*next) && !cells.contains(next)) {
+            cells[agent] = next;
         }
         if draw(8) == 0 {
             let (row, col) = free[draw(free.len())];

@@ -121,10 +121,10 @@ impl Layout {
             let (rows, cols) = (-1..=self.height as i64, -1..=self.width as i64);
             if rows.contains(&row) && cols.contains(&col) {
                 // A cell outside the map counts as an obstacle: the wall.
-                return cell(row, col).is_none_or(|cell| map.is_obstacle(cell));
+                return Cell::checked((row, col)).is_none_or(|cell| map.is_obstacle(cell));
             }
             noise.is_some_and(|(noise, border)| {
-                let place = cell(row + border as i64, col + border as i64);
+                let place = Cell::checked((row + border as i64, col + border as i64));
                 place.is_some_and(|cell| noise.contains(cell) && noise.is_obstacle(cell))
             })
         };
@@ -133,8 +133,4 @@ impl Layout {
         let all = rows.flat_map(|row| (-margin..self.width as i64 + margin).map(move |col| (row, col)));
         all.map(|(row, col)| f32::from(u8::from(is_obstacle(row, col)))).collect()
     }
-}
-
-fn cell(row: i64, col: i64) -> Option<Cell> {
-    Some(Cell::new(u16::try_from(row).ok()?, u16::try_from(col).ok()?))
 }

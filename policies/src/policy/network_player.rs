@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use pogema_core::{Action, Config, Error, Instance, Map, State};
+use pogema_core::{Action, Cell, Config, Error, Instance, Map, State};
 
 use crate::encode::EncoderSettings;
 use crate::network::{Network, Sampling};
@@ -71,9 +71,8 @@ impl Player for NetworkPlayer {
 /// Returns the logits without those of moves into obstacles or off the map. To stay is always possible.
 fn masked(mut logits: Logits, map: &Map, state: State<'_>, agent: usize) -> Logits {
     for (logit, action) in logits.iter_mut().zip(Action::ALL).skip(1) {
-        let (row, col) = state.cells[agent].toward(action);
-        let cell = u16::try_from(row).and_then(|row| Ok(pogema_core::Cell::new(row, u16::try_from(col)?)));
-        if cell.map_or(true, |cell| map.is_obstacle(cell)) {
+        let target = Cell::checked(state.cells[agent].toward(action));
+        if target.is_none_or(|cell| map.is_obstacle(cell)) {
             *logit = f32::NEG_INFINITY;
         }
     }

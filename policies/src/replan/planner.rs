@@ -21,7 +21,7 @@ impl ReplanVersion {
     fn moves(self) -> [Action; 4] {
         match self {
             Self::Cpp => [Action::Right, Action::Down, Action::Up, Action::Left],
-            Self::Python => [Action::Up, Action::Down, Action::Left, Action::Right],
+            Self::Python => Action::MOVES,
         }
     }
 }

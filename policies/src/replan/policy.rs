@@ -37,7 +37,7 @@ impl ReplanPolicy {
             actions.push(match plan {
                 Plan::Move(action) | Plan::Return(action) => action,
                 Plan::None if state.active[agent] && generator.random() > 0.5 => {
-                    let mut moves = [Action::Up, Action::Down, Action::Left, Action::Right];
+                    let mut moves = Action::MOVES;
                     generator.shuffle(&mut moves);
                     let is_free = |action: &Action| {
                         let (row, col) = state.cells[agent].toward(*action);

@@ -18,9 +18,8 @@ fn place(cell: Cell) -> Place {
     (i32::from(cell.row), i32::from(cell.col))
 }
 
-fn is_free(map: &Map, (row, col): Place) -> bool {
-    let cell = u16::try_from(row).and_then(|row| Ok(Cell::new(row, u16::try_from(col)?)));
-    cell.is_ok_and(|cell| !map.is_obstacle(cell))
+fn is_free(map: &Map, place: Place) -> bool {
+    Cell::checked(place).is_some_and(|cell| !map.is_obstacle(cell))
 }
 
 fn around((row, col): Place) -> [Place; 4] {

@@ -84,10 +84,7 @@ fn masks_forbid_moves_into_obstacles() {
             let actions = policy.act(episode.state()).unwrap();
             let map = episode.instance().unwrap().map();
             let leads_out = |(cell, action): (&pogema_core::Cell, &Action)| {
-                let (row, col) = cell.toward(*action);
-                let cell =
-                    u16::try_from(row).and_then(|row| Ok(pogema_core::Cell::new(row, u16::try_from(col)?)));
-                cell.map_or(true, |cell| map.is_obstacle(cell))
+                pogema_core::Cell::checked(cell.toward(*action)).is_none_or(|cell| map.is_obstacle(cell))
             };
             num_blocked += episode.state().cells.iter().zip(&actions).filter(|pair| leads_out(*pair)).count();
             episode.step(&actions).unwrap();
