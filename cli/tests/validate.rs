@@ -72,6 +72,20 @@ fn a_result_file_supplies_map_and_agents() {
 }
 
 #[test]
+fn a_result_file_with_more_starts_than_agents_is_reported() {
+    let result = "map_file=three.map\nstarts=(0,0),(2,0),(2,2),\ngoals=(1,0),(2,1),(1,2),\nsolution=\n0:(0,0),(2,0),\n";
+    let folder = folder(&[("result.txt", result)]);
+    let (text, _, status) = run(folder.path(), &["result.txt"]);
+    assert_eq!(
+        (text.as_str(), status),
+        ("not valid: the plan has 2 agents, expected 3, the number of starts", 1)
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&run(folder.path(), &["result.txt", "--json"]).0).unwrap();
+    assert_eq!(json["conflict"]["cell"], serde_json::Value::Null);
+}
+
+#[test]
 fn invalid_plans_are_reported_in_one_line() {
     let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,1) 5\n"), ("short.txt", "0: (0,0)\n")]);
     let error_of = |arguments: &[&str]| {

@@ -14,8 +14,8 @@ pub struct Conflict {
     pub step: usize,
     /// The agents involved, in ascending order.
     pub agents: Vec<usize>,
-    /// The cell where it occurs.
-    pub cell: Cell,
+    /// The cell where it occurs, if it concerns a cell.
+    pub cell: Option<Cell>,
     /// The kind of violation.
     pub kind: ConflictKind,
 }
@@ -23,6 +23,20 @@ pub struct Conflict {
 /// The kinds of violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConflictKind {
+    /// The plan has another number of agents than there are starts.
+    NumStarts {
+        /// The number of agents in the plan.
+        found: usize,
+        /// The number of starts.
+        expected: usize,
+    },
+    /// The plan has another number of agents than there are goals.
+    NumGoals {
+        /// The number of agents in the plan.
+        found: usize,
+        /// The number of goals.
+        expected: usize,
+    },
     /// The agent is not at its start.
     Start,
     /// The agent is off the map.
@@ -44,7 +58,14 @@ impl fmt::Display for Conflict {
         let Self { step, agents, cell, kind } = self;
         let first = agents.first().copied().unwrap_or(0);
         let second = agents.get(1).copied().unwrap_or(first);
+        let cell = cell.map(|cell| cell.to_string()).unwrap_or_default();
         match kind {
+            ConflictKind::NumStarts { found, expected } => {
+                write!(f, "the plan has {found} agents, expected {expected}, the number of starts")
+            }
+            ConflictKind::NumGoals { found, expected } => {
+                write!(f, "the plan has {found} agents, expected {expected}, the number of goals")
+            }
             ConflictKind::Start => write!(f, "agent {first} begins at {cell}, which is not its start"),
             ConflictKind::Outside => write!(f, "step {step}: agent {first} leaves the map at {cell}"),
             ConflictKind::Obstacle => write!(f, "step {step}: agent {first} is on an obstacle at {cell}"),
@@ -60,10 +81,12 @@ impl fmt::Display for Conflict {
 /// anywhere.
 ///
 /// # Errors
-/// The first conflict, by step and then by agent. A wrong number of starts or goals counts as a wrong start or goal of
-/// the missing agents.
+/// A wrong number of agents; otherwise the first conflict, by step and then by agent.
 pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan) -> Result<(), Conflict> {
     let cells = plan.cells();
+    let found = plan.num_agents();
+    check_number(found, starts, |expected| ConflictKind::NumStarts { found, expected })?;
+    check_number(found, goals.unwrap_or(&cells[0]), |expected| ConflictKind::NumGoals { found, expected })?;
     check_ends(ConflictKind::Start, 0, &cells[0], starts)?;
     for (step, now) in cells.iter().enumerate() {
         let before = &cells[step.saturating_sub(1)];
@@ -74,19 +97,26 @@ pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan)
     })
 }
 
-fn check_ends(kind: ConflictKind, step: usize, cells: &[Cell], wanted: &[Cell]) -> Result<(), Conflict> {
-    let num_agents = cells.len().max(wanted.len());
-    for agent in 0..num_agents {
-        if cells.get(agent) != wanted.get(agent) {
-            let cell = cells.get(agent).or(wanted.get(agent)).copied().unwrap_or(Cell { row: 0, col: 0 });
-            return Err(Conflict { step, agents: vec![agent], cell, kind });
-        }
+fn check_number(
+    found: usize,
+    wanted: &[Cell],
+    kind: impl FnOnce(usize) -> ConflictKind,
+) -> Result<(), Conflict> {
+    if found == wanted.len() {
+        return Ok(());
     }
-    Ok(())
+    Err(Conflict { step: 0, agents: Vec::new(), cell: None, kind: kind(wanted.len()) })
+}
+
+fn check_ends(kind: ConflictKind, step: usize, cells: &[Cell], wanted: &[Cell]) -> Result<(), Conflict> {
+    match (0..cells.len()).find(|&agent| cells[agent] != wanted[agent]) {
+        Some(agent) => Err(Conflict { step, agents: vec![agent], cell: Some(cells[agent]), kind }),
+        None => Ok(()),
+    }
 }
 
 fn check_step(map: &Map, step: usize, before: &[Cell], now: &[Cell]) -> Result<(), Conflict> {
-    let alone = |agent: usize, kind| Conflict { step, agents: vec![agent], cell: now[agent], kind };
+    let alone = |agent: usize, kind| Conflict { step, agents: vec![agent], cell: Some(now[agent]), kind };
     let mut standing: HashMap<Cell, usize> = HashMap::with_capacity(now.len());
     let mut moves: HashMap<(Cell, Cell), usize> = HashMap::with_capacity(now.len());
     for (agent, (&from, &to)) in before.iter().zip(now).enumerate() {
@@ -100,10 +130,20 @@ fn check_step(map: &Map, step: usize, before: &[Cell], now: &[Cell]) -> Result<(
             return Err(alone(agent, ConflictKind::Jump));
         }
         if let Some(other) = standing.insert(to, agent) {
-            return Err(Conflict { step, agents: vec![other, agent], cell: to, kind: ConflictKind::Vertex });
+            return Err(Conflict {
+                step,
+                agents: vec![other, agent],
+                cell: Some(to),
+                kind: ConflictKind::Vertex,
+            });
         }
         if let Some(&other) = moves.get(&(to, from)).filter(|_| from != to) {
-            return Err(Conflict { step, agents: vec![other, agent], cell: to, kind: ConflictKind::Edge });
+            return Err(Conflict {
+                step,
+                agents: vec![other, agent],
+                cell: Some(to),
+                kind: ConflictKind::Edge,
+            });
         }
         moves.insert((from, to), agent);
     }

@@ -99,7 +99,10 @@ fn as_text(task: &Task, verdict: &Result<(), Conflict>) -> String {
             let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
             format!("valid: {agents} agents, {steps} steps; sum of costs {cost}, makespan {makespan}")
         }
-        Err(conflict) => format!("not valid: {conflict}\n\n{}", drawing(task, conflict)),
+        Err(conflict) => match conflict.cell {
+            Some(cell) => format!("not valid: {conflict}\n\n{}", drawing(task, conflict, cell)),
+            None => format!("not valid: {conflict}"),
+        },
     }
 }
 
@@ -107,7 +110,7 @@ fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> Value {
     let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
     let conflict = verdict.as_ref().err().map(|conflict| {
         let Conflict { step, agents, cell, .. } = conflict;
-        json!({"step": step, "agents": agents, "cell": [cell.row, cell.col], "text": conflict.to_string()})
+        json!({"step": step, "agents": agents, "cell": cell, "text": conflict.to_string()})
     });
     json!({
         "valid": verdict.is_ok(),
@@ -120,15 +123,15 @@ fn as_json(plan: &Plan, verdict: &Result<(), Conflict>) -> Value {
 }
 
 /// Draws the neighbourhood of a conflict before and after its step.
-fn drawing(task: &Task, conflict: &Conflict) -> String {
+fn drawing(task: &Task, conflict: &Conflict, cell: Cell) -> String {
     let before = conflict.step.saturating_sub(1);
     let corner = |at: u16, shown: usize, all: usize| {
         usize::from(at).saturating_sub(shown / 2).min(all.saturating_sub(shown))
     };
     let (height, width) = (task.map.height(), task.map.width());
     let (num_rows, num_cols) = (DRAWN.0.min(height), DRAWN.1.min(width));
-    let top = corner(conflict.cell.row, num_rows, height);
-    let left = corner(conflict.cell.col, num_cols, width);
+    let top = corner(cell.row, num_rows, height);
+    let left = corner(cell.col, num_cols, width);
     let (rows, cols) = (top..top + num_rows, left..left + num_cols);
     let names = conflict.agents.iter().zip(["a", "b"]);
     let names: Vec<String> = names.map(|(agent, letter)| format!("{letter} is agent {agent}")).collect();

@@ -74,7 +74,6 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
         check(&[stay, &[(1, 0), (0, 2)]], &[(1, 0), (0, 1)]),
         of(ConflictKind::Goal, 1, &[1], "agent 1 ends at (0, 2), which is not its goal")
     );
-    assert_eq!(check(&[&[(0, 0)]], &[(0, 0)]).map_err(|found| found.0), Err(ConflictKind::Start));
 }
 
 #[test]
@@ -84,6 +83,18 @@ fn a_jump_across_the_longest_map_is_reported() {
     let (start, end) = ((0, 0), (Map::LONGEST_SIDE as u16 - 1, 258));
     let conflict = validate(&map, &cells(&[start]), None, &plan(&[&[start], &[end]])).unwrap_err();
     assert_eq!(conflict.kind, ConflictKind::Jump);
+}
+
+#[test]
+fn a_wrong_number_of_agents_is_reported_first() {
+    let stay = plan(&[&[(0, 0), (0, 2)]]);
+    let text = |starts: &[(u16, u16)], goals: &[(u16, u16)]| {
+        validate(&map(), &cells(starts), Some(&cells(goals)), &stay).unwrap_err().to_string()
+    };
+    let (one, two, three) = ([(2, 2)], [(2, 2), (0, 2)], [(2, 2), (0, 2), (2, 0)]);
+    assert_eq!(text(&three, &three), "the plan has 2 agents, expected 3, the number of starts");
+    assert_eq!(text(&one, &two), "the plan has 2 agents, expected 1, the number of starts");
+    assert_eq!(text(&two, &three), "the plan has 2 agents, expected 3, the number of goals");
 }
 
 #[test]
