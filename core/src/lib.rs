@@ -14,7 +14,7 @@
 //! | [`Episode`] | an engine with metrics and a recording |
 //! | [`Trace`] | a recorded episode, as JSON Lines |
 //! | [`metrics`] | metrics such as CSR, ISR, sum of costs, makespan and throughput |
-//! | [`files`] | atomic file writes |
+//! | [`files`] | bounded file reads and atomic file writes |
 //! | [`picture`] | text pictures of a state |
 //! | [`words!`], [`Words`] | enums whose variants are words in files, flags and Python |
 //! | [`SimdPath`] | the instruction set of engines and networks |

@@ -1,7 +1,6 @@
 //! Reads maps and scenarios from files.
 
-use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::Path;
 
 use crate::config::{FIELDS, GridConfig, value_from_yaml};
@@ -9,6 +8,7 @@ use crate::formats::{
     NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
 };
 use crate::text::{MapText, parse_map_text};
+use pogema_core::files::read_at_most;
 use pogema_core::{Error, InputLimit};
 
 /// Maximum size of a map file: 256 MiB.
@@ -144,14 +144,6 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, Error> {
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let reason = || format!("the file is larger than {} MiB, the limit for a map file", LIMIT >> 20);
     read_at_most(path, LIMIT)?.ok_or_else(|| Error::io(path, reason()))
-}
-
-/// Returns the bytes of a file, or `None` if there are more than `most`.
-fn read_at_most(path: &Path, most: u64) -> Result<Option<Vec<u8>>, Error> {
-    let failed = |error: std::io::Error| Error::io(path, error);
-    let mut bytes = Vec::new();
-    File::open(path).map_err(failed)?.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
-    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= most))
 }
 
 /// Returns the extension of a file, empty if it has none.

@@ -1,7 +1,5 @@
 //! Reads and writes weights and the JSON beside them.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use pogema_core::{Error, InputLimit, files};
@@ -56,6 +54,12 @@ fn read_config(path: &Path) -> Result<NetworkConfig, Error> {
 
 /// Writes a network as a `.safetensors` file and the JSON beside it.
 pub fn write(path: &Path, config: &NetworkConfig, tensors: &Tensors) -> Result<(), Error> {
+    if path.extension().is_none_or(|extension| extension != "safetensors") {
+        return Err(Error::io(
+            path,
+            "cannot hold the weights, expected a file name that ends in .safetensors",
+        ));
+    }
     let bytes: Vec<(&String, &[usize], Vec<u8>)> = tensors
         .iter()
         .map(|(name, tensor)| {
@@ -72,17 +76,13 @@ pub fn write(path: &Path, config: &NetworkConfig, tensors: &Tensors) -> Result<(
     let failed = |error: SafeTensorError| Error::io(path, error.to_string());
     let file = safetensors::serialize(views.map_err(failed)?, None).map_err(failed)?;
     let json = serde_json::to_string_pretty(config).map_err(|error| Error::io(path, error))?;
-    files::write_whole(path, &file)?;
-    files::write_whole(&path.with_extension("json"), (json + "\n").as_bytes())
+    files::write_both((path, &file), (&path.with_extension("json"), (json + "\n").as_bytes()))
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    let failed = |error: std::io::Error| Error::io(path, error);
     let limit = InputLimit::default();
-    let mut bytes = Vec::new();
-    let most = limit.largest_file();
-    File::open(path).map_err(failed)?.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
-    if bytes.len() as u64 > most { Err(failed(limit.file_error())) } else { Ok(bytes) }
+    let bytes = files::read_at_most(path, limit.largest_file())?;
+    bytes.ok_or_else(|| Error::io(path, limit.file_error()))
 }
 
 /// Parses the JSON. Errors are messages without the path.

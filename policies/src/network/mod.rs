@@ -148,7 +148,8 @@ impl Network {
     /// Writes the network of a file as a `.safetensors` file and the JSON beside it.
     ///
     /// # Errors
-    /// Those of [`Network::read`], and [`Error::Io`] if a file cannot be written.
+    /// Those of [`Network::read`]; [`Error::Io`] if `to` does not end in `.safetensors` or a file cannot be written.
+    /// Older files are then unchanged.
     pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<(), Error> {
         let from = from.as_ref();
         let (config, content) = file::read(from)?;
@@ -185,7 +186,8 @@ impl Network {
     /// Writes a `.safetensors` file and the JSON beside it, after checking them as [`Network::from_tensors`] does.
     ///
     /// # Errors
-    /// [`Error::Io`] if the network is wrong or a file cannot be written.
+    /// [`Error::Io`] if the network is wrong, the path does not end in `.safetensors`, or a file cannot be written.
+    /// Older files are then unchanged.
     pub fn write(
         path: impl AsRef<Path>,
         config: NetworkConfig,

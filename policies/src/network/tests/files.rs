@@ -142,6 +142,28 @@ fn wrong_configs_are_rejected() {
 }
 
 #[test]
+fn only_safetensors_files_are_written_and_an_error_changes_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, value: f32| {
+        let tensors =
+            SIZES.map(|(name, shape)| (name.to_owned(), shape.to_vec(), vec![value; shape.iter().product()]));
+        Network::write(folder.path().join(name), serde_json::from_value(config()).unwrap(), tensors)
+    };
+    for name in ["net.json", "net.onnx", "net"] {
+        let error = write(name, 0.5).unwrap_err().to_string();
+        assert!(error.ends_with("expected a file name that ends in .safetensors"), "{error}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    write("net.safetensors", 0.5).unwrap();
+    let before = std::fs::read(folder.path().join("net.safetensors")).unwrap();
+    std::fs::remove_file(folder.path().join("net.json")).unwrap();
+    std::fs::create_dir(folder.path().join("net.json")).unwrap();
+    assert!(write("net.safetensors", 0.25).unwrap_err().to_string().contains("net.json"));
+    assert!(std::fs::read(folder.path().join("net.safetensors")).unwrap() == before);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
 fn a_missing_file_is_named() {
     let error = Network::read(Path::new("none/weights.safetensors")).unwrap_err().to_string();
     assert!(error.starts_with("none/weights.safetensors: "), "{error}");
