@@ -144,6 +144,53 @@ fn maps_convert_between_formats() {
 }
 
 #[test]
+fn configs_with_starts_but_without_as_many_goals_are_no_maps() {
+    let folder = folder(&[
+        ("lone.yaml", "map: \"....\"\nagents_xy: [[0, 0]]\n"),
+        ("unequal.yaml", "map: \"....\"\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 2]]\n"),
+        ("pool.yaml", "map: \"....\"\npossible_targets_xy: [[0, 2]]\n"),
+    ]);
+    let parts = ["targets_xy", "agents_xy", "error: "];
+    for file in ["lone.yaml", "unequal.yaml"] {
+        for command in [&["run", "--map", file][..], &["maps", "stats", file], &["maps", "show", file]] {
+            assert_rejected(folder.path(), command, &[&parts[..], &[file]].concat());
+        }
+        for format in ["text", "scen", "config", "set"] {
+            assert_rejected(folder.path(), &["maps", "export", file, "--to", format], &parts);
+        }
+    }
+    assert_rejected(folder.path(), &["maps", "show", "pool.yaml"], &["pool.yaml", "possible_agents_xy"]);
+}
+
+#[test]
+fn an_exported_config_keeps_what_it_can_and_other_formats_name_what_they_cannot() {
+    let sequences =
+        "map: \"....\"\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\non_target: restart\n";
+    let pools =
+        "map: \"..#.\"\npossible_agents_xy: [[0, 3], [0, 0]]\npossible_targets_xy: [[0, 0], [0, 2]]\n";
+    let folder = folder(&[("sequences.yaml", sequences), ("pools.yaml", pools)]);
+    let at = folder.path();
+    let config = stdout_of(at, &["maps", "export", "sequences.yaml", "--to", "config"]);
+    assert_eq!(config, "map: |-\n  ....\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\n");
+    let config = stdout_of(at, &["maps", "export", "pools.yaml", "--to", "config"]);
+    let fields = "possible_agents_xy: [[0, 3], [0, 0]]\npossible_targets_xy: [[0, 0], [0, 2]]\n";
+    assert_eq!(config, format!("map: |-\n  ..#.\n{fields}"));
+    for format in ["text", "set", "scen"] {
+        assert_rejected(
+            at,
+            &["maps", "export", "sequences.yaml", "--to", format],
+            &["targets_xy", "sequences"],
+        );
+    }
+    for format in ["text", "set"] {
+        assert_rejected(at, &["maps", "export", "pools.yaml", "--to", format], &["possible_agents_xy"]);
+    }
+    let run = ["run", "--map", "sequences.yaml", "--on-target", "restart", "--json"];
+    let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
+    assert_eq!(summary["config"]["targets_xy"], serde_json::json!([[[0, 1], [0, 2]]]));
+}
+
+#[test]
 fn maps_are_shown_and_analysed() {
     let folder = folder(&[("pocket.txt", "a.B#.\nA.b#.\n####.\n.....\n"), ("row.txt", "aBbA\n")]);
     let at = folder.path();

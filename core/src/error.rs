@@ -160,6 +160,11 @@ fn of_agent(agent: Option<usize>) -> String {
     agent.map(|index| format!(" of agent {index}")).unwrap_or_default()
 }
 
+/// Returns a number with its noun for a message, such as `1 start` or `2 starts`.
+pub fn counted(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
 /// Returns the size of a map for a message, such as `1 row and 3 columns`.
 pub fn rows_and_columns(rows: usize, columns: usize) -> String {
     format!("{} and {}", counted(rows, "row"), counted(columns, "column"))

@@ -4,7 +4,7 @@ mod puzzles;
 
 use pogema_core::{Cell, Error, Map};
 
-use crate::config::nearest;
+use crate::config::{Targets, nearest};
 use crate::formats::NamedMap;
 use crate::text::MapText;
 
@@ -35,7 +35,7 @@ impl Puzzle {
         Ok(MapText {
             map: Map::from_rows(&plain)?,
             starts: cells_of_letters(&self.starts),
-            goals: cells_of_letters(&self.goals),
+            goals: Targets::Single(cells_of_letters(&self.goals)),
             pools: None,
         })
     }

@@ -83,6 +83,13 @@ pub enum Targets {
     Sequences(Vec<Vec<Cell>>),
 }
 
+impl Default for Targets {
+    /// No agents.
+    fn default() -> Self {
+        Self::Single(Vec::new())
+    }
+}
+
 impl Targets {
     /// Returns the number of agents that have goals.
     pub fn len(&self) -> usize {

@@ -92,9 +92,22 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
     }
     let config = GridConfig::from_value(&value).map_err(in_file)?;
     let Some(map) = config.map else { return Err(Error::io(path, "the config has no map")) };
-    let pools = config.possible_agents_xy.zip(config.possible_targets_xy);
-    let goals = config.targets_xy.map(|goals| goals.first()).unwrap_or_default();
-    let text = MapText { map, starts: config.agents_xy.unwrap_or_default(), goals, pools };
+    let (starts, goals) = (config.agents_xy.unwrap_or_default(), config.targets_xy.unwrap_or_default());
+    let Scenario { starts, goals } = Scenario::new(starts, goals).map_err(in_file)?;
+    let pools = match (config.possible_agents_xy, config.possible_targets_xy) {
+        (Some(starts), Some(goals)) => Some((starts, goals)),
+        (None, None) => None,
+        (starts, _) => {
+            let [missing, given] = if starts.is_some() {
+                ["possible_targets_xy", "possible_agents_xy"]
+            } else {
+                ["possible_agents_xy", "possible_targets_xy"]
+            };
+            let expected = format!("a list of cells beside {given}");
+            return Err(in_file(Error::config(missing, "null", expected)));
+        }
+    };
+    let text = MapText { map, starts, goals, pools };
     Ok(vec![NamedMap { name: stem(path), text }])
 }
 

@@ -13,7 +13,8 @@ impl GridConfig {
     /// The first agents take the starts and goals of the map, unless the field `agents_xy` is given.
     ///
     /// # Errors
-    /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts.
+    /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts, or for a map
+    /// with unequal numbers of starts and goals.
     pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
         let has_scenario = !text.starts.is_empty() && !fields.contains_key("agents_xy");
         let mut others = fields.clone();
@@ -22,12 +23,12 @@ impl GridConfig {
             "targets_xy" => !has_scenario,
             _ => true,
         });
-        let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
+        let plain = MapText { starts: Vec::new(), goals: Targets::default(), ..text.clone() };
         let config = Self::read(&others, Some(plain))?;
         if !has_scenario {
             return Ok(config);
         }
-        let scenario = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };
+        let scenario = Scenario::new(text.starts.clone(), text.goals.clone())?;
         config.with_scenario(&scenario, fields)
     }
 

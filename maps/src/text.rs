@@ -2,19 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use pogema_core::{Cell, Error, Map};
+use pogema_core::{Cell, Error, Map, counted};
 
+use crate::config::Targets;
+use crate::formats::check_equal_numbers;
 use crate::source::check_on_map;
 
-/// The content of a map text.
+/// The content of a map text, or a map of a config, which may hold more than a map text can express.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapText {
     /// The obstacles.
     pub map: Map,
     /// The cells of `a` to `z`, in alphabetical order.
     pub starts: Vec<Cell>,
-    /// The cells of `A` to `Z`, in alphabetical order: the first one is the goal of the first start.
-    pub goals: Vec<Cell>,
+    /// The cells of `A` to `Z`, in alphabetical order: the first one is the goal of the first start. Configs may have
+    /// goal sequences.
+    pub goals: Targets,
     /// The cells from which starts and goals are drawn, if the text has one of `@`, `$` and `!`.
     pub pools: Option<(Vec<Cell>, Vec<Cell>)>,
 }
@@ -24,7 +27,7 @@ const MOST_LETTERS: usize = 26;
 
 impl From<Map> for MapText {
     fn from(map: Map) -> Self {
-        Self { map, starts: Vec::new(), goals: Vec::new(), pools: None }
+        Self { map, starts: Vec::new(), goals: Targets::default(), pools: None }
     }
 }
 
@@ -32,18 +35,36 @@ impl MapText {
     /// Returns the rows of the map text.
     ///
     /// # Errors
-    /// [`Error::Instance`] for content that a map text cannot express: more than 26 agents, two letters on one cell, or
-    /// a letter on an obstacle or a cell marked by a pool; [`Error::Config`] for a cell off the map.
+    /// [`Error::Instance`] or [`Error::Config`] for content that a map text cannot express: more than 26 agents,
+    /// unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle or beside
+    /// pools, or pools whose cells are not free, in another order than row by row, or all free cells; [`Error::Config`]
+    /// for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
-        let width = self.map.width();
-        let mut letters: Vec<char> = self.map.rows().concat().chars().collect();
+        check_equal_numbers(&self.starts, &self.goals)?;
+        self.draw([true, true])
+    }
+
+    /// Returns the rows with the starts, and those with the goals, for drawings in which both may be on one cell.
+    ///
+    /// # Errors
+    /// As for [`MapText::rows`].
+    pub fn rows_apart(&self) -> Result<[Vec<String>; 2], Error> {
+        check_equal_numbers(&self.starts, &self.goals)?;
+        Ok([self.draw([true, false])?, self.draw([false, true])?])
+    }
+
+    /// Returns the rows with the starts, the goals, or both.
+    fn draw(&self, [has_starts, has_goals]: [bool; 2]) -> Result<Vec<String>, Error> {
+        let Targets::Single(goals) = &self.goals else {
+            return Err(Error::config("targets_xy", "goal sequences", "one goal per agent in a map text"));
+        };
         check_on_map(&self.map, "agents_xy", &self.starts)?;
-        check_on_map(&self.map, "targets_xy", &self.goals)?;
+        check_on_map(&self.map, "targets_xy", goals)?;
+        let mut letters: Vec<char> = self.map.rows().concat().chars().collect();
         if let Some((starts, goals)) = &self.pools {
-            check_on_map(&self.map, "possible_agents_xy", starts)?;
-            check_on_map(&self.map, "possible_targets_xy", goals)?;
+            self.check_pools(starts, goals)?;
             let mut kinds = vec![0; letters.len()];
             for (cells, kind) in [(starts, 1), (goals, 2)] {
                 for &cell in cells {
@@ -61,8 +82,8 @@ impl MapText {
             );
             return Err(Error::instance(reason));
         }
-        for (first, cells) in [(b'a', &self.starts), (b'A', &self.goals)] {
-            for (letter, &cell) in (first..).zip(cells) {
+        for (first, cells, is_drawn) in [(b'a', &self.starts, has_starts), (b'A', goals, has_goals)] {
+            for (letter, &cell) in (first..).zip(cells).filter(|_| is_drawn) {
                 let place = &mut letters[self.map.index(cell)];
                 if *place != '.' {
                     let reason = format!(
@@ -73,7 +94,33 @@ impl MapText {
                 *place = letter as char;
             }
         }
-        Ok(letters.chunks(width).map(|row| row.iter().collect()).collect())
+        Ok(letters.chunks(self.map.width()).map(|row| row.iter().collect()).collect())
+    }
+
+    /// Checks that a reader of the map text finds the same pools. Their order decides which cells a seed chooses.
+    fn check_pools(&self, starts: &[Cell], goals: &[Cell]) -> Result<(), Error> {
+        if !self.starts.is_empty() {
+            let expected = "none beside starts and goals in a map text";
+            return Err(Error::config("possible_agents_xy", counted(starts.len(), "cell"), expected));
+        }
+        for (field, cells) in [("possible_agents_xy", starts), ("possible_targets_xy", goals)] {
+            check_on_map(&self.map, field, cells)?;
+            if let Some(cell) = cells.iter().find(|&&cell| self.map.is_obstacle(cell)) {
+                let found = format!("{cell}, an obstacle");
+                return Err(Error::config(field, found, "free cells in a map text"));
+            }
+            let mut pairs = cells.iter().zip(cells.iter().skip(1));
+            if let Some((before, after)) = pairs.find(|(before, after)| before >= after) {
+                let found = format!("{after} after {before}");
+                let expected = "each cell once and row by row in a map text";
+                return Err(Error::config(field, found, expected));
+            }
+        }
+        if starts.len().min(goals.len()) == self.map.num_free() {
+            let expected = "fewer cells in a map text, or no list";
+            return Err(Error::config("possible_agents_xy", "all free cells", expected));
+        }
+        Ok(())
     }
 
     /// Returns the map text.
@@ -216,6 +263,7 @@ impl Reader {
         let map = Map::new(self.height, self.width, self.obstacles)?;
         let pools = self.has_pools.then_some((self.possible_starts, self.possible_goals));
         let starts = self.starts.into_values().collect();
-        Ok(MapText { map, starts, goals: self.goals.into_values().collect(), pools })
+        let goals = Targets::Single(self.goals.into_values().collect());
+        Ok(MapText { map, starts, goals, pools })
     }
 }

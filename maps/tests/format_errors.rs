@@ -10,7 +10,7 @@ use pogema_maps::formats::{
     write_scen,
 };
 use pogema_maps::generators::{Bays, Maze, MazeRanges, Preset, RandomMap, RandomRanges, Warehouse};
-use pogema_maps::{MapText, tiles};
+use pogema_maps::{MapText, Targets, parse_map_text, tiles};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -155,9 +155,10 @@ fn generator_settings_out_of_range() {
 fn maps_that_a_format_cannot_hold() {
     let map = Map::new(6, 10, vec![false; 60]).unwrap();
     let cells: Vec<Cell> = (0..27).map(|at| map.cell_at(at)).collect();
-    let crowd = MapText { starts: cells.clone(), goals: cells, ..MapText::from(map.clone()) };
+    let goals = Targets::Single(cells.clone());
+    let crowd = MapText { starts: cells, goals, ..MapText::from(map.clone()) };
     assert_error(crowd.to_text(), &["26 agents", "27"]);
-    let (start, goal) = (vec![Cell::new(0, 0)], vec![Cell::new(0, 0)]);
+    let (start, goal) = (vec![Cell::new(0, 0)], Targets::Single(vec![Cell::new(0, 0)]));
     let both = MapText { starts: start, goals: goal, ..MapText::from(map.clone()) };
     assert_error(both.to_text(), &["`a` already"]);
     assert_error(tiles("city", &map, 4), &["`4`", "6 rows and 10 columns"]);
@@ -166,12 +167,49 @@ fn maps_that_a_format_cannot_hold() {
 }
 
 #[test]
+fn a_map_text_expresses_only_what_its_reader_finds_again() {
+    let plain = parse_map_text("..\n.#\n").unwrap();
+    let cells =
+        |cells: &[(u16, u16)]| cells.iter().map(|&(row, col)| Cell::new(row, col)).collect::<Vec<_>>();
+    let lone = |starts: usize, goals: usize| MapText {
+        starts: cells(&vec![(0, 0); starts]),
+        goals: Targets::Single(cells(&vec![(0, 1); goals])),
+        ..plain.clone()
+    };
+    assert_error(lone(1, 0).to_text(), &["targets_xy", "agents_xy", "goals of 1 agent,"]);
+    // More goals than there are letters, or than fit 8 bits.
+    for goals in [34, 300] {
+        assert_error(lone(0, goals).to_text(), &["targets_xy", "agents_xy"]);
+        assert_error(lone(goals, goals).to_text(), &["26 agents"]);
+    }
+    let sequences = Targets::Sequences(vec![cells(&[(0, 1), (1, 0)])]);
+    assert_error(
+        MapText { starts: cells(&[(0, 0)]), goals: sequences, ..plain.clone() }.to_text(),
+        &["targets_xy", "goal sequences"],
+    );
+    let pools = |starts: &[(u16, u16)], goals: &[(u16, u16)]| MapText {
+        pools: Some((cells(starts), cells(goals))),
+        ..plain.clone()
+    };
+    assert_eq!(pools(&[(0, 0), (0, 1)], &[(1, 0)]).to_text().unwrap(), "@@\n$#");
+    let free = [(0, 0), (0, 1), (1, 0)];
+    assert_error(pools(&[(0, 1), (0, 0)], &free).to_text(), &["possible_agents_xy", "(0, 0) after (0, 1)"]);
+    assert_error(pools(&free, &[(0, 1), (0, 1)]).to_text(), &["possible_targets_xy", "(0, 1) after (0, 1)"]);
+    assert_error(pools(&free, &[(1, 1)]).to_text(), &["possible_targets_xy", "(1, 1), an obstacle"]);
+    assert_error(pools(&free, &free).to_text(), &["possible_agents_xy", "all free cells"]);
+    assert_error(
+        MapText { starts: lone(1, 1).starts, goals: lone(1, 1).goals, ..pools(&[(0, 0)], &free) }.to_text(),
+        &["possible_agents_xy", "beside starts and goals"],
+    );
+}
+
+#[test]
 fn inconsistent_scenarios() {
     assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]"), &["targets_xy"]);
     assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1]]"), &["targets_xy"]);
     assert_error(
         Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1, 1], [2, 2]]"),
-        &["1 agents", "2 goals"],
+        &["1 agent,", "2 agents"],
     );
     assert_error(Scenario::from_yaml("[1]"), &["agents_xy"]);
     let one = Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1, 1]]\nother: 3").unwrap();

@@ -99,10 +99,10 @@ impl Export {
                 ));
             }
             if self.to == Format::Config {
-                return write_out(self.out.as_deref(), config(&map.text, Some(&scenario)).as_bytes());
+                let text = config(&map.text, Some(&scenario))?;
+                return write_out(self.out.as_deref(), text.as_bytes());
             }
-            map.text.starts.clone_from(&scenario.starts);
-            map.text.goals = scenario.goals.first();
+            (map.text.starts, map.text.goals) = (scenario.starts, scenario.goals);
         }
         let bytes = self.bytes(&maps)?;
         write_out(self.out.as_deref(), &bytes)
@@ -117,7 +117,7 @@ impl Export {
             (Format::Text, [map]) => map.text.to_text()? + "\n",
             (Format::Map, [map]) => write_movingai(&map.text.map),
             (Format::Scen, [map]) => write_scen(&tasks(&map.name, &map.text)?)?,
-            (Format::Config, [map]) => config(&map.text, None),
+            (Format::Config, [map]) => config(&map.text, None)?,
             _ => return Err(ambiguous_map(&self.map, maps.len(), "for this format")),
         };
         Ok(written.into_bytes())
@@ -126,6 +126,11 @@ impl Export {
 
 /// Converts the starts and goals of a map to tasks of a .scen file.
 fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
+    let Scenario { starts, goals: Targets::Single(goals) } =
+        Scenario::new(text.starts.clone(), text.goals.clone())?
+    else {
+        return Err(Error::config("targets_xy", "goal sequences", "one goal per agent in a .scen file"));
+    };
     let task = |(agent, (&start, &goal))| {
         let steps = distances_to(&text.map, goal)[text.map.index(start)];
         if steps == u32::MAX {
@@ -144,22 +149,29 @@ fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
             length: f64::from(steps),
         })
     };
-    text.starts.iter().zip(&text.goals).enumerate().map(task).collect()
+    starts.iter().zip(&goals).enumerate().map(task).collect()
 }
 
-/// Formats a config as YAML, the map drawn row by row.
-fn config(text: &MapText, scenario: Option<&Scenario>) -> String {
+/// Formats a config as YAML, the map drawn row by row. Pools that a map text cannot express become fields.
+fn config(text: &MapText, scenario: Option<&Scenario>) -> Result<String, Error> {
     let mut lines = vec!["map: |-".to_owned()];
-    let plain = MapText { starts: Vec::new(), goals: Vec::new(), ..text.clone() };
-    // Only starts and goals can run out of letters, and there are none; pools have fixed characters.
-    let rows = plain.rows().unwrap_or_else(|_| plain.map.rows());
+    let plain = MapText { starts: Vec::new(), goals: Targets::default(), ..text.clone() };
+    let (rows, pools) = match plain.rows() {
+        Ok(rows) => (rows, None),
+        Err(_) => (plain.map.rows(), plain.pools),
+    };
     lines.extend(rows.iter().map(|row| format!("  {row}")));
-    let own = Scenario { starts: text.starts.clone(), goals: Targets::Single(text.goals.clone()) };
-    let scenario = scenario.or((!text.starts.is_empty()).then_some(&own));
-    for (field, value) in scenario.map(Scenario::fields).unwrap_or_default() {
+    let own = Scenario::new(text.starts.clone(), text.goals.clone())?;
+    let scenario = scenario.or((!own.starts.is_empty()).then_some(&own));
+    let mut fields = scenario.map(Scenario::fields).unwrap_or_default();
+    if let Some((starts, goals)) = pools {
+        fields.insert("possible_agents_xy".into(), json!(starts));
+        fields.insert("possible_targets_xy".into(), json!(goals));
+    }
+    for (field, value) in fields {
         lines.push(format!("{field}: {}", one_line(&value)));
     }
-    lines.join("\n") + "\n"
+    Ok(lines.join("\n") + "\n")
 }
 
 /// Formats a value as JSON, which is valid YAML, with a space after each comma.

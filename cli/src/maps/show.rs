@@ -113,7 +113,7 @@ const LONGER_SIDE: u32 = 1024;
 
 /// Returns a trace without steps: the map and its agents.
 fn still(text: &MapText) -> Result<Trace, Error> {
-    let goals = text.goals.iter().map(|&goal| GoalStream::single(goal)).collect();
+    let goals = text.goals.first().into_iter().map(GoalStream::single).collect();
     let instance = Instance::new(text.map.clone(), Outside::Free, text.starts.clone(), goals)?;
     let config = Config { num_agents: text.starts.len(), ..GridConfig::default().rules() };
     Ok(Trace::still(config, &instance))
@@ -138,11 +138,9 @@ fn picture(text: &MapText, max_width: usize) -> String {
     if text.map.width() > max_width {
         return braille(&text.map, max_width);
     }
-    let starts = MapText { goals: Vec::new(), ..text.clone() };
-    let goals = MapText { starts: Vec::new(), ..text.clone() };
-    match (text.to_text(), starts.rows(), goals.rows()) {
-        (Ok(rows), ..) => rows,
-        (_, Ok(starts), Ok(goals)) => {
+    match (text.to_text(), text.rows_apart()) {
+        (Ok(rows), _) => rows,
+        (_, Ok([starts, goals])) => {
             let rows = starts.iter().zip(&goals).map(|(start, goal)| format!("{start}  {goal}"));
             rows.collect::<Vec<_>>().join("\n")
         }

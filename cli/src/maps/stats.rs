@@ -7,7 +7,7 @@ use comfy_table::Table;
 use pogema_core::{Cell, Error, Map, OnGoal, Words, one_line};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::{NamedMap, Scenario};
-use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats, Targets};
+use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats};
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
@@ -86,8 +86,7 @@ impl Stats {
             let goals = instance.first_goals();
             return Ok(Some(analyse(plain_map, instance.starts(), &goals, on_goal)));
         }
-        let own =
-            Scenario { starts: map.text.starts.clone(), goals: Targets::Single(map.text.goals.clone()) };
+        let own = Scenario::new(map.text.starts.clone(), map.text.goals.clone())?;
         let own = self.first_agents(own)?;
         let has_agents = !own.starts.is_empty();
         Ok(has_agents.then(|| analyse(plain_map, &own.starts, &own.goals.first(), on_goal)))

@@ -146,7 +146,7 @@ impl GridConfig {
             }
             self.num_agents = text.starts.len();
             self.agents_xy = Some(text.starts);
-            self.targets_xy = Some(Targets::Single(text.goals));
+            self.targets_xy = Some(text.goals);
         } else if let (false, Some((starts, goals))) = (both_given, text.pools)
             && !starts.is_empty()
             && !goals.is_empty()

@@ -19,4 +19,5 @@ pub use archive::{read_archive, write_archive};
 pub use movingai::{Water, read_movingai, without_ring, write_movingai};
 pub use scen::{Task, read_scen, write_scen};
 pub use scenario::Scenario;
+pub(crate) use scenario::check_equal_numbers;
 pub use set::{NamedMap, read_set, set_entry, write_set};

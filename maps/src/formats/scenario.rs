@@ -1,6 +1,6 @@
 //! Starts and goals without a map, as in the benchmark's YAML files.
 
-use pogema_core::{Cell, Error, Map, shorten};
+use pogema_core::{Cell, Error, Map, counted, shorten};
 use serde_json::{Map as Object, Value, json};
 
 use super::scen::Task;
@@ -16,16 +16,26 @@ pub struct Scenario {
     pub goals: Targets,
 }
 
+/// Checks that as many agents have starts as have goals.
+///
+/// # Errors
+/// [`Error::Config`] if the numbers differ.
+pub(crate) fn check_equal_numbers(starts: &[Cell], goals: &Targets) -> Result<(), Error> {
+    if starts.len() == goals.len() {
+        return Ok(());
+    }
+    let expected = format!("goals of {}, as many as in agents_xy", counted(starts.len(), "agent"));
+    let found = format!("goals of {}", counted(goals.len(), "agent"));
+    Err(Error::config("targets_xy", found, expected))
+}
+
 impl Scenario {
     /// Creates a scenario from starts and goals.
     ///
     /// # Errors
     /// [`Error::Config`] if the numbers of starts and goals differ.
     pub fn new(starts: Vec<Cell>, goals: Targets) -> Result<Self, Error> {
-        if starts.len() != goals.len() {
-            let expected = format!("goals of {} agents, as many as in agents_xy", starts.len());
-            return Err(Error::config("targets_xy", format!("{} goals", goals.len()), expected));
-        }
+        check_equal_numbers(&starts, &goals)?;
         Ok(Self { starts, goals })
     }
 
