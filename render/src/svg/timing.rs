@@ -12,7 +12,7 @@ pub struct Timing {
     num_frames: usize,
     /// The end of every animation element.
     tail: String,
-    /// Decimals of a fraction, enough for a precision of a hundredth of a cell.
+    /// Decimals of a time, enough for a hundredth of a frame.
     decimals: usize,
 }
 
@@ -38,7 +38,7 @@ impl Timing {
         if length == 0.0 {
             return None;
         }
-        let (times, points) = self.keys(&lengths, |at| number_to(at / length, self.decimals_of(length)));
+        let (times, points) = self.keys(&lengths, |at| number_to(at / length, decimals_of(length)));
         let path = path.finish();
         Some(format!(
             "<animateMotion path=\"{path}\" keyPoints=\"{points}\" keyTimes=\"{times}\" calcMode=\"linear\" {}",
@@ -99,10 +99,12 @@ impl Timing {
     fn time(&self, slot: usize) -> String {
         number_to(slot as f64 / (self.num_frames + 1) as f64, self.decimals)
     }
+}
 
-    fn decimals_of(&self, length: f64) -> usize {
-        self.decimals.min(3 + (length as usize).checked_ilog10().unwrap_or(0) as usize)
-    }
+/// Returns the decimals of a fraction of a path, enough for a hundredth of a cell. A goal can jump across the map in
+/// one frame, so the number of frames bounds no path.
+fn decimals_of(length: f64) -> usize {
+    3 + (length as usize).checked_ilog10().unwrap_or(0) as usize
 }
 
 /// A path of straight segments, each as long as possible.
@@ -166,6 +168,20 @@ fn number_to(value: f64, decimals: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn goals_that_jump_far_are_drawn_in_their_cells() {
+        let goals = [1, 2, 3, 2999, 2999].map(|col| Cell::new(0, col));
+        let motion = Timing::new(goals.len(), 0.25).and_then(|timing| timing.motion(|at| goals[at]));
+        let motion = motion.unwrap_or_default();
+        let points = motion.split("keyPoints=\"").nth(1).and_then(|rest| rest.split('"').next());
+        let points: Vec<f64> = points.unwrap_or_default().split(';').flat_map(str::parse).collect();
+        let cols: Vec<f64> = points.iter().map(|point| 1.0 + point * 2998.0).collect();
+        // Column 2 lies on a straight line in time and space, so it needs no key.
+        for goal in [1.0, 3.0, 2999.0] {
+            assert!(cols.iter().any(|col| (col - goal).abs() < 0.01), "no key at column {goal}: {cols:?}");
+        }
+    }
 
     #[test]
     fn goals_jump_across_the_largest_maps() {
