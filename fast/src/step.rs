@@ -96,17 +96,18 @@ impl Engine {
     /// If the instance does not fit the config, or there is not enough memory.
     pub fn start(&mut self, instance: Instance) -> Result<(), Error> {
         instance.check_fits(&self.config)?;
-        self.start_resized(instance)
+        self.start_resized(&mut Some(instance))
     }
 
-    /// Begins an episode with an instance of any number of agents, which the config takes over.
+    /// Takes an instance, if there is one, and begins its episode. The config takes over its number of agents.
     ///
-    /// The instance must fit the config otherwise.
-    pub(crate) fn start_resized(&mut self, instance: Instance) -> Result<(), Error> {
+    /// The instance must fit the config otherwise. If there is not enough memory, the caller keeps the instance.
+    pub(crate) fn start_resized(&mut self, next: &mut Option<Instance>) -> Result<(), Error> {
+        let Some(instance) = next else { return Ok(()) };
         self.resize(instance.map().height(), instance.map().width())?;
         self.config.num_agents = instance.starts().len();
-        self.load(&instance);
-        self.streams = instance.into_goals();
+        self.load(instance);
+        self.streams = next.take().map(Instance::into_goals).unwrap_or_default();
         Ok(())
     }
 

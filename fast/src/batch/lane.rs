@@ -132,7 +132,7 @@ impl Lane {
 
     /// Starts the next episode in the engine that is not playing.
     fn start_next(&mut self) -> Result<(), Error> {
-        self.pending.take().map_or(Ok(()), |instance| self.ended.start_resized(instance))?;
+        self.ended.start_resized(&mut self.pending)?;
         self.is_next_ready = true;
         Ok(())
     }
@@ -177,7 +177,7 @@ impl Lane {
         if self.is_next_ready {
             self.switch_to_next();
         } else {
-            self.pending.take().map_or(Ok(()), |instance| self.engine.start_resized(instance))?;
+            self.engine.start_resized(&mut self.pending)?;
             self.mark_begun();
         }
         self.meter.reset();
@@ -198,12 +198,13 @@ impl Lane {
 
     /// Continues with the episodes of another source, which the preparer already has. `next` is the result of
     /// [`Lane::replace_next`].
-    pub fn change_source(&mut self, next: Option<Instance>, preparer: &Preparer) -> Result<(), Error> {
+    pub fn change_source(&mut self, mut next: Option<Instance>, preparer: &Preparer) -> Result<(), Error> {
         self.requested -= u64::from(self.pending.take().is_some());
         preparer.request(self.index, self.requested);
-        let started = next.map_or(Ok(()), |instance| self.ended.start_resized(instance));
+        let started = self.ended.start_resized(&mut next);
         if let Err(error) = &started {
             self.is_next_ready = false;
+            self.pending = next;
             self.failure = Some(error.clone());
         }
         started

@@ -217,11 +217,15 @@ impl Batch {
     /// Begins the episodes whose instances [`Batch::fetch_with`] has fetched.
     ///
     /// # Errors
-    /// [`Error::Length`] if the instances belong to a batch of another size. If there is not enough memory for a lane's
+    /// [`Error::Length`] if the instances belong to a batch of another size, if an instance does not fit the config, or
+    /// if the first call leaves out a lane; every episode is then unchanged. If there is not enough memory for a lane's
     /// map; the episode of that lane is then unchanged.
     pub fn begin_with(&mut self, firsts: FirstInstances) -> Result<(), Error> {
         let FirstInstances { preparer, instances } = firsts;
         Error::check_length("first instances", self.lanes.len(), instances.len())?;
+        for (lane, instance) in self.lanes.iter().zip(&instances) {
+            instance.as_ref().map_or_else(|| self.check_started(), |instance| lane.check_fits(instance))?;
+        }
         self.preparer = preparer;
         let mut begun = Ok(());
         for (lane, instance) in self.lanes.iter_mut().zip(instances) {

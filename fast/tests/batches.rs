@@ -1,0 +1,115 @@
+//! Wrong first instances and a lack of memory leave the episodes of a batch as they are.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(unsafe_code, reason = "an allocator that refuses large blocks")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell as Switch;
+use std::sync::atomic::AtomicBool;
+
+use pogema_core::{Action, Cell, Config, Error, GoalStream, Instance, Map, Outside, StepOut};
+use pogema_fast::{Batch, FirstInstances, Observations};
+
+/// An allocator that refuses large blocks to a thread that has switched them off.
+struct Limited;
+
+/// The smallest block that is refused: less than the board of the large map. Units: bytes.
+const LARGE: usize = 1 << 18;
+
+thread_local! {
+    static IS_FULL: Switch<bool> = const { Switch::new(false) };
+}
+
+// SAFETY: it only forwards to the system's allocator, or returns null, which means that there is no memory.
+unsafe impl GlobalAlloc for Limited {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if layout.size() >= LARGE && IS_FULL.get() {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: the caller's promises are those of the system's allocator.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: the block is from the system's allocator.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Limited = Limited;
+
+fn config(num_agents: usize) -> Config {
+    Config {
+        num_agents,
+        radius: 2,
+        max_steps: 2,
+        collision: pogema_core::Collision::Soft,
+        on_goal: pogema_core::OnGoal::Nothing,
+        observation: pogema_core::Observation::Default,
+        occupancy: pogema_core::Occupancy::AsReleased,
+        reward: pogema_core::Reward::Own,
+        persistent: false,
+    }
+}
+
+fn instance(num_agents: usize, side: usize) -> Instance {
+    let map = Map::new(side, side, vec![false; side * side]).unwrap();
+    let starts: Vec<Cell> = (0..num_agents).map(|agent| map.cell_at(agent)).collect();
+    let goals = starts.iter().map(|&start| GoalStream::single(start)).collect();
+    Instance::new(map, Outside::Free, starts, goals).unwrap()
+}
+
+fn batch(num_agents: usize, num_lanes: usize) -> Batch {
+    let source = move |_: usize, _: u64| Ok(instance(num_agents, 4));
+    Batch::new(config(num_agents), num_lanes, 1, source).unwrap()
+}
+
+fn firsts(batch: &mut Batch, num_agents: usize, chosen: &[bool]) -> FirstInstances {
+    let source = move |_: usize, _: u64| Ok(instance(num_agents, 4));
+    batch.fetch_with(source, chosen, &AtomicBool::new(false)).unwrap()
+}
+
+fn step(batch: &mut Batch) -> Result<(), Error> {
+    let num = batch.num_lanes() * batch.config().num_agents;
+    let (mut rewards, mut terminated, mut truncated) = (vec![0.0; num], vec![false; num], vec![false; num]);
+    let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+    let mut windows = vec![0.0; 75 * num];
+    batch.step(&vec![Action::Stay; num], out, Observations::F32(&mut windows))
+}
+
+#[test]
+fn first_instances_of_another_batch_are_rejected() {
+    let (mut large, mut small) = (batch(10, 2), batch(2, 2));
+    small.reset().unwrap();
+    let foreign = firsts(&mut large, 10, &[true; 2]);
+    assert_eq!(small.begin_with(foreign).unwrap_err().to_string(), "starts has length 10, expected 2");
+    assert_eq!(small.episode(0), Ok(Some(0)));
+    step(&mut small).unwrap();
+}
+
+#[test]
+fn the_first_episodes_begin_in_all_lanes() {
+    let (mut started, mut fresh) = (batch(2, 2), batch(2, 2));
+    started.reset().unwrap();
+    let half = firsts(&mut started, 2, &[true, false]);
+    assert_eq!(fresh.begin_with(half), Err(Error::NotReset));
+    assert_eq!(step(&mut fresh), Err(Error::NotReset));
+    assert_eq!(fresh.episode(0), Ok(None));
+}
+
+#[test]
+fn a_lane_without_memory_begins_the_same_episode_later() {
+    // Episode 1 has a map for which the memory is missing at first.
+    let source = |_: usize, episode: u64| Ok(instance(2, if episode == 1 { 600 } else { 4 }));
+    let mut batch = Batch::new(config(2), 1, 1, source).unwrap();
+    batch.reset().unwrap();
+    batch.fetch(&[true], &AtomicBool::new(false)).unwrap();
+    IS_FULL.set(true);
+    let outcome = batch.reset();
+    IS_FULL.set(false);
+    assert!(matches!(outcome, Err(Error::Memory { .. })), "{outcome:?}");
+    assert_eq!(batch.episode(0), Ok(Some(0)));
+    batch.reset().unwrap();
+    assert_eq!((batch.episode(0), batch.lane(0).unwrap().size()), (Ok(Some(1)), (600, 600)));
+}
