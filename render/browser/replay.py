@@ -70,13 +70,35 @@ def test_deep_links(world):
         equal((step(page), text(page, "agent-name")), (12, "Agent 3"))
         page.keyboard.press("ArrowRight")
         page.keyboard.press("]")
-        equal(page.evaluate("location.hash"), "#step=13&agent=4")
+        wait(page, "location.hash === '#step=13&agent=4'")
         page.evaluate("location.hash = '#step=40&agent=0'")
         wait(page, "replay.step === 40")
         equal(text(page, "agent-name"), "Agent 0")
     for bad in ("#step=999&agent=8", "#step=-1&agent=<b>", "#step=1e1&%"):
         with world.open("restart", bad) as page:
             equal((step(page), page.evaluate("replay.agent")), (0, None), bad)
+
+
+def test_dragging_the_slider_writes_the_address_once(world):
+    with world.open("restart") as page:
+        page.evaluate("""() => {
+            window.numWrites = 0;
+            const write = history.replaceState.bind(history);
+            history.replaceState = (...given) => { window.numWrites += 1; write(...given); };
+            const scrub = document.getElementById("scrub");
+            for (let at = 0; at < 300; at += 1) {
+                scrub.value = at % 60;
+                scrub.dispatchEvent(new Event("input"));
+            }
+        }""")
+        wait(page, "location.hash === '#step=59'")
+        equal(page.evaluate("numWrites"), 1)
+        page.keyboard.press("ArrowRight")
+        page.evaluate("""() => {
+            Object.defineProperty(document, "hidden", { value: true });
+            document.dispatchEvent(new Event("visibilitychange"));
+        }""")
+        equal(page.evaluate("location.hash"), "#step=60")
 
 
 def test_agents_glide_between_steps(world):

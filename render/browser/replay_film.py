@@ -63,6 +63,18 @@ def reason(film, at, agent):
     }
 
 
+def test_every_arrival_is_in_the_strip(world):
+    for name in [*SMALL, "on_goal"]:
+        film = world.film(name)
+        keeps = film["config"]["on_goal"] == "nothing"
+        flags = [state["on_goal"] for state in film["states"]]
+        arrivals = [sum(now and not (keeps and was) for was, now in zip(*pair)) for pair in zip(flags, flags[1:])]
+        with world.open(name) as page:
+            got = page.evaluate("Array.from({ length: replay.numSteps }, (_, step) => replay.arrivals(step + 1))")
+            equal(got, arrivals, name)
+    equal(arrivals[0], 1, "the agent that starts on its goal")
+
+
 def test_names_come_from_the_episode_and_are_escaped(world):
     with world.open("finish") as page:
         title = world.film("finish")["title"]

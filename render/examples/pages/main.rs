@@ -23,7 +23,7 @@ fn main() -> Result<(), Error> {
 }
 
 /// Name, title, config, and the fraction of random moves.
-const EPISODES: [(&str, &str, &str, f64); 5] = [
+const EPISODES: [(&str, &str, &str, f64); 6] = [
     (
         "finish",
         "Four agents </title><script>alert(1)</script> & goals",
@@ -47,6 +47,12 @@ const EPISODES: [(&str, &str, &str, f64); 5] = [
         "All on their goals together",
         "{size: 6, num_agents: 5, seed: 2, density: 0.1, on_target: nothing, reward: shared, empty_outside: false}",
         0.1,
+    ),
+    (
+        "on_goal",
+        "An agent that starts on its goal",
+        "{map: \"......\", agents_xy: [[0, 0], [0, 5]], targets_xy: [[0, 0], [0, 2]]}",
+        0.0,
     ),
     (
         "large",

@@ -133,8 +133,9 @@ class Film {
           this.agentReverted[agent] += 1;
           this.stepReverted[step] += 1;
         }
-        // Unless goals restart, count only arrivals: under `nothing`, agents may stay on their goals for many steps.
-        const arrived = this.config.on_goal === "restart" || !(this.flags[index - numAgents] & ON_GOAL);
+        // Under `nothing`, agents may stay on their goals for many steps. Otherwise each flag is an arrival, even that
+        // of an agent that starts on its goal and finishes in the first step.
+        const arrived = this.config.on_goal !== "nothing" || !(this.flags[index - numAgents] & ON_GOAL);
         if (this.flags[index] & ON_GOAL && arrived) this.stepOnGoal[step] += 1;
       }
     }

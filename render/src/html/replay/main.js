@@ -27,6 +27,7 @@ class Page {
     this.wire();
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("hashchange", () => this.readAddress());
+    document.addEventListener("visibilitychange", () => document.hidden && this.writeAddress());
     this.readAddress();
     this.expose();
     this.redraw();
@@ -57,6 +58,8 @@ class Page {
     byId("scrub").addEventListener("input", () => this.jump(Number(byId("scrub").value)));
     byId("speed").addEventListener("change", () => (player.speed = Number(byId("speed").value)));
     player.speed = Number(byId("speed").value);
+    // Browsers restore the controls of a page that is loaded again.
+    player.isSmooth = byId("smooth").checked;
     for (const id of ["goals", "numbers", "smooth"]) {
       byId(id).addEventListener("change", () => {
         player.isSmooth = byId("smooth").checked;
@@ -136,8 +139,17 @@ class Page {
     setText(byId("spoken"), `step ${this.player.step} of ${this.film.numSteps}`);
   }
 
-  // Writes the step and the agent into the address, so that readers can share it.
+  // Writes the step and the agent into the address soon, so that readers can share it. Browsers reject more than a few
+  // writes per second, as dragging the slider would cause.
   updateAddress() {
+    clearTimeout(this.addressTimer);
+    this.addressTimer = setTimeout(() => this.writeAddress(), 200);
+  }
+
+  writeAddress() {
+    if (!this.addressTimer) return;
+    clearTimeout(this.addressTimer);
+    this.addressTimer = null;
     const agent = this.chosen === null ? "" : `&agent=${this.chosen}`;
     const hash = `#step=${this.player.step}${agent}`;
     if (hash !== location.hash) history.replaceState(null, "", hash);
@@ -186,6 +198,7 @@ class Page {
       numAgents: film.numAgents,
       state: (step, agent) => film.agent(step, agent),
       observe: (step, agent) => film.observe(step, agent),
+      arrivals: (step) => film.stepOnGoal[step],
       marks: (step) => film.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
       // The centre of a cell on the stage. Units: pixels.
       center: (row, col) => view.center(row, col),
