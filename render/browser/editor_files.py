@@ -158,6 +158,16 @@ def test_errors_are_reported_with_line_and_column(world):
         ),
         (
             "bad.yaml",
+            'map: "..?"\n',
+            'bad.yaml: line 1, column 9: unknown character "?", expected one of .#@$!, a-z or A-Z',
+        ),
+        (
+            "bad.yaml",
+            'map: "..\\n.?"\n',
+            'bad.yaml: line 1, column 6: unknown character "?", expected one of .#@$!, a-z or A-Z',
+        ),
+        (
+            "bad.yaml",
             "map: |\n  ..\nno field\n",
             "bad.yaml: line 3, column 1: expected a field such as map: or a comment",
         ),

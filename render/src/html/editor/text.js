@@ -4,7 +4,7 @@
 class ParseError extends Error {
   constructor(line, column, reason) {
     super(`line ${line}, column ${column}: ${reason}`);
-    Object.assign(this, { line, column });
+    Object.assign(this, { line, column, reason });
   }
 }
 

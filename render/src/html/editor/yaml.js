@@ -88,7 +88,8 @@ function parseMapBlock(block) {
     return parseMapText(block.lines.slice(1).join("\n"), block.line + 1, 1);
   }
   const text = plainText(value);
-  if (text !== null) return parseMapText(text, block.line, block.column + block.lines[0].slice(block.column - 1).indexOf(value));
+  const column = block.column + block.lines[0].slice(block.column - 1).indexOf(value);
+  if (text !== null) return parseQuotedMap(value, text, block.line, column);
   if (/^[^[\s#&*!|>%@`{]/.test(value)) {
     // Blank the name of the field, so that columns are those of the file.
     const blank = " ".repeat(block.column - 1) + block.lines[0].slice(block.column - 1);
@@ -101,6 +102,16 @@ function parseMapBlock(block) {
     throw new ParseError(block.line, block.column + 1, `row ${Math.max(bad, 0)} of the map is invalid, expected 0 and 1, as many as in the first row`);
   }
   return { height: rows.length, width: rows[0].length, cells: Uint8Array.from(rows.flat()), agents: [] };
+}
+
+// Parses the map text between quotes. Escapes shift its characters, so an error then has the position of the value.
+function parseQuotedMap(value, text, line, column) {
+  try {
+    return parseMapText(text, line, column + 1);
+  } catch (error) {
+    if (!(error instanceof ParseError) || text === value.slice(1, -1)) throw error;
+    throw new ParseError(line, column, error.reason);
+  }
 }
 
 // Returns the text between quotes on one line, or null.
