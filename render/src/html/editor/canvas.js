@@ -37,7 +37,7 @@ class Canvas {
     for (let index = 0; index < labels.length; index += 1) {
       if (labels[index] === 0) continue;
       const color = colorOf(labels[index] - 1);
-      const channels = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16));
+      const channels = channelsOf(color);
       image.data.set([...channels, 70], 4 * index);
     }
     context.putImageData(image, 0, 0);

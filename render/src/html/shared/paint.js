@@ -8,9 +8,11 @@ const PALETTE = [
   "#6c54c0", "#e4a8b4", "#90c0fc", "#00cc84", "#84546c",
 ];
 const colorOf = (agent) => PALETTE[agent % PALETTE.length];
+// Returns the red, green and blue channels of a colour such as `#c1433c`.
+const channelsOf = (color) => [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16));
 // The text colour, dark or light, that is more readable on each colour.
 const INK = PALETTE.map((color) => {
-  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16));
+  const [red, green, blue] = channelsOf(color);
   return 0.3 * red + 0.59 * green + 0.11 * blue > 150 ? "#14171a" : "#ffffff";
 });
 
@@ -41,7 +43,7 @@ function bitmapOf(isObstacle, height, width) {
   const canvas = make("canvas", { width, height });
   const context = canvas.getContext("2d");
   const image = context.createImageData(width, height);
-  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(theme.obstacle.slice(at, at + 2), 16));
+  const [red, green, blue] = channelsOf(theme.obstacle);
   for (let index = 0; index < height * width; index += 1) {
     if (isObstacle[index]) image.data.set([red, green, blue, 255], 4 * index);
   }
