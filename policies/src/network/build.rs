@@ -17,9 +17,19 @@ const MOST_DEPTH: usize = 16;
 /// Builds the steps of a network. Errors are messages that name the layer or the tensor.
 pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(LayerSteps, Heads), String> {
     let [channels, rows, cols] = architecture.window;
+    if architecture.scalars > MOST_VALUES {
+        return Err(format!("`scalars` is {}, expected at most {MOST_VALUES}", architecture.scalars));
+    }
     let margin = margin_of(&architecture.layers, 0)?;
-    let plane = Plane { rows, cols, channels, stride: channels, margin };
+    let plane = Plane { rows, cols, channels, stride: channels, margin: 0 };
     check_size(&plane, "the window")?;
+    let plane = Plane { margin, ..plane };
+    check_size(&plane, "").map_err(|_| {
+        format!(
+            "padding {margin} around the window of {rows} rows and {cols} columns is too wide, expected at most \
+             {MOST_VALUES} values"
+        )
+    })?;
     let steps = LayerSteps { num_scalars: architecture.scalars, ..LayerSteps::default() };
     let mut builder = Builder { tensors, steps, margin, held: Vec::new() };
     let input = builder.new_plane(plane);
@@ -209,8 +219,16 @@ impl Builder<'_> {
                 Ok(Value::Plane(output))
             }
             (Value::Flat(input), Value::Flat(inner)) => {
-                if self.steps.flats[input].pieces != self.steps.flats[inner].pieces {
+                let [one, other] = [input, inner].map(|slot| &self.steps.flats[slot]);
+                if one.len() != other.len() {
                     return Err(differs());
+                }
+                if one != other {
+                    // The kernels keep a flattened window pixel by pixel, but the output of a dense layer as PyTorch
+                    // does.
+                    let reason = "layer `residual`: one side of the sum contains a flattened window and the other does \
+                                  not, expected `dense` between `flatten` and the sum";
+                    return Err(reason.into());
                 }
                 let output = self.new_flat(self.steps.flats[input].pieces.clone());
                 self.steps.of_flats.push(FlatStep::Add { inputs: [input, inner], output });
@@ -250,7 +268,7 @@ impl Builder<'_> {
     }
 
     fn new_flat(&mut self, pieces: Vec<Piece>) -> usize {
-        self.steps.flats.push(Flat { pieces });
+        self.steps.flats.push(Flat::new(pieces));
         self.steps.flats.len() - 1
     }
 }

@@ -119,6 +119,20 @@ pub struct Flat {
 }
 
 impl Flat {
+    /// Creates a list of pieces. Adjacent pieces that are already in PyTorch's order become one.
+    pub fn new(pieces: Vec<Piece>) -> Self {
+        let mut merged: Vec<Piece> = Vec::with_capacity(pieces.len());
+        for piece in pieces {
+            let is_list = piece.pixels == 1 || piece.channels == 1;
+            let piece = if is_list { Piece { pixels: 1, channels: piece.len() } } else { piece };
+            match merged.last_mut() {
+                Some(last) if is_list && last.pixels == 1 => last.channels += piece.channels,
+                _ => merged.push(piece),
+            }
+        }
+        Self { pieces: merged }
+    }
+
     pub fn len(&self) -> usize {
         self.pieces.iter().map(Piece::len).sum()
     }

@@ -29,7 +29,9 @@ impl Layers {
     fn run(&self, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Workspace) {
         let Self { steps, heads, path } = self;
         let Workspace { buffers, logits, values } = workspace;
-        let Some(LayerBuffers { apart, half, agents, heads: outputs }) = buffers else { return };
+        let Some(LayerBuffers { apart, half, agents, heads: outputs }) = buffers else {
+            unreachable!("the workspace belongs to another network")
+        };
         let num_outputs = heads.dense.num_outputs;
         if chunk.num_agents > steps.most_apart() {
             let agents = if chunk.num_agents > HALF { agents } else { half };

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::{Network, SimdPath};
+use super::{Error, Inputs, Network, RecurrentState, SimdPath};
 use crate::network::file;
 
 const SIZES: [(&str, &[usize]); 6] = [
@@ -133,12 +133,67 @@ fn wrong_configs_are_rejected() {
         json!([{"convolution": {"name": "conv", "padding": 3}}]),
         "layer `conv`: padding 3 and a kernel of 3 × 3",
     );
-    layers(json!([{"convolution": {"name": "conv", "padding": u64::MAX}}]), "expected 1 to");
+    for padding in [4_000_000, u64::MAX] {
+        let expected = format!("padding {padding} around the window of 3 rows and 3 columns is too wide");
+        layers(json!([{"convolution": {"name": "conv", "padding": padding}}]), &expected);
+    }
     layers(json!([{"dense": "core"}]), "layer `core` has a window as input, expected `flatten` before it");
     layers(json!(["flatten", {"scalars": []}]), "layer `scalars` has no input");
     layers(json!([]), "the layers end with a window");
     let deep = (0..40).fold(json!(["relu"]), |layers, _| json!([{"residual": layers}]));
     layers(deep, "nested more than 16 deep");
+}
+
+/// Creates a network whose tensors have these values, in all entries.
+fn filled(architecture: &Value, tensors: &[(&str, &[usize], f32)]) -> Result<Network, Error> {
+    let config = json!({"version": 1, "architecture": architecture});
+    let tensors = tensors
+        .iter()
+        .map(|(name, shape, value)| ((*name).into(), shape.to_vec(), vec![*value; shape.iter().product()]));
+    Network::from_tensors(serde_json::from_value(config).unwrap(), tensors)
+}
+
+#[test]
+fn more_scalars_than_fit_are_rejected() {
+    let layers = json!(["flatten", {"scalars": []}]);
+    let architecture =
+        json!({"window": [1, 3, 3], "scalars": u64::MAX - 4, "layers": layers, "actions": "a"});
+    let tensors: [(&str, &[usize], f32); 2] = [("a.weight", &[5, 4], 0.0), ("a.bias", &[5], 0.0)];
+    let error = filled(&architecture, &tensors).unwrap_err().to_string();
+    assert_eq!(error, "network: `scalars` is 18446744073709551611, expected at most 16777216");
+}
+
+#[test]
+fn lists_in_one_order_are_added_however_they_were_joined() {
+    let layers = json!(["flatten", {"scalars": []}, {"residual": [{"dense": "core"}]}]);
+    let architecture = json!({"window": [1, 3, 3], "scalars": 2, "layers": layers, "actions": "a"});
+    let tensors: [(&str, &[usize], f32); 4] = [
+        ("core.weight", &[11, 11], 0.0),
+        ("core.bias", &[11], 1.0),
+        ("a.weight", &[5, 11], 1.0),
+        ("a.bias", &[5], 0.0),
+    ];
+    let network = filled(&architecture, &tensors).unwrap();
+    let (mut state, mut workspace) = (RecurrentState::new(&network, 1), network.workspace());
+    let inputs = Inputs { windows: &[1.0; 9], scalars: &[2.0; 2], batch: 1 };
+    let outputs = network.forward(inputs, &mut state, &mut workspace).unwrap();
+    assert_eq!(outputs.logits, [9.0 * 2.0 + 2.0 * 3.0; 5]);
+}
+
+#[test]
+fn a_sum_with_a_flattened_window_names_the_limit() {
+    let layers = json!([
+        {"convolution": {"name": "conv", "padding": 1}}, "flatten", {"residual": [{"dense": "core"}]},
+    ]);
+    let architecture = json!({"window": [1, 3, 3], "layers": layers, "actions": "a"});
+    let tensors: [(&str, &[usize], f32); 4] = [
+        ("conv.weight", &[2, 1, 3, 3], 1.0),
+        ("conv.bias", &[2], 1.0),
+        ("core.weight", &[18, 18], 1.0),
+        ("core.bias", &[18], 1.0),
+    ];
+    let error = filled(&architecture, &tensors).unwrap_err().to_string();
+    assert!(error.ends_with("expected `dense` between `flatten` and the sum"), "{error}");
 }
 
 #[test]
