@@ -47,6 +47,12 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Laye
     Ok((steps, heads))
 }
 
+/// Checks that a network of these layers can be built. Errors are as for [`build`].
+#[cfg(feature = "onnx")]
+pub fn check_layers(architecture: &Architecture, tensors: &mut Tensors) -> Result<(), String> {
+    build(architecture, tensors).map(|_| ())
+}
+
 /// Returns the widest padding of any convolution, which is the margin of all planes.
 fn margin_of(layers: &[Layer], depth: usize) -> Result<usize, String> {
     if depth > MOST_DEPTH {

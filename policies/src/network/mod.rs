@@ -25,6 +25,8 @@ use std::sync::Arc;
 use pogema_core::{Error, SimdPath};
 
 pub use architecture::{Architecture, Layer};
+#[cfg(feature = "onnx")]
+pub(crate) use build::check_layers;
 pub use config::{NetworkConfig, Sampling, SamplingConfig};
 pub use error::ForwardError;
 pub use program::Workspace;

@@ -31,6 +31,13 @@ struct RawGraph {
     output: Vec<Vec<u8>>,
 }
 
+/// A tensor of which only the name is read.
+#[derive(Clone, PartialEq, Message)]
+struct RawTensor {
+    #[prost(string, tag = "8")]
+    name: String,
+}
+
 /// Returns the file with only the operators that the logits need. Errors are messages without the path.
 pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
     let failed = |error: prost::DecodeError| format!("not an ONNX file: {error}");
@@ -46,13 +53,18 @@ pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
         if node.attribute.iter().any(|attribute| attribute.g.is_some() || !attribute.graphs.is_empty()) {
             return Err(format!("operator `{}` contains a subgraph, which is not supported", node.op_type));
         }
-        needed.extend(node.input);
+        // The name of an optional input that is absent is empty.
+        needed.extend(node.input.into_iter().filter(|name| !name.is_empty()));
         nodes.push(raw);
     }
     nodes.reverse();
     graph.node = nodes;
     let named = |raw: &Vec<u8>| ValueInfo::decode(&**raw).ok().map(|value| value.name);
     graph.output.retain(|output| named(output).is_some_and(|name| name == logits));
+    // Old files list their tensors among the inputs. The runtime would expect values for them.
+    for raw in &graph.initializer {
+        needed.remove(&RawTensor::decode(&**raw).map_err(failed)?.name);
+    }
     graph.input.retain(|input| named(input).is_some_and(|name| needed.contains(&name)));
     Ok(model.encode_to_vec())
 }

@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
                 _ => Err(format!("output `{output}` does not come from a dense layer")),
             },
             Some(Value::Unknown(reason)) => {
-                Err(format!("output `{output}` depends on {reason}, which is not a supported layer"))
+                Err(format!("output `{output}` depends on something other than a supported layer: {reason}"))
             }
             _ => Err(format!("output `{output}` depends on no input")),
         }

@@ -11,6 +11,8 @@ mod runtime;
 
 use prost::Message;
 
+#[cfg(feature = "onnx")]
+use crate::network::check_layers;
 use crate::network::{Architecture, Tensors};
 use graph::Reader;
 use proto::Model;
@@ -47,7 +49,13 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
             graph.output.len()
         ));
     };
-    match reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name)) {
+    let layers = reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name));
+    // A list of layers that cannot be built is for the runtime, too.
+    #[cfg(feature = "onnx")]
+    let layers = layers.and_then(|(architecture, tensors)| {
+        check_layers(&architecture, &mut tensors.clone()).map(|()| (architecture, tensors))
+    });
+    match layers {
         Ok((architecture, tensors)) => Ok(Graph::Layers(architecture, tensors)),
         #[cfg(feature = "onnx")]
         Err(reason) => {

@@ -69,8 +69,12 @@ impl<'a> Reader<'a> {
     /// Stores the tensors of a layer and returns its name: that of its weights if no other layer has it, else
     /// `layer-NUMBER`.
     fn store(&mut self, weights: &TensorProto, tensors: Vec<(&str, Vec<usize>, Vec<f32>)>) -> String {
-        let number = self.tensors.len();
         let own = weights.name.strip_suffix(".weight").filter(|name| !self.tensors.contains_key(*name));
+        let mut number = self.tensors.len();
+        // A file may itself call its tensors `layer-NUMBER`.
+        while self.tensors.contains_key(&format!("layer-{number}")) {
+            number += 1;
+        }
         let name = own.map_or_else(|| format!("layer-{number}"), str::to_owned);
         let named = tensors.into_iter().map(|(end, shape, values)| (format!("{name}.{end}"), shape, values));
         self.tensors.insert(name.clone(), named.collect());
@@ -113,6 +117,16 @@ impl<'a> Reader<'a> {
             return Ok(vec![0.0; outputs]);
         }
         Ok(self.constant(node, 2)?.floats()?.1)
+    }
+
+    /// Returns whether an input of a node is absent, is zeros, or is not a constant.
+    fn is_absent_or_zero(&self, node: &Node, index: usize) -> bool {
+        match node.input.get(index).and_then(|name| self.values.get(&**name)) {
+            Some(Value::Constant(tensor)) => {
+                tensor.floats().is_ok_and(|(_, values)| values.iter().all(|value| *value == 0.0))
+            }
+            _ => true,
+        }
     }
 
     fn gemm(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
@@ -167,8 +181,11 @@ impl<'a> Reader<'a> {
                     (transposed(&values, [inputs, outputs]), bias),
                 ))
             }
-            [Value::Step(one), Value::Step(other)] if self.steps[one].shape == self.steps[other].shape => {
-                let shape = self.steps[one].shape;
+            _ => {
+                let ((one, shape), (other, other_shape)) = (self.step(node, 0)?, self.step(node, 1)?);
+                if shape != other_shape {
+                    return Err(String::new());
+                }
                 // Only the value that was read later can be computed from the other.
                 let (first, last) = (one.min(other), one.max(other));
                 let layers = self.layers_between(first, last);
@@ -176,7 +193,6 @@ impl<'a> Reader<'a> {
                     .ok_or("operator `Add` of two values, neither of which is computed from the other")?;
                 Ok(self.append(first, Layer::Residual(layers), shape))
             }
-            _ => Err(String::new()),
         }
     }
 
@@ -259,6 +275,9 @@ impl<'a> Reader<'a> {
             || node.int("linear_before_reset", 0) != 1
             || node.int("layout", 0) != 0
             || !node.is_text("direction", "forward")
+            || !node.has_texts("activations", &["Sigmoid", "Tanh"])
+            || ["activation_alpha", "activation_beta", "clip"].iter().any(|name| node.has(name))
+            || !self.is_absent_or_zero(node, 5)
         {
             return Err("operator `GRU` that differs from PyTorch's".into());
         }

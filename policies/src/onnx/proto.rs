@@ -58,6 +58,8 @@ pub struct Attribute {
     pub g: Option<Vec<u8>>,
     #[prost(int64, repeated, packed = "false", tag = "8")]
     pub ints: Vec<i64>,
+    #[prost(bytes = "vec", repeated, tag = "9")]
+    pub strings: Vec<Vec<u8>>,
     #[prost(bytes = "vec", repeated, tag = "11")]
     pub graphs: Vec<Vec<u8>>,
 }
@@ -137,6 +139,18 @@ impl Node {
     /// Returns whether an attribute is absent or has this text.
     pub fn is_text(&self, name: &str, text: &str) -> bool {
         self.attribute(name).is_none_or(|attribute| attribute.s == text.as_bytes())
+    }
+
+    /// Returns whether an attribute is absent or has these texts.
+    pub fn has_texts(&self, name: &str, texts: &[&str]) -> bool {
+        self.attribute(name).is_none_or(|attribute| {
+            attribute.strings.iter().map(Vec::as_slice).eq(texts.iter().map(|text| text.as_bytes()))
+        })
+    }
+
+    /// Returns whether an attribute is given.
+    pub fn has(&self, name: &str) -> bool {
+        self.attribute(name).is_some()
     }
 
     /// Returns an attribute that is a tensor.

@@ -96,7 +96,7 @@ fn operators_after_the_logits_do_not_matter_but_those_before_do() {
     assert!(read(nodes.clone(), tensors()).is_ok());
     nodes[0].op_type = "Celu".into();
     let error = read(nodes.clone(), tensors()).unwrap_err();
-    assert_eq!(error, "output `logits` depends on operator `Celu`, which is not a supported layer");
+    assert_eq!(error, "output `logits` depends on something other than a supported layer: operator `Celu`");
     nodes[0] = node("Flatten", &["logits"], "flat", vec![]);
     assert!(
         read(nodes, tensors()).unwrap_err().contains("value `logits`, which no earlier operator returns")
@@ -218,6 +218,161 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
     graph.node.iter().for_each(|node| reader.add(node));
     let error = reader.finish("logits", None).err().unwrap();
     assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
+}
+
+#[test]
+fn recurrent_layers_with_other_functions_are_rejected() {
+    let texts = |name: &str, texts: &[&str]| Attribute {
+        name: name.into(),
+        strings: texts.iter().map(|text| text.as_bytes().to_vec()).collect(),
+        ..Attribute::default()
+    };
+    let read = |attribute: Option<Attribute>, state: &[f32]| {
+        let mut graph = recurrent(1);
+        graph.node[2].attribute.extend(attribute);
+        if !state.is_empty() {
+            graph.input.pop();
+            let mut state_tensor = tensor("h0", &[1, 1, STATE as i64]);
+            state_tensor.float_data = state.into();
+            graph.initializer.push(state_tensor);
+        }
+        let mut reader = Reader::new(&graph)?;
+        graph.node.iter().for_each(|node| reader.add(node));
+        reader.finish("logits", None).map(|_| ())
+    };
+    assert_eq!(read(Some(texts("activations", &["Sigmoid", "Tanh"])), &[0.0; STATE]), Ok(()));
+    let wrong = [
+        (Some(texts("activations", &["Sigmoid", "Relu"])), 0.0),
+        (Some(int("clip", 1)), 0.0),
+        (Some(int("activation_alpha", 1)), 0.0),
+        (Some(int("activation_beta", 1)), 0.0),
+        (None, 0.5),
+    ];
+    for (attribute, state) in wrong {
+        let error = read(attribute, &[state; STATE]).unwrap_err();
+        assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
+    }
+}
+
+#[test]
+fn layers_that_the_file_numbers_itself_keep_their_tensors() {
+    let nodes = vec![
+        node("Conv", &["obs", "layer-1.weight"], "x", vec![ints("pads", &[1; 4])]),
+        node("Flatten", &["x"], "flat", vec![]),
+        node("Gemm", &["flat", "unnamed"], "logits", vec![int("transB", 1)]),
+    ];
+    let got =
+        read(nodes, vec![tensor("layer-1.weight", &[2, 2, 3, 3]), tensor("unnamed", &[5, 18])]).unwrap();
+    assert_eq!(got["layers"][0]["convolution"]["name"], "layer-1");
+    assert_eq!(got["actions"], "layer-2");
+}
+
+#[test]
+fn a_product_without_bias_can_be_added_to_its_input() {
+    let nodes = vec![
+        node("Flatten", &["obs"], "flat", vec![]),
+        node("MatMul", &["flat", "w"], "x", vec![]),
+        node("Relu", &["x"], "y", vec![]),
+        node("MatMul", &["y", "m"], "product", vec![]),
+        node("Add", &["y", "product"], "sum", vec![]),
+        node("Gemm", &["sum", "head.weight"], "logits", vec![int("transB", 1)]),
+    ];
+    let tensors = vec![tensor("w", &[18, 4]), tensor("m", &[4, 4]), tensor("head.weight", &[5, 4])];
+    let got = read(nodes, tensors).unwrap();
+    let residual = json!({"residual": [{"dense": "layer-1"}]});
+    assert_eq!(got["layers"], json!(["flatten", {"dense": "layer-0"}, "relu", residual]));
+}
+
+#[test]
+fn the_type_of_a_tensor_is_named() {
+    let mut half = tensor("head.weight", &[5, 18]);
+    half.data_type = 10;
+    let error = read(vec![node("Flatten", &["obs"], "flat", vec![]), head("flat")], vec![half]).unwrap_err();
+    let reason = "tensor `head.weight` has type 10, expected 1 (float)";
+    assert_eq!(error, format!("output `logits` depends on something other than a supported layer: {reason}"));
+}
+
+/// The runtime of a graph from `obs`, a window of 2 × 3 × 3, to `x`, a list of 18 values.
+#[cfg(feature = "onnx")]
+fn runtime_of(nodes: Vec<Node>, tensors: Vec<TensorProto>) -> Box<super::Runtime> {
+    use prost::Message;
+
+    use super::proto::Model;
+
+    let mut nodes = nodes;
+    nodes.push(node("Gemm", &["x", "head.weight", "bias"], "logits", vec![int("transB", 1)]));
+    let mut initializer = vec![tensor("head.weight", &[5, 18]), tensor("bias", &[5])];
+    initializer.extend(tensors);
+    // As in old files, the inputs list the tensors.
+    let listed = initializer.iter().map(|tensor| value(&tensor.name, &tensor.dims));
+    let input = std::iter::once(value("obs", &[1, 2, 3, 3])).chain(listed).collect();
+    let graph = Graph { node: nodes, initializer, input, output: vec![value("logits", &[1, 5])] };
+    let file = [vec![0x08, 0x08], Model { graph: Some(graph) }.encode_to_vec()].concat();
+    match super::read(&file).unwrap() {
+        super::Graph::Runtime(runtime) => runtime,
+        super::Graph::Layers(..) => panic!("all operators are layers"),
+    }
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn the_runtime_runs_layers_that_cannot_be_built() {
+    let attributes = vec![ints("pads", &[1; 4]), ints("strides", &[1, 1]), ints("dilations", &[1, 1])];
+    let sum_of_windows = vec![
+        node("Conv", &["obs", "conv.weight"], "y", attributes),
+        node("Add", &["y", "obs"], "sum", vec![]),
+        node("Flatten", &["sum"], "x", vec![]),
+    ];
+    let runtime = runtime_of(sum_of_windows, vec![tensor("conv.weight", &[2, 2, 3, 3])]);
+    assert!(runtime.reason.contains("layer `residual` begins with the window"), "{}", runtime.reason);
+    assert_eq!((runtime.num_actions, runtime.window), (5, [2, 3, 3]));
+    let sum_of_lists = vec![
+        node("Flatten", &["obs"], "flat", vec![]),
+        node("MatMul", &["flat", "m"], "product", vec![]),
+        node("Add", &["flat", "product"], "x", vec![]),
+    ];
+    let runtime = runtime_of(sum_of_lists, vec![tensor("m", &[18, 18])]);
+    assert!(runtime.reason.contains("a flattened window"), "{}", runtime.reason);
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn absent_inputs_need_no_operator() {
+    use prost::Message;
+
+    use super::proto::Model;
+
+    let clip = node("Clip", &["obs", "", "most"], "clipped", vec![]);
+    let other = node("Frobnicate", &["obs"], "", vec![]);
+    let graph = Graph {
+        node: vec![other, clip, node("Flatten", &["clipped"], "logits", vec![])],
+        initializer: vec![tensor("most", &[])],
+        input: vec![value("obs", &[1, 2, 3, 3])],
+        output: vec![value("logits", &[1, 18])],
+    };
+    let cut = super::cut::cut(&Model { graph: Some(graph) }.encode_to_vec(), "logits").unwrap();
+    let nodes = Model::decode(&*cut).unwrap().graph.unwrap().node;
+    assert_eq!(nodes.iter().map(|node| &*node.op_type).collect::<Vec<_>>(), ["Clip", "Flatten"]);
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+#[should_panic(expected = "the workspace belongs to another network")]
+fn the_workspace_of_a_runtime_does_not_serve_layers() {
+    use prost::Message;
+
+    use super::proto::Model;
+    use crate::network::{Inputs, Network, RecurrentState};
+
+    let folder = tempfile::tempdir().unwrap();
+    let open = |name: &str, bytes: Vec<u8>| {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        Network::read(folder.path().join(name)).unwrap()
+    };
+    let layers = open("layers.onnx", Model { graph: Some(recurrent(1)) }.encode_to_vec());
+    let mut workspace = open("other.onnx", other_operator("Mul")).workspace();
+    let inputs = Inputs { windows: &[0.0; INPUTS], scalars: &[], batch: 1 };
+    let _ = layers.forward(inputs, &mut RecurrentState::new(&layers, 1), &mut workspace);
 }
 
 /// A head on a window whose values are doubled by an operator that is not a layer.
