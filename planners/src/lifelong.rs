@@ -55,8 +55,23 @@ pub(crate) fn current_goals(goals: &[Vec<Vertex>]) -> Result<Vec<Vertex>, Error>
 /// # Errors
 /// As for [`Lifelong::next`].
 pub(crate) fn check_agents(num_vertices: usize, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
-    Error::check_length("goals", now.len(), goals.len())?;
+    check_vertices(num_vertices, now, goals)?;
     let mut holder = vec![usize::MAX; num_vertices];
+    for (agent, &at) in now.iter().enumerate() {
+        let other = std::mem::replace(&mut holder[at as usize], agent);
+        if other != usize::MAX {
+            return Err(shares_vertex(agent, at, other));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that each agent has a goal, and that all positions and goals are vertices.
+///
+/// # Errors
+/// As for [`Lifelong::next`].
+pub(crate) fn check_vertices(num_vertices: usize, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
+    Error::check_length("goals", now.len(), goals.len())?;
     for (agent, (&at, &goal)) in now.iter().zip(goals).enumerate() {
         for (what, vertex) in [("position", at), ("goal", goal)] {
             if vertex as usize >= num_vertices {
@@ -66,10 +81,11 @@ pub(crate) fn check_agents(num_vertices: usize, now: &[Vertex], goals: &[Vertex]
                 ));
             }
         }
-        let other = std::mem::replace(&mut holder[at as usize], agent);
-        if other != usize::MAX {
-            return Err(Error::agent(agent, format!("it shares vertex {at} with agent {other}")));
-        }
     }
     Ok(())
+}
+
+/// Returns the error about two agents on one vertex.
+pub(crate) fn shares_vertex(agent: usize, at: Vertex, other: usize) -> Error {
+    Error::agent(agent, format!("it shares vertex {at} with agent {other}"))
 }

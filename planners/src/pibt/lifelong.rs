@@ -7,7 +7,7 @@ use pogema_core::Error;
 use crate::budget::Budget;
 use crate::distances::{CostToGo, Distances};
 use crate::graph::{Graph, Vertex};
-use crate::lifelong::Lifelong;
+use crate::lifelong::{Lifelong, check_vertices, shares_vertex};
 use crate::pibt::guidance::Guidance;
 use crate::pibt::input::StepInput;
 use crate::pibt::planner::PibtParams;
@@ -64,7 +64,10 @@ impl PibtLifelong {
     /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for an unknown vertex or a shared
     /// start vertex.
     pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
-        self.check(now, goals)?;
+        check_vertices(self.graph.num_vertices(), now, goals)?;
+        if let Some((agent, other)) = self.step.find_shared_vertex(now) {
+            return Err(shares_vertex(agent, now[agent], other));
+        }
         if now.len() != self.goals.len() {
             *self = Self::for_agents(self.graph.clone(), now.len(), self.params.clone());
         }
@@ -79,26 +82,10 @@ impl PibtLifelong {
                 self.step.run(&StepInput { graph, now, goals, costs, order }, &[])
             }
         };
+        // INVARIANT: the agents are on different vertices, so PIBT finds a move for each.
         let next = next.ok_or_else(|| Error::instance("two agents share a cell"))?;
         self.priorities.update(|agent| next[agent] == goals[agent]);
         Ok(next)
-    }
-
-    fn check(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
-        Error::check_length("goals", now.len(), goals.len())?;
-        let num_vertices = self.graph.num_vertices() as Vertex;
-        for (agent, (&place, &goal)) in now.iter().zip(goals).enumerate() {
-            if place.max(goal) >= num_vertices {
-                return Err(Error::agent(
-                    agent,
-                    format!("position or goal is not a vertex below {num_vertices}"),
-                ));
-            }
-        }
-        match self.step.find_shared_vertex(now) {
-            Some(agent) => Err(Error::agent(agent, "it shares its cell with another agent")),
-            None => Ok(()),
-        }
     }
 
     /// Computes the costs to go of new goals.

@@ -89,10 +89,11 @@ impl PibtStep {
         found.then_some(&self.next[..])
     }
 
-    /// Returns an agent that shares its vertex with another.
-    pub fn find_shared_vertex(&mut self, now: &[Vertex]) -> Option<usize> {
+    /// Returns the first agent that shares its vertex with an earlier one, and that one.
+    pub fn find_shared_vertex(&mut self, now: &[Vertex]) -> Option<(usize, usize)> {
         let stands = |(agent, &vertex): (usize, &Vertex)| {
-            (std::mem::replace(&mut self.standing[vertex as usize], agent as Agent) != NONE).then_some(agent)
+            let other = std::mem::replace(&mut self.standing[vertex as usize], agent as Agent);
+            (other != NONE).then_some((agent, other as usize))
         };
         let found = now.iter().enumerate().find_map(stands);
         for &vertex in now {

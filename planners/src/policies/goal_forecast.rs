@@ -37,7 +37,11 @@ impl GoalForecast {
     /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode.
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let error = |reason: String| Error::OutOfStep { reason };
-        if now.step != self.step || now.goals.len() != self.ahead.len() {
+        if now.goals.len() != self.ahead.len() {
+            let (found, expected) = (now.goals.len(), self.ahead.len());
+            return Err(error(format!("found a state of {found} agents, expected {expected}")));
+        }
+        if now.step != self.step {
             let reason = format!(
                 "found the state of step {}, expected step {} of the same episode",
                 now.step, self.step

@@ -142,9 +142,9 @@ fn invalid_positions_and_goals_are_rejected() {
     let mut error = |now: &[Vertex], goals: &[Vertex]| pibt.step(now, goals).unwrap_err().to_string();
     assert_eq!(error(&[0], &[0, 1]), "goals has length 2, expected 1");
     assert_eq!(error(&[0, 1], &[0]), "goals has length 1, expected 2");
-    assert_eq!(error(&[0, 3], &[0, 1]), "instance: agent 1: position or goal is not a vertex below 3");
-    assert_eq!(error(&[0, 1], &[0, 9]), "instance: agent 1: position or goal is not a vertex below 3");
-    assert_eq!(error(&[1, 1], &[0, 2]), "instance: agent 1: it shares its cell with another agent");
+    assert_eq!(error(&[0, 3], &[0, 1]), "instance: agent 1: position is vertex 3, expected a vertex below 3");
+    assert_eq!(error(&[0, 1], &[0, 9]), "instance: agent 1: goal is vertex 9, expected a vertex below 3");
+    assert_eq!(error(&[1, 1], &[0, 2]), "instance: agent 1: it shares vertex 1 with agent 0");
     assert_eq!(pibt.step(&[0, 1], &[0, 2]).unwrap(), [0, 2]);
 }
 

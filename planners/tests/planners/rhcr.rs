@@ -5,8 +5,10 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::common::{Case, rng};
-use pogema_core::Map;
-use pogema_planners::{Budget, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, WindowSolver, validate};
+use pogema_core::{Cell, GoalStream, Instance, Map, Outside, State};
+use pogema_planners::{
+    Budget, GoalForecast, Graph, Lifelong, Plan, Rhcr, RhcrParams, Vertex, WindowSolver, validate,
+};
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
 
@@ -170,4 +172,21 @@ fn degenerate_problems_have_steps_or_errors() {
         assert_eq!(text(&[2], &[0]), "instance: agent 0: position is vertex 2, expected a vertex below 2");
         assert_eq!(text(&[0], &[2]), "instance: agent 0: goal is vertex 2, expected a vertex below 2");
     }
+}
+
+#[test]
+fn a_forecast_names_what_does_not_fit_its_episode() {
+    let case = Case::new(&["..."], &[]);
+    let starts = vec![Cell::new(0, 0), Cell::new(0, 1)];
+    let goals = vec![GoalStream::single(Cell::new(0, 2)), GoalStream::single(Cell::new(0, 1))];
+    let instance = Instance::new(case.map.clone(), Outside::Free, starts, goals).unwrap();
+    let mut forecast = GoalForecast::new(&instance, 2);
+    let cells = [Cell::new(0, 2), Cell::new(0, 1), Cell::new(0, 0)];
+    let mut error = |step: u64, num_agents: usize| {
+        let (cells, flags) = (&cells[..num_agents], &[true; 3][..num_agents]);
+        let state = State { step, cells, goals: cells, active: flags, on_goal: flags };
+        forecast.follow(state).unwrap_err().to_string()
+    };
+    assert_eq!(error(0, 3), "found a state of 3 agents, expected 2");
+    assert_eq!(error(1, 2), "found the state of step 1, expected step 0 of the same episode");
 }

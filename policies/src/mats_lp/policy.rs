@@ -147,7 +147,12 @@ impl Episode {
     /// Advances to the next state.
     fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let is_first = self.next_step == 0;
-        if now.step != self.next_step || (!is_first && now.cells.len() != self.best.len()) {
+        if !is_first && now.cells.len() != self.best.len() {
+            let (found, expected) = (now.cells.len(), self.best.len());
+            let reason = format!("found a state of {found} agents, expected {expected}");
+            return Err(Error::OutOfStep { reason });
+        }
+        if now.step != self.next_step {
             let reason = format!(
                 "found the state of step {}, expected step {} of the same episode",
                 now.step, self.next_step
