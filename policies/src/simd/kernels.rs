@@ -22,7 +22,7 @@ pub struct Convolve<'a> {
 
 /// One row of the output and one block of its channels.
 struct Row {
-    /// The first weight of each pixel's first tap.
+    /// The first value of the input that the row reads.
     input: *const f32,
     weights: *const f32,
     bias: *const f32,
