@@ -170,11 +170,6 @@ pub fn rows_and_columns(rows: usize, columns: usize) -> String {
     format!("{} and {}", counted(rows, "row"), counted(columns, "column"))
 }
 
-/// Returns a number and its noun, in the plural unless the number is 1.
-pub fn counted(number: usize, noun: &str) -> String {
-    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
-}
-
 fn wrong_field(field: &str, value: &str, expected: &str) -> String {
     format!("`{field}` is `{value}`, expected {expected}")
 }
