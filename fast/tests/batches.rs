@@ -1,43 +1,19 @@
 //! Wrong first instances and a lack of memory leave the episodes of a batch as they are.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
-#![allow(unsafe_code, reason = "an allocator that refuses large blocks")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell as Switch;
+use std::alloc::System;
 use std::sync::atomic::AtomicBool;
 
+use cap::Cap;
 use pogema_core::{Action, Cell, Config, Error, GoalStream, Instance, Map, Outside, StepOut};
 use pogema_fast::{Batch, FirstInstances, Observations};
 
-/// An allocator that refuses large blocks to a thread that has switched them off.
-struct Limited;
-
-/// The smallest block that is refused: less than the board of the large map. Units: bytes.
-const LARGE: usize = 1 << 18;
-
-thread_local! {
-    static IS_FULL: Switch<bool> = const { Switch::new(false) };
-}
-
-// SAFETY: it only forwards to the system's allocator, or returns null, which means that there is no memory.
-unsafe impl GlobalAlloc for Limited {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if layout.size() >= LARGE && IS_FULL.get() {
-            return std::ptr::null_mut();
-        }
-        // SAFETY: the caller's promises are those of the system's allocator.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        // SAFETY: the block is from the system's allocator.
-        unsafe { System.dealloc(block, layout) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Limited = Limited;
+static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
+
+/// Less than the board of the large map, and more than the other tests need. Units: bytes.
+const ROOM: usize = 1 << 18;
 
 fn config(num_agents: usize) -> Config {
     Config {
@@ -105,9 +81,9 @@ fn a_lane_without_memory_begins_the_same_episode_later() {
     let mut batch = Batch::new(config(2), 1, 1, source).unwrap();
     batch.reset().unwrap();
     batch.fetch(&[true], &AtomicBool::new(false)).unwrap();
-    IS_FULL.set(true);
+    ALLOCATOR.set_limit(ALLOCATOR.allocated() + ROOM).unwrap();
     let outcome = batch.reset();
-    IS_FULL.set(false);
+    ALLOCATOR.set_limit(usize::MAX).unwrap();
     assert!(matches!(outcome, Err(Error::Memory { .. })), "{outcome:?}");
     assert_eq!(batch.episode(0), Ok(Some(0)));
     batch.reset().unwrap();
