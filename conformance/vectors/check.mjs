@@ -28,7 +28,7 @@ function compared(claims, answer) {
   for (const key of OPTIONAL) if (!claims.tells?.includes(key)) delete kept[key];
   for (const key of ["observations", "metrics"]) if (!claims.profiles.includes(key)) delete kept[key];
   for (const name in kept.metrics ?? {}) if (!claims.metrics?.includes(name)) delete kept.metrics[name];
-  if (Object.keys(kept.metrics ?? {}).length === 0) delete kept.metrics;
+  if (kept.metrics && Object.keys(kept.metrics).length === 0) delete kept.metrics;
   return kept;
 }
 
