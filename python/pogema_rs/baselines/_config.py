@@ -27,7 +27,7 @@ CHANNELS = (
     "obstacles", "agents", "all_agents", "goal", "cost_to_go", "path", "follower_path", "seen_agents", "seen_obstacles",
 )  # fmt: skip
 
-#: With it, a signed byte holds `2 * radius`.
+#: The largest radius of windows: a record holds their values times `2 * radius` in signed bytes.
 LARGEST_RADIUS = 63
 
 Section = TypeVar("Section")
@@ -323,7 +323,6 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(environment.size <= 255, "environment.size", "at most 255")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
-    # A byte holds `2 * radius` times each value.
     check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
     for key in ("filters", "blocks", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
